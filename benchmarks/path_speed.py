@@ -24,7 +24,11 @@ from forcefit.assembly.kinematics.posture import (
 )
 from forcefit.assembly.linear.energy import solve_assembly
 from forcefit.assembly.model.robot import BeamLink, Robot
-from forcefit.assembly.path.idle_motions import with_idle_accelerations
+from forcefit.assembly.path.idle_motions import (
+    idle_motions,
+    momentum_free_rates,
+    with_idle_accelerations,
+)
 from forcefit.assembly.path.inertial_loads import inertial_loads
 from forcefit.assembly.path.motion import follow_path
 from forcefit.assembly.path.path_errors import path_errors
@@ -67,8 +71,13 @@ def solve_instant(robot: Robot, path: Trajectory, row: int) -> None:
     placed, _ = place_many(robot, goals_of(path.names, robot, values))
     posture = placed[0]
     assert posture is not None
-    motion = follow_path(together([posture]), path.names, (values, first, second))
-    motion = with_idle_accelerations(motion, np.zeros(3))
+    there, at = together([posture]), (values, first, second)
+    motion = follow_path(there, path.names, at)
+    idle = idle_motions(motion)
+    if idle is not None:
+        rates = momentum_free_rates(motion, idle)
+        motion = follow_path(there, path.names, at, rates)
+        motion = with_idle_accelerations(motion, idle, np.zeros(3))
     loads = inertial_loads(motion)
     moving = solve_assembly(posture, bodies=loads.bodies[0], carried=loads.carried[0])
     static = solve_assembly(posture)

@@ -20,14 +20,33 @@ from forcefit.assembly.effects.places import with_screws
 from forcefit.assembly.measurement.conditions import Conditions, Yield
 from forcefit.assembly.measurement.variables import LOADS, past, variable
 from forcefit.assembly.model.function import Function
+from forcefit.assembly.model.links import own_screw
 from forcefit.assembly.model.robot import BASE, Robot
 from forcefit.inputs.errors import BadInput
 from forcefit.stiffness.screws import SCREW
 
 AXES = tuple(axis.lower() for axis in SCREW)
+THREAD = "rs"  # [rad] motion along the thread of a helical joint
 FORMULA = "formula"
 CLOCKS = ("time", "cov.time")
 _parsed = lru_cache(maxsize=256)(parse_formula)
+
+
+def along(robot: Robot, where: str, component: str, values: NDArray) -> NDArray:
+    """Return the part of screws or wrenches along a component at a place.
+
+    Args:
+        robot: any robot.
+        where: a frame.
+        component: ``rx`` .. ``tz``, or ``rs`` of a helical joint.
+        values: (..., 6) by component of a frame's screw, or of the wrench on it.
+
+    Returns:
+        (...) the product with the unit screw.
+    """
+    if component == THREAD:
+        return values @ unit_screw(robot, where, component)
+    return values[..., AXES.index(component)]
 
 
 def is_loaded(function: Function) -> bool:
@@ -65,9 +84,26 @@ def _is_covariate(name: str) -> bool:
     return name in {"time", "approach"} or name.startswith("cov.")
 
 
-def components_of(where: str) -> tuple[str, ...]:
-    """Return the components that a function may have at a place."""
-    return LOADS if where == "load" else AXES
+def components_of(where: str, robot: Robot) -> tuple[str, ...]:
+    """Return the components that a function may have at a place.
+
+    Args:
+        where: a frame, ``"base"``, ``"reading"`` or ``"load"``.
+        robot: the robot on which it acts.
+
+    Returns:
+        ``mx`` .. ``fz`` of the load, ``rx`` .. ``tz`` of other places, and ``rs`` of a
+        helical joint.
+    """
+    threads = [frame.name for frame in robot.frames if frame.pitch]
+    return LOADS if where == "load" else (*AXES, *[THREAD] * (where in threads))
+
+
+def unit_screw(robot: Robot, where: str, component: str) -> NDArray:
+    """Return the (6,) unit screw, or wrench of the load, of a component at a place."""
+    if component == THREAD:
+        return own_screw(robot.frame(where))
+    return np.eye(6)[(LOADS if where == "load" else AXES).index(component)]
 
 
 def parameters_of(function: Function, component: str) -> dict[str, float]:
@@ -244,10 +280,9 @@ def _with_function(
         return _yielding(conditions, function, where, inputs, acts)
     change = np.zeros((len(conditions), 6))
     for component in function.components:
-        row = components_of(where).index(component)
         values = np.where(acts, value_of(function, component, list(inputs.T)), 0.0)
         _check_finite(function, values, inputs)
-        change[:, row] += values
+        change += values[:, None] * unit_screw(conditions.robot, where, component)
     if where == "reading":
         return replace(conditions, reading=conditions.reading + change)
     if where == "load":
@@ -285,7 +320,7 @@ def _yielding(
     sized = function.form == "reversal"
     new = []
     for component in function.components:
-        row = AXES.index(component)
+        row = (*AXES, THREAD).index(component)
 
         def law(x: NDArray, w: NDArray, component: str = component) -> NDArray:
             known = [

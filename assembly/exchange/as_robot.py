@@ -137,7 +137,8 @@ def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
             continue
         turn = transform(np.zeros(3), onto(joint.axis))
         motion = {
-            "joint": joint.kind, "actuated": joint.actuated, "limits": joint.limits
+            "joint": joint.kind, "actuated": joint.actuated, "limits": joint.limits,
+            "pitch": 2 * np.pi * joint.lead,
         }  # fmt: skip
         motion["joint_stiffness"] = springs.get(joint.name)
         name = joint.name

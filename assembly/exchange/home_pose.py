@@ -13,7 +13,6 @@ from forcefit.assembly.exchange.mechanism import (
 )
 from forcefit.assembly.exchange.orientation import onto
 from forcefit.assembly.exchange.tree import place_frames
-from forcefit.assembly.model.robot import JOINTS
 from forcefit.inputs.errors import BadInput, quoted
 from forcefit.stiffness.screws import rotation_vector, skew, transform
 
@@ -107,7 +106,7 @@ def _attempts(mechanism: Mechanism, starts: int) -> Iterator[tuple[NDArray, bool
     yield start, False
     random = np.random.default_rng(0)
     kinds = np.array([joint.kind for joint in mechanism.joints])
-    reach = np.where(kinds == "revolute", np.pi, _size(mechanism))
+    reach = np.where(np.isin(kinds, ["revolute", "helical"]), np.pi, _size(mechanism))
     for count in range(1, starts + 1):
         spread = reach * random.uniform(-1, 1, len(start)) * count / starts
         yield start + spread, False
@@ -166,8 +165,14 @@ class _Loops:
 
     @cached_property
     def kinds(self) -> NDArray:
-        """(n,) 0 fixed, 1 revolute, 2 prismatic."""
-        return np.array([JOINTS.index(j.kind) for j in self.mechanism.joints], int)
+        """(n,) 0 fixed, 1 revolute or helical, 2 prismatic."""
+        kinds = {"fixed": 0, "revolute": 1, "helical": 1, "prismatic": 2}
+        return np.array([kinds[j.kind] for j in self.mechanism.joints], int)
+
+    @cached_property
+    def leads(self) -> NDArray:
+        """(n,) [m/rad] translations of helical joints per angle, 0 of others."""
+        return np.array([j.lead for j in self.mechanism.joints], float)
 
     @property
     def moving(self) -> NDArray:
@@ -239,18 +244,18 @@ class _Loops:
     def equations(self, q: NDArray) -> tuple[NDArray, NDArray]:
         """Return the mismatch, translations over the size, and its derivatives by q."""
         parents, fixed, _ = self.tree
-        before, after = place_frames(parents, self.kinds, fixed, q)
+        before, after = place_frames(parents, self.kinds, fixed, q, self.leads)
         p = before[:, :3, 3]
         z = before[:, :3, 2] * self.moving[:, None]
         turning = (self.kinds == 1)[:, None]
-        past_axes = np.cross(z, p)
+        past_axes = np.cross(z, p) - self.leads[:, None] * z
         scale = np.array([1, 1, 1, *[1 / self.size] * 3])
         residuals, rows = [np.zeros(0)], [np.zeros((0, len(q)))]
         for *places, asked in self.ends:
             poses, moved = [], []
             for joint, place in places:
                 T = place if joint < 0 else after[joint] @ place
-                # z x (origin of T - p)
+                # z x (origin of T - p), and the lead of a thread along z
                 arm = np.where(turning, z @ skew(T[:3, 3]) - past_axes, z)
                 screws = np.concatenate([z * turning, arm], axis=1)
                 poses.append(T)

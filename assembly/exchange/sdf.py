@@ -36,7 +36,8 @@ from forcefit.assembly.exchange.ties import may_tie, refuse_ties
 from forcefit.assembly.exchange.xml_file import Node, counted, read_xml
 from forcefit.inputs.errors import BadInput
 
-_HELD = {"joint": ("pose", "parent", "child", "axis", "axis2"),
+_HELD = {"joint": ("pose", "parent", "child", "axis", "axis2", "thread_pitch",
+                   "screw_thread_pitch"),
          "link": ("pose", "inertial")}  # fmt: skip
 _RANGE = ("lower", "upper")
 _HELD_OF_AXIS = ("xyz", "use_parent_model_frame", "mimic")
@@ -122,12 +123,16 @@ def _of_axis(joint: Node, tag: str, part: Node) -> str:
     spring = part.child("spring_stiffness")
     # further axes of joints of several freedoms are not read
     crossed = joint.optional("type") in {"universal", "revolute2"}
-    taken = crossed or (tag == "axis" and joint.optional("type") != "ball")
+    single = joint.optional("type") not in {"ball", "screw"}
+    taken = crossed or (tag == "axis" and single)
     if not taken and spring is not None and spring.number("", "-") > 0:
         return f"joint axis {part.tag}, not converted, though it may carry load"
     if part.tag == "limit" and taken:
         rest = [one.tag for one in part.children() if one.tag not in _RANGE]
         return f"joint axis limit {', '.join(rest)}" if rest else ""
+    screw = joint.optional("type") == "screw"
+    if part.tag == "limit" and screw:
+        return "joint axis limit of a screw, whose unit the format does not state"
     springs_alone = all(one.tag.startswith("spring_") for one in part.children())
     held = part.tag in _HELD_OF_AXIS or (part.tag == "dynamics" and springs_alone)
     return "" if held else f"joint axis {part.tag}"

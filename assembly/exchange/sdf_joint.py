@@ -3,7 +3,9 @@
 Sources:
     sdformat.org, specification 1.12, ``<joint>``; until 1.4 an axis is seen from the
     model's frame, until 1.6 with ``use_parent_model_frame``, later with
-    ``expressed_in``.
+    ``expressed_in``.  gazebosim/sdformat, pull request 1168: ``screw_thread_pitch``
+    [m per turn] is positive for a right-hand thread; the older ``thread_pitch``
+    [rad/m] is positive for a left-hand thread, as in Gazebo classic.
 """
 
 from dataclasses import replace
@@ -21,10 +23,11 @@ from forcefit.assembly.exchange.mechanism import (
 from forcefit.assembly.exchange.orientation import onto
 from forcefit.assembly.exchange.sdf_frames import MODEL, Frames, Named, word
 from forcefit.assembly.exchange.xml_file import Node
+from forcefit.assembly.files.joint_file import LARGEST_PITCH, LEAST_PITCH
 from forcefit.inputs.errors import quoted
 
 _KINDS = ("fixed", "revolute", "continuous", "prismatic", "ball", "universal",
-          "revolute2")  # fmt: skip
+          "revolute2", "screw")  # fmt: skip
 _Z = (0.0, 0.0, 1.0)
 
 
@@ -82,6 +85,7 @@ def joint_parts(
         "fixed": [("", "fixed", np.array(_Z))],
         "prismatic": [("", "prismatic", axes[0])],
         "ball": ball(),
+        "screw": [("", "helical", axes[0])],
         "universal": [("first", "revolute", axes[0]), ("second", "revolute", axes[1])],
     }  # fmt: skip
     freedoms["revolute2"] = freedoms["universal"]
@@ -97,11 +101,35 @@ def joint_parts(
     if len(parts) == 1:
         ((_, one, axis),) = parts
         joint = Joint(name, one, parent, carried, placement, axis, after)
+        if kind == "screw":  # the format does not state the unit of its range
+            return [replace(joint, lead=_lead(node))], []
         return [joint if one == "fixed" else _of_axis(joint, node, "axis")], []
     joints, between = chain(name, parent, carried, placement, after, parts)
     tags = {"first": "axis", "second": "axis2"}  # a ball's rotations have none
     known = [tags.get(part, "") for part, _, _ in parts]
     return [_of_axis(j, node, t) for j, t in zip(joints, known, strict=True)], between
+
+
+def _lead(node: Node) -> float:
+    """Return the [m/rad] lead of a screw, positive for a right-hand thread."""
+    pitch, old = node.child("screw_thread_pitch"), node.child("thread_pitch")
+    if pitch is None and old is None:
+        raise node.bad(
+            "screw_thread_pitch", "missing; expected a number [m per turn], > 0 for a "
+            "right-hand thread"
+        )  # fmt: skip
+    given = pitch if pitch is not None else old
+    assert given is not None
+    value = given.number("", "m" if given is pitch else "rad/m")
+    lead = 0.0
+    if value != 0.0:
+        lead = value / (2 * np.pi) if given is pitch else -1.0 / value
+    if not LEAST_PITCH <= 2 * np.pi * abs(lead) <= LARGEST_PITCH:
+        raise given.bad(
+            "", f"found {value:g}, expected a thread of {LEAST_PITCH:g} to "
+            f"{LARGEST_PITCH:g} m per turn"
+        )  # fmt: skip
+    return lead
 
 
 def _of_axis(joint: Joint, node: Node, tag: str) -> Joint:

@@ -23,6 +23,7 @@ from forcefit.assembly.effects.units import (
 )
 from forcefit.assembly.measurement.variables import FORCE, LOADS
 from forcefit.assembly.model.function import KINDS, PLACES, Function
+from forcefit.assembly.model.joint_names import names_of
 from forcefit.assembly.model.robot import BASE, Robot
 from forcefit.inputs.table import BadInput, Table, nearest, quoted
 
@@ -52,20 +53,22 @@ def read_function(table: Table, robot: Robot) -> Function:
     if label:
         table.place = f"effect {quoted(label)}"
     where = table.text("where", expected='a frame, "base", "reading" or "load"')
-    places = (*(frame.name for frame in robot.frames), *PLACES)
+    places = (*names_of(robot), *PLACES)
     if where not in places:
         message = f"found {quoted(where)}, expected a frame or a place"
         raise table.bad("where", f"{message}{nearest(where, places)}")
+    if where in robot.joints:
+        where = robot.joints[where].main
     kind = table.choice("kind", KINDS, "screw")
     if kind == "compliance" and where in {"reading", "load"}:
         raise table.bad("kind", f'found "compliance" in the {where}, expected "screw"')
     components = _words(table, "components", 6)
     for name in components:
-        valid = components_of(where)
+        valid = components_of(where, robot)
         if name not in valid:
             hint = nearest(name, valid)
             raise table.bad("components", f"found {quoted(name)} there{hint}")
-    variables = _words(table, "variables", 2)
+    variables = tuple(_of_main(v, robot) for v in _words(table, "variables", 2))
     for name in variables:
         _check_variable(table, name, robot)
     form = table.choice("form", (*FORMS, FORMULA))
@@ -105,6 +108,15 @@ def _numbers(
         return {}
     inner = table.table(key)
     return {name: inner.number(name, "SI", least=least) for name in inner.content}
+
+
+def _of_main(variable: str, robot: Robot) -> str:
+    """Return a variable with the frame in place of a joint of several frames."""
+    kind, _, rest = variable.partition(".")
+    name, _, axis = rest.rpartition(".")
+    if kind == "wrench" and name in robot.joints:
+        return f"wrench.{robot.joints[name].main}.{axis}"
+    return variable
 
 
 def _check_variable(table: Table, name: str, robot: Robot) -> None:

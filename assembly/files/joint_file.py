@@ -18,8 +18,8 @@ from forcefit.inputs.table import BadInput, Table
 # [rad, m] smaller values are refused, because their square is 0
 _LEAST_CLEARANCE = 1e-30
 _LEAST_LENGTH = 1e-9  # [m] a shorter one would allow tilts of many turns
-_LEAST_PITCH = 1e-9  # [m] smaller pitches are refused
-_LARGEST_PITCH = 1.0  # [m] larger pitches are refused
+LEAST_PITCH = 1e-9  # [m] smaller pitches are refused
+LARGEST_PITCH = 1.0  # [m] larger pitches are refused
 _CLEARANCE = {"radial": "m", "axial": "m", "tilt": "rad", "spin": "rad", "ball": "m"}
 
 
@@ -41,9 +41,9 @@ def read_pitch(table: Table, joint: str) -> float:
             expected = "expected none, or a helical joint"
             raise table.bad("pitch", f"found one on a {joint} joint, {expected}")
         return 0.0
-    pitch = table.number("pitch", "m per turn", largest=_LARGEST_PITCH)
-    if abs(pitch) < _LEAST_PITCH:
-        expected = f"expected at least {_LEAST_PITCH:g} m, or at most minus that"
+    pitch = table.number("pitch", "m per turn", largest=LARGEST_PITCH)
+    if abs(pitch) < LEAST_PITCH:
+        expected = f"expected at least {LEAST_PITCH:g} m, or at most minus that"
         raise table.bad("pitch", f"found {pitch:g}, {expected}")
     return pitch
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from forcefit.assembly.files.written_units import without_units
+from forcefit.assembly.model.joint_names import names_of, row_of
 from forcefit.assembly.model.largest import LARGEST, LARGEST_LENGTH
 from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.steps.plan import (
@@ -218,24 +219,32 @@ _READERS: dict[str, Callable[[Table, str, Robot], Step]] = {
 
 
 def _frame(table: Table, key: str, robot: Robot) -> str:
-    """Return the name of a frame."""
+    """Return the name of a frame; of a joint of several, of that in its axes."""
     name = table.text(key, expected="the name of a frame")
-    names = [frame.name for frame in robot.frames]
+    names = names_of(robot)
     if name not in names:
         fault = f"found {quoted(name)}, expected the name of a frame"
         raise table.bad(key, f"{fault}{nearest(name, names)}")
-    return name
+    if key == "join" and name in robot.joints:
+        frames = ", ".join(robot.joints[name].frames)
+        fault = f"found {quoted(name)}, a joint of several motions"
+        raise table.bad(key, f"{fault}; expected one of its frames {frames}")
+    return robot.frames[row_of(robot, name)].name
 
 
 def _part(table: Table, key: str, robot: Robot) -> tuple[str, str] | str:
-    """Return a frame, or the closure of two frames in either order."""
+    """Return a frame, or the closure of two frames in either order.
+
+    A closure after a drawn joint may be named by the joint: its frame is ``ball.end``.
+    """
     value = table.require(key, "a frame, or the two frames of a closure")
     if isinstance(value, str):
         return _frame(table, key, robot)
     proper = isinstance(value, list) and all(isinstance(v, str) for v in value)
-    for pair in (value, value[::-1]) if proper and len(value) == 2 else ():
-        if tuple(pair) in robot.closures:
-            return pair[0], pair[1]
+    for first, second in (value, value[::-1]) if proper and len(value) == 2 else ():
+        for pair in ((first, second), (f"{first}.end", second)):
+            if pair in robot.closures:
+                return pair
     known = ", ".join(f'["{a}", "{b}"]' for a, b in robot.closures) or "no closure"
     fault = f"found {describe(value)}, expected a frame or one of the closures {known}"
     raise table.bad(key, fault)

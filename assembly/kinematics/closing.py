@@ -18,6 +18,7 @@ from forcefit.assembly.kinematics.closure_rates import (
 )
 from forcefit.assembly.kinematics.nominal import Target, follow, mobile
 from forcefit.assembly.kinematics.posture import joint_target
+from forcefit.assembly.model.joint_names import error_rows, names_of
 from forcefit.assembly.model.links import own_screw
 from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, nearest
@@ -69,7 +70,8 @@ def rest_in(robot: Robot, name: str) -> Robot:
     Args:
         robot: its passive joints are moved as near to closing as possible, with drives
             at their ``position``.
-        name: name of a frame in the loop that does not close.
+        name: name of a frame, or of a joint of several frames, in the loop that does
+            not close; of a universal joint the first bearing takes the mismatch.
 
     Returns:
         The robot whose nominal geometry closes; with its errors it is the one given.
@@ -78,12 +80,12 @@ def rest_in(robot: Robot, name: str) -> Robot:
         BadInput: no such frame, no loop through it is open, or the mismatch is no small
             motion.
     """
-    if name not in (names := [f.name for f in robot.frames]):
+    if name not in (names := names_of(robot)):
         raise BadInput(f'--rest: no frame "{name[:60]}"{nearest(name, names)}')
     driven = [f.actuated for f in robot.frames]
     held = np.where(driven, robot.positions, np.nan)
     track = follow(robot, robot.positions, Target(coordinates=held[None]), guess=True)
-    T, row = track.transforms[0], robot.index(name)
+    T, row = track.transforms[0], error_rows(robot, name)[0][0]
     robot = _positioned(robot, track.coordinates[0])
     for k, pair in enumerate(robot.closures):
         a, b = (robot.index(end) for end in pair)

@@ -52,7 +52,8 @@ class Yield:
 
     Attributes:
         frame: name of the frame.
-        component: row of the screw at the frame that it changes, in the frame's axes.
+        component: row of the screw at the frame that it changes, in the frame's axes; 6
+            for the motion along the thread of a helical joint.
         through: frames and rows of the wrenches on which the law depends.
         inputs: (R, k) other inputs of the law in each row.
         law: smooth function [rad or m] of the inputs (R, k) and wrenches (R, s).

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.assembly.measurement.conditions import Conditions
-from forcefit.assembly.model.links import in_series
+from forcefit.assembly.model.links import in_series, own_screw
 from forcefit.assembly.solvers.conic import SolverFailed
 
 T = TypeVar("T")
@@ -60,7 +60,9 @@ class Yields:
     def _units(self, pairs: list[tuple[str, int]]) -> NDArray:
         columns = np.zeros((6 * len(self.conditions.robot.frames), len(pairs)))
         for k, (frame, row) in enumerate(pairs):
-            columns[6 * self.conditions.robot.index(frame) + row, k] = 1.0
+            i = self.conditions.robot.index(frame)
+            thread = own_screw(self.conditions.robot.frames[i])
+            columns[6 * i : 6 * i + 6, k] = np.eye(6)[row] if row < 6 else thread
         return columns
 
     def deflections(self, through: NDArray) -> NDArray:
@@ -177,7 +179,8 @@ def with_springs(conditions: Conditions, row: int) -> Conditions:
             left.append(each)
             continue
         i = conditions.robot.index(each.frame)
-        K = in_series(frames[i].resistance, each.component, compliance)
+        component = each.component if each.component < 6 else frames[i].own_axis
+        K = in_series(frames[i].resistance, component, compliance)
         frames[i] = replace(frames[i], joint_stiffness=K)
     robot = replace(conditions.robot, frames=tuple(frames))
     return replace(one, robot=robot, yields=tuple(left))

@@ -25,11 +25,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
+from forcefit.assembly.model.joint_names import error_label, error_rows
 from forcefit.assembly.model.random_errors import SIGNS, frames_named
 from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 from forcefit.results.display import html_table, short_repr
-from forcefit.stiffness.screws import SCREW
 
 KINDS = ("uniform", "normal", "truncated")
 _LARGEST = 1e3  # [rad, m] larger than any error
@@ -74,7 +74,7 @@ class ErrorSources:
 
     def __post_init__(self) -> None:
         names = [
-            f"{self.robot.frames[i].name}.{SCREW[c]}"
+            error_label(self.robot, i, c)
             for i, c in zip(self.frame, self.component, strict=True)
         ]
         object.__setattr__(self, "labels", tuple(names))
@@ -193,8 +193,8 @@ def tolerance_sources(
     Args:
         robot: robot of n frames.
         tolerances: (6,) [rad, m] half widths by component, 0 for none.
-        frames: names of the frames; if None, all at whose body the robot has errors or
-            a link.
+        frames: names of the frames and joints; if None, all frames at whose body the
+            robot has errors or a link.
         distribution: ``"uniform"`` over the tolerance, or ``"truncated"``: normal, cut
             at the tolerance.
         deviations: number of standard deviations in the tolerance.
@@ -208,13 +208,15 @@ def tolerance_sources(
     names = frames_named(robot, frames) if frames is not None else tuple(
         f.name for f in robot.frames if f.link is not None or f.geometric_error.any()
     )  # fmt: skip
-    components = np.flatnonzero(np.asarray(tolerances, dtype=float) > 0)
-    rows = np.array([robot.index(name) for name in names], dtype=int)
-    frame, component = (
-        np.repeat(rows, len(components)), np.tile(components, len(rows))
-    )  # fmt: skip
+    given = np.asarray(tolerances, dtype=float)
+    widths = {
+        (row, order[c]): given[c]
+        for name in names for row, order in error_rows(robot, name)
+        for c in np.flatnonzero(given > 0)
+    }  # fmt: skip
+    frame, component = np.array(list(widths), dtype=int).reshape(-1, 2).T
     count, cut = len(frame), distribution == "truncated"
-    width = np.asarray(tolerances, dtype=float)[component]
+    width = np.array(list(widths.values()), dtype=float)
     return ErrorSources(
         robot=robot,
         frame=frame,
@@ -255,8 +257,8 @@ def read_sources(
     seen: dict[tuple[int, int], str] = {}
     for (i, c, *_), table in rows:
         if (i, c) in seen:
-            name = f"{robot.frames[i].name}.{SCREW[c]}"
-            raise table.bad("", f"found {quoted(name)} again, first in {seen[i, c]}")
+            name = quoted(error_label(robot, i, c))
+            raise table.bad("", f"found {name} again, first in {seen[i, c]}")
         seen[i, c] = table.place
     columns = zip(*(row for row, _ in rows), strict=True)
     return ErrorSources(
@@ -306,7 +308,6 @@ def _rows(table: Table, robot: Robot) -> list[tuple]:
     kept = np.flatnonzero((scale > 0) | (centre != 0))
     code = KINDS.index(kind)
     return [
-        ((robot.index(name), c, code, centre[c], scale[c], least[c], limit[c], signed),
-         table)
-        for name in frames for c in kept
+        ((row, order[c], code, centre[c], scale[c], least[c], limit[c], signed), table)
+        for name in frames for row, order in error_rows(robot, name) for c in kept
     ]  # fmt: skip

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from forcefit.assembly.model.joint_names import error_rows, names_of, row_of
 from forcefit.assembly.model.robot import Robot
+from forcefit.inputs.table import BadInput, nearest, quoted
 
 SIGNS = ("literal", "signed")
 
@@ -16,7 +18,8 @@ class ErrorDraw:
     """Parameters of a draw of geometric errors delta l.
 
     Attributes:
-        frames: names of the frames that get an error, in the order of drawing.
+        frames: names of the frames and joints that get an error, in the order of
+            drawing.
         least: (6,) [rad, m] smallest size of each component.
         most: (6,) [rad, m] largest size.
         seed: seed of the random numbers.
@@ -51,32 +54,38 @@ def draw_errors(robot: Robot, draw: ErrorDraw) -> NDArray:
     """
     if draw.signs not in SIGNS:
         raise ValueError(f"signs is {draw.signs!r}, expected one of {SIGNS}")
-    rows = [robot.index(name) for name in draw.frames]
+    places = [place for name in draw.frames for place in error_rows(robot, name)]
     rng = np.random.default_rng(draw.seed)
-    sizes = rng.uniform(draw.least, draw.most, size=(len(rows), 6))
+    sizes = rng.uniform(draw.least, draw.most, size=(len(places), 6))
     if draw.signs == "signed":
         sizes = sizes * rng.choice([-1.0, 1.0], size=sizes.shape)
     errors = np.zeros((len(robot.frames), 6))
-    errors[rows] = sizes
+    for (row, order), size in zip(places, sizes, strict=True):
+        errors[row, order] = size
     return errors
 
 
 def frames_named(robot: Robot, names: Sequence[str]) -> tuple[str, ...]:
-    """Return frames by full name, or by the part after a leg's dot in every leg.
+    """Return frames and joints by full name, or by the part after a leg's dot.
 
     Args:
         robot: any robot.
         names: names such as ``["leg1.link_a"]``, or ``["link_a"]`` for all legs.
 
     Returns:
-        Full names in the robot's order.
+        Full names of frames, and of joints of several frames, in the robot's order.
 
     Raises:
-        BadInput: a name matches no frame.
+        BadInput: a name matches neither a frame nor a joint.
     """
-    known = [f.name for f in robot.frames]
+    known = names_of(robot)
+    frames = known[: len(robot.frames)]
     chosen = set()
     for name in names:
-        fits = {k for k in known if k == name or k.split(".", 1)[-1] == name}
-        chosen |= fits or {known[robot.index(name)]}  # index() names the nearest
-    return tuple(k for k in known if k in chosen)
+        among = frames if name in frames else known  # a frame's name means no joint
+        fits = {k for k in among if k == name or k.split(".", 1)[-1] == name}
+        if not fits:
+            hint = nearest(name, known)
+            raise BadInput(f"{robot.name}: no frame {quoted(name)}{hint}")
+        chosen |= fits
+    return tuple(sorted(chosen, key=lambda k: (row_of(robot, k), known.index(k))))

@@ -26,6 +26,7 @@ from forcefit.assembly.model.frame import (
     beam_axis,
     locked,
 )
+from forcefit.assembly.model.frame_series import NamedJoint, joints_of
 from forcefit.assembly.model.function import Function
 from forcefit.assembly.model.link_kinds import (
     BeamLink,
@@ -133,6 +134,8 @@ class Robot(EqualData):
             return self._rows[name]
         except KeyError:
             hint = nearest(name, self._rows)
+            if name in self.joints:
+                hint = f", but a joint of {', '.join(self.joints[name].frames)}"
             raise BadInput(f"{self.name}: no frame {quoted(name)}{hint}") from None
 
     def frame(self, name: str) -> Frame:
@@ -146,6 +149,11 @@ class Robot(EqualData):
     @cached_property
     def _rows(self) -> dict[str, int]:
         return {frame.name: i for i, frame in enumerate(self.frames)}
+
+    @cached_property
+    def joints(self) -> Mapping[str, NamedJoint]:
+        """Joints of several frames by name, such as ``ball`` of ``ball.first``."""
+        return joints_of(self.frames)
 
     @cached_property
     def parents(self) -> NDArray:

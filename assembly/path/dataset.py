@@ -68,6 +68,7 @@ def path_dataset(errors: PathErrors, command: str = "") -> "xarray.Dataset":
         "program_sha256": program_hash(),
         "path_law": errors.trajectory.law,
         "assumption": errors.assumption,
+        "stiffness_state": errors.state,
         "first_frequency": errors.frequency,
     }
     about |= {"command": command} if command else {}

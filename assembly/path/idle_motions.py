@@ -1,11 +1,14 @@
-"""Accelerations of idle motions, which neither drives nor platform nor closures hold.
+"""Rates and accelerations of idle motions, which nothing holds.
 
-A rod between two balls may spin.  No force resists its inertia about its own axis, so
-the spin accelerates until none is left: the loads then do no work on idle motions.
-Their rates are taken as zero.
+Neither drives nor platform nor closures hold an idle motion, such as the spin of a rod
+between two balls.  No force acts along it, so a path from rest leaves its momentum
+zero: a round rod keeps zero angular momentum about its axis, and its kinetic energy is
+the least.  Its acceleration is such that the loads do no work on it.  Both rules
+together are exact where the inertia does not depend on the idle motion, as for a body
+whose mass is round about its axis of spin.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,46 +21,93 @@ _MASSLESS = 1e-12  # of the largest inertia: below it an idle motion has none
 _ROUNDING = 1e-20  # of the whole mass on the longest arm: 1e-10 of an arm, squared
 
 
-def with_idle_accelerations(motion: Motion, gravity: NDArray) -> Motion:
-    """Return the motion with idle motions that accelerate under the loads.
+@dataclass(frozen=True, eq=False)
+class IdleMotions:
+    """The d idle motions of a robot of n frames at k points of a path.
+
+    Attributes:
+        joints: (k, n, d) [rad or m] rates of the joints for a unit of each.
+        bodies: d twists (k, n, 6) of the bodies, read at the base's origin.
+        parts: likewise of the parts that the joints carry.
+        inverse: (k, d, d) pseudoinverse of their inertia.
+    """
+
+    joints: NDArray
+    bodies: list[NDArray]
+    parts: list[NDArray]
+    inverse: NDArray
+
+
+def idle_motions(motion: Motion) -> IdleMotions | None:
+    """Return the idle motions of a robot along a path, None if there are none.
 
     Args:
-        motion: motion at k points, idle motions at rest.
-        gravity: (3,) [m/s^2] base axes.
-
-    Returns:
-        The same without idle motions.
+        motion: motion at k points; only its postures and equations are used.
     """
     if not motion.free:
-        return motion
+        return None
     Z = idle_rates(motion)
     if not Z.shape[2]:
-        return motion
+        return None
     robot, T = motion.postures.robot, motion.postures.transforms
     S, carries = motion_screws(robot, T), carries_matrix(robot)
     joints = [S * Z[:, :, d, None] for d in range(Z.shape[2])]
     bodies = [carries @ own for own in joints]
     parts = [body + own for body, own in zip(bodies, joints, strict=True)]
+    idle = IdleMotions(Z, bodies, parts, np.zeros(()))
+    inertia = np.stack([_momentum(motion, idle, body) for body in bodies], axis=2)
+    least = _ROUNDING * _largest_inertia(motion, bodies)
+    return replace(idle, inverse=_inverse(inertia, least))
 
-    def work(loads: InertialLoads) -> NDArray:
-        p = T[..., :3, 3]
-        return np.stack([
-            _power(loads.bodies, body, p) + _power(loads.carried, part, p)
-            for body, part in zip(bodies, parts, strict=True)
-        ], axis=1)  # fmt: skip
 
-    still = replace(motion, twists=np.zeros_like(motion.twists))
-    inertia = -np.stack([
-        work(inertial_loads(replace(still, accelerations=body))) for body in bodies
-    ], axis=2)  # fmt: skip
-    driving = work(inertial_loads(motion, gravity))
-    solve = _inverse(inertia, _ROUNDING * _largest_inertia(motion, bodies))
-    second = (solve @ driving[..., None])[..., 0]
-    added = sum(second[:, d, None, None] * body for d, body in enumerate(bodies))
-    rates = motion.second_rates + (Z @ second[..., None])[..., 0]
+def momentum_free_rates(motion: Motion, idle: IdleMotions) -> NDArray:
+    """Return rates of the joints that leave no momentum along idle motions.
+
+    Args:
+        motion: motion at k points with any rates of the idle motions.
+        idle: its idle motions.
+
+    Returns:
+        (k, n) [rad/s or m/s] to be added to the rates of the motion.
+    """
+    momentum = _momentum(motion, idle, motion.twists)
+    amounts = -idle.inverse @ momentum[..., None]
+    return np.asarray((idle.joints @ amounts)[..., 0])
+
+
+def with_idle_accelerations(
+    motion: Motion, idle: IdleMotions, gravity: NDArray
+) -> Motion:
+    """Return the motion with idle motions that accelerate under the loads.
+
+    Args:
+        motion: motion at k points.
+        idle: its idle motions.
+        gravity: (3,) [m/s^2] base axes.
+    """
+    driving = _work(motion, idle, inertial_loads(motion, gravity))
+    second = (idle.inverse @ driving[..., None])[..., 0]
+    added = sum(second[:, d, None, None] * body for d, body in enumerate(idle.bodies))
+    rates = motion.second_rates + (idle.joints @ second[..., None])[..., 0]
     return replace(
         motion, second_rates=rates, accelerations=motion.accelerations + added
     )
+
+
+def _momentum(motion: Motion, idle: IdleMotions, twists: NDArray) -> NDArray:
+    """Return (k, d) [kg m^2/s or kg m/s] momentum of twists along idle motions."""
+    # loads of bodies at rest are linear in their accelerations
+    still = replace(motion, twists=np.zeros_like(twists), accelerations=twists)
+    return -_work(motion, idle, inertial_loads(still))
+
+
+def _work(motion: Motion, idle: IdleMotions, loads: InertialLoads) -> NDArray:
+    """Return (k, d) the power of loads on a unit of each idle motion."""
+    p = motion.postures.transforms[..., :3, 3]
+    return np.stack([
+        _power(loads.bodies, body, p) + _power(loads.carried, part, p)
+        for body, part in zip(idle.bodies, idle.parts, strict=True)
+    ], axis=1)  # fmt: skip
 
 
 def _inverse(inertia: NDArray, least: NDArray) -> NDArray:

@@ -14,9 +14,10 @@ A_j     ``accelerations``       (k, n, 6)     derivative of V_j with time
 With V = sum S_j q'_j over the joints that carry a body, its derivative is
 A = sum S_j q''_j + [V_j, S_j] q'_j.  At a closure the V and A of its two frames are
 equal.  These equations, and those of the prescribed components of the pose, are linear
-in q' and then in q''.  Both have the same matrix.  Its least-norm solution leaves at
-rest what neither closures nor path prescribe, such as the spin of a rod between two
-balls.  No pose is differenced.
+in q' and then in q''.  Both have the same matrix.  Its least-norm solution is used
+where neither closures nor path prescribe a rate, such as the spin of a rod between two
+balls; :mod:`forcefit.assembly.path.idle_motions` adds the rates that the inertia of the bodies
+determines.  No pose is differenced.
 
 Sources:
     Featherstone (2008), Rigid Body Dynamics Algorithms, chapters 2 and 8 (spatial
@@ -92,8 +93,9 @@ class NotFollowed(Exception):
 
 
 def follow_path(
-    postures: Posture, names: tuple[str, ...], path: tuple[NDArray, NDArray, NDArray]
-) -> Motion:
+    postures: Posture, names: tuple[str, ...],
+    path: tuple[NDArray, NDArray, NDArray], idle: NDArray | float = 0.0,
+) -> Motion:  # fmt: skip
     """Return the motion of a robot along a path.
 
     Args:
@@ -101,6 +103,9 @@ def follow_path(
         names: c prescribed components, ``tx`` .. or ``q.<frame>``, of one kind; drives
             that are not named among joints stay at rest.
         path: (k, c) components [m or rad] and their first and second derivatives.
+        idle: (k, n) [rad/s or m/s] joint rates that neither closures nor path prescribe
+            (:func:`forcefit.assembly.path.idle_motions.momentum_free_rates`), added to the
+            least-norm solution.
 
     Returns:
         The motion.
@@ -130,7 +135,7 @@ def follow_path(
         return q
 
     closed = np.zeros((len(values), E.shape[1] - values.shape[1]))
-    rates = joints(first, closed)
+    rates = joints(first, closed) + idle
     carries = carries_matrix(robot)
     twists = carries @ (S * rates[..., None])
     turning = (bracket(twists) @ S[..., None])[..., 0] * rates[..., None]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from forcefit.assembly.kinematics.nominal import Target
-from forcefit.assembly.kinematics.posture import together
+from forcefit.assembly.kinematics.posture import Posture, together
 from forcefit.assembly.kinematics.verdict import verdicts
 from forcefit.assembly.linear.energy import Assembly, solve_assembly
 from forcefit.assembly.linear.pose_error import bound_pose_error
@@ -22,24 +22,31 @@ from forcefit.assembly.model.links import own_screw
 from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.model.statuses import OK, SINGULAR
 from forcefit.assembly.path.beam_inertia import beam_stress
-from forcefit.assembly.path.idle_motions import with_idle_accelerations
+from forcefit.assembly.path.idle_motions import (
+    idle_motions,
+    momentum_free_rates,
+    with_idle_accelerations,
+)
 from forcefit.assembly.path.inertial_loads import InertialLoads, inertial_loads
 from forcefit.assembly.path.motion import Motion, NotFollowed, follow_path
 from forcefit.assembly.path.placing import check_path_robot, first_frequency, placed
+from forcefit.assembly.path.tangents import check_state, compliances
 from forcefit.assembly.path.trajectory import Trajectory
-from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from forcefit.assembly.sweeps.targets import goals_of, of_joints
 from forcefit.inputs.table import BadInput, nearest
 from forcefit.results.display import Figures, html_table, largest, short_repr
 
 ASSUMPTIONS = ("none", "frozen", "free")  # of the bounds of problem (27) under load
-_BLOCK = 2000  # points solved together
+_BLOCK = 2000  # points solved and stored together
+_BLOCK_OF_TANGENTS = 100  # likewise, where each has a tangent of its own
 # results that exist wherever the path does
 _GEOMETRIC = {
     "coordinates", "rates", "second_rates", "platform", "platform_velocity",
     "platform_acceleration", "compliance",
 }  # fmt: skip
 Progress = Callable[[int, int], None]
+# returns the arrays of a block from the number of its first point, computed or stored
+Recall = Callable[..., tuple[NDArray, ...]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +57,7 @@ class PathErrors:
         robot: the robot.
         trajectory: components of the pose.
         assumption: of the bounds of problem (27), ``"none"`` without.
+        state: in which the compliance is taken.
         frequency: [Hz] least first natural frequency along the path; NaN if unknown.
         free: largest number of joint motions that neither path nor closures prescribe;
             they are left at rest.
@@ -62,7 +70,7 @@ class PathErrors:
             - ``inertial_screw`` (k, 6) its change by the accelerations
             - ``energy`` (k,), ``wrench`` (k, n, 6) through bodies at their tips,
               ``drive_force`` (k, drives), ``stress`` (k, links)
-            - ``compliance`` (k, 6, 6) nominal, of the platform
+            - ``compliance`` (k, 6, 6) of the platform in this state
             - with an assumption ``rotation_error``, ``translation_error`` (k, 2)
         status: (k,) ``"ok"``, or why a point has no result.
         reason: (k,) message where the status is not ok.
@@ -71,6 +79,7 @@ class PathErrors:
     robot: Robot
     trajectory: Trajectory
     assumption: str
+    state: str
     frequency: float
     free: int
     arrays: dict[str, NDArray]
@@ -120,7 +129,9 @@ def path_errors(
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
     assumption: str = "none",
+    state: str = "nominal",
     progress: Progress = lambda done, most: None,
+    recall: Recall = lambda compute, *given: compute(),
 ) -> PathErrors:
     """Return the errors of a robot along a path, its inertia included.
 
@@ -132,32 +143,39 @@ def path_errors(
         gravity: (3,) [m/s^2] base axes; none if absent.
         assumption: of bounds of the pose error, problem (27): ``"frozen"`` or
             ``"free"``; ``"none"`` for no bounds.
+        state: of the compliance: ``"nominal"``, ``"contact"`` or ``"exact"``, the
+            latter two under the loads of each instant.
         progress: called with the points solved, and all.
+        recall: of :class:`forcefit.assembly.statistics.replay.Replay`, which stores blocks of
+            points; by default every block is computed.
 
     Returns:
         The results.
 
     Raises:
         BadInput: nothing has a mass, the robot has effects, a point is out of reach or
-            cannot be followed, or no such assumption.
+            cannot be followed; no such assumption or state, or a link has a mass in
+            the state ``"exact"``.
     """
     if assumption not in ASSUMPTIONS:
         hint = nearest(assumption, ASSUMPTIONS)
         raise BadInput(f'--assumption: found "{assumption[:60]}"{hint}')
     check_path_robot(robot)
-    asked = _Asked(robot, trajectory, load, gravity, assumption)
+    check_state(robot, state)
+    asked = _Asked(robot, trajectory, load, gravity, assumption, state)
     count, parts = len(trajectory.times), []
+    block = _BLOCK if state == "nominal" else _BLOCK_OF_TANGENTS
     progress(0, count)
-    for first in range(0, count, _BLOCK):
-        rows = slice(first, min(first + _BLOCK, count))
-        parts.append(_solve(asked, rows))
+    for first in range(0, count, block):
+        rows = slice(first, min(first + block, count))
+        parts.append(_recalled(asked, rows, recall))
         progress(rows.stop, count)
     arrays = {name: np.concatenate([p[name] for p in parts]) for name in parts[0]}
     status, reason = arrays.pop("status"), arrays.pop("reason")
     free = int(arrays.pop("free").max())
     frequency = first_frequency(robot, trajectory)
     return PathErrors(
-        robot, trajectory, assumption, frequency, free, arrays, status, reason
+        robot, trajectory, assumption, state, frequency, free, arrays, status, reason
     )
 
 
@@ -170,13 +188,32 @@ class _Asked:
     load: ArrayLike | None
     gravity: ArrayLike | None
     assumption: str
+    state: str
+
+
+def _recalled(asked: _Asked, rows: slice, recall: Recall) -> dict[str, NDArray]:
+    """Return the results of a block of points, computed or from a store."""
+
+    def compute() -> tuple[NDArray, ...]:
+        solved = _solve(asked, rows)
+        texts = [solved.pop(name).astype(str) for name in ("status", "reason")]
+        return np.array(list(solved)), *solved.values(), *texts
+
+    names, *values, status, reason = recall(compute, rows.start, rows.stop)
+    arrays = dict(zip(names.tolist(), values, strict=True))
+    return arrays | {"status": status.astype(object), "reason": reason.astype(object)}
 
 
 def _solve(asked: _Asked, rows: slice) -> dict[str, NDArray]:
     """Return the results of a block of points."""
     motion, verdict = _moved(asked, rows)
     gravity = np.zeros(3) if asked.gravity is None else np.asarray(asked.gravity, float)
-    motion = with_idle_accelerations(motion, gravity)
+    idle = idle_motions(motion)
+    if idle is not None:
+        motion = _followed(
+            asked, rows, motion.postures, momentum_free_rates(motion, idle)
+        )
+        motion = with_idle_accelerations(motion, idle, gravity)
     loads = inertial_loads(motion, gravity)
     still = np.zeros_like(motion.twists)
     at_rest = replace(motion, twists=still, accelerations=still)
@@ -201,7 +238,7 @@ def _solve(asked: _Asked, rows: slice) -> dict[str, NDArray]:
         "wrench": wrenches,
         "drive_force": _drive_forces(robot, assembly.joint_wrenches),
         "stress": _stresses(robot, loads, wrenches),
-        "compliance": platform_stiffness(motion.postures).compliance,
+        "compliance": compliances(motion.postures, asked.state, asked.load, loads),
     }
     if asked.assumption != "none":
         bounds = bound_pose_error(assembly, asked.assumption)
@@ -227,17 +264,23 @@ def _moved(asked: _Asked, rows: slice) -> tuple[Motion, list[tuple[str, str]]]:
     goals = goals_of(path.names, robot, values)
     target = Target(coordinates=goals) if of_joints(path.names) else Target(goals)
     verdict = verdicts(robot, target, there.coordinates, there.transforms)
+    return _followed(asked, rows, there), verdict
+
+
+def _followed(
+    asked: _Asked, rows: slice, postures: Posture, idle: NDArray | float = 0.0
+) -> Motion:
+    """Return the motion of a block of points, with added rates of idle motions."""
+    path = asked.trajectory
+    at = path.values[rows], path.first[rows], path.second[rows]
     try:
-        motion = follow_path(
-            there, path.names, (values, path.first[rows], path.second[rows])
-        )
+        return follow_path(postures, path.names, at, idle)
     except NotFollowed as error:
         raise BadInput(
             f"path at {path.times[rows][error.row]:.6g} s: the platform cannot have "
             "the velocity and acceleration of the path here; expected a path without "
             "singular postures"
         ) from None
-    return motion, verdict
 
 
 def _assembled(asked: _Asked, motion: Motion, loads: InertialLoads) -> Assembly:

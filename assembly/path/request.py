@@ -1,22 +1,28 @@
 """The errors along a path from the options of ``forcefit assembly path``."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from hashlib import sha256
+from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from forcefit.assembly.exchange.robot_files import load_robot
 from forcefit.assembly.kinematics.nominal import size_of
+from forcefit.assembly.model.force_control import with_drive_forces
 from forcefit.assembly.model.robot import Robot
-from forcefit.assembly.path.path_errors import (
-    PathErrors,
-    Progress,
-    path_errors,
-)
+from forcefit.assembly.path.dataset import path_dataset
+from forcefit.assembly.path.path_errors import PathErrors, Progress, path_errors
 from forcefit.assembly.path.path_file import PathTable, check_path, read_path
 from forcefit.assembly.path.placing import check_path_robot, check_rows
+from forcefit.assembly.path.tangents import check_state
 from forcefit.assembly.path.trajectory import Trajectory, profiled, timed
+from forcefit.assembly.statistics.replay import journalled
+from forcefit.assembly.sweeps.dataset import save_dataset
+from forcefit.assembly.sweeps.identity import program_hash, robot_hash
 from forcefit.inputs.errors import checked
 from forcefit.inputs.table import BadInput, nearest
 
@@ -57,6 +63,10 @@ def errors_along_path(
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
     assumption: str = "none",
+    state: str = "nominal",
+    drive_force: Mapping[str, float] | None = None,
+    output: Path | str | None = None,
+    command: str = "",
     progress: Progress = lambda done, most: None,
 ) -> PathErrors:
     """Return the errors of a robot along a path, its inertia included.
@@ -70,20 +80,58 @@ def errors_along_path(
         gravity: (3,) [m/s^2] base axes; none if absent.
         assumption: of bounds of the pose error, problem (27): ``"frozen"`` or
             ``"free"``; ``"none"`` for no bounds.
+        state: in which the compliance of the platform is taken: ``"nominal"``;
+            ``"contact"`` or ``"exact"``, under the loads of each instant.
+        drive_force: [N m or N] by name of a drive that applies this force and holds no
+            coordinate.
+        output: NetCDF file to write.  Finished points are kept in ``<output>.journal``.
+            After an interruption the same call resumes from it.
+        command: command line, for provenance in the file; empty without one.
         progress: called with the points solved, and all.
 
     Returns:
         The results.
 
     Raises:
-        BadInput: the path, its times or the robot break a rule; a row is out of reach.
+        BadInput: the path, its times or the robot break a rule; a row is out of reach;
+            the journal belongs to another path, or a file cannot be written.
     """
     machine = robot if isinstance(robot, Robot) else load_robot(robot)
+    if drive_force:
+        machine = with_drive_forces(machine, drive_force)
+    check_state(machine, state)
     trajectory = trajectory_of(machine, path, times or PathTimes())
-    return path_errors(
-        machine, trajectory, load=load, gravity=gravity, assumption=assumption,
-        progress=progress,
-    )  # fmt: skip
+    asked = {"load": load, "gravity": gravity, "assumption": assumption, "state": state}
+    file = None if output is None else Path(output)
+    with journalled(file, _identity(machine, trajectory, asked)) as replay:
+        errors = path_errors(
+            machine, trajectory, load=load, gravity=gravity, assumption=assumption,
+            state=state, progress=progress, recall=replay.recall,
+        )  # fmt: skip
+        if file is not None:
+            save_dataset(path_dataset(errors, command), file)
+    return errors
+
+
+def _identity(
+    robot: Robot, trajectory: Trajectory, asked: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return what must be equal for a path to be resumed from a journal."""
+    digest = sha256(trajectory.law.encode())
+    for name in ("times", "values", "first", "second"):
+        digest.update(np.ascontiguousarray(getattr(trajectory, name)).tobytes())
+    return {
+        "program": f"forcefit {version('forcefit')}",
+        "program_sha256": program_hash(),
+        "robot_sha256": robot_hash(robot),
+        "path_sha256": digest.hexdigest(),
+        "path_columns": " ".join(trajectory.names),
+        "options": str({
+            name: value if value is None or isinstance(value, str)
+            else np.asarray(value, float).tolist()
+            for name, value in asked.items()
+        }),
+    }  # fmt: skip
 
 
 def trajectory_of(

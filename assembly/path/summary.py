@@ -5,7 +5,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from forcefit.assembly.kinematics.mobility import mobility
+from forcefit.assembly.kinematics.posture import POSE, home_posture
 from forcefit.assembly.linear.closure import virtual_joints
+from forcefit.assembly.model.joint_names import joint_of
 from forcefit.assembly.model.link_stress import stressed_links
 from forcefit.assembly.model.statuses import OK
 from forcefit.assembly.path.path_errors import PathErrors
@@ -84,7 +87,7 @@ def path_summary(errors: PathErrors) -> dict[str, Any]:
     if not solved.any():
         return summary
     owners = {
-        "force": [frame.name for frame in errors.robot.frames],
+        "force": [joint_of(errors.robot, i) for i in range(len(errors.robot.frames))],
         "stress": [link.frame for link in stressed_links(errors.robot)],
     }
     summary["largest"] = {
@@ -148,11 +151,24 @@ def remarks(errors: PathErrors) -> list[str]:
             "these loads, so that the deflection by acceleration is unknown"
         )
     if errors.free:
-        found.append(
-            f"{errors.free} joint motions follow neither from the path nor from the "
-            "closures; their rates are taken as zero"
-        )
+        found.append(_free_motions(errors))
     return found
+
+
+def _free_motions(errors: PathErrors) -> str:
+    """Return a remark on motions that the path does not prescribe."""
+    names, robot = errors.trajectory.names, errors.robot
+    freedoms = mobility(home_posture(robot)).platform_freedoms
+    if names[0] in POSE and len(names) < freedoms:
+        return (
+            f"the path states {', '.join(names)} alone, and the platform has "
+            f"{freedoms} freedoms: it moves with the least rates of the joints; "
+            "expected a column for each component of the pose"
+        )
+    return (
+        f"{errors.free} joint motions follow neither from the path nor from the "
+        "closures; bodies that they move have no momentum along them"
+    )
 
 
 def path_text(summary: dict[str, Any]) -> str:

@@ -28,6 +28,7 @@ from forcefit.assembly.linear.load import driven
 from forcefit.assembly.linear.nearest_pose import nearest_pose
 from forcefit.assembly.model.clearance import bound_name
 from forcefit.assembly.model.given_load import Load, one_load
+from forcefit.assembly.model.joint_names import shown_name
 from forcefit.assembly.platform_stiffness.active_set import contacts
 from forcefit.assembly.platform_stiffness.exact_tangent import exact_tangent
 from forcefit.assembly.platform_stiffness.linear_tangent import in_contact
@@ -270,8 +271,8 @@ def clearance_names(joints: VirtualJoints, marked: NDArray) -> frozenset[str]:
     names = set()
     for k in np.flatnonzero(marked):
         columns = joints.cones[:, joints.group == k]
-        frame = joints.robot.frames[int(columns.any(axis=1).argmax()) // 6]
-        names.add(f"{frame.name} {bound_name(columns)}")
+        row = int(columns.any(axis=1).argmax()) // 6
+        names.add(f"{shown_name(joints.robot, row)} {bound_name(columns)}")
     return frozenset(names)
 
 

@@ -26,6 +26,7 @@ from forcefit.assembly.exact.descent import Expansion
 from forcefit.assembly.exact.equilibrium import curvature_modes, tangent_space
 from forcefit.assembly.exact.exact import ExactAssembly
 from forcefit.assembly.kinematics.se3 import turn_jacobian
+from forcefit.assembly.model.joint_names import row_of, shown_name
 from forcefit.assembly.platform_stiffness.linear_tangent import Side, owners
 from forcefit.assembly.platform_stiffness.matrices import (
     Part,
@@ -72,11 +73,12 @@ def exact_tangent(
 
 def part_owners(equilibrium: ExactAssembly) -> tuple[Part, ...]:
     """Return the owner of each spring; pieces belong to their beam."""
-    cut, frames = equilibrium.cut, equilibrium.posture.robot.frames
+    cut, robot = equilibrium.cut, equilibrium.posture.robot
     parts = owners(equilibrium.expansion.placement.model.joints)
-    rows = [cut.owner[cut.robot.index(part.frame)] for part in parts]
+    rows = [cut.owner[row_of(cut.robot, part.frame)] for part in parts]
     return tuple(
-        Part(frames[row].name, part.kind) for row, part in zip(rows, parts, strict=True)
+        Part(shown_name(robot, row), part.kind)
+        for row, part in zip(rows, parts, strict=True)
     )
 
 

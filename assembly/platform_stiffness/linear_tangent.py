@@ -32,6 +32,7 @@ from forcefit.assembly.linear.closure import (
     virtual_joints,
 )
 from forcefit.assembly.linear.energy import Assembly
+from forcefit.assembly.model.joint_names import shown_name
 from forcefit.assembly.platform_stiffness.active_set import (
     bound_forces,
     contacts,
@@ -117,16 +118,16 @@ def _tangents(u: NDArray) -> NDArray:
 
 
 def _frame(joints: VirtualJoints, column: int) -> str:
-    """Return the name of the frame of a clearance."""
+    """Return the name of the frame or joint of a clearance."""
     row = int(np.abs(joints.cones[:, column]).argmax()) // 6
-    return joints.robot.frames[row].name
+    return shown_name(joints.robot, row)
 
 
 def owners(joints: VirtualJoints) -> list[Part]:
     """Return the owner of each column of ``joints.elastic``."""
     rows = np.abs(joints.elastic).argmax(axis=0) // 6 if joints.elastic.size else ()
     return [
-        Part(joints.robot.frames[row].name, "link" if link else "joint")
+        Part(shown_name(joints.robot, row), "link" if link else "joint")
         for row, link in zip(rows, joints.links, strict=True)
     ]
 

@@ -41,11 +41,16 @@ from forcefit.results.display import Figures, html_table, numbers, short_repr, s
 from forcefit.stiffness.screws import screw_map
 
 _RANK = 1e-10  # relative size below which a motion counts as zero
+_ROUNDING = 1e-12  # relative size of rounding of motions of the platform
 _UNTOUCHED = 1e-9  # component of a unit screw below which it counts as zero
 
 
 class Part(NamedTuple):
-    """Owner of a deformation: a frame's ``link``, ``joint`` or ``clearance``."""
+    """Owner of a deformation: ``link``, ``joint`` or ``clearance`` of a frame.
+
+    ``frame`` may be the name of a joint of several frames
+    (:func:`forcefit.assembly.model.joint_names.shown_name`).
+    """
 
     frame: str
     kind: str
@@ -182,8 +187,11 @@ class PlatformStiffness:
         """Wrenches (6, r) of a basis, stiffness (r, r) in it, rigid wrenches (6, .)."""
         scale = self._scale[:, None]
         basis = null_space((scale * self.free).T) if self.free.size else np.eye(6)
-        U, S, Vt = np.linalg.svd(basis.T @ (scale * self.root))
-        rank = int(np.sum(S > _RANK * S.max(initial=0.0)))
+        whole = scale * self.root
+        U, S, Vt = np.linalg.svd(basis.T @ whole)
+        # what springs add along free motions leaves its rounding in other directions
+        rounding = _ROUNDING * np.abs(whole).max(initial=0.0)
+        rank = int(np.sum(S > max(_RANK * S.max(initial=0.0), rounding)))
         inverse = np.diag(1.0 / S[:rank])
         core = inverse @ inverse
         if not self.stable:

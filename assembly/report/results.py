@@ -26,6 +26,7 @@ from forcefit.assembly.linear.pose_error import bound_pose_error
 from forcefit.assembly.linear.reference.reduction import FreeMotion
 from forcefit.assembly.linear.zone import zone_margin
 from forcefit.assembly.model.contact_closures import contact_closures
+from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.model.statuses import NOT_PROVED, UNSTABLE
 from forcefit.assembly.platform_stiffness.exact_tangent import exact_tangent
 from forcefit.assembly.report.beyond_linear import far_from_linear
@@ -105,6 +106,7 @@ def solution_of(
         "status": "ok",
         "pose": posture.pose(),
         "joints": dict(zip(names, posture.coordinates.tolist(), strict=True)),
+        **_joint_frames(robot),
         "nominal_mismatch": posture.mismatch,
         "mobility": mobility_of(posture),
         "remarks": [
@@ -254,6 +256,12 @@ def exact_text(results: dict[str, Any]) -> str:
     )
 
 
+def _joint_frames(robot: Robot) -> dict[str, dict[str, str]]:
+    """Return the main frame of each joint of several frames; nothing without any."""
+    frames = {name: joint.main for name, joint in robot.joints.items()}
+    return {"joint_frames": frames} if frames else {}
+
+
 def solution_text(results: dict[str, Any]) -> str:
     """Return a solution as text.
 
@@ -273,7 +281,9 @@ def solution_text(results: dict[str, Any]) -> str:
     text = listing(results["robot"], lines, results["remarks"])
     if not solved:
         return text
-    return "\n".join([text, *wrench_lines(results["frames"], results["closures"])])
+    joints = results.get("joint_frames", {})
+    tables = wrench_lines(results["frames"], results["closures"], joints)
+    return "\n".join([text, *tables])
 
 
 def _linearisation_lines(results: dict[str, Any]) -> dict[str, str]:

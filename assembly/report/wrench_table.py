@@ -12,13 +12,25 @@ from forcefit.stiffness.screws import WRENCH
 _HEAD = tuple(f"{name} [{'N m' if name[0] == 'M' else 'N'}]" for name in WRENCH)
 
 
-def wrench_lines(frames: Mapping[str, Any], closures: Sequence[Any]) -> list[str]:
+# first parts of names of the frames that belong to a joint, after its own name
+_OF_JOINT = {
+    "first", "second", "third", "turn", "slide", "slide_x", "slide_y", "end"
+}  # fmt: skip
+
+
+def wrench_lines(
+    frames: Mapping[str, Any], closures: Sequence[Any], joints: Mapping[str, str]
+) -> list[str]:
     """Return the wrenches through all frames and closures as text.
+
+    A joint of several frames has one row, at its point in its axes: the wrench through
+    its other frames is the same.
 
     Args:
         frames: wrenches by frame, from
             :func:`forcefit.assembly.report.results.solution_of`.
         closures: wrenches of the closures from the same function.
+        joints: frame at the point and in the axes of each joint of several frames.
 
     Returns:
         Lines of one table for each kind of wrench.
@@ -26,7 +38,10 @@ def wrench_lines(frames: Mapping[str, Any], closures: Sequence[Any]) -> list[str
     starts = {k: f["start_wrench"] for k, f in frames.items() if "start_wrench" in f}
     tables = {
         "wrenches through the bodies, at each frame's origin in its axes":
-            ("frame", {name: frame["wrench"] for name, frame in frames.items()}),
+            ("frame", {
+                row: frame["wrench"] for name, frame in frames.items()
+                if (row := _shown(name, joints))
+            }),
         "wrenches at the start of links under their own weight": ("frame", starts),
         "wrenches of the closures, at the platform's origin, base axes":
             ("closure", {" - ".join(c["frames"]): c["wrench"] for c in closures}),
@@ -38,3 +53,15 @@ def wrench_lines(frames: Mapping[str, Any], closures: Sequence[Any]) -> list[str
             rows = dict(zip(wrenches, shown.tolist(), strict=True))
             lines += ["", title, *table_lines((first, *_HEAD), rows)]
     return lines
+
+
+def _shown(name: str, joints: Mapping[str, str]) -> str:
+    """Return the name in the table, empty for a further frame of a joint."""
+    for joint, main in joints.items():
+        if name == main:
+            return joint
+        if name.startswith(f"{joint}."):
+            part = name[len(joint) + 1 :].partition(".")[0]
+            if part in _OF_JOINT:
+                return ""
+    return name

@@ -12,6 +12,7 @@ from forcefit.assembly.kinematics.ranks import RANK
 from forcefit.assembly.linear.reference.reduction import complement
 from forcefit.assembly.model.contact_closures import contact_closures
 from forcefit.assembly.model.error_distributions import KINDS, ErrorSources
+from forcefit.assembly.model.joint_names import shown_name
 from forcefit.assembly.statistics.callout_sources import CalloutSources, Sources
 from forcefit.assembly.statistics.linear_response import LinearResponse
 from forcefit.inputs.table import BadInput
@@ -169,4 +170,4 @@ def _cone_name(prepared: LinearResponse, column: NDArray) -> str:
     """Name of a clearance: the frame's, and its components."""
     row = int(np.flatnonzero(column)[0])
     kind = ("tilt", "tilt", "spin", "radial", "radial", "axial")[row % 6]
-    return f"{kind} clearance of {prepared.posture.robot.frames[row // 6].name}"
+    return f"{kind} clearance of {shown_name(prepared.posture.robot, row // 6)}"

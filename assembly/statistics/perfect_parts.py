@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.assembly.model.clearance import bound_name
+from forcefit.assembly.model.joint_names import shown_name
 from forcefit.assembly.statistics.experiment import Experiment
 from forcefit.assembly.statistics.linear_response import LinearResponse
 from forcefit.assembly.statistics.quantities import POSE_ERRORS, UNITS
@@ -92,11 +93,11 @@ def _clearance_parts(prepared: LinearResponse) -> dict[str, dict[str, float]]:
 
 def _clearance_kinds(prepared: LinearResponse) -> list[str]:
     """Return the kind of each cone, such as ``hinge.tilt``, common to all legs."""
-    frames, kinds = prepared.posture.robot.frames, []
+    robot, kinds = prepared.posture.robot, []
     for first, end in zip(prepared.starts[:-1], prepared.starts[1:], strict=True):
         columns: NDArray = prepared.joints.cones[:, first:end]
-        frame = frames[int(columns.any(axis=1).argmax()) // 6]
-        kinds.append(f"{kind_of(frame.name)}.{bound_name(columns)}")
+        name = shown_name(robot, int(columns.any(axis=1).argmax()) // 6)
+        kinds.append(f"{kind_of(name)}.{bound_name(columns)}")
     return kinds
 
 

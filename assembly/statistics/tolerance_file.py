@@ -13,6 +13,7 @@ import numpy as np
 from forcefit.assembly.kinematics.callout_maps import place_callouts
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.model.error_distributions import KINDS, ErrorSources
+from forcefit.assembly.model.joint_names import error_label, error_rows
 from forcefit.assembly.model.random_errors import frames_named
 from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.statistics.callout_sources import CalloutSources, Sources
@@ -138,10 +139,10 @@ def _groups(root: Table, tables: Sequence[Table], robot: Robot) -> _Groups:
             default = _callouts(table, robot, callouts, number)
         else:
             places, unit = _places(table, robot)
-            default = f"{robot.frames[places[0][0]].name}.{SCREW[places[0][1]]}"
+            default = error_label(robot, *places[0])
         for place in places:
             if place in rows:
-                label = f"{robot.frames[place[0]].name}.{SCREW[place[1]]}"
+                label = error_label(robot, *place)
                 first = rows[place]
                 where = "this table" if first == number else quoted(names[first])
                 raise table.bad("", f"found {quoted(label)} again, first in {where}")
@@ -222,5 +223,8 @@ def _places(table: Table, robot: Robot) -> tuple[list[tuple[int, int]], int]:
         raise table.bad("frames", str(error)) from None
     if not frames:
         raise table.bad("frames", "expected at least one")
-    places = [(robot.index(f), SCREW.index(p)) for f in frames for p in parts]
+    places = [
+        (row, order[SCREW.index(part)])
+        for name in frames for row, order in error_rows(robot, name) for part in parts
+    ]  # fmt: skip
     return places, units.pop()

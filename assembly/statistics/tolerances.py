@@ -13,6 +13,7 @@ from forcefit.assembly.kinematics.posture import Posture, place_many
 from forcefit.assembly.kinematics.verdict import SINGULAR_WORDS, verdicts
 from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
 from forcefit.assembly.linear.zone import Compliant
+from forcefit.assembly.model.joint_names import error_label
 from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.model.statuses import OUT_OF_REACH, SINGULAR
 from forcefit.assembly.solvers.conic import SolverFailed
@@ -22,7 +23,6 @@ from forcefit.assembly.statistics.sensitivity import energy_slopes
 from forcefit.assembly.sweeps.identity import program_hash, robot_hash
 from forcefit.assembly.sweeps.targets import goals_of, grid_targets, parse_grid
 from forcefit.inputs.table import BadInput
-from forcefit.stiffness.screws import SCREW
 
 
 def grid_postures(robot: Robot, grid: str) -> tuple[list[Posture], dict[str, int]]:
@@ -137,7 +137,7 @@ def present_errors(
         "assemblable_share": float(np.mean(values <= 1.0 + 1e-6)),
         "slopes": [
             {
-                "error": f"{robot.frames[i].name}.{SCREW[c]}",
+                "error": error_label(robot, i, c),
                 "value": robot.errors[i, c],
                 "margin_slope": slopes[i, c],
                 "share_of_margin": float(effect[k]) / margin if margin > 0 else 0.0,

@@ -19,6 +19,7 @@ from forcefit.assembly.kinematics.posture import Posture, place_robot
 from forcefit.assembly.linear.reference.energy import CannotAssemble
 from forcefit.assembly.model.contact_closures import contact_frames
 from forcefit.assembly.model.error_distributions import draw_generator
+from forcefit.assembly.model.joint_names import joint_of, moves
 from forcefit.assembly.model.robot import Frame, LockedAt, Robot
 from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.assembly.steps.left_anywhere import positions_left_anywhere
@@ -202,8 +203,11 @@ def loose_over_poses(robot: Robot) -> list[str]:
         A list of one sentence, or empty.
     """
     contacts = contact_frames(robot)
-    fixed = [f for f in robot.frames if f.joint == "fixed" and f.clearance]
-    loose = [frame.name for frame in fixed if frame.name not in contacts]
+    owners = dict.fromkeys(
+        joint_of(robot, row) for row, f in enumerate(robot.frames)
+        if f.joint == "fixed" and f.clearance and f.name not in contacts
+    )  # fmt: skip
+    loose = [name for name in owners if not moves(robot, name)]
     if not loose:
         return []
     return [

@@ -2,7 +2,8 @@
 
 A path consists of the frame's name and the keys of the number, such as
 ``leg1.link_a.link.beam.radius`` or ``leg1.elbow.clearance.radial``.  A frame's name
-without its leg means that frame in every leg.  Three numbers in brackets are x, y, z;
+without its leg means that frame in every leg.  A joint of several frames may be named
+too, such as ``ball.clearance.ball``.  Three numbers in brackets are x, y, z;
 six are rx .. tz, and so are the rows and columns of six by six (``stiffness.rx.ty``
 sets both entries of a symmetric matrix); six moments of inertia are xx, yy, zz, xy,
 xz, yz.
@@ -10,7 +11,7 @@ xz, yz.
 
 import copy
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from typing import Any
 from forcefit.assembly.files.drawing_file import is_drawing
 from forcefit.assembly.files.robot_file import declared_robot, robot_of, robot_table
 from forcefit.assembly.files.solved_links import solve_links
+from forcefit.assembly.model.joint_names import NamedJoint, joint_paths
 from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.steps.bolted import bolt_joints
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
@@ -51,11 +53,13 @@ class Design:
         file: name of the file, for messages; paths in the table are relative to its
             folder.
         name: name of the robot if the table has none.
+        joints: joints of several frames by name; a path may begin with one.
     """
 
     content: dict[str, Any]
     file: str
     name: str
+    joints: Mapping[str, NamedJoint] = field(default_factory=dict)
 
     @cached_property
     def paths(self) -> list[str]:
@@ -75,7 +79,8 @@ class Design:
             path: full path, or path with the frame's name without its leg.
 
         Returns:
-            One path, or one path for each leg.
+            One path, or one path for each leg, and for each bearing of a universal
+            joint.
 
         Raises:
             BadInput: the robot has no such number; the message names a similar one.
@@ -84,6 +89,9 @@ class Design:
         matches = [p for p in known if p == path] or [
             p for p in known if p.partition(".")[2] == path
         ]
+        for joint in () if matches else self.joints.values():
+            matches += joint_paths(joint, path)
+        matches = [p for p in matches if p in self.values]
         if not matches:
             hint = nearest(path, known) if known else ""
             raise BadInput(f"{self.file}: no number {quoted(path)}{hint}")
@@ -143,7 +151,7 @@ class Design:
 
 def design_of(robot: Robot) -> Design:
     """Return a robot in memory in the form of a robot file."""
-    return Design(robot_table(robot), robot.name, robot.name)
+    return Design(robot_table(robot), robot.name, robot.name, robot.joints)
 
 
 def load_design(name: str | Path) -> Design:
@@ -169,8 +177,8 @@ def load_design(name: str | Path) -> Design:
     if is_drawing(
         table
     ):  # its bodies may be copied, so numbers are addressed in frames
-        return Design(robot_table(robot), str(name), robot.name)
-    return Design(table.content, str(name), robot.name)
+        return Design(robot_table(robot), str(name), robot.name, robot.joints)
+    return Design(table.content, str(name), robot.name, robot.joints)
 
 
 def unit_of(path: str) -> str:

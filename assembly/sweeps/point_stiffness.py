@@ -19,6 +19,7 @@ from forcefit.assembly.linear.energy import CannotAssemble
 from forcefit.assembly.linear.reference.reduction import FreeMotion
 from forcefit.assembly.measurement.conditions import Conditions
 from forcefit.assembly.measurement.predict import assemble_row
+from forcefit.assembly.model.joint_names import shown_name
 from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.platform_stiffness.exact_tangent import exact_tangent
 from forcefit.assembly.platform_stiffness.linear_tangent import in_contact, owners
@@ -53,7 +54,7 @@ def _parts(robot: Robot, state: str) -> list[Part]:
     parts = list(dict.fromkeys(owners(joints)))
     if state == "contact":
         rows = np.unique(np.abs(joints.cones).argmax(axis=0) // 6)
-        parts += [Part(robot.frames[row].name, "clearance") for row in rows.tolist()]
+        parts += [Part(shown_name(robot, row), "clearance") for row in rows.tolist()]
     return parts + [_FORCES] * (state == "exact")
 
 

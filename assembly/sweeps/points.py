@@ -19,6 +19,7 @@ from forcefit.assembly.linear.pose_error import PoseError, bound_pose_error
 from forcefit.assembly.linear.zone import MARGINS, zone_margin
 from forcefit.assembly.measurement.conditions import Conditions
 from forcefit.assembly.measurement.predict import assemble_row, read
+from forcefit.assembly.model.joint_names import row_of
 from forcefit.assembly.model.link_stress import peak_stresses, stressed_links
 from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.model.statuses import (
@@ -302,7 +303,7 @@ def _record_wrenches(
     """Record the wrenches at the chosen frames, and the stress of the links."""
     out = solved.records
     if question.wrenches:
-        chosen = [robot.index(name) for name in question.wrenches]
+        chosen = [row_of(robot, name) for name in question.wrenches]
         out["wrench"][rows] = (wrenches - at_tips)[:, chosen]
     if question.strength is not None:
         stress = peak_stresses(robot, wrenches, at_tips)

@@ -14,6 +14,7 @@ from forcefit.assembly.exchange.robot_files import load_robot
 from forcefit.assembly.kinematics.closing import closing_of
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.linear.reference.pose_error import ASSUMPTIONS
+from forcefit.assembly.model.joint_names import row_of
 from forcefit.assembly.model.link_stress import stressed_names
 from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.model.statuses import OK, OUT_OF_REACH
@@ -149,7 +150,7 @@ def _check(options: SweepOptions, machine: Robot) -> None:
     if not 0 <= near <= 1:
         raise BadInput(f"--near: found {near:g}, expected a number from 0 to 1")
     for name in options.wrench_of:
-        machine.index(name)
+        row_of(machine, name)
     if strength is not None:
         if not 0 < strength < float("inf"):
             raise BadInput(f"--yield-strength: found {strength:g}, expected > 0")

@@ -1,5 +1,8 @@
 """The command ``forcefit assembly path``."""
 
+import sys
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -7,6 +10,7 @@ import typer
 
 from forcefit.commands.answer import answer
 from forcefit.commands.options import (
+    DriveForceOption,
     FigureOption,
     GravityOption,
     JsonOption,
@@ -15,8 +19,10 @@ from forcefit.commands.options import (
     RestOption,
     RobotArgument,
     note_closing,
+    parse_assignments,
     parse_gravity,
     parse_load,
+    parse_state,
 )
 from forcefit.commands.progress import one_thread, progress_lines
 from forcefit.commands.report import ReportOption, provenance
@@ -82,6 +88,14 @@ def path(
             help="Also bound the pose error, problem (27): frozen | free | none."
         ),
     ] = "none",
+    state: Annotated[
+        str,
+        typer.Option(
+            help="State of the platform's compliance: nominal (clearances at zero) | "
+            "contact (errors, loads, clearances) | exact (finite motions)."
+        ),
+    ] = "nominal",
+    drive_force: DriveForceOption = None,
     rest: RestOption = None,
     mismatch: MismatchOption = None,
     output: Annotated[
@@ -94,8 +108,10 @@ def path(
 ) -> None:
     """Compute the errors by inertia along a path.
 
-    Masses must be declared.  Vibration is left out.
+    Masses must be declared.  Vibration is left out.  With -o an interrupted
+    computation resumes when the command is run again.
     """
+    from forcefit.assembly.model.largest import LARGEST
     from forcefit.assembly.path.request import PathTimes, errors_along_path
     from forcefit.assembly.path.summary import path_summary, path_text
     from forcefit.assembly.sweeps.dataset import check_dataset
@@ -108,16 +124,19 @@ def path(
     times = PathTimes(
         profile, duration, speed, acceleration, interval, ends, points
     )  # fmt: skip
-    machine = _closed(robot, rest, mismatch)
-    with one_thread(), progress_lines() as update:
+    forces = drive_force and parse_assignments(drive_force, "--drive-force", LARGEST)
+    machine, source = _closed(robot, rest, mismatch), provenance(robot, path)
+    with one_thread(), progress_lines() as update, _resumable(output) as note:
         errors = errors_along_path(
             machine, path, times=times, load=wrench, gravity=g, assumption=assumption,
-            progress=lambda done, total: update("points", done, total),
+            state=parse_state(state), drive_force=forces or None, output=output,
+            command=source.command,
+            progress=lambda done, total: update("points", note(done), total),
         )  # fmt: skip
     summary = path_summary(errors)
     if output is not None:
         summary["output"] = str(output)
-    _write(summary, errors, provenance(robot, path), output, figure, report)
+    _write(summary, errors, source, figure, report)
     answer(summary, path_text(summary), summary["status"], json)
 
 
@@ -131,18 +150,37 @@ def _closed(robot: str, rest: str | None, mismatch: str | None) -> Any:
     return machine
 
 
+@contextmanager
+def _resumable(output: Path | None) -> Generator[Callable[[int], int], None, None]:
+    """Yield a function that notes finished points; on Ctrl-C print how to resume."""
+    done = [0]
+
+    def note(finished: int) -> int:
+        done[0] = finished
+        return finished
+
+    try:
+        yield note
+    except KeyboardInterrupt:
+        if output is None:
+            raise
+        from forcefit.assembly.sweeps.sweep import journal_path
+
+        print(
+            f"forcefit: interrupted; {done[0]} points are kept in "
+            f"{journal_path(output)}: run the same command again to continue",
+            file=sys.stderr,
+        )
+        raise typer.Exit(130) from None
+
+
 def _write(
-    summary: dict[str, Any], errors: Any, source: Any, output: Path | None,
-    figure: Path | None, report: Path | None,
+    summary: dict[str, Any], errors: Any, source: Any, figure: Path | None,
+    report: Path | None,
 ) -> None:  # fmt: skip
-    """Write data, picture and page."""
+    """Write picture and page."""
     from forcefit.assembly.path.report import path_page, plot_path
 
-    if output is not None:
-        from forcefit.assembly.path.dataset import path_dataset
-        from forcefit.assembly.sweeps.dataset import save_dataset
-
-        save_dataset(path_dataset(errors, source.command), output)
     if figure is not None:
         save_figure(plot_path(errors), figure)
     if report is not None:

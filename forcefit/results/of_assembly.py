@@ -53,6 +53,7 @@ MOBILITY = record(
 SOLUTION = record(
     "nominal_mismatch remarks load gravity reading? method?", _POSTURE, _SOLVED,
     joints=Each(number("joint coordinate", "rad or m")),
+    joint_frames_=Each(text("frame at the point and in the axes of a joint")),
     mobility=MOBILITY,
     zone_=ZONE,
     certificate_=record(

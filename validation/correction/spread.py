@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.assembly.effects.functions import (
+    along,
     in_session,
     inputs_of,
     is_loaded,
+    unit_screw,
     value_of,
 )
 from forcefit.assembly.measurement.conditions import Conditions
@@ -122,17 +124,17 @@ def _answer(
     conditions: Conditions, response: Responses, function: Function, component: str
 ) -> NDArray:
     """Return the (R, 6) derivatives of the deviation by a component of a function."""
-    axis = READING.index(component)
+    unit = unit_screw(conditions.robot, function.where, component)
     if function.where == "reading":
-        return np.broadcast_to(np.eye(6)[axis], (len(conditions), 6))
+        return np.broadcast_to(unit, (len(conditions), 6))
     if function.where == "base":
-        screw = np.zeros((len(conditions), 6))
-        screw[:, axis] = 1.0
+        screw = np.tile(unit, (len(conditions), 1))
         origin = conditions.postures.platform[:, :3, 3]
         screw[:, 3:] += np.cross(screw[:, :3], origin)
         return np.einsum("rij,rj->ri", response.reading, screw)
-    row = conditions.robot.index(function.where)
+    robot, row = conditions.robot, conditions.robot.index(function.where)
+    screws = along(robot, function.where, component, response.screws[:, :, row])
     if function.kind == "compliance":
-        wrench = response.wrenches[:, row, axis, None]
-        return response.screws[:, :, row, axis] * wrench
-    return response.screws[:, :, row, axis]
+        through = along(robot, function.where, component, response.wrenches[:, row])
+        return screws * through[:, None]
+    return screws

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.assembly.effects.functions import AXES
+from forcefit.assembly.effects.functions import AXES, THREAD
 from forcefit.assembly.effects.places import body_axis, drives, growing
 from forcefit.assembly.measurement.conditions import Conditions
 from forcefit.assembly.measurement.variables import variable
 from forcefit.assembly.model.function import Function
-from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.model.robot import Frame, Robot
 from forcefit.validation.diagnosis.function_forms import CandidateShape
 
 TURN, SHIFT = AXES[:3], AXES[3:]
@@ -80,6 +80,11 @@ def is_turn(component: str) -> bool:
     return component[0] in "rm"
 
 
+def own_component(frame: Frame) -> str:
+    """Return the component of a joint's own motion: along the thread if helical."""
+    return THREAD if frame.pitch else AXES[frame.own_axis]
+
+
 def variables_of(conditions: Conditions) -> list[str]:
     """Return the names of variables that vary and are known in a whole session.
 
@@ -135,11 +140,12 @@ def places_of(
     """
     single: list[tuple[str, tuple[str, ...]]]
     single = [(f.name, (axis,)) for f in robot.frames for axis in AXES]
+    single += [(f.name, (THREAD,)) for f in robot.frames if f.pitch]
     single += [(p, (axis,)) for p in ("base", "reading") for axis in AXES]
     single.append(("reading", AXES))
     for name in (*(f.name for f in robot.frames), "base"):
         single += [(name, TURN), (name, SHIFT)]
-    own = tuple((f.name, (AXES[f.own_axis],)) for f in robot.frames if f.actuated)
+    own = tuple((f.name, (own_component(f),)) for f in robot.frames if f.actuated)
     along = tuple((name, _along(robot, name)) for name in growing(robot))
     for name in variables:
         for where, components in single:

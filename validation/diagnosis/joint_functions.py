@@ -12,10 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.assembly.effects.friction_hysteresis import elastic_joints
-from forcefit.assembly.effects.functions import AXES
+from forcefit.assembly.effects.functions import AXES, THREAD
 from forcefit.assembly.effects.places import drives
 from forcefit.validation.diagnosis import function_forms as forms
-from forcefit.validation.diagnosis.candidates import Candidate, CandidatePart, places_of
+from forcefit.validation.diagnosis.candidates import (
+    Candidate,
+    CandidatePart,
+    own_component,
+    places_of,
+)
 from forcefit.validation.diagnosis.elements import Element
 from forcefit.validation.diagnosis.function_forms import CandidateShape, is_angle
 from forcefit.validation.diagnosis.functions import Functions
@@ -48,6 +53,8 @@ def _of_wrench(functions: Functions) -> list[tuple[Candidate, float]]:
     prior = -math.log(4.0 * max(len(functions.variables), 1) * max(len(joints), 1))
     listed = []
     for name, component, kind in joints:
+        if component == THREAD:  # no variable is the wrench along a thread
+            continue
         wrench = f"wrench.{name}.{'mf'[component[0] == 't']}{component[1]}"
         part = CandidatePart(name, (component,), wrench)
         listed.append((Candidate((part,), kind, _CUBIC), prior))
@@ -62,6 +69,8 @@ def _knees(functions: Functions, name: str, component: str) -> list[CandidateSha
     """Return laws with a knee for the load of a drive or spring along its motion."""
     robot = functions.conditions.robot
     frame, axis = robot.frame(name), AXES.index(component)
+    if frame.pitch:  # no variable is the wrench along a thread
+        return []
     if axis != frame.own_axis or name not in (*drives(robot), *elastic_joints(robot)):
         return []
     load = functions.sensitivities.wrenches[:, robot.index(name), axis]
@@ -85,7 +94,7 @@ def _at_drives(
 ) -> Iterator[tuple[str, Parts, list[CandidateShape]]]:
     """Return functions of all drives: common variables, and backlash over a turn."""
     conditions, robot = functions.conditions, functions.campaign.robot
-    own = [(f.name, (AXES[f.own_axis],)) for f in robot.frames if f.actuated]
+    own = [(f.name, (own_component(f),)) for f in robot.frames if f.actuated]
     if len(own) < 2:
         return
     sided = "approach" in functions.variables

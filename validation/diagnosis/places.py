@@ -11,11 +11,11 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.assembly.effects.functions import AXES
+from forcefit.assembly.effects.functions import along
 from forcefit.assembly.kinematics.nominal import size_of
 from forcefit.assembly.measurement.variables import LOADS
 from forcefit.validation.campaign.campaign import Campaign
-from forcefit.validation.diagnosis.candidates import is_turn, places_of
+from forcefit.validation.diagnosis.candidates import is_turn, own_component, places_of
 from forcefit.validation.diagnosis.gaussian import SIZES
 from forcefit.validation.diagnosis.nuisance import LARGEST_SHIFT, LARGEST_TURN
 from forcefit.validation.diagnosis.sensitivities import Sensitivities
@@ -150,7 +150,7 @@ class Places:
         name, component, kind = where
         frames = {f.name: f for f in self._campaign.robot.frames}
         frame = frames.get(name)
-        own = bool(frame and frame.actuated and AXES[frame.own_axis] == component)
+        own = bool(frame and frame.actuated and own_component(frame) == component)
         return kind != "screw", not own, frame is None
 
     def plausible(self, where: Where) -> float:
@@ -160,12 +160,12 @@ class Places:
         if name == "load":
             forces = np.abs(conditions.load[:, 3:])
             return _HEAVY * float(forces.max()) or _FORCE
-        axis = AXES.index(component)
-        most = self._plausible[axis // 3]
+        most = self._plausible[not is_turn(component)]
         if kind == "screw":
             return most
         row = conditions.robot.index(name)
-        w = self._sensitivities.wrenches[:, row, axis]
+        wrenches = self._sensitivities.wrenches[:, row]
+        w = along(conditions.robot, name, component, wrenches)
         size = float(np.sqrt(np.mean(w**2)))
         return most / size if size > 0 else 0.0
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.assembly.effects.forms import FORMS, roughness
-from forcefit.assembly.effects.functions import AXES, basis
+from forcefit.assembly.effects.functions import AXES, along, basis, unit_screw
 from forcefit.assembly.measurement.conditions import Conditions
 from forcefit.assembly.measurement.predict import predict
 from forcefit.assembly.measurement.variables import LOADS
@@ -96,18 +96,19 @@ class Sensitivities:
         """Return (R, 6) change of the reading per unit of a component at a place."""
         if where == "load":
             return self.under_load[self.rows, :, LOADS.index(component)]
-        axis = AXES.index(component)
+        unit = unit_screw(self.conditions.robot, where, component)
         if where == "reading":
-            return np.broadcast_to(np.eye(6)[axis], (len(self._origin), 6))
+            return np.broadcast_to(unit, (len(self._origin), 6))
         if where == "base":
-            screw = np.zeros((len(self._origin), 6))
-            screw[:, axis] = 1.0
+            screw = np.tile(unit, (len(self._origin), 1))
             screw[:, 3:] += np.cross(screw[:, :3], self._origin)
             return np.einsum("rij,rj->ri", self._response.reading, screw)
         row = self.conditions.robot.index(where)
-        sensitivity = self._response.screws[:, :, row, axis]
+        robot, response = self.conditions.robot, self._response
+        sensitivity = along(robot, where, component, response.screws[:, :, row])
         if kind == "compliance":
-            return sensitivity * self._response.wrenches[:, row, axis, None]
+            through = along(robot, where, component, response.wrenches[:, row])
+            return sensitivity * through[:, None]
         return sensitivity
 
     def _basis(

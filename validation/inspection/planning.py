@@ -92,8 +92,8 @@ def plan_rows(
         The plan.
 
     Raises:
-        BadInput: there are too few rows, or the closures hold at hardly any
-            configuration.
+        BadInput: there are too few rows, the closures hold at hardly any
+            configuration, or no effect changes the readings.
     """
     if rows < _FEWEST:
         raise BadInput(f"--rows: found {rows}, expected at least {_FEWEST}")
@@ -109,6 +109,12 @@ def plan_rows(
         for name, X in design_signatures(campaign, progress).columns.items()
         if np.any(X)
     }
+    if not columns:
+        raise BadInput(
+            f"{robot.name}: found no effect that changes the readings without "
+            "clearances, which a plan leaves out; expected geometric errors that close "
+            "without them"
+        )
     names = tuple(columns)
     criterion = _Criterion([columns[name] for name in names], count)
     chosen = criterion.exchanged(rng.permutation(count)[:rows])

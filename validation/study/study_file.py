@@ -15,6 +15,7 @@ from forcefit.assembly.exchange.robot_files import load_robot
 from forcefit.assembly.kinematics.closing import closing_of
 from forcefit.assembly.kinematics.posture import POSE
 from forcefit.assembly.linear.load import driven
+from forcefit.assembly.model.joint_names import error_rows
 from forcefit.assembly.model.largest import LARGEST_LENGTH
 from forcefit.assembly.model.random_errors import (
     SIGNS,
@@ -208,8 +209,9 @@ def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
         rows = table.table("explicit")
         errors = np.zeros((len(robot.frames), 6))
         for name in rows.content:
-            for frame in _known(rows, name, robot, [name]):
-                errors[robot.index(frame)] = rows.array(name, (6,), "rad, m")
+            for whole in _known(rows, name, robot, [name]):
+                for row, order in error_rows(robot, whole):
+                    errors[row, order] = rows.array(name, (6,), "rad, m")
         table.finish()
         given = "geometric errors given in the study file"
         return bolt_joints(robot.with_errors(fixed + errors)), given

@@ -107,11 +107,11 @@ REFUSED = {
                   + BUSHING.format("fa", "fc")),
         'drake:linear_bushing_rpy: found an element between "fa" and "fc" that may '
         "connect them and is not converted; expected joints: declare a joint"),
-    ("urdf", "a screw in gazebo"): (
-        urdf_with(K + '<gazebo><joint name="l" type="screw"><parent>a</parent>'
+    ("urdf", "a gearbox in gazebo"): (
+        urdf_with(K + '<gazebo><joint name="l" type="gearbox"><parent>a</parent>'
                   "<child>c</child></joint></gazebo>"),
-        "joint \"l\".type: found 'screw', expected fixed | revolute | continuous | "
-        "prismatic | ball | universal | revolute2"),
+        "joint \"l\".type: found 'gearbox', expected fixed | revolute | continuous | "
+        "prismatic | ball | universal | revolute2 | screw"),
     ("urdf", "a screw of drake"): (
         urdf_with(urdf_joint("k", "b", "c", "", "screw", "drake:joint")),
         "drake:joint \"k\".type: found 'screw', expected ball | universal | planar"),
@@ -176,10 +176,10 @@ REFUSED = {
         mjcf('<worldbody><site name="s" pos="0 0 0" fromto="0 0 0 1 0 0"/>'
              "</worldbody>"),
         'site "s".fromto: found equal points, or pos together with fromto'),
-    ("sdf", "a screw"): (
-        four_bar().replace('"pin_a" type="revolute"', '"pin_a" type="screw"'),
-        "joint \"pin_a\".type: found 'screw', expected fixed | revolute | "
-        "continuous | prismatic | ball | universal | revolute2"),
+    ("sdf", "a gearbox"): (
+        four_bar().replace('"pin_a" type="revolute"', '"pin_a" type="gearbox"'),
+        "joint \"pin_a\".type: found 'gearbox', expected fixed | revolute | "
+        "continuous | prismatic | ball | universal | revolute2 | screw"),
     ("sdf", "an unknown link"): (
         four_bar().replace("<child>coupler</child>", "<child>couple</child>"),
         'joint "pin_a".child: found "couple", expected a link or frame; did you '

@@ -6,6 +6,7 @@ import pytest
 from forcefit.assembly.exchange.convert import convert
 from forcefit.assembly.files.robot_file import read_robot
 from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.inputs.table import BadInput
 
 # crank 0.1, coupler 0.3, rocker 0.25, ground 0.3 [m]; at home the crank lies along x
 GROUND, CRANK, COUPLER, ROCKER = 0.3, 0.1, 0.3, 0.25
@@ -67,3 +68,89 @@ def test_sdf_four_bar_equals_the_law_of_cosines(tmp_path):
         assert (T @ [COUPLER, 0, 0, 1])[:2] == pytest.approx(pin(angle), abs=1e-9)
         start = [CRANK * np.cos(angle), CRANK * np.sin(angle), 0]
         assert T[:3, 3] == pytest.approx(start, abs=1e-9)
+
+
+def spindle(pitch, backwards=False, kind="screw", nut="", slide=""):
+    """Text of the SDF of a spindle that turns in a nut, which a slide guides."""
+    ends = ("nut", "spindle") if backwards else ("spindle", "nut")
+    return f"""<sdf version="1.10"><model name="press">
+<link name="spindle"/>
+<link name="nut"><pose>0 0 0.2 0 0 0</pose></link>
+<joint name="drive" type="revolute"><parent>world</parent><child>spindle</child>
+ <axis><xyz>0 0 1</xyz></axis></joint>
+<joint name="thread" type="{kind}"><parent>{ends[0]}</parent><child>{ends[1]}</child>
+ {pitch}<axis><xyz>0 0 1</xyz>{nut}</axis></joint>
+<joint name="guide" type="prismatic"><parent>world</parent><child>nut</child>
+ <axis><xyz>0 0 1</xyz>{slide}</axis></joint>
+</model></sdf>"""
+
+
+def press(tmp_path, text):
+    """The robot of a press whose spindle is driven, and what was left out."""
+    source = tmp_path / "press.sdf"
+    source.write_text(text)
+    loops = tmp_path / "loops.yaml"
+    loops.write_text("closed_loop: []\nname_mot: [drive]\nplatform: nut\n")
+    answer = convert(source, tmp_path / "press.toml", loops=loops)
+    return answer, read_robot(tmp_path / "press.toml")
+
+
+RIGHT = "<screw_thread_pitch>0.01</screw_thread_pitch>"  # [m per turn]
+
+
+@pytest.mark.parametrize(("pitch", "expected"), [
+    (RIGHT, 0.01),
+    ("<screw_thread_pitch>-0.01</screw_thread_pitch>", -0.01),
+    # [rad/m], positive for a left-hand thread
+    (f"<thread_pitch>{-2 * np.pi / 0.01}</thread_pitch>", 0.01),
+    (f"<thread_pitch>5</thread_pitch>{RIGHT}", 0.01),
+])  # fmt: skip
+@pytest.mark.parametrize("backwards", [False, True])
+def test_right_hand_thread_of_an_sdf_lowers_the_nut(
+    tmp_path, pitch, expected, backwards
+):
+    """A nut that does not turn sinks by the pitch when its spindle turns by +360 deg.
+
+    The order of parent and child does not change the hand of a thread.
+    """
+    _, robot = press(tmp_path, spindle(pitch, backwards))
+    for angle in (0.3, -2.0):
+        at = place_robot(robot, joints={"drive": angle}).transforms
+        T = at[robot.index("nut")]
+        height = 0.2 - expected * angle / (2 * np.pi)
+        assert T[:3, 3] == pytest.approx([0, 0, height], abs=1e-12)
+        assert T[:3, :3] == pytest.approx(np.eye(3), abs=1e-12)
+
+
+def test_home_of_a_screw_that_follows_its_slide_is_solved(tmp_path):
+    """Slide s = 0.02 m + 1 m/rad drive, and s = -lead drive: one angle fulfils both."""
+    rule = (
+        '<mimic joint="drive"><multiplier>1</multiplier><offset>0.02</offset></mimic>'
+    )
+    _, robot = press(tmp_path, spindle(RIGHT, slide=rule))
+    lead = 0.01 / (2 * np.pi)
+    found = robot.frame("drive").position
+    assert found == pytest.approx(-0.02 / (1 + lead), abs=1e-9)
+
+
+def test_range_and_spring_of_a_screw_are_left_out_by_name(tmp_path):
+    nut = "<limit><lower>-1</lower><upper>1</upper></limit>"
+    nut += "<dynamics><spring_stiffness>3</spring_stiffness></dynamics>"
+    answer, robot = press(tmp_path, spindle(RIGHT, nut=nut))
+    assert robot.frame("thread").limits is None
+    left_out = " ".join(answer.left_out)
+    assert (
+        "joint axis limit of a screw, whose unit the format does not state" in left_out
+    )
+    assert "joint axis dynamics, not converted, though it may carry load" in left_out
+
+
+@pytest.mark.parametrize(("pitch", "message"), [
+    ("", "screw_thread_pitch: missing; expected a number"),
+    ("<thread_pitch>0</thread_pitch>", "found 0, expected a thread of 1e-09 to 1 m"),
+    ("<screw_thread_pitch>2</screw_thread_pitch>", "found 2, expected a thread"),
+])  # fmt: skip
+def test_screw_of_an_sdf_without_a_pitch_is_refused(tmp_path, pitch, message):
+    with pytest.raises(BadInput, match=message):
+        press(tmp_path, spindle(pitch))
+    assert not (tmp_path / "press.toml").exists()

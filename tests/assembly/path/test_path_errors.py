@@ -224,7 +224,7 @@ LEG = """
 [[leg]]
 name = "leg{name}"
 repeat = {{ count = 3, about = [0, 0, 1] }}
-body = [{{ name = "nut" }}, {{ name = "screw", mass = {mass}, centre = {middle} }}]
+body = [{{ name = "nut" }}, {{ name = "screw", mass = {mass}, centre = {middle}, inertia = {inertia} }}]
 joint = [
     {{ name = "low", type = "{kind}", between = ["base", "nut"], at = {low}, {axes} }},
     {{ name = "drive", type = "prismatic", between = ["nut", "screw"], at = {low}, axis = {along}, actuated = true }},
@@ -233,8 +233,11 @@ joint = [
 """  # noqa: E501
 
 
-def six_legs(file, kind, mass=0.0):
-    """A Gough platform whose six legs have masses on their axes; and a leg's vector."""
+def six_legs(file, kind, mass=0.0, across=0.0, about=0.0):
+    """A Gough platform whose six legs have masses on their axes; and a leg's vector.
+
+    The moments of inertia of each leg across and about its axis are in kg m^2.
+    """
     text = SPHERICAL_ENDS
     for name, below, above in (("a", 10, 50), ("b", 110, 70)):
         low, top = (
@@ -245,9 +248,13 @@ def six_legs(file, kind, mass=0.0):
         first = np.cross(along, [0.0, 0.0, 1.0])
         second = np.cross(along, first)
         axes = f"axis = {first.tolist()}, axis2 = {second.tolist()}"
+        u = along / np.linalg.norm(along)
+        J = across * np.eye(3) + (about - across) * np.outer(u, u)
+        inertia = [*np.diag(J).tolist(), *J[np.triu_indices(3, 1)].tolist()]
         text += LEG.format(
             name=name, kind=kind, mass=mass, axes=axes, low=low.tolist(),
             top=top.tolist(), along=along.tolist(), middle=(low + 0.7 * along).tolist(),
+            inertia=inertia,
         )  # fmt: skip
     file.write_text(text)
     return read_robot(file), along
@@ -275,3 +282,39 @@ def test_legs_with_masses_on_their_axes_may_spin_without_a_change(tmp_path):
         errors = path_errors(robot, path, gravity=[0.0, 0.0, -9.81])
         forces.append(errors.arrays["drive_force"][0])
     np.testing.assert_allclose(forces[0], forces[1], rtol=1e-9)
+
+
+def test_round_legs_between_balls_keep_no_spin(tmp_path):
+    """Free of moments about their axes, they start and stay without spin.
+
+    So no force depends on their moment of inertia about the axis.
+    """
+    names = ["tx", "ty", "tz", "rx", "ry", "rz"]
+    pose, rate, second = [0.05, -0.02, 0.55, 0.1, -0.1, 0.2], [0.5] * 6, [-3.0] * 6
+    forces = []
+    for about in (0.0, 0.02):
+        robot, _ = six_legs(tmp_path / "six.toml", "spherical", 0.8, 0.02, about)
+        path = instants(names, [pose], [rate], [second])
+        errors = path_errors(robot, path, gravity=[0.0, 0.0, -9.81])
+        forces.append(errors.arrays["drive_force"][0])
+    np.testing.assert_allclose(forces[1], forces[0], rtol=1e-9)
+
+
+def test_thread_turns_the_force_of_a_slide_into_a_torque(tmp_path):
+    """A leg with its masses on its axis: the torque of its screw is h times the force.
+
+    The spindle turns many times, but has no inertia about its axis.
+    """
+    names = ["tx", "ty", "tz", "rx", "ry", "rz"]
+    pose, rate, second = [0.05, -0.02, 0.55, 0.1, -0.1, 0.2], [0.5] * 6, [-3.0] * 6
+    path, file = instants(names, [pose], [rate], [second]), tmp_path / "six.toml"
+    slides, _ = six_legs(file, "universal", mass=0.8)
+    threads = file.read_text().replace(
+        'type = "prismatic"', 'type = "helical", pitch = 0.01'
+    )
+    file.write_text(threads)
+    force, torque = (
+        path_errors(robot, path, gravity=[0.0, 0.0, -9.81]).arrays["drive_force"]
+        for robot in (slides, read_robot(file))
+    )
+    np.testing.assert_allclose(torque, 0.01 / (2 * np.pi) * force, rtol=1e-9)

@@ -7,6 +7,7 @@ import pytest
 
 from benchmarks.evidence.stiffness_random_robots import by_differences
 from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.files.robot_file import read_robot
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.kinematics.se3 import turn_jacobian
 from forcefit.assembly.linear.energy import solve_assembly
@@ -343,3 +344,37 @@ def test_stiffness_at_a_change_of_contact_depends_on_the_side(state):
     away = platform_stiffness(posture, state, side="letting go")
     assert stop.along(UNIT[5])[0] == np.inf
     assert away.along(UNIT[5])[0] == pytest.approx(1e5)
+
+
+def test_block_pressed_on_a_table_slides_and_is_rigid_across(tmp_path):
+    """Its drives cannot hold it within their clearances, nor can they tilt it."""
+    text = """
+format = 2
+name = "block"
+platform = "puck"
+platform_at = [0, 0, 0.02]
+body = [{ name = "puck" }]
+[[joint]]
+name = "table"
+type = "planar"
+between = ["base", "puck"]
+at = [0, 0, 0]
+axis = [0, 0, 1]
+clearance = { pad = { gap = 1e-5, length = 0.08, width = 0.06 } }
+[[leg]]
+name = "leg"
+repeat = { count = 3, about = [0, 0, 1] }
+body = [{ name = "sleeve" }, { name = "rod" }]
+joint = [
+    { name = "foot", type = "revolute", between = ["base", "sleeve"], at = [0, 0.4, 0], axis = [0, 0, 1], clearance = { radial = 1e-5, axial = 2e-5, tilt = 1e-3 } },
+    { name = "push", type = "prismatic", between = ["sleeve", "rod"], at = [0, 0.4, 0], axis = [-0.0643, -0.3234, 0], actuated = true, drive_stiffness = 1e6 },
+    { name = "head", type = "revolute", between = ["rod", "puck"], at = [-0.0643, 0.0766, 0], axis = [0, 0, 1], clearance = { radial = 1e-5, axial = 2e-5, tilt = 1e-3 } },
+]
+"""  # noqa: E501
+    file = tmp_path / "block.toml"
+    file.write_text(text)
+    posture = home_posture(read_robot(file))
+    tangent = platform_stiffness(posture, "contact", [0, 0, 0, 0, 0, -50])
+    assert tangent.free.shape == tangent.rigid.shape == (6, 3)
+    np.testing.assert_allclose(tangent.free[[0, 1, 5]], 0.0, atol=1e-9)
+    np.testing.assert_allclose(tangent.rigid[[2, 3, 4]], 0.0, atol=1e-9)

@@ -196,3 +196,27 @@ def test_path_through_a_point_out_of_reach_between_rows_is_refused(run, tmp_path
     status, out, err = run("assembly", "path", "five_bar", "--path", file, *words)
     assert (status, out) == (2, "")
     assert err.count("\n") == 1
+
+
+def test_path_refuses_a_drive_force_and_a_state_that_do_not_exist(run, slide):
+    asked = ["assembly", "path", slide / "slide.toml", "--path", slide / "way.csv",
+             "--profile", "quintic", "--duration", 0.05]  # fmt: skip
+    status, _, message = run(*asked, "--drive-force", "rial=3")
+    assert status == 2
+    assert 'no drive "rial"; did you mean "rail"' in message
+    status, _, message = run(*asked, "--state", "contcat", "-o", slide / "way.nc")
+    assert status == 2
+    assert "--state: found 'contcat'; did you mean" in message
+    assert not list(slide.glob("way.nc*"))
+
+
+def test_path_notes_components_that_it_leaves_free(run, tmp_path):
+    """A hexapod has six freedoms; two columns leave four of them open."""
+    rows = "pose.tx,pose.tz\n0,0.53\n0.01,0.53\n"
+    (tmp_path / "way.csv").write_text(rows)
+    status, out, _ = run(
+        "assembly", "path", "hexapod", "--path", tmp_path / "way.csv",
+        "--profile", "quintic", "--duration", 0.5, "--points", 5,
+    )  # fmt: skip
+    assert status == 0
+    assert "the path states tx, tz alone, and the platform has 6 freedoms" in out

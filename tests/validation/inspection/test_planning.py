@@ -2,11 +2,13 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.files.robot_file import read_robot, write_robot
+from forcefit.assembly.robots import load_robot
 from forcefit.validation.campaign.campaign_file import read_commands
 from forcefit.validation.inspection.planning import _Criterion
 from tests.campaigns_for_tests import ARM
@@ -63,3 +65,20 @@ def test_plan_refuses_wrong_options(tmp_path, run, option, value, says):
     assert code == 2
     assert says in error
     assert not (tmp_path / "plan").exists()
+
+
+def test_plan_refuses_a_rigid_robot_that_closes_in_its_clearances_only(tmp_path, run):
+    """A planar rigid four-bar whose coupler is twisted out of its plane."""
+    robot = load_robot("four_bar")
+    frames = tuple(
+        replace(f, link=None, joint_stiffness=None,
+                geometric_error=np.array([1e-5, 0, 0, 0, 0, 0]) * (f.name == "middle"))
+        for f in robot.frames
+    )  # fmt: skip
+    file = tmp_path / "rigid.toml"
+    write_robot(replace(robot, frames=frames), file)
+    folder = tmp_path / "plan"
+    code, _, message = run("validation", "plan", file, "--rows", "12", "-o", folder)
+    assert code == 2
+    assert not folder.exists()
+    assert "found no effect that changes the readings without clearances" in message

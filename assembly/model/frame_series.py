@@ -1,0 +1,92 @@
+"""Series of frames that are one joint of several freedoms, by their names.
+
+They are found by the names, the kinds and the common point of the frames, so that a
+robot file of frames that was converted from a drawing has the same joints.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from forcefit.assembly.model.frame import Frame
+from forcefit.stiffness.screws import rotation_matrix, transform
+
+_SAME = 1e-9  # [m] distance below which the frames of one joint are at one point
+# ends of the frames' names with their joints, from the first body to the second
+_SERIES: dict[tuple[tuple[str, str], ...], str] = {
+    (("first", "revolute"), ("second", "revolute")): "universal",
+    (
+        ("first", "revolute"),
+        ("second", "revolute"),
+        ("third", "revolute"),
+    ): "spherical",
+    (("turn", "revolute"), ("slide", "prismatic")): "cylindrical",
+    (
+        ("slide_x", "prismatic"),
+        ("slide_y", "prismatic"),
+        ("turn", "revolute"),
+    ): "planar",
+}
+
+
+@dataclass(frozen=True)
+class NamedJoint:
+    """A joint of several frames.
+
+    Attributes:
+        name: of the joint.
+        kind: ``"universal"``, ``"spherical"``, ``"cylindrical"`` or ``"planar"``.
+        frames: names of its frames with a freedom, parents first.
+        main: name of the frame at the joint's point and in its axes.
+        carriers: names of the frames with its geometric errors: two of a universal
+            joint, one of others.
+    """
+
+    name: str
+    kind: str
+    frames: tuple[str, ...]
+    main: str
+    carriers: tuple[str, ...]
+
+
+def joints_of(frames: Sequence[Frame]) -> dict[str, NamedJoint]:
+    """Return the joints of several frames by name, in the order of the frames.
+
+    Args:
+        frames: of a robot, parents first.
+    """
+    known = {frame.name: frame for frame in frames}
+    stems: dict[str, list[Frame]] = {}
+    for frame in frames:
+        stem, dot, _ = frame.name.rpartition(".")
+        if dot and frame.passive and stem not in known:
+            stems.setdefault(stem, []).append(frame)
+    found = (_joint(known, stem, parts) for stem, parts in stems.items())
+    return {joint.name: joint for joint in found if joint is not None}
+
+
+def _joint(
+    known: Mapping[str, Frame], stem: str, parts: list[Frame]
+) -> NamedJoint | None:
+    """The joint of the frames whose names begin alike, None if they are not one."""
+    ends = tuple((part.name[len(stem) + 1 :], part.joint) for part in parts)
+    kind = _SERIES.get(ends) or _SERIES.get(ends[::-1])
+    if kind is None or not _at_one_point(known, stem, parts):
+        return None
+    names = tuple(part.name for part in parts)
+    ordered = names if ends in _SERIES else names[::-1]
+    main = ordered[2] if kind == "planar" else ordered[0]
+    carriers = ordered if kind == "universal" else ordered[:1]
+    return NamedJoint(stem, kind, names, main, carriers)
+
+
+def _at_one_point(known: Mapping[str, Frame], stem: str, parts: list[Frame]) -> bool:
+    """Whether frames follow each other at one point, only contacts between them."""
+    frame, T = parts[-1], np.eye(4)
+    while frame is not parts[0]:
+        T = transform(frame.translation, rotation_matrix(frame.rotation)) @ T
+        if not frame.parent.startswith(f"{stem}."):
+            return False
+        frame = known[frame.parent]
+    return float(np.abs(T[:3, 3]).max()) <= _SAME
