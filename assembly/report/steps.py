@@ -29,8 +29,7 @@ from forcefit.results.display import listing, numbers
 from forcefit.results.text import lines_of
 
 QUANTILES = (0.05, 0.5, 0.95, 0.99)
-# machines that are carried through the steps together; with clearances one by one
-_BLOCK, _BLOCK_WITH_CLEARANCES = 10_000, 100
+_BLOCK = 2_000  # machines that are carried through the steps together
 _IN_CLEARANCES = (
     "clearances that no force determines stay as close as possible to where the last "
     "step left them; a clamp or a load determines them"
@@ -162,11 +161,10 @@ def drawn_steps(
         SolverFailed: the solver of the clearances gave up.
     """
     machine = machine_at(posture)
-    size = _BLOCK if not machine.cones.shape[1] else _BLOCK_WITH_CLEARANCES
     blocks: list[dict[tuple[str, str], NDArray]] = []
     try:
-        for first in range(0, len(errors), size):
-            some = errors[first : first + size]
+        for first in range(0, len(errors), _BLOCK):
+            some = errors[first : first + _BLOCK]
             blocks.append(_drawn_block(machine, plan, some, gravity))
             progress(first + len(some), len(errors))
     except KeyboardInterrupt:
