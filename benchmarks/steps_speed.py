@@ -30,9 +30,7 @@ def plan_of(robot: Robot) -> Plan:
 
 def main() -> None:
     """Print a line for each robot."""
-    print(
-        f"{'robot':10}{'frames':>7}{'steps':>7}{'all [s]':>9}{'machine and step [us]':>23}"
-    )
+    print("robot     frames  steps  all [s]  machine and step [us]")
     for name in ROBOTS:
         robot = load_robot(name)
         plan = plan_of(robot)
