@@ -39,7 +39,7 @@ def left(robot, rule):
 
 
 def test_slot_with_an_arm_reaches_its_corner():
-    """Tilt 2 mrad on an arm of 0.3 m adds to the radius of 1 mm, axial 0.2 mm does not."""
+    """Tilt of 2 mrad on an arm of 0.3 m adds to the radius of 1 mm."""
     gaps = Clearance(radial=1e-3, axial=2e-4, tilt=2e-3)
     slot = Frame("slot", "base", locked_at=LockedAt(gaps, **WORST))
     arm = Frame("arm", "slot", translation=[0, 0, 0.3])
