@@ -34,6 +34,11 @@ _IN_CLEARANCES = (
     "clearances that no force determines stay as close as possible to where the last "
     "step left them; a clamp or a load determines them"
 )
+_ADJUSTED = (
+    "an adjustment to a frame, or under loads, is the better of two local leasts: the "
+    "one near the present error, and the one near the change that is best while all "
+    "clearances stay where they are pressed"
+)
 
 
 def steps_of(
@@ -63,6 +68,8 @@ def steps_of(
     }  # fmt: skip
     if machine.cones.shape[1]:
         results["remarks"].append(_IN_CLEARANCES)
+        if any(isinstance(step, Adjust) for step in plan.steps):
+            results["remarks"].append(_ADJUSTED)
     if best is not None:
         results["order"] = {
             "objective": objective, "value": best.value, "bound": best.bound,
