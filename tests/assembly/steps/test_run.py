@@ -615,13 +615,13 @@ def test_shim_of_a_loaded_robot_with_clearances_needs_the_least_energy_nearby(rn
     frame = robot.frame(last[1])
     load = Preload("force", robot.platform, np.array([0, 0, 0.3, 2.0, -5.0, 0]))
     fixture = Fix("fixture", robot.platform, dict.fromkeys(SCREW, 0.0))
-    shim = Adjust("shim", frame.name, ("TZ",), Measure("gap", last))
+    shim = Adjust("shim", frame.name, ("TX",), Measure("gap", last))
     release = Release("free", ("fixture",))
     before = (fixture, load)
 
     def energy(change):
         moved = errors.copy()
-        moved[robot.index(frame.name), SCREW.index("TZ")] += change
+        moved[robot.index(frame.name), SCREW.index("TX")] += change
         posture = home_posture(robot.with_errors(moved))
         plan = Plan((*before, Join("last", last), release))
         return assemble_in_steps(plan, posture)[-2].energy[0]
