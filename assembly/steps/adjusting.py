@@ -62,6 +62,8 @@ def adjustment_of(machine: Machine, state: State, step: Adjust) -> NDArray:
     Raises:
         BadInput: clearances are loose, and the frame's joint is bolted.
     """
+    if step.amount is not None:
+        return np.broadcast_to(step.amount, (len(state.errors), len(step.components)))
     if state.is_linear(machine):
         amount = _linear_adjustment(machine, state, step)
     elif state.loads or isinstance(step.reading.part, str):

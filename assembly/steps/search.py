@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 
 from forcefit.assembly.kinematics.posture import Posture
 from forcefit.assembly.linear.reference.energy import CannotAssemble
+from forcefit.assembly.steps.amounts import with_best_amounts
 from forcefit.assembly.steps.influence import depends_on_state
 from forcefit.assembly.steps.machine import Machine, machine_at
 from forcefit.assembly.steps.plan import Adjust, Join, Plan, Step, check_plan
@@ -45,9 +46,11 @@ class BestOrder:
     """The best order of a plan.
 
     Attributes:
-        plan: the plan in that order.
+        plan: the plan in that order, with the changes of its adjustments.
         value: of the objective [N, J or m].
-        bound: lower bound over all orders; equal to ``value`` where all were searched.
+        bound: lower bound over all orders; equal to ``value`` where all were searched,
+            0 where other changes of the adjustments than those of their readings were
+            found to be better.
         given: value of the plan as given; inf if it cannot be assembled.
         searched: number of sets or of partial orders that were computed.
         method: ``"sets"`` or ``"orders"``.
@@ -99,7 +102,16 @@ def best_order(
         if found.value < given * (1 - _EQUAL):
             return found
         return replace(found, plan=plan, value=given, bound=min(given, found.bound))
-    return _over_orders(search, start, plan, given)
+    found = _over_orders(search, start, plan, given)
+
+    def many(count: int) -> State:
+        errors = np.repeat(start.errors, count, axis=0)
+        return first_state(machine, plan, errors, gravity)
+
+    own = found.plan, machine, many, objective, found.value
+    best, value = with_best_amounts(*own)
+    bound = found.bound if value == found.value else 0.0
+    return replace(found, plan=best, value=value, bound=bound)
 
 
 @dataclass(eq=False)

@@ -13,6 +13,7 @@ from forcefit.assembly.steps.plan import Adjust, Fix, Join, Measure, Plan, Relea
 from forcefit.assembly.steps.run import assemble_in_steps
 from forcefit.assembly.steps.search import OBJECTIVES, best_order
 from tests.assembly.steps.robots_for_steps import leg, planar_platform, three_legs
+from tests.assembly.steps.test_run import LENGTHS, gough
 
 LEG = {i: ("platform", f"leg{i}") for i in (1, 2, 3)}
 
@@ -90,6 +91,31 @@ def test_adjustments_change_places_with_joins_to_reduce_the_error():
     found = best_order(given, posture, "error")
     assert found.value == pytest.approx(0.0, abs=1e-12)
     assert [step.name for step in found.plan.steps].index("shim") == 2
+
+
+def test_least_error_changes_the_adjustments_too():
+    """Leg 6 of the Gough platform: -34.1 um leave 5.4 um, where -40 um make TZ zero."""
+    shim = Adjust("shim", "leg6", ("TZ",), Measure("z", "platform", ("TZ",)))
+    found = best_order(Plan((shim,)), gough(LENGTHS), "error")
+    assert found.given == pytest.approx(6.6e-6, abs=0.05e-6)
+    assert found.value == pytest.approx(5.4e-6, abs=0.05e-6)
+    assert found.plan.steps[0].amount == pytest.approx([-34.1e-6], abs=0.05e-6)
+    assert found.bound == 0.0
+    assert outcome(found.plan, gough(LENGTHS), "error") == pytest.approx(found.value)
+
+
+def test_least_energy_changes_the_adjustments_within_their_increments():
+    """A shim of 50 um leaves no energy. One of 40 um leaves a gap of 10 um to two legs
+    of 1e6 N/m in series, 25 uJ."""
+    posture = legs_on_a_guide((10e-6, 60e-6))
+    reading = Measure("z", "platform", ("TZ",))
+    joins = tuple(Join(f"{i}", ("platform", f"leg{i}")) for i in range(2))
+    for increment, amount, energy in ((0.0, 50e-6, 0.0), (40e-6, 40e-6, 25e-6)):
+        shim = Adjust("shim", "leg0", ("TZ",), reading, increment)
+        found = best_order(Plan((*joins, shim)), posture, "energy")
+        (shim,) = (step for step in found.plan.steps if isinstance(step, Adjust))
+        assert shim.amount == pytest.approx([amount], rel=1e-6)
+        assert found.value == pytest.approx(energy, rel=1e-6, abs=1e-12)
 
 
 def test_adjustment_to_a_closure_stays_before_the_step_that_joins_it():
