@@ -11,7 +11,7 @@ at least that of the state with all pinned parts joined and the locked ones left
 The least error has no bound.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from heapq import heappop, heappush
 from itertools import groupby
@@ -24,9 +24,10 @@ from numpy.typing import ArrayLike
 from forcefit.assembly.kinematics.posture import Posture
 from forcefit.assembly.linear.reference.energy import CannotAssemble
 from forcefit.assembly.steps.amounts import with_best_amounts
+from forcefit.assembly.steps.choices import choices, movable_runs, order_matters
 from forcefit.assembly.steps.influence import depends_on_state
 from forcefit.assembly.steps.machine import Machine, machine_at
-from forcefit.assembly.steps.plan import Adjust, Join, Plan, Step, check_plan
+from forcefit.assembly.steps.plan import Join, Plan, Step, check_plan
 from forcefit.assembly.steps.run import StepResult, carry_out
 from forcefit.assembly.steps.state import State, closed_rows, first_state, settle
 from forcefit.inputs.table import BadInput, quoted
@@ -96,7 +97,7 @@ def best_order(
     runs = [list(run) for _, run in groupby(plan.steps, lambda s: isinstance(s, Join))]
     search = _Search(machine, objective, progress, most)
     given = search.value_of(start, plan.steps)
-    pinned = not any(map(_order_matters, _movable_runs(plan.steps)))
+    pinned = not any(map(order_matters, movable_runs(plan.steps)))
     if pinned and objective == "force":
         found = _over_sets(search, start, runs, given)
         if found.value < given * (1 - _EQUAL):
@@ -303,42 +304,9 @@ def _children(
 ) -> list[_Partial]:  # fmt: skip
     """Return a partial order continued by each step that may come next."""
     children = []
-    for step, others in _choices(left):
+    for step, others in choices(left):
         found = search.carry_out(state, step)
         if found is not None:
             worst = max(peak, _force(found[1]))
             children.append((found[0], worst, (*done, step), others))
     return children
-
-
-def _choices(left: tuple[Step, ...]) -> Iterator[tuple[Step, tuple[Step, ...]]]:
-    """Yield the steps that may come next, with those that are left then."""
-    for i, step in enumerate(left):
-        movable = isinstance(step, (Join, Adjust))
-        if i and not movable:
-            return
-        if not any(_keep_order(earlier, step) for earlier in left[:i]):
-            yield step, left[:i] + left[i + 1 :]
-        if not movable:
-            return
-
-
-def _keep_order(one: Step, other: Step) -> bool:
-    """Return whether one step adjusts a closure that the other one joins."""
-    steps = {type(one): one, type(other): other}
-    join, adjust = steps.get(Join), steps.get(Adjust)
-    if not isinstance(join, Join) or not isinstance(adjust, Adjust):
-        return False
-    return join.part == adjust.reading.part
-
-
-def _movable_runs(steps: tuple[Step, ...]) -> list[list[Step]]:
-    """Return the runs of steps that may change places among themselves."""
-    runs = groupby(steps, lambda step: isinstance(step, (Join, Adjust)))
-    return [list(run) for movable, run in runs if movable]
-
-
-def _order_matters(run: list[Step]) -> bool:
-    """Return whether the state after a run depends on its order."""
-    joins = [step for step in run if isinstance(step, Join)]
-    return any(map(depends_on_state, run if joins else joins))

@@ -1,5 +1,6 @@
 """The worst position of a bolted joint: by hand, and against sampled positions."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -93,7 +94,24 @@ def test_bracket_of_a_four_bar_holds_all_sampled_positions(tmp_path, angle):
         assert 0.98 * largest <= low <= high
 
 
-def test_command_names_the_assumption_and_refuses_loads(tmp_path):
+def test_command_error_bounds_the_worst_bolt(tmp_path, run):
+    """The values of the command are those of the function."""
+    key = '{ joints = { crank = 1.2 }, left = "worst" }'
+    path = four_bar(tmp_path, key)
+    status, text, _ = run("assembly", "error", path, "--joint", "crank=0.4")
+    assert status == 0
+    assert "bolted at worst, rotation" in text
+    words = ("assembly", "error", path, "--joint", "crank=0.4", "--json", "-")
+    status, text, _ = run(*words)
+    found = json.loads(text)["bolted_worst"]
+    robot = bolt_joints(load_robot(path))
+    worst = worst_left(place_robot(robot, joints={"crank": 0.4}))
+    bounds = [found["translation"][key] for key in ("lower", "upper")]
+    assert bounds == pytest.approx(worst.translation)
+    assert found["assumption"] == BRACKET
+
+
+def test_report_names_the_assumption_and_refuses_loads(tmp_path):
     """The text has both brackets; the worst position under a load is not defined."""
     key = '{ joints = { crank = 1.2 }, left = "worst" }'
     robot = bolt_joints(load_robot(str(four_bar(tmp_path, key))))
