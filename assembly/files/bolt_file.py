@@ -10,7 +10,7 @@ from forcefit.inputs.table import Table, describe
 
 _EXPECTED = (
     '"home", { pose = { tx = .. } } or { joints = { NAME = .. } }, with left = '
-    '"uniform" for a random position'
+    '"uniform" for a random position or "worst"'
 )
 
 

@@ -34,6 +34,14 @@ void newton(const ConeProblem &given, const Limits &limits, double *u, double *y
 // than required.
 int64_t farthest(const AskedBody &asked, double *bounds, double *screw);
 
+// Cone programmes of the same G and H: positions u (count, nu) and multipliers (count,
+// r + p) of the rows of G and H.
+void minimise_all(const ConeProblems &given, double *u, double *y);
+
+// The points of {|u_k| <= 1 for each cone k, H u = H u0} closest to given ones.
+// Overwrites u0 (count, nu), where solved (count,) is set.
+void closest_points(const Projections &given, double *u, int64_t *solved);
+
 // Follows every target along its straight line.
 void follow_all(const Tree &tree, const Targets &targets, Tracks &out);
 

@@ -83,6 +83,22 @@ struct ConeProblem {
     const double *G, *h, *d, *H, *k;      // (r, nu), (r,), (nu,), (p, nu), (p,)
 };
 
+// count of these problems with the same G, H and cones: h (count, r), d (count, nu), k
+// (count, p).
+struct ConeProblems {
+    int64_t count, r, p, cones;
+    const int64_t *starts;
+    const double *G, *h, *d, *H, *k;
+};
+
+// Points of one set: count points (count, nu) of which the closest one is asked, rows (p,
+// nu) that keep their values, and the cones (count, nu) whose positions are kept: 1.
+struct Projections {
+    int64_t count, p, cones;
+    const int64_t *starts;
+    const double *rows, *from, *kept;
+};
+
 // Required gap; for Newton's method the largest number of steps and the first sigma.
 struct Limits {
     double relative, absolute, first_sigma;

@@ -65,7 +65,7 @@ class Clearance:
             raise BadInput(f"clearance.{key}: {ONE_OF_BALL}")
 
 
-LEFT = ("least", "uniform")  # rules for the position in which a joint is bolted
+LEFT = ("least", "uniform", "worst")  # rules for the position of a bolted joint
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +77,9 @@ class LockedAt:
         pose: components ``tx .. rz`` [m, rad] of the platform at that pose.
         joints: or coordinates [rad or m] of drives; home if both are empty.
         left: where the fitter leaves drawn machines: ``"least"``, the least sum of
-            squares among the positions of least energy, or ``"uniform"``, any of them.
+            squares among the positions of least energy; ``"uniform"``, any of them; or
+            ``"worst"``, the one with the largest pose error, which ``assembly error``
+            bounds.
         screw: (6,) [rad, m] clearance that is locked in; it is part of the geometric
             error.  Computed by :func:`forcefit.assembly.steps.bolted.bolt_joints`.
     """

@@ -20,6 +20,7 @@ from forcefit.assembly.linear.reference.reduction import FreeMotion
 from forcefit.assembly.report.first_order import singular_status
 from forcefit.assembly.report.results import proof_status
 from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.assembly.steps.worst_left import is_left_worst, worst_left
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import listing
 from forcefit.results.text import lines_of, value_text
@@ -51,7 +52,8 @@ def pose_error_of(
         The keys of the public format; ``status`` as in :func:`solution_of`.
 
     Raises:
-        BadInput: the assumption ``budget`` is requested with a load.
+        BadInput: the assumption ``budget`` is requested with a load, or a joint of a
+            loaded robot is left ``"worst"``.
     """
     loaded = bool(np.any(load) or np.any(gravity) or driven(posture.robot))
     if loaded and "budget" in (assumptions or ()):
@@ -93,6 +95,13 @@ def pose_error_of(
                 table[name]["along"] = along
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         return results | {"status": failure_status(error), "reason": str(error)}
+    if is_left_worst(posture.robot):
+        if loaded:
+            raise BadInput(
+                f'{posture.robot.name}: found a load and a joint with left = "worst", '
+                "expected no load; the worst position is that without loads"
+            )
+        results["bolted_worst"] = _worst_left(posture, offset)
     certificate = {"relative_gap": assembly.relative_gap()}
     return results | proof_status("; ".join(unproved)) | {
         "energy": assembly.energy, "platform_screw": assembly.platform_screw,
@@ -108,6 +117,16 @@ def _bounds(bound: PoseError) -> dict[str, Any]:
         "cuts": bound.supports,
         "method": bound.method,
     }
+
+
+def _worst_left(posture: Posture, offset: NDArray) -> dict[str, Any]:
+    """Return the bounds over all positions in which joints may be bolted."""
+    worst = worst_left(posture, offset)
+    bounds = {
+        part: dict(zip(("lower", "upper"), getattr(worst, part), strict=True))
+        for part in ("rotation", "translation")
+    }
+    return bounds | {"assumption": worst.assumption}
 
 
 def _support(
@@ -145,6 +164,11 @@ def pose_error_text(results: dict[str, Any]) -> str:
             lines[f"{assumption}, along the direction"] = _bounds_text(
                 part, bounds["along"]
             )
+    if "bolted_worst" in results:
+        worst = results["bolted_worst"]
+        for part in ("rotation", "translation"):
+            lines[f"bolted at worst, {part}"] = _bounds_text(part, worst[part])
+        lines["bolted at worst"] = worst["assumption"]
     return listing(results["robot"], lines, results.get("remarks", ()))
 
 

@@ -29,11 +29,15 @@ from forcefit.results.display import listing, numbers
 from forcefit.results.text import lines_of
 
 QUANTILES = (0.05, 0.5, 0.95, 0.99)
-# machines that are carried through the steps together; with clearances one by one
-_BLOCK, _BLOCK_WITH_CLEARANCES = 10_000, 100
+_BLOCK = 2_000  # machines that are carried through the steps together
 _IN_CLEARANCES = (
     "clearances that no force determines stay as close as possible to where the last "
     "step left them; a clamp or a load determines them"
+)
+_ADJUSTED = (
+    "an adjustment to a frame, or under loads, is the better of two local leasts: the "
+    "one near the present error, and the one near the change that is best while all "
+    "clearances stay where they are pressed"
 )
 
 
@@ -64,6 +68,8 @@ def steps_of(
     }  # fmt: skip
     if machine.cones.shape[1]:
         results["remarks"].append(_IN_CLEARANCES)
+        if any(isinstance(step, Adjust) for step in plan.steps):
+            results["remarks"].append(_ADJUSTED)
     if best is not None:
         results["order"] = {
             "objective": objective, "value": best.value, "bound": best.bound,
@@ -162,11 +168,10 @@ def drawn_steps(
         SolverFailed: the solver of the clearances gave up.
     """
     machine = machine_at(posture)
-    size = _BLOCK if not machine.cones.shape[1] else _BLOCK_WITH_CLEARANCES
     blocks: list[dict[tuple[str, str], NDArray]] = []
     try:
-        for first in range(0, len(errors), size):
-            some = errors[first : first + size]
+        for first in range(0, len(errors), _BLOCK):
+            some = errors[first : first + _BLOCK]
             blocks.append(_drawn_block(machine, plan, some, gravity))
             progress(first + len(some), len(errors))
     except KeyboardInterrupt:

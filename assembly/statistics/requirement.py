@@ -141,7 +141,13 @@ class Requirement:
 
     @cached_property
     def convex(self) -> dict[str, list]:
-        """Prepared postures by limit, for limits that are convex in the errors."""
+        """Prepared postures by limit, for limits that are convex in the errors.
+
+        With bolted joints none is: the clearance that is locked in is not linear in the
+        errors.
+        """
+        if any(frame.locked_at for frame in self.postures[0].robot.frames):
+            return {}
         return {key: self.prepared[key] for key in CONVEX if key in self.prepared}
 
     @property

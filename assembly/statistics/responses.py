@@ -1,11 +1,14 @@
 """A limited quantity as a function of the errors, with its slopes by each error."""
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.assembly.linear.energy import Assembly
 from forcefit.assembly.model.error_distributions import draw_generator
 from forcefit.assembly.model.link_stress import WEIGHTLESS, LinkStress, stressed_links
+from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.statistics.callout_sources import Sources
 from forcefit.assembly.statistics.clearance_positions import (
     CLEARANCE_STREAM,
@@ -19,9 +22,13 @@ from forcefit.assembly.statistics.worst_clearance import (
     bound_worst_errors,
     worst_error_slopes,
 )
+from forcefit.assembly.steps.bolted import bolted_errors
 
 _STEP = 1e-6  # relative to a wrench: step for differences of the stress formula
 _PRECISION = 1e-9  # [rad or m] required precision of the largest pose errors
+# step for differences of bolted joints, relative to the largest value of a number, and
+# the smallest such value
+_BOLT_STEP, _LEAST_VALUE = 1e-4, 1e-6
 _PARTS = {"moment": slice(0, 3), "force": slice(3, 6)}
 
 
@@ -48,16 +55,22 @@ def respond(
             :class:`forcefit.assembly.statistics.experiment.Experiment`.
 
     Returns:
-        (k,) values and (k, m) slopes; NaN without a solution.
+        (k,) values and (k, m) slopes; NaN without a solution.  Joints are bolted with
+        these errors, at the least sum of squares.
+
+    Raises:
+        CannotBolt: a robot cannot be assembled where its joint is bolted.
     """
-    errors = sources.errors(values)
+    robot = prepared.posture.robot
+    errors = bolted_errors(robot, sources.errors(values))
+    by_number = partial(_by_number, robot, sources, values)
     if isinstance(prepared, PostureMargins):
         margins = prepared.solve(errors)
         slopes = prepared.slopes(margins)
-        return margins.margin, sources.of_numbers(slopes)
+        return margins.margin, by_number(slopes)
     draws = prepared.solve(errors)
     if key == "energy":
-        return draws.energy, -sources.of_numbers(draws.wrenches)
+        return draws.energy, -by_number(draws.wrenches)
     size = np.full(len(values), np.nan)
     slopes = np.full(errors.shape, np.nan)
     # draws whose clearances are not known have unknown active bounds
@@ -76,7 +89,25 @@ def respond(
         slopes[solved] = solution_slopes(
             prepared, some, by_wrench, by_screw, by_clearance
         )
-    return size, sources.of_numbers(slopes)
+    return size, by_number(slopes)
+
+
+def _by_number(
+    robot: Robot, sources: Sources, values: NDArray, slopes: NDArray
+) -> NDArray:
+    """Return (k, m) slopes by the numbers of the sources from those by all errors.
+
+    A bolted joint locks in a clearance that depends on the errors; its derivatives are
+    central differences.
+    """
+    if not any(frame.locked_at for frame in robot.frames):
+        return sources.of_numbers(slopes)
+    k, m = values.shape
+    steps = np.diag(_BOLT_STEP * np.maximum(np.abs(values).max(axis=0), _LEAST_VALUE))
+    moved = np.concatenate([values + step for step in (*steps, *-steps)])
+    ahead, behind = bolted_errors(robot, sources.errors(moved)).reshape(2, m, k, -1)
+    change = (ahead - behind) / (2 * np.diag(steps))[:, None, None]
+    return np.asarray(np.einsum("mkn,kn->km", change, slopes.reshape(k, -1)))
 
 
 def _pose_error(

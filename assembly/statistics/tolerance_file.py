@@ -39,10 +39,10 @@ def read_plan(path: Path | str, robot: Robot) -> Plan:
         The plan.
 
     Raises:
-        BadInput: the file violates a rule, or a joint of the robot is bolted at a pose.
+        BadInput: the file violates a rule, or a joint of the robot is bolted at a pose
+            and the worst case of callouts is asked for.
     """
     root = read_toml(path)
-    refuse_bolted(robot, "allocation of tolerances")
     cost = _choice(root, "cost", COSTS)
     distribution = _choice(root, "distribution", ("uniform", "truncated"))
     asked_yield = root.number("yield", "1", 1.0, above=0.0, largest=1.0)
@@ -58,6 +58,8 @@ def read_plan(path: Path | str, robot: Robot) -> Plan:
         raise root.bad("tolerance", "missing; expected tables [[tolerance]]")
     groups = _groups(root, tables, robot)
     others = sorted(set(limits or {"margin_free"}) - set(POSE_ERRORS))
+    if groups.callouts and asked_yield == 1.0:
+        refuse_bolted(robot, "worst case of callouts (yield = 1)")
     if groups.callouts and asked_yield == 1.0 and others:
         fault = f"found 1 with callouts and a limit on {others[0]}"
         expected = "expected less than 1, or limits on rotation and translation only"

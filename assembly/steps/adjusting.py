@@ -1,4 +1,17 @@
-"""Adjustments: a change of geometric errors that makes a reading least."""
+"""Adjustments: a change of geometric errors that makes a reading least.
+
+Three cases differ:
+
+====================== =============================================================
+no loose clearance     the reading is linear in the change: least squares
+closure, no loads      convex in the change and the clearances together: one equilibrium
+frame, or loads        piecewise linear in the change, because the equilibrium decides
+                       which clearances are in contact: Gauss and Newton's method to
+                       local leasts, of which the least is taken.  It starts from the
+                       present error, and from the change that is best if the
+                       clearances stay where they are pressed
+====================== =============================================================
+"""
 
 from dataclasses import replace
 
@@ -16,6 +29,13 @@ from forcefit.assembly.steps.state import (
     with_hold,
 )
 from forcefit.inputs.table import BadInput, quoted
+
+_MOST_STEPS, _HALVINGS = 30, 12  # of Gauss and Newton's method, of each of its steps
+_STEP = 1e-7  # [rad, reference lengths] step of the differences
+_FLAT = (
+    1e-6  # share of the steepest slope below which a slope is the differences' error
+)
+_SETTLED = 1e-7  # relative reduction of the reading below which the search ends
 
 
 def with_adjustment(
@@ -40,13 +60,16 @@ def adjustment_of(machine: Machine, state: State, step: Adjust) -> NDArray:
         The changes of the components of the frame's geometric error.
 
     Raises:
-        BadInput: clearances are loose, and the reading is a frame, loads act, or the
-            frame's joint is bolted.
+        BadInput: clearances are loose, and the frame's joint is bolted.
     """
+    if step.amount is not None:
+        return np.broadcast_to(step.amount, (len(state.errors), len(step.components)))
     if state.is_linear(machine):
         amount = _linear_adjustment(machine, state, step)
+    elif state.loads or isinstance(step.reading.part, str):
+        amount = _best_local_adjustment(machine, state, step)
     else:
-        _check_convex(machine, state, step)
+        _check_not_bolted(machine, state, step)
         amount = _closing_adjustment(machine, state, step)
     if step.increment:
         amount = step.increment * np.round(amount / step.increment)
@@ -68,19 +91,79 @@ def _linear_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
     return -value @ np.linalg.pinv(slopes * unit).T * unit
 
 
-def _check_convex(machine: Machine, state: State, step: Adjust) -> None:
-    """Refuse adjustments that are not least energies, where clearances are loose."""
-    where = f"step {quoted(step.name)}: found clearances that are not bolted, and"
-    only = "only the energy of closing a closure without loads is made least there"
-    if isinstance(step.reading.part, str):
-        raise BadInput(f"{where} a frame as the reading; {only}")
-    if state.loads:
-        raise BadInput(
-            f"{where} the loads {', '.join(map(quoted, state.loads))}; {only}"
-        )
+def _best_local_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
+    """Return the better one of the changes at two local leasts of the reading."""
+    none = np.zeros((len(state.errors), len(step.components)))
+    amount, size = _local_adjustment(machine, state, step, none)
+    pressed = _linear_adjustment(*_with_pressed_clearances(machine, state), step)
+    other, other_size = _local_adjustment(machine, state, step, pressed)
+    better = other_size < size * (1 - _SETTLED)
+    return np.where(better[:, None], other, amount)
+
+
+def _with_pressed_clearances(machine: Machine, state: State) -> tuple[Machine, State]:
+    """Return the machine with all clearances as errors, where they are now."""
+    moved, joints = state.found.clearances @ machine.cones.T, machine.joints
+    fixed = replace(joints, cones=joints.cones[:, :0], group=joints.group[:0])
+    found = replace(state.found, clearances=state.found.clearances[:, :0])
+    held = replace(state, errors=state.errors + moved, found=found)
+    return replace(machine, joints=fixed), held
+
+
+def _local_adjustment(
+    machine: Machine, state: State, step: Adjust, start: NDArray
+) -> tuple[NDArray, NDArray]:
+    """Return the change at a local least of the reading, and the (k,) least."""
+    unit = 1 / machine.scale[rows_of(step.components)]
+    amount = start
+    value, slopes = _value_and_slopes(machine, state, step, amount)
+    for _ in range(_MOST_STEPS):
+        inverse = np.linalg.pinv(slopes * unit, rcond=_FLAT)
+        change = -np.einsum("kcp,kp->kc", inverse, value) * unit
+        size, going = np.linalg.norm(value, axis=1), np.ones(len(value), dtype=bool)
+        for _ in range(_HALVINGS):  # a step may end in another set of contacts
+            trial = amount + change * going[:, None]
+            found = _value_at(machine, state, step, trial)
+            less = np.linalg.norm(found, axis=1) < size * (1 - _SETTLED)
+            amount = np.where((going & less)[:, None], trial, amount)
+            going &= ~less
+            change /= 2
+            if not going.any():
+                break
+        if going.all():
+            break
+        value, slopes = _value_and_slopes(machine, state, step, amount)
+    return amount, np.linalg.norm(value, axis=1)
+
+
+def _value_and_slopes(
+    machine: Machine, state: State, step: Adjust, amount: NDArray
+) -> tuple[NDArray, NDArray]:
+    """Return (k, p) what becomes least after a change, and its (k, p, a) slopes."""
+    value = _value_at(machine, state, step, amount)
+    slopes = np.empty((*value.shape, len(step.components)))
+    for i, scale in enumerate(machine.scale[rows_of(step.components)]):
+        one = np.zeros(len(step.components))
+        one[i] = _STEP / scale
+        ahead = _value_at(machine, state, step, amount + one)
+        slopes[..., i] = (ahead - value) / one[i]
+    return value, slopes
+
+
+def _value_at(machine: Machine, state: State, step: Adjust, amount: NDArray) -> NDArray:
+    """Return what an adjustment makes least, after a change."""
+    moved = settle(machine, with_adjustment(machine, state, step, amount))
+    return _to_vanish(machine, moved, step)
+
+
+def _check_not_bolted(machine: Machine, state: State, step: Adjust) -> None:
+    """Refuse an adjustment in a joint that is bolted among loose clearances."""
     if machine.posture.robot.index(step.frame) in state.bolted.values():
-        found = f"{quoted(step.frame)}, whose joint is bolted"
-        raise BadInput(f"{where} {found}; expected another frame to adjust")
+        raise BadInput(
+            f"step {quoted(step.name)}: found clearances that are not bolted, and "
+            f"{quoted(step.frame)}, whose joint is bolted; expected another frame to "
+            "adjust"
+        )
 
 
 def _closing_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:

@@ -25,13 +25,18 @@ from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.assembly.steps.left_anywhere import positions_left_anywhere
 from forcefit.assembly.steps.machine import Machine, machine_at
 from forcefit.assembly.steps.plan import Plan
-from forcefit.assembly.steps.state import first_state
+from forcefit.assembly.steps.state import State, first_state
 from forcefit.inputs.table import BadInput, quoted
 from forcefit.results.display import numbers
 
 BOLT_STREAM = 4  # stream of random numbers of bolted joints, see draw_generator
 _ROUNDED = 1e-12  # share of its bound below which a clearance is rounding
 _BOLTED = "is bolted at"  # words of a remark
+_RULES = {
+    "least": "",
+    "uniform": ", drawn machines anywhere at least energy",
+    "worst": "; assembly error bounds the error of all other positions",
+}
 
 
 class CannotBolt(BadInput):
@@ -73,8 +78,7 @@ def _remark(frame: Frame) -> str:
     """Return the position in which a joint is bolted."""
     assert frame.locked_at is not None
     screw = numbers(frame.locked_at.screw)
-    drawn = ", drawn machines anywhere at least energy"
-    rule = drawn if frame.locked_at.left == "uniform" else ""
+    rule = _RULES[frame.locked_at.left]
     return f"joint {quoted(frame.name)} {_BOLTED} {screw} rad, m in its clearance{rule}"
 
 
@@ -91,7 +95,8 @@ def bolt_generators(
     Returns:
         One for each draw; None if no position is random.
     """
-    if all(f.locked_at is None or f.locked_at.left == "least" for f in robot.frames):
+    bolts = [frame.locked_at for frame in robot.frames]
+    if all(bolt is None or bolt.left != "uniform" for bolt in bolts):
         return None
     numbers = np.asarray(draws).tolist()
     return [draw_generator(seed, number, BOLT_STREAM) for number in numbers]
@@ -118,19 +123,62 @@ def bolted_errors(
     """
     total = errors
     for frames, machine in _bolts(robot):
-        try:
-            state = first_state(machine, Plan(()), total, None)
-        except (CannotAssemble, SolverFailed) as error:
-            place = f"{robot.name}: frame {quoted(robot.frames[frames[0]].name)}"
-            raise CannotBolt(f"{place}.locked_at: {error}") from None
+        state = _loose_state(robot, frames, machine, total)
         u = state.found.clearances
         bolt = robot.frames[frames[0]].locked_at
         if rngs is not None and bolt is not None and bolt.left == "uniform":
             u = positions_left_anywhere(machine, state, rngs)
-        moved = np.where(np.abs(u) > _ROUNDED, u, 0.0) @ machine.cones.T
-        total = total.copy()
-        total[:, frames] += moved.reshape(total.shape)[:, frames]
+        total = _with_locked(machine, frames, total, u)
     return total
+
+
+def _loose_state(
+    robot: Robot, frames: list[int], machine: Machine, errors: NDArray
+) -> State:
+    """Return machines at the pose of a bolt, before it is bolted."""
+    try:
+        return first_state(machine, Plan(()), errors, None)
+    except (CannotAssemble, SolverFailed) as error:
+        place = f"{robot.name}: frame {quoted(robot.frames[frames[0]].name)}"
+        raise CannotBolt(f"{place}.locked_at: {error}") from None
+
+
+def _with_locked(
+    machine: Machine, frames: list[int], errors: NDArray, u: NDArray
+) -> NDArray:
+    """Return errors with the clearances of bolted frames locked in."""
+    moved = np.where(np.abs(u) > _ROUNDED, u, 0.0) @ machine.cones.T
+    total = errors.copy()
+    total[:, frames] += moved.reshape(total.shape)[:, frames]
+    return total
+
+
+def last_bolt(robot: Robot) -> tuple[list[int], Machine, State]:
+    """Return the joints that are bolted last, and the robot before.
+
+    Args:
+        robot: robot with a joint that is left ``"worst"``.
+
+    Returns:
+        Frames, machine and its state at the pose of the bolt, joints of it loose.
+
+    Raises:
+        BadInput: joints that are bolted earlier are left ``"worst"``, or the robot
+            cannot be assembled there.
+    """
+    total = robot.declared_errors[None]
+    *before, (frames, machine) = _bolts(robot)
+    for earlier, own in before:
+        first = robot.frames[earlier[0]]
+        if first.locked_at is not None and first.locked_at.left == "worst":
+            raise BadInput(
+                f"{robot.name}: frame {quoted(first.name)}.locked_at.left: found "
+                '"worst" on a joint that is not bolted last; expected "least", or the '
+                "same pose for all joints that are left worst, last in the file"
+            )
+        state = _loose_state(robot, earlier, own, total)
+        total = _with_locked(own, earlier, total, state.found.clearances)
+    return frames, machine, _loose_state(robot, frames, machine, total)
 
 
 @lru_cache(maxsize=16)

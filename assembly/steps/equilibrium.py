@@ -26,7 +26,11 @@ from scipy.linalg import svd
 from forcefit.assembly.kinematics.ranks import RANK, ROWS_RANK, noise_of, rank_of
 from forcefit.assembly.linear.reference.energy import CannotAssemble
 from forcefit.assembly.linear.reference.reduction import FreeMotion, complement
-from forcefit.assembly.solvers.conic import SolverFailed, minimise_energy
+from forcefit.assembly.solvers.many_programmes import (
+    Minima,
+    closest_of_same_energy,
+    minimise_energies,
+)
 
 _OPEN = 1e-12  # [rad, reference lengths] closure error that counts as rounding
 _ROUNDING = 1e-14  # share of the largest right side that counts as rounding
@@ -56,7 +60,8 @@ class Movable(NamedTuple):
         cones: (6n, nu) of clearances, in units of their bounds.
         group: (nu,) cone of each clearance, counted from 0.
         free: (6n, nq) of free motions, lengths in reference lengths.
-        on_springs: (k, ny) [sqrt(2 J)] loads on the springs.
+        on_springs: (k, ny) [sqrt(2 J)] loads on the springs; here and below the same
+            for all machines.
         on_cones: (k, nu) [J] loads on the clearances.
         on_free: (k, nq) [J] loads on the free motions.
     """
@@ -206,17 +211,16 @@ def _least(
     _check_closed(rigid @ U[:, rank:], right)
     H, k = U[:, :rank].T @ split.rigid.T @ A_u, rigid @ U[:, :rank]
     d = movable.on_cones + by_motions
-    u, strains, inner = np.zeros_like(last), np.zeros_like(h), np.zeros_like(right)
-    for i in range(len(right)):
-        least = minimise_energy(G, h[i], d[i], H, k[i], movable.group)
-        if not least.feasible:
-            raise CannotAssemble("neither springs nor clearances can close the rows")
-        u[i] = _closest(least.clearances, last[i], np.vstack([G, H, d[i]]), movable)
-        strains[i] = G @ u[i] + h[i]
-        terms = np.abs(G) @ np.abs(u[i]) + np.abs(h[i])
-        strains[i][np.abs(strains[i]) <= _SOLVED * terms.max(initial=0.0)] = 0.0
-        rigid_part = split.rigid @ U[:, :rank] @ least.rigid_multipliers
-        inner[i] = split.elastic @ (strains[i] / S) + rigid_part
+    least = minimise_energies(G, h, d, H, k, movable.group)
+    if not least.feasible.all():
+        raise CannotAssemble("neither springs nor clearances can close the rows")
+    u = _closest(G, h, d, H, least, last, movable.group)
+    strains = u @ G.T + h
+    terms = np.abs(u) @ np.abs(G).T + np.abs(h)
+    solved = _SOLVED * terms.max(axis=1, initial=0.0)
+    strains[np.abs(strains) <= solved[:, None]] = 0.0
+    inner = (strains / S) @ split.elastic.T
+    inner += least.rigid_multipliers @ (split.rigid @ U[:, :rank]).T
     return u, strains, inner
 
 
@@ -230,22 +234,20 @@ def _check_closed(rigid: NDArray, right: NDArray) -> None:
         )
 
 
-def _closest(u: NDArray, last: NDArray, rows: NDArray, movable: Movable) -> NDArray:
+def _closest(
+    G: NDArray, h: NDArray, d: NDArray, H: NDArray, least: Minima, last: NDArray,
+    group: NDArray,
+) -> NDArray:  # fmt: skip
     """Return the clearances closest to the last ones, of the same energy."""
+    rows = np.vstack([G, H, d[:1]])  # all machines are loaded alike
     size = np.linalg.norm(rows, axis=1)
     rows = rows[size > 0] / size[size > 0, None]
-    _, S, Vt = np.linalg.svd(rows) if len(rows) else (0, np.zeros(0), np.eye(len(u)))
+    u = least.clearances
+    _, S, Vt = np.linalg.svd(rows) if len(rows) else (0, np.zeros(0), np.eye(len(d.T)))
     kept = Vt[: rank_of(S, ROWS_RANK)]
-    if len(kept) == len(u):
+    if len(kept) == len(Vt):
         return u
-    zero = np.zeros(len(u))
-    try:
-        closest = minimise_energy(
-            np.eye(len(u)), -last, zero, kept, kept @ u, movable.group
-        )
-    except SolverFailed:
-        return u
-    return closest.clearances if closest.feasible else u
+    return closest_of_same_energy(least, last, kept, (G, h, d, H, group))
 
 
 def _moved(B_q: NDArray, right: NDArray, last: NDArray) -> NDArray:

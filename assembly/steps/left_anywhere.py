@@ -33,14 +33,10 @@ def positions_left_anywhere(
         (k, nu) clearances in units of their bounds.
     """
     u = state.found.clearances.copy()
-    rows = np.vstack([
-        np.zeros((1, len(machine.cones))),
-        *(h.rows for h in state.holds.values()),
-    ])
-    of_cones, of_motions = rows @ machine.cones, rows @ machine.free
-    loaded = _loaded(machine, state, of_cones[1:])
     # the mixture of a walk is judged by random combinations of all clearances
     judged = np.random.default_rng(0).normal(size=(6, u.shape[1]))
+    of_cones, of_motions = _of_rows(machine, state)
+    loaded = _loaded(machine, state, of_cones[1:])
     for i, rng in enumerate(rngs):
         # near the least load that presses a clearance, forces are the solver's error:
         # if the set has an interior with all clearances, none is loaded
@@ -55,6 +51,35 @@ def positions_left_anywhere(
             if moved or free.all() and not loaded[i].any():
                 break
     return u
+
+
+def free_positions(
+    machine: Machine, state: State, row: int
+) -> tuple[NDArray, NDArray, NDArray]:
+    """Return how the clearances of one machine may move at least energy.
+
+    Args:
+        machine: columns and rows of the robot.
+        state: of k machines at least energy, without loads.
+        row: the machine.
+
+    Returns:
+        (nu,) clearances in units of their bounds; (nu,) bool, those that carry no load;
+        and orthonormal columns, directions in which these move without strain.
+    """
+    of_cones, of_motions = _of_rows(machine, state)
+    free = ~_loaded(machine, state, of_cones[1:])[row]
+    Z = _directions(of_cones[:, free], of_motions)
+    return state.found.clearances[row], free, Z
+
+
+def _of_rows(machine: Machine, state: State) -> tuple[NDArray, NDArray]:
+    """Return all rows held, on clearances and free motions; the first row is zero."""
+    rows = np.vstack([
+        np.zeros((1, len(machine.cones))),
+        *(h.rows for h in state.holds.values()),
+    ])
+    return rows @ machine.cones, rows @ machine.free
 
 
 def _directions(of_cones: NDArray, of_motions: NDArray) -> NDArray:

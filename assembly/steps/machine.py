@@ -118,24 +118,26 @@ class Machine:
         )  # fmt: skip
         return movable, cones, motions
 
-    def screws(self, errors: NDArray, found: Equilibrium) -> NDArray:
-        """Return the (k, 6n) [rad, m] screws of all frames.
+    def values(self, rows: NDArray, errors: NDArray, found: Equilibrium) -> NDArray:
+        """Return the values of rows on the screws of all frames.
 
         Args:
-            errors: (k, 6n) geometric errors.
+            rows: (m, 6n) see :meth:`rows`.
+            errors: (k, 6n) [rad, m] geometric errors.
             found: springs, clearances and free motions.
 
         Returns:
-            Their sum.
+            (k, m) lengths in reference lengths.
         """
-        moved = found.springs @ self.springs.T + found.clearances @ self.cones.T
-        return errors + moved + found.motions @ self.free.T
+        value = errors @ rows.T + found.springs @ (rows @ self.springs).T
+        value += found.clearances @ (rows @ self.cones).T
+        return value + found.motions @ (rows @ self.free).T
 
     def platform_screw(self, errors: NDArray, found: Equilibrium) -> NDArray:
         """Return the (k, 6) [rad, m] platform's screw at its origin, base axes."""
         robot = self.posture.robot
         row = robot.index(robot.platform)
-        own = self.screws(errors, found) @ self.rows(robot.platform).T / self.scale
+        own = self.values(self.rows(robot.platform), errors, found) / self.scale
         return own @ self.posture.paths[row].T
 
     def opening(
@@ -152,7 +154,7 @@ class Machine:
         Returns:
             (k, m) right side less the rows' value, lengths in reference lengths.
         """
-        open_ = hold.right - self.screws(errors, found) @ hold.rows.T
+        open_ = hold.right - self.values(hold.rows, errors, found)
         rows = [other.rows @ self.free for other in holds.values()]
         held = np.vstack([np.zeros((1, self.free.shape[1])), *rows])
         _, S, Vt = np.linalg.svd(held)
@@ -162,6 +164,8 @@ class Machine:
 
     def work(self, loads: Sequence[FrameLoads], state: Any) -> NDArray:
         """Return the (k,) [J] work of loads on all screws of a state."""
+        if not loads:
+            return np.zeros(len(state.errors))
         found, links = state.found, self.joints.links
         of_links = found.springs * links @ self.springs.T + state.errors
         of_joints = found.springs * ~links @ self.springs.T

@@ -117,6 +117,8 @@ class Adjust:
             closing a closure would need.
         increment: [rad or m] to a multiple of which changes are rounded; 0 if
             continuous.
+        amount: (a,) or (k, a) [rad or m] change that is made whatever the reading says;
+            of :func:`forcefit.assembly.steps.amounts.with_best_amounts`.
     """
 
     name: str
@@ -124,6 +126,7 @@ class Adjust:
     components: tuple[str, ...]
     reading: Measure
     increment: float = 0.0
+    amount: NDArray | None = field(default=None, compare=False)
 
 
 Step = Fix | Join | Preload | Release | Measure | Adjust

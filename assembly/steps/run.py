@@ -185,7 +185,7 @@ def _join(
     hold = closed_rows(machine, state, step.part)
     opening = machine.opening(state.errors, state.found, state.holds, hold)
     locked = rows_of(step.locked)
-    as_it_lies = machine.screws(state.errors, state.found) @ hold.rows.T
+    as_it_lies = machine.values(hold.rows, state.errors, state.found)
     hold.right[:, locked] = as_it_lies[:, locked]
     opening[:, locked] = 0.0
     blank = replace(blank, opening=-opening / machine.scale)
@@ -280,21 +280,21 @@ def _half_work(machine: Machine, before: State, after: State, step: Step) -> NDA
     It is half of the wrench that a step adds, or that a release removes, times the
     motion against it; NaN for steps that do neither.
     """
-    old = machine.screws(before.errors, before.found)
-    new = machine.screws(after.errors, after.found)
     if step.name in after.holds:
         hold, multipliers = after.holds[step.name], after.multipliers()[step.name]
-        return np.vecdot(multipliers, hold.right - old @ hold.rows.T) / 2
+        old = machine.values(hold.rows, before.errors, before.found)
+        return np.vecdot(multipliers, hold.right - old) / 2
     loads = before.loads if isinstance(step, Release) else after.loads
     names = step.steps if isinstance(step, Release) else (step.name,)
     acting = [loads[name] for name in names if name in loads]
     half = (machine.work(acting, after) - machine.work(acting, before)) / 2
     if not isinstance(step, Release):
-        return half if acting else np.full(len(new), np.nan)
+        return half if acting else np.full(len(half), np.nan)
     for name in names:
         if name in before.holds:
             hold, multipliers = before.holds[name], before.multipliers()[name]
-            half = half - np.vecdot(multipliers, hold.right - new @ hold.rows.T) / 2
+            new = machine.values(hold.rows, after.errors, after.found)
+            half = half - np.vecdot(multipliers, hold.right - new) / 2
     return half
 
 
@@ -305,8 +305,8 @@ def _spring_back(machine: Machine, before: State, after: State, step: Step) -> N
     for name in released:
         if name in before.holds:
             hold = before.holds[name]
-            old = machine.screws(before.errors, before.found) @ hold.rows.T
-            new = machine.screws(after.errors, after.found) @ hold.rows.T
+            old = machine.values(hold.rows, before.errors, before.found)
+            new = machine.values(hold.rows, after.errors, after.found)
             motion = np.zeros_like(motion)
             motion[:, hold.components] = (new - old) / machine.scale[hold.components]
     return motion

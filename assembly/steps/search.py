@@ -1,15 +1,17 @@
 """The order in which parts are joined: which one needs the least force or error.
 
-Only steps that join are permuted, among themselves and between the other steps.  If
-all of them are closed at fixed positions, the state after each depends only on the set
+Only steps that join or adjust are permuted, among themselves and between the other
+steps.  An adjustment to a closure stays on its side of the step that joins it.  If no
+step holds what it finds, the state after each depends only on the set
 joined so far; the least peak force is a shortest path over the 2^n sets, with the
 largest force in place of the sum.  The path is searched from its end, because the state
 of a set has the closing forces of all its parts.  If joints are bolted as they lie, the
-orders are searched by branch and bound: the peak force never falls, and without loads
-joining a part never lowers the energy, so both bound the orders not yet searched.
+orders are searched by branch and bound: the peak force never falls, and the energy is
+at least that of the state with all pinned parts joined and the locked ones left open.
+The least error has no bound.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from heapq import heappop, heappush
 from itertools import groupby
@@ -21,6 +23,8 @@ from numpy.typing import ArrayLike
 
 from forcefit.assembly.kinematics.posture import Posture
 from forcefit.assembly.linear.reference.energy import CannotAssemble
+from forcefit.assembly.steps.amounts import with_best_amounts
+from forcefit.assembly.steps.choices import choices, movable_runs, order_matters
 from forcefit.assembly.steps.influence import depends_on_state
 from forcefit.assembly.steps.machine import Machine, machine_at
 from forcefit.assembly.steps.plan import Join, Plan, Step, check_plan
@@ -30,7 +34,6 @@ from forcefit.inputs.table import BadInput, quoted
 
 Objective = Literal["force", "energy", "error"]
 OBJECTIVES: tuple[Objective, ...] = ("force", "energy", "error")
-ALL_ORDERS = 8  # joins in a run of which all orders are searched, without a bound
 _EQUAL = 1e-9  # share by which an order must be better than the given one
 MOST_STATES = 200_000  # states that are computed: some minutes
 
@@ -44,9 +47,11 @@ class BestOrder:
     """The best order of a plan.
 
     Attributes:
-        plan: the plan in that order.
+        plan: the plan in that order, with the changes of its adjustments.
         value: of the objective [N, J or m].
-        bound: lower bound over all orders; equal to ``value`` where all were searched.
+        bound: lower bound over all orders; equal to ``value`` where all were searched,
+            0 where other changes of the adjustments than those of their readings were
+            found to be better.
         given: value of the plan as given; inf if it cannot be assembled.
         searched: number of sets or of partial orders that were computed.
         method: ``"sets"`` or ``"orders"``.
@@ -71,7 +76,7 @@ def best_order(
     """Return the order of the joining steps with the least value of an objective.
 
     Args:
-        plan: the steps; runs of consecutive joining steps are permuted.
+        plan: the steps; runs of consecutive joins and adjustments are permuted.
         posture: pose at which the robot is assembled.
         objective: ``"force"`` [N], the largest closing force of a step; ``"energy"``
             [J], stored at the end; ``"error"`` [m], the translation of the platform at
@@ -84,28 +89,30 @@ def best_order(
         The order, with a bound.
 
     Raises:
-        BadInput: the plan does not fit the robot, no order can be assembled, or there
-            are too many joining steps.
+        BadInput: the plan does not fit the robot, or no order can be assembled.
     """
     check_plan(plan, posture.robot)
     machine = machine_at(posture)
     start = first_state(machine, plan, None, gravity)
     runs = [list(run) for _, run in groupby(plan.steps, lambda s: isinstance(s, Join))]
-    longest = max((len(run) for run in runs if isinstance(run[0], Join)), default=0)
     search = _Search(machine, objective, progress, most)
     given = search.value_of(start, plan.steps)
-    pinned = not any(isinstance(s, Join) and depends_on_state(s) for s in plan.steps)
+    pinned = not any(map(order_matters, movable_runs(plan.steps)))
     if pinned and objective == "force":
         found = _over_sets(search, start, runs, given)
         if found.value < given * (1 - _EQUAL):
             return found
         return replace(found, plan=plan, value=given, bound=min(given, found.bound))
-    if objective == "error" and longest > ALL_ORDERS:
-        raise BadInput(
-            f"order: found {longest} joining steps in a row, expected at most "
-            f"{ALL_ORDERS} for the least error, which no partial order bounds"
-        )
-    return _over_orders(search, start, plan, given)
+    found = _over_orders(search, start, plan, given)
+
+    def many(count: int) -> State:
+        errors = np.repeat(start.errors, count, axis=0)
+        return first_state(machine, plan, errors, gravity)
+
+    own = found.plan, machine, many, objective, found.value
+    best, value = with_best_amounts(*own)
+    bound = found.bound if value == found.value else 0.0
+    return replace(found, plan=best, value=value, bound=bound)
 
 
 @dataclass(eq=False)
@@ -163,10 +170,18 @@ class _Search:
         """Return a lower bound of the objective after the steps that are left."""
         if self.objective == "force":
             return peak
-        only_joins = all(isinstance(step, Join) for step in left)
-        if self.objective == "energy" and only_joins and not state.loads:
-            return float(state.found.energy[0])
-        return 0.0
+        joins = [step for step in left if isinstance(step, Join)]
+        if self.objective != "energy" or len(joins) < len(left) or state.loads:
+            return 0.0
+        holds = dict(state.holds)
+        for step in joins:
+            if not depends_on_state(step) and not isinstance(step.part, str):
+                holds[step.name] = closed_rows(self.machine, state, step.part)
+        try:
+            closed = settle(self.machine, replace(state, holds=holds))
+        except CannotAssemble:
+            return inf
+        return float(closed.found.energy[0])
 
     def value_of(self, state: State, steps: tuple[Step, ...]) -> float:
         """Return the objective of steps in their order; inf if they cannot be."""
@@ -289,20 +304,9 @@ def _children(
 ) -> list[_Partial]:  # fmt: skip
     """Return a partial order continued by each step that may come next."""
     children = []
-    for step, others in _choices(left):
+    for step, others in choices(left):
         found = search.carry_out(state, step)
         if found is not None:
             worst = max(peak, _force(found[1]))
             children.append((found[0], worst, (*done, step), others))
     return children
-
-
-def _choices(left: tuple[Step, ...]) -> Iterator[tuple[Step, tuple[Step, ...]]]:
-    """Yield the steps that may come next, with those that are left then."""
-    if not isinstance(left[0], Join):
-        yield left[0], left[1:]
-        return
-    for i, step in enumerate(left):
-        if not isinstance(step, Join):
-            return
-        yield step, left[:i] + left[i + 1 :]

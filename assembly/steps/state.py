@@ -163,7 +163,7 @@ def fixture_rows(machine: Machine, state: State, step: Fix) -> Hold:
     k, rows = len(state.errors), machine.rows(step.frame)
     if step.position is None:
         chosen = np.arange(6)
-        right = machine.screws(state.errors, state.found) @ rows.T
+        right = machine.values(rows, state.errors, state.found)
     else:
         chosen = rows_of(tuple(step.position))
         values = np.array(list(step.position.values()), dtype=float)
@@ -197,8 +197,9 @@ def reading_of(machine: Machine, state: State, step: Measure) -> NDArray:
     """Return the (k, p) [rad or m] readings of a measurement."""
     chosen = rows_of(step.components)
     if isinstance(step.part, str):
-        screws = machine.screws(state.errors, state.found)
-        return (screws @ machine.rows(step.part).T / machine.scale)[:, chosen]
+        rows = machine.rows(step.part)
+        screws = machine.values(rows, state.errors, state.found)
+        return (screws / machine.scale)[:, chosen]
     hold = closed_rows(machine, state, step.part)
     opening = machine.opening(state.errors, state.found, state.holds, hold)
     return (-opening / machine.scale)[:, chosen]

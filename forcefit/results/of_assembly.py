@@ -74,8 +74,8 @@ _EXACT = record(
     ),
     linear_=record("energy platform_screw"), linearisation_error_=_LINEARISATION,
 )  # fmt: skip
-_BOUNDS = record("platform_screw", lower=number("lower bound", ""),
-                 upper=number("upper bound", ""))  # fmt: skip
+_LOWER_UPPER = record(lower=number("lower bound", ""), upper=number("upper bound", ""))
+_BOUNDS = record("platform_screw", _LOWER_UPPER)
 _ASSUMPTIONS = Each(
     record("cuts? method? reason?", rotation=_BOUNDS, translation=_BOUNDS,
            along_=_BOUNDS)
@@ -83,6 +83,7 @@ _ASSUMPTIONS = Each(
 _ERROR = record(
     "load? gravity? point? direction? energy? platform_screw? remarks?", _POSTURE,
     error_=_ASSUMPTIONS, certificate_=record("relative_gap"),
+    bolted_worst_=record("assumption", rotation=_LOWER_UPPER, translation=_LOWER_UPPER),
 )  # fmt: skip
 _SHARES = record(
     links=Each(_SHARE), joints=Each(_SHARE), clearances_=Each(_SHARE),

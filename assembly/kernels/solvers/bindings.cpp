@@ -93,6 +93,41 @@ void call_farthest_points(
     farthest_points(own, out);
 }
 
+void call_minimise_all(
+    nb::handle G, nb::handle h, nb::handle d, nb::handle H, nb::handle k,
+    nb::handle cones, nb::handle u, nb::handle y) {
+    Size count, r, p, nu, ends;
+    ConeProblems own;
+    own.h = reals(h, "h", count, r);
+    own.d = reals(d, "d", count, nu);
+    own.k = reals(k, "k", count, p);
+    own.G = reals(G, "G", r, nu);
+    own.H = reals(H, "H", p, nu);
+    own.starts = starts(cones, "starts", nu.value, true, ends);
+    own.count = count.value, own.r = r.value, own.p = p.value;
+    own.cones = ends.value - 1;
+    double *points = address<double>(u, "u", count, nu);
+    double *multipliers = address<double>(y, "y", count.value, own.r + own.p);
+    const nb::gil_scoped_release others;
+    minimise_all(own, points, multipliers);
+}
+
+void call_closest_points(
+    nb::handle rows, nb::handle cones, nb::handle from, nb::handle kept, nb::handle u,
+    nb::handle solved) {
+    Size count, p, nu, ends;
+    Projections own;
+    own.rows = reals(rows, "rows", p, nu);
+    own.starts = starts(cones, "starts", nu.value, true, ends);
+    own.from = reals(from, "from", count, nu);
+    own.kept = reals(kept, "kept", count, nu);
+    own.count = count.value, own.p = p.value, own.cones = ends.value - 1;
+    double *points = address<double>(u, "u", count, nu);
+    int64_t *done = address<int64_t>(solved, "solved", count);
+    const nb::gil_scoped_release others;
+    closest_points(own, points, done);
+}
+
 }  // namespace
 
 void bind_solvers(nb::module_ &m) {
@@ -115,4 +150,12 @@ void bind_solvers(nb::module_ &m) {
         nb::arg("H"), nb::arg("starts"), nb::arg("d"), nb::arg("right"),
         nb::arg("tolerance"), nb::arg("points"), nb::arg("multipliers"),
         nb::arg("solved"));
+    m.def(
+        "minimise_all", &call_minimise_all,
+        nb::arg("G"), nb::arg("h"), nb::arg("d"), nb::arg("H"), nb::arg("k"),
+        nb::arg("starts"), nb::arg("u"), nb::arg("y"));
+    m.def(
+        "closest_points", &call_closest_points,
+        nb::arg("rows"), nb::arg("starts"), nb::arg("from"), nb::arg("kept"),
+        nb::arg("u"), nb::arg("solved"));
 }

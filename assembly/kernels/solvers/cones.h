@@ -61,6 +61,7 @@ public:
     Whole dual_newton(
         Programme &q, int steps, double first_sigma, double relative, Real absolute,
         Whole asked);
+    Whole closest(Programme &q, const Row &a, const Row &kept, Whole asked);
 
 private:
     // Nesterov and Todd's scaling of a cone.  What two products give is not kept: all
@@ -94,6 +95,7 @@ private:
     struct Slopes { Real smooth, residual, kink, primal; Whole closed; };
     void forces(const Programme &q, int rows, const Real *y);
     Slopes slopes(const Programme &q, Real sigma, const Real *y);
+    Real project(const Row &a, const Row &kept, const Row &fixed);
 };
 
 // Overwrites the scaling with that of (u, z) in lanes where all points are inside the

@@ -11,18 +11,22 @@ import pytest
 
 from forcefit.assembly.exchange.robot_files import load_robot
 from forcefit.assembly.files.robot_file import write_robot
-from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.linear.energy import solve_assembly
 from forcefit.assembly.model.error_distributions import read_sources, tolerance_sources
 from forcefit.assembly.model.links import link_compliances
+from forcefit.assembly.model.robot import Clearance, Frame, LockedAt, Robot
+from forcefit.assembly.statistics.allocation import allocate
 from forcefit.assembly.statistics.experiment import Experiment
 from forcefit.assembly.statistics.linear_response import linear_response
+from forcefit.assembly.statistics.responses import respond
 from forcefit.assembly.statistics.tolerance_file import read_plan
 from forcefit.assembly.statistics.worst_pose import worst_pose
 from forcefit.assembly.steps.bolted import bolt_joints, loose_over_poses
 from forcefit.assembly.sweeps.robot_sweep import sweep
 from forcefit.inputs.table import BadInput
 from forcefit.stiffness.screws import rotation_matrix
+from tests.assembly.steps.robots_for_steps import spring
 
 STEEL = "link = { beam = { radius = 0.02 }, young = 2.1e11, poisson = 0.3 }"
 PIN = "clearance = { radial = 1e-5, axial = 1e-5, tilt = 1e-4 }"
@@ -290,12 +294,64 @@ def test_remark_names_fixed_joints_that_are_loose_at_every_pose(tmp_path):
     assert loose_over_poses(load_robot(four_bar(tmp_path, at_angle(0.4)))) == []
 
 
-def test_tolerances_of_a_bolted_robot_are_refused_in_one_line(tmp_path):
+def slot_on_a_spring(gap, stiffness):
+    """A platform on a rigid leg, and on a spring whose slot is bolted at home."""
+    bolt = LockedAt(Clearance(axial=gap))
+    frames = (
+        Frame("guide", "base", joint="prismatic"),
+        Frame("platform", "guide"),
+        Frame("rigid", "base"),
+        Frame("slot", "base", link=spring(stiffness, 5), locked_at=bolt),
+        Frame("end", "slot"),
+    )
+    closures = (("platform", "rigid"), ("platform", "end"))
+    return Robot("slot on a spring", "platform", frames, closures)
+
+
+PLAN = """
+yield = 1
+draws = 8
+[limits]
+energy = 0.8e-3
+[[tolerance]]
+frames = ["slot"]
+components = ["TZ"]
+cost = 4
+[[tolerance]]
+frames = ["rigid"]
+components = ["TZ"]
+cost = 1
+"""
+
+
+def test_tolerances_of_a_bolted_robot_use_its_slot(tmp_path):
+    """4/a + 1/b is least at a = 2 C / 3, b = C / 3 where a + b <= C.
+
+    The slot takes up 50 um, the spring of 1e6 N/m stores 0.8 mJ at 40 um: C is 90 um.
+    """
+    robot = slot_on_a_spring(50e-6, 1e6)
+    path = tmp_path / "plan.toml"
+    path.write_text(PLAN)
+    found = allocate([home_posture(robot)], read_plan(path, robot), fresh=0)
+    assert found.tolerances == pytest.approx([60e-6, 30e-6], rel=2e-3)
+    assert found.worst["energy"][0] <= 0.8e-3 * (1 + 1e-3)
+    assert np.isnan(found.price_bound)
+
+
+def test_slopes_of_a_bolted_robot_are_those_of_its_errors(tmp_path):
+    """Central differences of the four-bar's energy at another pose than the bolt's."""
     robot = load_robot(four_bar(tmp_path, at_angle(0.4)))
-    plan = tmp_path / "plan.toml"
-    plan.write_text('cost = "inverse"\n')
-    with pytest.raises(BadInput, match="bolted at a pose"):
-        read_plan(plan, robot)
+    response = linear_response(place_robot(robot, joints={"crank": 1.6}))
+    widths = np.array([1e-3, 0, 0, 1e-3, 0, 0])
+    sources = tolerance_sources(robot, widths, ("pin1", "pin2", "stand"))
+    values = 2e-3 * np.array([[1, -0.4, 0.8, 0.3, 0.1, -0.7], [2, 1, -1, 0, 0.5, 0.2]])
+    _, slopes = respond(response, sources, values)
+    for j, step in enumerate(2e-7 * np.eye(values.shape[1])):
+        high, low = (
+            respond(response, sources, values + sign * step)[0] for sign in (1, -1)
+        )
+        scale = np.abs(slopes).max()
+        assert slopes[:, j] == pytest.approx((high - low) / 4e-7, abs=1e-6 * scale)
 
 
 DRAWN = """

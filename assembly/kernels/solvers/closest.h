@@ -1,0 +1,107 @@
+// Points of small convex sets closest to given ones, in parallel; symbols as in cones.h:
+//
+//     minimise  |u - a|^2 / 2   subject to  M u = e,  |u_k| <= 1, each cone k
+//
+// by Newton's method on the dual, which is smooth:
+//
+//     maximise  y.(M u - e) + |u - a|^2 / 2  with u the point of the cones closest to
+//     a - M^T y.
+//
+// The value of the rows, e, is that of a point of the set that is known.
+//
+// Source: Li, Sun, Toh (2018), A highly efficient semismooth Newton augmented Lagrangian
+// method for solving lasso problems.
+#pragma once
+
+#include "cones.h"
+
+namespace LANE_SPACE {
+
+constexpr int STEPS_CLOSEST = 40;  // largest number of Newton steps
+// added to the curvature, whose largest possible value is 1: rows that only cones without
+// freedom enter have none
+constexpr double CURVATURE = 1e-13;
+
+// The point of the cones closest to a - z1: u, and D of the curvature M D M^T.  Cones that
+// are kept remain at `fixed`.  Returns the value of the dual without its rows' part.
+inline Real Solver::project(const Row &a, const Row &kept, const Row &fixed) {
+    Real value = {};
+    k.each([&](auto size, int c, int first) {
+        Real *own = &u[first], *D = heads[c].D;
+        const Whole stays = kept[first] != 0.0;
+        for (int i = 0; i < size; ++i) own[i] = a[first + i] - z1[first + i];
+        const Real length = root(inner(own, own, size));
+        const Whole inside = length <= 1.0;
+        const Real shorter = 1.0 / (inside ? real(1.0) : length);
+        for (int i = 0; i < size; ++i)
+            own[i] = stays ? fixed[first + i] : own[i] * shorter;
+        if (size.ball) {
+            for (int i = 0; i < size; ++i) wide[0][first + i] = own[i];
+            D[0] = stays ? Real{} : shorter;
+            D[1] = inside ? Real{} : D[0];
+        } else if (size == 1) {
+            D[0] = stays | ~inside ? Real{} : real(1.0);
+        } else {  // on the disc's edge only rotation is free
+            D[0] = inside ? real(1.0) : shorter * own[1] * own[1];
+            D[1] = inside ? Real{} : -shorter * own[0] * own[1];
+            D[2] = inside ? real(1.0) : shorter * own[0] * own[0];
+            for (int i = 0; i < 3; ++i) D[i] = stays ? Real{} : D[i];
+        }
+        for (int i = first; i < first + size; ++i) {
+            const Real step = u[i] - a[i];
+            value += z1[i] * u[i] + 0.5 * step * step;
+        }
+    });
+    return value;
+}
+
+// Finds the points closest to `a` in the requested lanes, from the point q.u of each set,
+// which is overwritten in lanes that are solved; returns these.
+inline Whole Solver::closest(Programme &q, const Row &a, const Row &kept, Whole asked) {
+    const int m = q.p;
+    const Row fixed = q.u;
+    multiply(q.M.rows(), m, fixed.data(), k.nu, q.e.data());
+    std::fill(y.begin(), y.end(), Real{});
+    Real before = real(-INFINITY);
+    Whole going = asked, done = {}, halvings = {}, taken = {};
+    Row step(m);
+    while (true) {
+        std::fill(z1.begin(), z1.end(), Real{});
+        combine(q.M.rows(), m, y.data(), k.nu, z1.data());
+        Real value = project(a, kept, fixed), worst = {};
+        multiply(q.M.rows(), m, u.data(), k.nu, right.data());
+        for (int i = 0; i < m; ++i) {
+            right[i] -= q.e[i];
+            value -= y[i] * q.e[i];
+            worst = larger(magnitude(right[i]), worst);
+        }
+        const Whole close = worst <= ON_ROWS;
+        for (int j = 0; j < k.nu; ++j) q.u[j] = (going & close) ? u[j] : q.u[j];
+        done |= going & close;
+        going &= ~close;
+        const Whole climbs = value >= before - 1e-14;
+        halvings = climbs ? Whole{} : halvings + 1;
+        going &= (climbs & (taken < STEPS_CLOSEST)) | (~climbs & (halvings <= HALVINGS));
+        if (!any(going)) return done;
+        const Whole shorter = going & ~climbs, on = going & climbs;
+        for (int i = 0; i < m; ++i) {
+            step[i] = shorter ? 0.3 * step[i] : step[i];
+            y[i] = shorter ? start[i] + step[i] : y[i];
+        }
+        if (!any(on)) continue;
+        before = on ? value : before;
+        taken -= on;
+        fill_system(q);
+        for (int i = 0; i < m; ++i) system.S[i][i] += CURVATURE;
+        going &= ~on | system.factor(m, true);
+        system.solve(m, right.data());
+        const Whole ahead = on & going;
+        for (int i = 0; i < m; ++i) {
+            start[i] = ahead ? y[i] : start[i];
+            step[i] = ahead ? right[i] : step[i];
+            y[i] = ahead ? y[i] + step[i] : y[i];
+        }
+    }
+}
+
+}  // namespace LANE_SPACE
