@@ -1,9 +1,10 @@
 """Names of drawn joints that became several frames, such as ``ball`` of ``ball.first``.
 
 A joint of several freedoms is a series of passive frames at one point, each with one
-freedom (:mod:`forcefit.assembly.drawing.parts`).  Its errors, clearance and springs are on one
-of them, those of a universal joint on both.  A user names the joint; these functions
-return the frames that are meant.  :mod:`forcefit.assembly.model.frame_series` finds the joints.
+freedom (:mod:`forcefit.assembly.drawing.parts`).  Its errors, clearance and springs are
+on one of them, those of a universal joint on both.  A user names the joint; these
+functions return the frames that are meant.  :mod:`forcefit.assembly.model.frame_series`
+finds the joints.
 """
 
 import re

@@ -16,8 +16,8 @@ A = sum S_j q''_j + [V_j, S_j] q'_j.  At a closure the V and A of its two frames
 equal.  These equations, and those of the prescribed components of the pose, are linear
 in q' and then in q''.  Both have the same matrix.  Its least-norm solution is used
 where neither closures nor path prescribe a rate, such as the spin of a rod between two
-balls; :mod:`forcefit.assembly.path.idle_motions` adds the rates that the inertia of the bodies
-determines.  No pose is differenced.
+balls; :mod:`forcefit.assembly.path.idle_motions` adds the rates that the inertia of the
+bodies determines.  No pose is differenced.
 
 Sources:
     Featherstone (2008), Rigid Body Dynamics Algorithms, chapters 2 and 8 (spatial
@@ -104,8 +104,8 @@ def follow_path(
             that are not named among joints stay at rest.
         path: (k, c) components [m or rad] and their first and second derivatives.
         idle: (k, n) [rad/s or m/s] joint rates that neither closures nor path prescribe
-            (:func:`forcefit.assembly.path.idle_motions.momentum_free_rates`), added to the
-            least-norm solution.
+            (:func:`forcefit.assembly.path.idle_motions.momentum_free_rates`), added to
+            the least-norm solution.
 
     Returns:
         The motion.

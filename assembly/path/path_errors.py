@@ -146,8 +146,8 @@ def path_errors(
         state: of the compliance: ``"nominal"``, ``"contact"`` or ``"exact"``, the
             latter two under the loads of each instant.
         progress: called with the points solved, and all.
-        recall: of :class:`forcefit.assembly.statistics.replay.Replay`, which stores blocks of
-            points; by default every block is computed.
+        recall: of :class:`forcefit.assembly.statistics.replay.Replay`, which stores
+            blocks of points; by default every block is computed.
 
     Returns:
         The results.

@@ -1,8 +1,8 @@
 """Cone programmes with the same matrices and many right sides, compiled.
 
-A programme is that of :func:`forcefit.assembly.solvers.conic.minimise_energy`.  Each lane of the
-processor's vector registers solves one of them; those that are not proved are solved
-again one at a time.
+A programme is that of :func:`forcefit.assembly.solvers.conic.minimise_energy`.  Each
+lane of the processor's vector registers solves one of them; those that are not proved
+are solved again one at a time.
 """
 
 from typing import NamedTuple
@@ -81,8 +81,8 @@ def _proved(problem: tuple[NDArray, ...], u: NDArray, n: NDArray) -> NDArray:
     """Return (n,) bool: solutions with a small gap that satisfy the rows of H.
 
     For every y and n the energy is at least the bound of
-    :func:`forcefit.assembly.solvers.conic.minimise_energy`, here at y = G u + h, or at the best
-    multiple of y and n where no load acts.
+    :func:`forcefit.assembly.solvers.conic.minimise_energy`, here at y = G u + h, or at
+    the best multiple of y and n where no load acts.
     """
     G, h, d, H, k, group = problem
     y = u @ G.T + h
