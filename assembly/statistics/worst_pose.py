@@ -195,14 +195,12 @@ def _support(
 
         return closed_form
     N = np.linalg.svd(rows)[2][len(rows) :].T
-    bounds = [
-        bound @ N[columns]
-        for zone, columns in zip(sets.zones, sets.columns, strict=True)
-        for bound in zone.bounds_on_u
-    ]
+    own = list(zip(sets.zones, sets.columns, strict=True))
+    bounds = [b @ N[columns] for zone, columns in own for b in zone.bounds_on_u]
+    cones = [c @ N[columns] for zone, columns in own for c in zone.cones_on_u]
 
     def programme(direction: NDArray) -> tuple[float, NDArray, NDArray]:
-        y, height = largest_product(direction @ P @ N, bounds)
+        y, height = largest_product(direction @ P @ N, bounds, cones)
         return height, sets.screws @ (N @ y), N @ y
 
     return programme

@@ -13,6 +13,8 @@ from forcefit.assembly.callouts.zones_of_features import (
     plane_orientation,
     plane_position,
     point_position,
+    round_plane_orientation,
+    round_plane_position,
     shift_along,
 )
 
@@ -163,6 +165,66 @@ def test_plane_zone_is_an_octahedron():
     C = zone.covariance()
     assert C[5, 5] == pytest.approx(g**2 / 10, rel=0.01)
     assert C[0, 0] == pytest.approx((g / B) ** 2 / 10, rel=0.01)
+
+
+def test_round_face_zone_is_a_double_cone():
+    """Support g max(|w_TZ|, |(w_RX, w_RY)|/r).  Sections at a height are discs of
+    radius (g - |TZ|)/r, so the variances are g^2/10 and 3 (g/r)^2/20."""
+    g, r = 20e-6, 0.020
+    zone = round_plane_position(2 * g, 2 * r)
+    rng = np.random.default_rng(1)
+    for _ in range(10):
+        w = rng.normal(size=6) * [r, r, 0, 1, 1, 1]
+        expected = g * max(abs(w[5]), np.hypot(w[0], w[1]) / r)
+        assert zone.support(w) == pytest.approx(expected, rel=1e-7)
+        screw = zone.farthest(w)
+        assert w @ screw == pytest.approx(expected, rel=1e-7)
+        assert abs(screw[5]) + r * np.hypot(screw[0], screw[1]) <= g * (1 + 1e-9)
+    C = zone.covariance()
+    assert C[5, 5] == pytest.approx(g**2 / 10, rel=0.01)
+    assert C[0, 0] == pytest.approx(3 / 20 * (g / r) ** 2, rel=0.01)
+    screws = drawn(zone, count=20_000)
+    gauge = abs(screws[:, 5]) + r * np.hypot(screws[:, 0], screws[:, 1])
+    # the share of the volume within a factor f of the zone is f^3
+    assert np.mean(gauge < 0.5 * g) == pytest.approx(0.125, abs=0.01)
+    assert gauge.max() <= g * (1 + 1e-9)
+
+
+def test_parallelism_cuts_the_double_cone_of_a_round_face():
+    """Corners: the tip (g, 0) and the circle (g - r b, b) with b = t/(2 r)."""
+    g, r, b = 20e-6, 0.020, 0.4e-3
+    zone = intersection([
+        round_plane_position(2 * g, 2 * r), round_plane_orientation(2 * r * b, 2 * r)
+    ])  # fmt: skip
+    rng = np.random.default_rng(2)
+    for _ in range(10):
+        w = rng.normal(size=6) * [r, r, 0, 1, 1, 1]
+        circle = (g - r * b) * abs(w[5]) + b * np.hypot(w[0], w[1])
+        expected = max(g * abs(w[5]), circle)
+        assert zone.support(w) == pytest.approx(expected, rel=1e-7)
+    assert zone.support(np.eye(6)[0]) == pytest.approx(b, rel=1e-7)
+
+
+@pytest.mark.parametrize("size", [0.0, 0.4, 1.0])
+def test_position_in_a_zone_that_grows_depends_on_the_size_alone(size):
+    """A size is drawn first, then the position in the zone of that size: uniform in
+    the part of the tilts that perpendicularity allows."""
+    zone = intersection([
+        axis_position(WIDTH, LENGTH, bonus=18e-6), axis_orientation(20e-6, LENGTH)
+    ])  # fmt: skip
+    fixed = intersection([
+        axis_position(WIDTH + size * 18e-6, LENGTH), axis_orientation(20e-6, LENGTH)
+    ])  # fmt: skip
+
+    def numbers(attempt):
+        uniform = numbers_of(zone, 100_000)(attempt)
+        if attempt == 0:  # later attempts keep the size of the part
+            uniform[:, -1] = size
+        return uniform
+
+    screws = zone.draw(numbers) @ zone.columns.T
+    C = fixed.covariance()
+    assert screws.var(axis=0)[[0, 3]] == pytest.approx(np.diag(C)[[0, 3]], rel=0.02)
 
 
 def test_support_of_a_polyhedron_agrees_with_a_linear_programme():
