@@ -45,7 +45,10 @@ _DEVIATIONS = {
 }
 LETTERS = ("d", "e", "f", "g", "h", "js", "k", "m", "n", "p")
 _ONE = r"([A-Za-z]{1,2})(\d{1,2})"
-_FIT = re.compile(rf"\s*(\d+\.?\d*)\s*(?:mm)?\s*{_ONE}\s*/\s*{_ONE}\s*")
+_FIT = re.compile(
+    rf"\s*(\d+\.?\d*)\s*(?:mm)?\s*{_ONE}\s*/\s*{_ONE}\s*"
+    r"(?:\+\s*(\d+\.?\d*(?:e[-+]?\d+)?)\s*um\s*)?"
+)
 _SIZE = re.compile(rf"\s*(\d+\.?\d*)\s*(?:mm)?\s*{_ONE}\s*")
 _UM = 1e-6
 _EXPECTED = 'expected a fit such as "12 H7/g6"'
@@ -69,12 +72,14 @@ class Fit:
         size: [m] nominal diameter.
         hole: deviations of the hole.
         shaft: deviations of the shaft.
+        form: [m] radial clearance that the form of the parts adds, >= 0.
     """
 
     text: str
     size: float
     hole: Limits
     shaft: Limits
+    form: float = 0.0
 
     @property
     def diametral(self) -> tuple[float, float]:
@@ -91,14 +96,17 @@ class Fit:
 
     @property
     def radial(self) -> tuple[float, float]:
-        """[m] least and largest radial clearance, half the diametral one, >= 0."""
+        """[m] least and largest radial clearance, >= 0.
+
+        It is half the diametral one, with that of the form.
+        """
         least, most = self.diametral
-        return max(0.0, least / 2), max(0.0, most / 2)
+        return max(0.0, least / 2) + self.form, max(0.0, most / 2) + self.form
 
     @property
     def mean_radial(self) -> float:
         """[m] radial clearance of parts of mean sizes, 0 if they interfere."""
-        return max(0.0, sum(self.diametral) / 4)
+        return max(0.0, sum(self.diametral) / 4) + self.form
 
     def draw(
         self, uniform: NDArray, distribution: str = "uniform", cp: float = 1.0
@@ -125,7 +133,7 @@ class Fit:
                 relative = ndtri(np.maximum(column, 2.0**-54))
                 relative /= _DEVIATIONS_IN_LIMIT * cp
             sizes.append(middle + half * relative)
-        return np.asarray(np.maximum(0.0, (sizes[0] - sizes[1]) / 2))
+        return np.asarray(np.maximum(0.0, (sizes[0] - sizes[1]) / 2) + self.form)
 
 
 @dataclass(frozen=True)
@@ -151,7 +159,8 @@ def parse_fit(text: str) -> Fit:
     """Return the fit that a text states.
 
     Args:
-        text: nominal size in mm, hole and shaft, such as ``"12 H7/g6"``.
+        text: nominal size in mm, hole and shaft, such as ``"12 H7/g6"``; or with the
+            radial clearance that the form of the parts adds, ``"12 H7/g6 + 5 um"``.
 
     Returns:
         The fit, of any kind.
@@ -162,13 +171,13 @@ def parse_fit(text: str) -> Fit:
     match = _FIT.fullmatch(text)
     if match is None:
         raise BadInput(f"found {quoted(text)}, {_EXPECTED}")
-    size, hole, hole_grade, shaft, shaft_grade = match.groups()
+    size, hole, hole_grade, shaft, shaft_grade, form = match.groups()
     if not hole.isupper() or not shaft.islower():
         fault = "capital letters are holes, small letters shafts"
         raise BadInput(f"found {quoted(text)}, {_EXPECTED}: {fault}")
     return Fit(
         text.strip(), float(size) * 1e-3, limits_of(float(size), hole, int(hole_grade)),
-        limits_of(float(size), shaft, int(shaft_grade)),
+        limits_of(float(size), shaft, int(shaft_grade)), float(form or 0.0) * _UM,
     )  # fmt: skip
 
 

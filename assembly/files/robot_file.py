@@ -27,6 +27,7 @@ from forcefit.assembly.files.joint_file import (
 from forcefit.assembly.files.link_file import link_table, read_link
 from forcefit.assembly.files.toml_text import file_text
 from forcefit.assembly.kinematics.callout_maps import place_callouts
+from forcefit.assembly.kinematics.placed_callout import fits_by_parts
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.model.frame import FORCE_CONTROL
 from forcefit.assembly.model.inertia import six_moments
@@ -262,12 +263,7 @@ def _fitted_ends(tables: list[Table]) -> dict[str, FittedEnd]:
 def _fit_remarks(robot: Robot) -> tuple[str, ...]:
     """Return a remark on the fits, of which one clearance is used."""
     texts = []
-    ends = robot.fitted_ends
-    by_parts = {
-        ends[frame].parts if frame in ends else frame: text
-        for frame, text in robot.fits.items()
-    }
-    for name, text in by_parts.items():
+    for name, text in fits_by_parts(robot).items():
         fit = parse_fit(text)
         mean, (least, most) = 1e6 * fit.mean_radial, (1e6 * r for r in fit.radial)
         texts.append(

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from forcefit.assembly.callouts.fits import Fit, FittedEnd, parse_fit
 from forcefit.assembly.callouts.zone import DISTRIBUTIONS
-from forcefit.assembly.kinematics.callout_maps import PlacedCallout, place_callouts
+from forcefit.assembly.kinematics.callout_maps import place_callouts
+from forcefit.assembly.kinematics.placed_callout import PlacedCallout
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.model.error_distributions import ErrorSources
 from forcefit.assembly.model.robot import Clearance, Frame, Robot
@@ -117,17 +118,26 @@ class CalloutSources:
 
         Returns:
             (m,) names.  A callout is always whole; by kind the callouts of the same
-            name in every leg are one group.
+            name in every leg are one group.  What depends on the size of one hole is
+            one group: its position at maximum material, the shift of a datum, its fit.
         """
         labels = () if self.independent is None else self.independent.labels
-        own = [group_of(label, by) for label in labels]
+        names, holes, counts = list[str](), list[str](), list[int]()
         for placed in self.placed:
-            callout = placed.callout
-            name = kind_of(callout.name) if by == "kind" else callout.name
-            own += [f"{callout.words} of {name}"] * sum(placed.zone.dimensions)
+            name = placed.callout.name
+            names.append(f"{placed.words} of {kind_of(name) if by == 'kind' else name}")
+            holes.append(placed.hole_of if placed.hole else "")
+            counts.append(sum(placed.zone.dimensions))
         for fit in self.fits:
             short = kind_of(fit.frame) if by == "kind" else fit.frame
-            own.append(f"fit {fit.fit.text} of {short}")
+            names.append(f"fit {fit.fit.text} of {short}")
+            holes.append(fit.frame)
+            counts.append(1)
+        own = [group_of(label, by) for label in labels]
+        for name, hole, count in zip(names, holes, counts, strict=True):
+            of_hole = [n for n, h in zip(names, holes, strict=True) if h == hole]
+            whole = " and ".join(dict.fromkeys(of_hole)) if hole else name
+            own += [whole] * count
         return own
 
     def draw(self, first: int, count: int, seed: int, stream: int = 0) -> NDArray:
@@ -139,7 +149,9 @@ class CalloutSources:
         @cache
         def uniforms(attempt: int) -> list[NDArray]:
             rows = _uniforms(first, count, seed, stream, int(ends[-1]), attempt)
-            return np.split(rows, ends[:-1], axis=1)
+            parts = np.split(rows, ends[:-1], axis=1)
+            self._share_sizes(parts)
+            return parts
 
         parts = []
         if self.independent is not None:
@@ -156,6 +168,15 @@ class CalloutSources:
             radial = one.fit.draw(uniforms(0)[i])
             parts.append(radial[:, None] - one.fit.mean_radial)
         return np.hstack(parts)
+
+    def _share_sizes(self, parts: list[NDArray]) -> None:
+        """Give what depends on the size of one hole the same uniform numbers of it."""
+        sizes: dict[str, NDArray] = {}
+        for part, placed in zip(parts[1:], self.placed, strict=False):
+            if placed.hole:
+                part[:, -1] = sizes.setdefault(placed.hole_of, part[:, -1])
+        for part, fit in zip(parts[1 + len(self.placed) :], self.fits, strict=True):
+            part[:, 0] = sizes.get(fit.frame, part[:, 0])
 
     def with_clearances(self, values: NDArray) -> Robot:
         """Return the robot with the clearances of one draw's numbers (m,)."""
@@ -209,7 +230,8 @@ class CalloutSources:
         own = [] if self.independent is None else self.independent.identity
         for p in self.placed:
             law = [DISTRIBUTIONS.index(p.callout.distribution), p.callout.cp]
-            own += [*p.zone.bounds, np.array([p.zone.bonus, *law]), p.errors]
+            growth = [p.zone.bonus, *law, *([1.0] if p.zone.from_zero else [])]
+            own += [*p.zone.bounds, *p.zone.cones, np.array(growth), p.errors]
         for f in self.fits:
             rows = [x for row, end in f.bounds for x in (row, *_length(end))]
             own.append(np.array([*f.fit.hole, *f.fit.shaft, *rows]))

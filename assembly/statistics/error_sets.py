@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.assembly.callouts.zone import Zone
-from forcefit.assembly.kinematics.callout_maps import PlacedCallout
+from forcefit.assembly.kinematics.placed_callout import PlacedCallout
 from forcefit.assembly.model.error_distributions import KINDS, ErrorSources
 from forcefit.assembly.statistics.callout_sources import CalloutSources, Sources
 from forcefit.assembly.statistics.linear_response import LinearResponse

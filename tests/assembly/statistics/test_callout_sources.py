@@ -129,6 +129,64 @@ def test_worst_case_has_the_largest_clearance_of_a_fit(tmp_path):
     assert found.attained == pytest.approx(17.5e-6, rel=1e-6)
 
 
+LOOSE = """
+format = 2
+name = "arm"
+platform = "rod"
+platform_at = [0.4, 0, 0]
+[[tolerance]]
+feature = "shoulder"
+datums = ["foot"]
+position = "0.05 mm (M)"
+hole = "12 H7"
+extent = "20 mm"
+[[body]]
+name = "rod"
+[[body]]
+name = "stand"
+[[joint]]
+name = "foot"
+type = "fixed"
+between = ["base", "stand"]
+at = [0.1, 0, 0]
+[[joint]]
+name = "shoulder"
+type = "revolute"
+between = ["base", "rod"]
+at = [0, 0, 0]
+axis = [0, 0, 1]
+actuated = true
+clearance = { fit = "12 H7/g6" }
+"""
+
+
+def test_larger_hole_has_a_larger_zone_and_a_larger_clearance(tmp_path):
+    """Hole 12 H7 of size s above its least one: ends of the bore within R = 25 um +
+    s/2, diametral clearance s + 6 to 17 um.  Uniform s in 0 to 18 um and ends in their
+    discs: the covariance of r^2 and the clearance is cov(R^2/2, s) = 398.25 um^3."""
+    path = tmp_path / "arm.toml"
+    path.write_text(LOOSE)
+    sources = sources_of(read_robot(path))
+    values = sources.draw(0, 200_000, 1)
+    radius = 25 * np.linalg.norm(values[:, :2], axis=1)
+    diametral = 20.5 + 2e6 * values[:, -1]
+    size = 2 * np.maximum(0.0, radius - 25)  # the hole is at least so large
+    assert (diametral > size + 6 - 1e-9).all()
+    assert np.cov(radius**2, diametral)[0, 1] == pytest.approx(398.25, rel=0.03)
+    assert diametral.std() == pytest.approx(6.09, abs=0.03)
+    groups = dict(source_groups(sources, "source"))
+    name = "position of shoulder on base and fit 12 H7/g6 of shoulder"
+    assert sorted(groups[name]) == list(range(5))
+
+
+def test_hole_at_maximum_material_is_that_of_the_fit(tmp_path):
+    path = tmp_path / "arm.toml"
+    path.write_text(LOOSE.replace('hole = "12 H7"', 'hole = "12 H8"'))
+    expected = 'found the hole "12 H8", expected that of the fit "12 H7/g6"'
+    with pytest.raises(BadInput, match=expected):
+        read_robot(path)
+
+
 def test_command_reports_the_importance_by_callout(tmp_path):
     from forcefit.commands.app import app
 
