@@ -138,21 +138,24 @@ class Fit:
 
 @dataclass(frozen=True)
 class FittedEnd:
-    """An end of a bore, or a bearing, that a fit lets tilt about another place.
+    """An end of a bore or a guide, or a bearing, that turns about another place.
 
     Attributes:
-        length: [m] between the two places, > 0: the tilt is at most the radial
+        length: [m] between the two places, > 0: the rotation is at most the radial
             clearance divided by it.
         parts: name of the hole and the shaft; ends of the same parts have the same
             clearance.
+        bound: of the clearance that follows from the fit: ``"tilt"`` of a bore,
+            ``"spin"`` of a guide, whose contacts turn about one axis each.
     """
 
     length: float
     parts: str
+    bound: str = "tilt"
 
-    def tilt(self, radial: float) -> float:
-        """[rad] largest tilt for a radial clearance [m]."""
-        return radial / self.length
+    def bounds(self, radial: float) -> dict[str, float]:
+        """[rad] largest rotation, by its name, for a radial clearance [m]."""
+        return {self.bound: radial / self.length}
 
 
 def parse_fit(text: str) -> Fit:

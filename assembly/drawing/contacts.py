@@ -114,6 +114,28 @@ def guide(gaps: tuple[float, float], length: float) -> tuple[Contact, ...]:
     return tuple(contacts)
 
 
+def fitted_guide(
+    contacts: tuple[Contact, ...], fits: tuple[str, str], length: float
+) -> tuple[Contact, ...]:
+    """Return the contacts of :func:`guide` with the fits along x and y.
+
+    Args:
+        contacts: of a guide, for the mean gaps of the fits.
+        fits: along x and y.
+        length: [m] of the guide.
+    """
+    turns = {"yaw": (fits[0], "x"), "pitch": (fits[1], "y")}
+    found = []
+    for contact in contacts:
+        fit, parts = next(
+            (own for turn, own in turns.items() if f"_{turn}_" in contact.suffix),
+            ("", ""),
+        )
+        end = FittedEnd(length, parts, "spin") if fit else None
+        found.append(replace(contact, fit=fit, end=end))
+    return tuple(found)
+
+
 def largest_roll(gaps: tuple[float, float], width: float, height: float) -> float:
     """Return the largest roll of a block in its guide.
 

@@ -474,10 +474,11 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
 def _write_fit(clearance: dict[str, Any], robot: Robot, name: str) -> None:
     """Replace the mean of a frame's fit by the fit."""
     end = robot.fitted_ends.get(name)
-    del clearance["radial" if end is None else "tilt"]
+    del clearance["radial" if end is None else end.bound]
     clearance["fit"] = robot.fits[name]
     if end is not None:
         clearance |= {"length": end.length, "parts": end.parts}
+        clearance |= {} if end.bound == "tilt" else {"bound": end.bound}
 
 
 def root_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:

@@ -76,6 +76,7 @@ _CLEARANCE = record(
     fit_=_FIT,
     length_=number("length of the bore, or distance of two bearings", "m"),
     parts_=text("name of the hole and the shaft of a fit with length"),
+    bound_=Words(("tilt", "spin")),
 )  # fmt: skip
 _FRAME = record(
     name=text("name"), parent=text('name of a frame, or "base"'),
@@ -153,7 +154,8 @@ _CONTACTS = record(
     "", _CLEARANCE,
     bearings_=Listed(record(z=number("height", "m"), radial_=_GAP, fit_=_FIT)),
     guide_=record(
-        gap=Either((_GAP, number("gaps along x and y", "m", "axis"))),
+        gap_=Either((_GAP, number("gaps along x and y", "m", "axis"))),
+        fit_=Either((_FIT, Listed(_FIT))),
         length=number("length along the axis", "m"),
         width=number("width along x", "m"), height=number("height along y", "m"),
     ),

@@ -194,7 +194,7 @@ class CalloutSources:
         for one, bound in zip(self.fits, radial, strict=True):
             gap = max(0.0, bound)
             for row, end in one.bounds:
-                new = {"radial": gap} if end is None else {"tilt": end.tilt(gap)}
+                new = {"radial": gap} if end is None else end.bounds(gap)
                 frames[row] = _with_clearance(frames[row], new)
         return replace(self.robot, frames=tuple(frames))
 
