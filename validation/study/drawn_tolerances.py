@@ -143,7 +143,8 @@ def drawn_at_pose(
     )  # fmt: skip
     summary = {
         "robot": posture.robot.name, "pose": posture.pose(), "seed": asked.seed,
-        "load": None, "gravity": None, **summarise(data, asked.limits),
+        "load": None, "gravity": None,
+        **summarise(data, asked.limits, capable=bool(asked.limits)),
     }  # fmt: skip
     try:
         worst = {"worst_case": worst_results(experiment.energies, sources, asked.seed)}

@@ -17,6 +17,7 @@ from forcefit.assembly.statistics.monte_carlo import run_draws
 from forcefit.assembly.statistics.worst_pose import worst_pose
 from forcefit.inputs.table import BadInput
 from tests.drawn_four_bar_for_tests import COEFFICIENTS, LEVER, four_bar_file
+from tests.pages_for_tests import parse
 
 
 @pytest.fixture(scope="module")
@@ -209,6 +210,19 @@ def test_command_reports_the_importance_by_callout(tmp_path):
     assert turned["attained"] == pytest.approx(0.1903e-3, abs=5e-8)
     assert turned["reading"] == "linear"
     assert sum(turned["shares"].values()) == pytest.approx(0.1903e-3, abs=5e-8)
+    shares = results["importance"]["quantities"]["translation"]["total_index"]
+    name = max(shares, key=lambda group: shares[group][0])
+    value, low, high = (round(100 * share) for share in shares[name])
+    sentence = f"{name}: {value} % of the variance of the translation ({low} to {high}"
+    assert sentence in result.output
+    page = (tmp_path / "page.html").read_text()
+    assert sentence in page.replace("&nbsp;", " ")
+    columns = parse(page).table("", "limit", "Cp")[1]
+    for index in ("cp", "cpk", "ppm"):
+        one = results["capability"]["translation"][index]
+        assert str(one["value"]) != "nan"
+        assert one["lower"] <= one["value"] <= one["upper"]
+    assert len(columns) == 11
     above = results["exceeds"]["translation"]["probability"]
     assert results["capability"]["translation"]["ppm"]["value"] == above * 1e6
     assert "certified bound" in (tmp_path / "page.html").read_text()
