@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.assembly.callouts.fits import parse_size
+from forcefit.assembly.callouts.fits import parse_hole
 from forcefit.assembly.callouts.general_tolerances import (
     linear_tolerance,
     parse_general,
@@ -220,7 +220,7 @@ def _zone(callout: Callout, kind: str, width: float) -> Zone:
         return axis_position_along(width, length, direction)
     bonus = 0.0
     if callout.hole and kind == "position":
-        bonus = float(np.ptp(parse_size(callout.hole)))
+        bonus = float(np.ptp(parse_hole(callout.hole)[1]))
     return axis_position(width, length, bonus)
 
 
@@ -257,15 +257,17 @@ def _general(callout: Callout, away: NDArray, datum_axis: NDArray | None) -> lis
 
 
 def check_orientation(
-    callout: Callout, axis: NDArray, datum_axis: NDArray | None, same_shape: bool
-) -> None:
+    callout: Callout, axis: NDArray, datum_axis: NDArray | None,
+    same_shape: bool | None,
+) -> None:  # fmt: skip
     """Refuse perpendicularity and parallelism that the nominal geometry does not have.
 
     Args:
         callout: of the feature.
         axis: (3,) unit vector of the feature's axis or normal.
         datum_axis: (3,) of datum A in the same axes, None for a point.
-        same_shape: whether both are axes, or both planes.
+        same_shape: whether both are axes, or both planes; None if datum A may be the
+            face or the bore of a fixed joint.
 
     Raises:
         BadInput: the angle at home is another one, or the datum is a point.
@@ -276,12 +278,13 @@ def check_orientation(
         cosine = abs(float(axis @ datum_axis))
         parallel = cosine > np.sqrt(1 - _ALONG**2)
         square = cosine < _ALONG
+        known = [same_shape] if same_shape is not None else [True, False]
         fits = {
-            "parallelism": parallel if same_shape else square,
-            "perpendicularity": square if same_shape else parallel,
-            "angularity": True,
+            "parallelism": [parallel if same else square for same in known],
+            "perpendicularity": [square if same else parallel for same in known],
+            "angularity": [True],
         }[kind]
-        if not fits:
+        if not any(fits):
             angle = np.degrees(np.arccos(min(1.0, cosine)))
             raise BadInput(
                 f"found {kind} where axis or normal and that of datum A are at "
@@ -290,6 +293,8 @@ def check_orientation(
             )
 
 
-def _expected(kind: str, same_shape: bool) -> int:
+def _expected(kind: str, same_shape: bool | None) -> str:
     """[deg] angle of axes or normals."""
-    return 0 if (kind == "parallelism") == same_shape else 90
+    if same_shape is None:
+        return "0 or 90"
+    return "0" if (kind == "parallelism") == same_shape else "90"

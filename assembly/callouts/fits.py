@@ -214,6 +214,21 @@ def parse_size(text: str) -> Limits:
     return limits_of(float(match[1]), match[2], int(match[3]))
 
 
+def parse_hole(text: str) -> tuple[float, Limits]:
+    """Return nominal size [m] and deviations of a hole, such as ``"12 H7"``.
+
+    Raises:
+        BadInput: see :func:`parse_size`; or it is a shaft.
+    """
+    limits = parse_size(text)
+    match = _SIZE.fullmatch(text)
+    assert match is not None
+    if match[2].islower():
+        expected = 'expected a hole, whose letter is a capital, such as "12 H7"'
+        raise BadInput(f"found {quoted(text)}, a shaft; {expected}")
+    return float(match[1]) * 1e-3, limits
+
+
 def limits_of(size: float, letter: str, grade: int) -> Limits:
     """Return the deviations of a hole (capital letter) or a shaft (small letter).
 

@@ -8,7 +8,7 @@ an axis at height z is e(z) = (TX + z RY, TY - z RX).
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.assembly.callouts.fits import parse_size
+from forcefit.assembly.callouts.fits import parse_hole
 from forcefit.assembly.callouts.zone import Zone
 
 _SIGNS = ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))
@@ -117,7 +117,7 @@ def datum_shift(hole: str) -> Zone:
         A disc across the hole's axis, whose diameter is the size of the hole less the
         least one: a point at the least hole.
     """
-    growth = float(np.ptp(parse_size(hole)))
+    growth = float(np.ptp(parse_hole(hole)[1]))
     return Zone((offset_rows(0.0) * 2 / growth,), from_zero=True)
 
 

@@ -17,7 +17,7 @@ from forcefit.assembly.callouts.callout import (
     Callout,
     Datum,
 )
-from forcefit.assembly.callouts.fits import parse_size
+from forcefit.assembly.callouts.fits import parse_hole
 from forcefit.assembly.callouts.general_tolerances import parse_general
 from forcefit.assembly.callouts.written_tolerances import (
     parse_length,
@@ -146,7 +146,7 @@ def _drawn(
             fault = "found one of a feature whose form alone is stated"
             raise table.bad(key, f"{fault}, expected none")
         return None
-    datums = joint_datums(table, find)
+    datums = joint_datums(table, feature.name, find)
     name = copied.prefix + table.text("name", f"{given} on {short}")
     callout = _callout(table, name, feature.name, tuple(datums), shape, False, None)
     table.finish()
@@ -217,7 +217,7 @@ def _widths(table: Table, shape: str) -> tuple[dict[str, float], str]:
     used = False
     hole = table.text("hole", "") if table.has("hole") else ""
     if hole:
-        parsed_value(table, "hole", parse_size)
+        parsed_value(table, "hole", parse_hole)
     for word in (*LOCATIONS, *ORIENTATIONS):
         if not table.has(word):
             continue

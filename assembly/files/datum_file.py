@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from forcefit.assembly.callouts.callout import HELD, Datum
-from forcefit.assembly.callouts.fits import parse_size
+from forcefit.assembly.callouts.fits import parse_hole
 from forcefit.assembly.drawing.drawing import DrawnJoint
 from forcefit.assembly.model.largest import LARGEST_LENGTH
 from forcefit.inputs.table import BadInput, Table, describe, nearest, quoted
@@ -31,12 +31,26 @@ def frame_datums(table: Table, frames: list[str]) -> tuple[Datum, ...]:
     return datums
 
 
-def joint_datums(table: Table, find: Callable[[str, str], DrawnJoint]) -> list[Datum]:
-    """The datums by names of joints; ``"B (M)"`` is at maximum material."""
+def joint_datums(
+    table: Table, feature: str, find: Callable[[str, str], DrawnJoint]
+) -> list[Datum]:
+    """Return the datums of a feature in a file of bodies and joints.
+
+    Args:
+        table: of the tolerances of the feature.
+        feature: name of its joint in the whole robot.
+        find: function of a name as written and its key, which returns the joint.
+
+    Returns:
+        The datums by names of joints; ``"B (M)"`` is at maximum material.
+
+    Raises:
+        BadInput: a rule of the format is broken.
+    """
     datums = []
     hole = table.text("datum_hole", "")
     if hole:
-        parsed_value(table, "datum_hole", parse_size)
+        parsed_value(table, "datum_hole", parse_hole)
     for number, value in enumerate(_datum_list(table)):
         if not isinstance(value, str):
             fault = f"found {describe(value)}, expected names of joints"
@@ -45,6 +59,9 @@ def joint_datums(table: Table, find: Callable[[str, str], DrawnJoint]) -> list[D
         if at_most:
             name = value.removesuffix("(M)").strip()
         joint = find(name, "datums")
+        if joint.name == feature:
+            fault = f"found {quoted(value)}, which is the feature itself"
+            raise table.bad("datums", f"{fault}, expected another joint of the body")
         if at_most:
             _check_shifting(table, value, number, joint.kind, hole)
         datums.append(Datum(joint.name, hole=hole if at_most else ""))
@@ -61,7 +78,8 @@ def _check_shifting(
     """Refuse (M) at a datum that is no hole, and at one that holds a tilt."""
     if kind not in _HOLES:
         fault = f"found {quoted(value)}, a {kind} joint"
-        raise table.bad("datums", f"{fault}; expected (M) at a {' or '.join(_HOLES)}")
+        expected = f"expected (M) at a {' or '.join(_HOLES)} joint"
+        raise table.bad("datums", f"{fault}; {expected}")
     if number == 0:
         fault = f"found {quoted(value)} as datum A, whose tilt would shift too"
         raise table.bad("datums", f"{fault}; expected (M) at datum B or C")
@@ -104,7 +122,7 @@ def _hole_of_datum(table: Table, name: str, shape: str) -> tuple[str, str]:
     if shape != "axis":
         fault = f"found one of a datum that is a {shape}"
         raise table.bad("hole", f"{fault}, expected none")
-    parsed_value(table, "hole", parse_size)
+    parsed_value(table, "hole", parse_hole)
     return table.text("hole"), table.text("hole_of", name)
 
 

@@ -220,8 +220,12 @@ def _zone(
     offset = R.T @ (pose[:3, 3] - of_datum[:3, 3])
     axis = None if shape == "point" else R.T @ of_datum[:3, 2]
     try:
-        planes = (shape == "plane", callout.shape == "plane")
-        check_orientation(callout, np.eye(3)[2], axis, planes[0] == planes[1])
+        same = (
+            None
+            if shape == "body"
+            else ((shape == "plane") == (callout.shape == "plane"))
+        )
+        check_orientation(callout, np.eye(3)[2], axis, same)
         return zone_of(callout, offset, axis)
     except BadInput as error:
         raise BadInput(fault_of(callout, str(error))) from None

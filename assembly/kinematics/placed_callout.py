@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from numpy.typing import NDArray
 
 from forcefit.assembly.callouts.callout import Callout, Datum
-from forcefit.assembly.callouts.fits import parse_fit, parse_size
+from forcefit.assembly.callouts.fits import Limits, parse_fit, parse_hole
 from forcefit.assembly.callouts.zone import Zone
 from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, quoted
@@ -90,11 +90,17 @@ def check_holes(
             fault = f"found the hole of {quoted(one.hole_of)} on two bodies"
             raise BadInput(fault_of(one.callout, f"{fault}, expected one hole"))
         fit = fits.get(one.hole_of)
-        if parse_size(size) != parse_size(one.hole):
+        if parse_hole(size) != parse_hole(one.hole):
             expected = f"{quoted(size)}, as before"
-        elif fit is not None and parse_fit(fit).hole != parse_size(one.hole):
+        elif fit is not None and _hole_of(fit) != parse_hole(one.hole):
             expected = f"that of the fit {quoted(fit)}"
         else:
             continue
         fault = f"found the hole {quoted(one.hole)}, expected {expected}"
         raise BadInput(fault_of(one.callout, fault))
+
+
+def _hole_of(text: str) -> tuple[float, Limits]:
+    """Nominal size and deviations of the hole of a fit."""
+    fit = parse_fit(text)
+    return fit.size, fit.hole

@@ -23,6 +23,8 @@ from forcefit.assembly.statistics.ranking import group_of, kind_of
 from forcefit.inputs.table import BadInput
 
 _SAMPLE = 1 << 14  # draws of a fit for its variance
+# frames of a universal, a cylindrical and a planar joint, whose name is before the dot
+_PARTS_OF_JOINTS = ("first", "second", "turn", "slide")
 _WORDS = 4  # random numbers of one step of Philox
 
 
@@ -129,7 +131,7 @@ class CalloutSources:
             holes.append(placed.hole_of if placed.hole else "")
             counts.append(sum(placed.zone.dimensions))
         for fit in self.fits:
-            short = kind_of(fit.frame) if by == "kind" else fit.frame
+            short = self._kind_of_fit(fit.frame) if by == "kind" else fit.frame
             names.append(f"fit {fit.fit.text} of {short}")
             holes.append(fit.frame)
             counts.append(1)
@@ -139,6 +141,13 @@ class CalloutSources:
             whole = " and ".join(dict.fromkeys(of_hole)) if hole else name
             own += [whole] * count
         return own
+
+    def _kind_of_fit(self, name: str) -> str:
+        """The name of a fit without that of its leg, if it begins with one."""
+        joint, _, rest = name.partition(".")
+        frames = {frame.name for frame in self.robot.frames}
+        of_joint = joint in frames or rest.split(".")[0] in _PARTS_OF_JOINTS
+        return name if of_joint else kind_of(name)
 
     def draw(self, first: int, count: int, seed: int, stream: int = 0) -> NDArray:
         """Return the (count, m) numbers of draws; see ErrorSources.uniforms."""

@@ -67,6 +67,7 @@ def test_gaps_of_a_guide_are_drawn_once_along_each_axis(tmp_path):
     assert [fit.name for fit in sources.fits] == [
         "fit 40 H7/g6 of slide.x", "fit 30 H8/f7 of slide.y",
     ]  # fmt: skip
+    assert sources.groups_by("kind") == [fit.name for fit in sources.fits]
     means = [fit.fit.mean_radial for fit in sources.fits]
     gaps = 1e6 * (sources.draw(0, 20_000, 1) + means)
     assert (gaps.min(axis=0) >= [4.5, 10]).all()
