@@ -202,31 +202,19 @@ def clearance_fit(text: str) -> Fit:
     return fit
 
 
-def parse_size(text: str) -> Limits:
-    """Return the deviations of one size, such as ``"12 H7"`` or ``"20 k6"``.
-
-    Raises:
-        BadInput: it is no such text, or one that the tables do not have.
-    """
-    match = _SIZE.fullmatch(text)
-    if match is None:
-        raise BadInput(f'found {quoted(text)}, expected a size such as "12 H7"')
-    return limits_of(float(match[1]), match[2], int(match[3]))
-
-
 def parse_hole(text: str) -> tuple[float, Limits]:
     """Return nominal size [m] and deviations of a hole, such as ``"12 H7"``.
 
     Raises:
-        BadInput: see :func:`parse_size`; or it is a shaft.
+        BadInput: it is no such text, a shaft, or a hole that the tables do not have.
     """
-    limits = parse_size(text)
     match = _SIZE.fullmatch(text)
-    assert match is not None
+    if match is None:
+        raise BadInput(f'found {quoted(text)}, expected a size such as "12 H7"')
     if match[2].islower():
         expected = 'expected a hole, whose letter is a capital, such as "12 H7"'
         raise BadInput(f"found {quoted(text)}, a shaft; {expected}")
-    return float(match[1]) * 1e-3, limits
+    return float(match[1]) * 1e-3, limits_of(float(match[1]), match[2], int(match[3]))
 
 
 def limits_of(size: float, letter: str, grade: int) -> Limits:

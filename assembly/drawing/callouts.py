@@ -66,7 +66,7 @@ def _of_frames(
     frame, after, joint = _side(step, drawn.body)
     pose = poses[frame][after]
     R = pose[:3, :3]
-    across = drawn.direction
+    across = None if drawn.direction is None else np.array(drawn.direction)
     if callout.shape == "plane":  # the direction of the first of two sizes
         across = joint.across if len(callout.extent) == 2 else None
     datums = []
@@ -82,7 +82,7 @@ def _of_frames(
     return replace(
         callout, feature=frame, after=after, datums=tuple(datums),
         axis=_vector(R.T @ _axis(joint, drawn.body)),
-        direction=None if across is None else _vector(R.T @ np.array(across)),
+        direction=None if across is None else _vector(R.T @ across),
         at=_point(pose, joint), hole_of=_hole_of(step, drawn) if callout.hole else "",
     )  # fmt: skip
 

@@ -49,8 +49,8 @@ def read_drawn_clearance(table: Table, kind: str) -> _Clearance:
         raise inner.bad(contacts[1], f"{fault}, expected one of them")
     if contacts not in ([], ["length"]) and inner.has("fit"):
         expected = {"bearings": "it in each bearing", "guide": "it in the guide"}
-        given = expected.get(contacts[0], "only a gap in m")
-        fault = f"found together with {quoted(contacts[0])}, expected {given}"
+        instead = expected.get(contacts[0], "only a gap in m")
+        fault = f"found together with {quoted(contacts[0])}, expected {instead}"
         raise inner.bad("fit", fault)
     found: _Clearance = bounds, ()
     for key in contacts:

@@ -166,11 +166,8 @@ def bounds_over_grid(
     Returns:
         The maps with a certified upper bound of the worst rotation and translation over
         all parts and clearances at every point, NaN where there is no solution.
-
-    Raises:
-        BadInput: the robot has a joint that is bolted at a pose.
     """
-    sources, axes = sources_of(robot), list(maps["status"].dims)
+    sources, axes = sources_of(robot), [str(axis) for axis in maps["status"].dims]
     bounds = np.full((maps["status"].size, len(POSE_ERRORS)), np.nan)
     values = [maps[axis].values for axis in axes]
     points = np.stack(np.meshgrid(*values, indexing="ij"), -1).reshape(-1, len(axes))

@@ -61,7 +61,7 @@ def _worst_drawn(results: StudyResults) -> dict[str, Any] | None:
         return None
     worst, parts = found["worst_case"], ("rotation", "translation")
     means = "; ".join(dict.fromkeys(worst[part]["means"] for part in parts))
-    table = {
+    table: dict[str, Any] = {
         "assumption": means, "pose": {part: worst[part]["bound"] for part in parts},
         "map": None,
     }  # fmt: skip
@@ -69,8 +69,9 @@ def _worst_drawn(results: StudyResults) -> dict[str, Any] | None:
         values = {part: results.maps[DRAWN_ERRORS[part]].values for part in parts}
         known = ~np.isnan(values["rotation"])
         if known.any():
-            table["map"] = {part: float(v[known].max()) for part, v in values.items()}
-            table["map"] |= {"points": int(known.sum()), "of": known.size}
+            largest = {part: float(v[known].max()) for part, v in values.items()}
+            points = {"points": int(known.sum()), "of": known.size}
+            table["map"] = largest | points
     return table
 
 

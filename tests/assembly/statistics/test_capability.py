@@ -17,7 +17,13 @@ from forcefit.assembly.statistics.estimates import proportion
 
 @pytest.mark.parametrize(
     ("cpk", "ppm", "tol"),
-    [(1.0, 2700, 0.5), (4 / 3, 63.3, 0.05), (1.33, 66.1, 0.05), (2.0, 0.00197, 5e-6)],
+    [
+        (1.0, 2700, 0.5),
+        (4 / 3, 63.3, 0.05),
+        (1.33, 66.1, 0.05),
+        (1.67, 0.544, 5e-4),
+        (2.0, 0.00197, 5e-6),
+    ],
 )
 def test_share_outside_of_a_centred_process_is_the_known_ppm(cpk, ppm, tol):
     assert share_outside(cpk, cpk) * 1e6 == pytest.approx(ppm, abs=tol)
