@@ -240,6 +240,8 @@ class CalloutSources:
         for p in self.placed:
             law = [DISTRIBUTIONS.index(p.callout.distribution), p.callout.cp]
             growth = [p.zone.bonus, *law, *([1.0] if p.zone.from_zero else [])]
+            if p.hole:  # which fit has the same hole
+                growth += [float(f.frame == p.hole_of) for f in self.fits]
             own += [*p.zone.bounds, *p.zone.cones, np.array(growth), p.errors]
         for f in self.fits:
             rows = [x for row, end in f.bounds for x in (row, *_length(end))]
