@@ -134,6 +134,7 @@ def test_normal_interval_has_three_cp_deviations_to_its_limit(cp):
 
 @pytest.mark.parametrize("zone", [
     POSITION, BOTH,
+    pytest.param(round_plane_position(4e-5, 0.04), marks=pytest.mark.slow),
     pytest.param(plane_position(4e-5, 0.04, 0.03), marks=pytest.mark.slow),
 ])  # fmt: skip
 def test_truncated_draws_stay_in_the_zone_and_have_its_covariance(zone):
@@ -145,7 +146,7 @@ def test_truncated_draws_stay_in_the_zone_and_have_its_covariance(zone):
         assert screws[:, i].var() == pytest.approx(C[i, i], rel=0.02)
 
 
-@pytest.mark.parametrize("zone", [POSITION, BOTH])
+@pytest.mark.parametrize("zone", [POSITION, BOTH, round_plane_position(4e-5, 0.04)])
 def test_normal_draws_leave_the_zone_as_often_as_one_dimension(zone):
     u = zone.draw(numbers_of(zone), "normal", 0.7)
     # 2 Phi(-2.1) = 3.57 %
