@@ -6,7 +6,6 @@ In a file of frames a feature is a frame, in a file of bodies a joint of the bod
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -27,11 +26,9 @@ from forcefit.assembly.callouts.written_tolerances import (
 from forcefit.assembly.callouts.zone import DISTRIBUTIONS
 from forcefit.assembly.drawing.drawing import DrawnBody, DrawnCallout, DrawnJoint
 from forcefit.assembly.files.datum_file import (
-    ORIGIN,
     Z_AXIS,
     Vector,
     check_frame,
-    datum_table,
     frame_datums,
     joint_datums,
     parsed_value,
@@ -304,43 +301,3 @@ def _across(table: Table, axis: Vector | None) -> Vector | None:
         if abs(float(np.dot(direction, axis))) > _ACROSS:
             raise table.bad("direction", _NOT_ACROSS)
     return direction
-
-
-def callout_table(callout: Callout) -> dict[str, Any]:
-    """Return the content of ``[[tolerance]]`` of a frames file, without defaults."""
-    table: dict[str, Any] = {"feature": callout.feature}
-    if callout.name != callout.feature:
-        table["name"] = callout.name
-    table["datums"] = [datum_table(datum) for datum in callout.datums]
-    if callout.after:
-        table["after"] = True
-    if callout.shape != "axis":
-        table["shape"] = callout.shape
-    if callout.axis != Z_AXIS:
-        table["axis"] = list(callout.axis)
-    if callout.at != ORIGIN:
-        table["at"] = list(callout.at)
-    if callout.shape == "plane" and len(callout.extent) == 1:
-        table["diameter"] = callout.extent[0]
-    elif callout.extent:
-        table["extent"] = list(callout.extent)
-    for word, width in callout.widths.items():
-        at_most = callout.hole and word == "position"
-        table[word] = f"{width!r} m (M)" if at_most else width
-    if callout.hole:
-        table["hole"] = callout.hole
-    if callout.hole_of not in ("", callout.feature):
-        table["hole_of"] = callout.hole_of
-    if callout.direction is not None:
-        table["direction"] = list(callout.direction)
-    if callout.length is not None:
-        length, tolerance = callout.length
-        table["length"] = f"{length!r} +- {tolerance!r} m"
-        table["length"] += " (E)" * callout.envelope
-    if callout.general:
-        table["general"] = callout.general
-    if callout.distribution != "uniform":
-        table["distribution"] = callout.distribution
-    if callout.cp != 1.0:
-        table["cp"] = callout.cp
-    return table

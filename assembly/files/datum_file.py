@@ -161,15 +161,3 @@ def parsed_value(table: Table, key: str, parse: Callable[[Any], Parsed]) -> Pars
     except TypeError:  # a text was expected
         fault = f"found {describe(table.content[key])}, expected a text"
         raise table.bad(key, fault) from None
-
-
-def datum_table(datum: Datum) -> str | dict[str, Any]:
-    """A datum as it is written."""
-    if datum == Datum(datum.frame):
-        return datum.frame
-    table = {"frame": datum.frame, "shape": datum.shape, "axis": list(datum.axis)}
-    if datum.at != ORIGIN:
-        table["at"] = list(datum.at)
-    if datum.hole:
-        table |= {"hole": datum.hole, "hole_of": datum.hole_of}
-    return table

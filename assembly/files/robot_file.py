@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from forcefit.assembly.callouts.fits import FittedEnd, parse_fit
 from forcefit.assembly.drawing.frames import robot_of_drawing
 from forcefit.assembly.files.bolt_file import read_locked_at
-from forcefit.assembly.files.callout_file import callout_table, read_frame_callouts
+from forcefit.assembly.files.callout_file import read_frame_callouts
+from forcefit.assembly.files.callout_writing import callout_table
 from forcefit.assembly.files.drawing_file import is_drawing, read_drawing
 from forcefit.assembly.files.effect_file import effect_tables, with_effects
 from forcefit.assembly.files.inertia_file import read_inertia

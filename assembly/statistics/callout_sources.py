@@ -12,40 +12,24 @@ from functools import cache, cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.assembly.callouts.fits import Fit, FittedEnd, parse_fit
+from forcefit.assembly.callouts.fits import FittedEnd
 from forcefit.assembly.callouts.zone import DISTRIBUTIONS
 from forcefit.assembly.kinematics.callout_maps import place_callouts
 from forcefit.assembly.kinematics.placed_callout import PlacedCallout
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.model.error_distributions import ErrorSources
-from forcefit.assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.statistics.joint_fits import (
+    JointFit,
+    fits_of,
+    kind_of_fit,
+    with_clearance,
+)
 from forcefit.assembly.statistics.ranking import group_of, kind_of
 from forcefit.inputs.table import BadInput
 
 _SAMPLE = 1 << 14  # draws of a fit for its variance
-# frames of a universal, a cylindrical and a planar joint, whose name is before the dot
-_PARTS_OF_JOINTS = ("first", "second", "turn", "slide")
 _WORDS = 4  # random numbers of one step of Philox
-
-
-@dataclass(frozen=True, eq=False)
-class JointFit:
-    """A fit of a hole and a shaft.
-
-    Attributes:
-        frame: name of the joint's frame, or of the parts.
-        fit: the fit.
-        bounds: rows of the frames that it bounds, and how: None for ``radial``.
-    """
-
-    frame: str
-    fit: Fit
-    bounds: tuple[tuple[int, FittedEnd | None], ...]
-
-    @property
-    def name(self) -> str:
-        """Name in tables: ``"fit 12 H7/g6 of elbow"``."""
-        return f"fit {self.fit.text} of {self.frame}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +115,7 @@ class CalloutSources:
             holes.append(placed.hole_of if placed.hole else "")
             counts.append(sum(placed.zone.dimensions))
         for fit in self.fits:
-            short = self._kind_of_fit(fit.frame) if by == "kind" else fit.frame
+            short = kind_of_fit(self.robot, fit) if by == "kind" else fit.frame
             names.append(f"fit {fit.fit.text} of {short}")
             holes.append(fit.frame)
             counts.append(1)
@@ -141,13 +125,6 @@ class CalloutSources:
             whole = " and ".join(dict.fromkeys(of_hole)) if hole else name
             own += [whole] * count
         return own
-
-    def _kind_of_fit(self, name: str) -> str:
-        """The name of a fit without that of its leg, if it begins with one."""
-        joint, _, rest = name.partition(".")
-        frames = {frame.name for frame in self.robot.frames}
-        of_joint = joint in frames or rest.split(".")[0] in _PARTS_OF_JOINTS
-        return name if of_joint else kind_of(name)
 
     def draw(self, first: int, count: int, seed: int, stream: int = 0) -> NDArray:
         """Return the (count, m) numbers of draws; see ErrorSources.uniforms."""
@@ -204,7 +181,7 @@ class CalloutSources:
             gap = max(0.0, bound)
             for row, end in one.bounds:
                 new = {"radial": gap} if end is None else end.bounds(gap)
-                frames[row] = _with_clearance(frames[row], new)
+                frames[row] = with_clearance(frames[row], new)
         return replace(self.robot, frames=tuple(frames))
 
     def errors(self, values: NDArray) -> NDArray:
@@ -252,30 +229,9 @@ class CalloutSources:
 Sources = ErrorSources | CalloutSources
 
 
-def _with_clearance(frame: Frame, new: dict[str, float]) -> Frame:
-    """The frame with other bounds; those of a bolted joint hold before it is bolted."""
-    bolt = frame.locked_at
-    if bolt is not None:
-        clearance = replace(bolt.clearance, **new)
-        return replace(frame, locked_at=replace(bolt, clearance=clearance))
-    return replace(frame, clearance=replace(frame.clearance or Clearance(), **new))
-
-
 def _length(end: FittedEnd | None) -> list[float]:
     """The length of a fitted end, nothing of a radial clearance."""
     return [] if end is None else [end.length]
-
-
-def _fits_of(robot: Robot) -> tuple[JointFit, ...]:
-    """The fits of a robot, each hole and shaft once."""
-    found: dict[str, JointFit] = {}
-    for frame, text in robot.fits.items():
-        end = robot.fitted_ends.get(frame)
-        name = frame if end is None else end.parts
-        one = found.get(name, JointFit(name, parse_fit(text), ()))
-        bound = robot.index(frame), end
-        found[name] = replace(one, bounds=(*one.bounds, bound))
-    return tuple(found.values())
 
 
 def _nth(uniforms: Callable[[int], list[NDArray]], i: int) -> Callable[[int], NDArray]:
@@ -313,7 +269,7 @@ def sources_of(
     Raises:
         BadInput: there are neither.
     """
-    fits = _fits_of(robot)
+    fits = fits_of(robot)
     if robot.callouts or fits:
         placed = place_callouts(home_posture(robot))
         return CalloutSources(robot, placed, independent, fixed, fits)
