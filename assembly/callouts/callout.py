@@ -216,11 +216,11 @@ def _zone(callout: Callout, kind: str, width: float) -> Zone:
     (length,) = callout.extent
     if not location:
         return axis_orientation(width, length, direction)
-    if direction is not None:
-        return axis_position_along(width, length, direction)
     bonus = 0.0
     if callout.hole and kind == "position":
         bonus = float(np.ptp(parse_hole(callout.hole)[1]))
+    if direction is not None:
+        return axis_position_along(width, length, direction, bonus)
     return axis_position(width, length, bonus)
 
 

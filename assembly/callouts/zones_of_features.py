@@ -34,16 +34,19 @@ def axis_position(width: float, length: float, bonus: float = 0.0) -> Zone:
     return Zone(ends, bonus / width)
 
 
-def axis_position_along(width: float, length: float, direction: NDArray) -> Zone:
+def axis_position_along(
+    width: float, length: float, direction: NDArray, bonus: float = 0.0
+) -> Zone:
     """Return the zone of an axis between two planes: position in one direction.
 
     Args:
         width: [m] distance of the planes.
         length: [m] of the bore.
         direction: (2,) unit vector across the planes, in the feature's x and y.
+        bonus: [m] growth of the distance from least to largest hole (M); 0 for none.
     """
     ends = (direction @ offset_rows(z) * 2 / width for z in (length / 2, -length / 2))
-    return Zone(tuple(row[None] for row in ends))
+    return Zone(tuple(row[None] for row in ends), bonus / width)
 
 
 def axis_orientation(

@@ -220,11 +220,9 @@ def _zone(
     offset = R.T @ (pose[:3, 3] - of_datum[:3, 3])
     axis = None if shape == "point" else R.T @ of_datum[:3, 2]
     try:
-        same = (
-            None
-            if shape == "body"
-            else ((shape == "plane") == (callout.shape == "plane"))
-        )
+        same = None  # a fixed joint may be a face or a bore
+        if shape != "body":
+            same = (shape == "plane") == (callout.shape == "plane")
         check_orientation(callout, np.eye(3)[2], axis, same)
         return zone_of(callout, offset, axis)
     except BadInput as error:

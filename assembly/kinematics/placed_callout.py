@@ -32,11 +32,9 @@ class PlacedCallout:
     @property
     def words(self) -> str:
         """What is called out, or which datum shifts."""
-        return (
-            self.callout.words
-            if self.datum is None
-            else (f"shift of datum {self.datum.frame}")
-        )
+        if self.datum is None:
+            return self.callout.words
+        return f"shift of datum {self.datum.hole_of}"
 
     @property
     def name(self) -> str:

@@ -253,6 +253,17 @@ def test_position_in_one_direction_leaves_the_other_exact():
     assert zone.support(np.eye(6)[0]) == pytest.approx(0, abs=1e-15)
 
 
+def test_position_in_one_direction_at_maximum_material_grows_with_the_hole():
+    """Between planes 0.05 to 0.068 mm apart: at most 34 um, E[x^2] = E[R^2]/3 at one
+    end for uniform ends and R uniform in 25 to 34 um."""
+    zone = axis_position_along(WIDTH, LENGTH, np.array([1.0, 0.0]), bonus=18e-6)
+    assert zone.support(np.eye(6)[3]) == pytest.approx(34e-6)
+    ends = drawn(zone, count=400_000) @ offset_rows(LENGTH / 2)[0]
+    assert 33.9e-6 < abs(ends).max() <= 34e-6
+    mean_square = (34e-6**3 - 25e-6**3) / (3 * 9e-6) / 3
+    assert np.mean(ends**2) == pytest.approx(mean_square, rel=0.01)
+
+
 def test_orientation_in_one_direction_is_an_interval():
     zone = axis_orientation(20e-6, LENGTH, np.array([1.0, 0.0]))
     assert zone.support(np.eye(6)[1]) == pytest.approx(1e-3)

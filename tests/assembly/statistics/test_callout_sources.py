@@ -226,3 +226,19 @@ def test_command_reports_the_importance_by_callout(tmp_path):
     above = results["exceeds"]["translation"]["probability"]
     assert results["capability"]["translation"]["ppm"]["value"] == above * 1e6
     assert "certified bound" in (tmp_path / "page.html").read_text()
+
+
+def test_position_in_one_direction_at_maximum_material_shares_its_hole(tmp_path):
+    """Ends within 25 um + s/2 along x alone; the diametral clearance is s + 6 at least
+    for a hole s above its least size."""
+    path = tmp_path / "arm.toml"
+    path.write_text(
+        LOOSE.replace('hole = "12 H7"', 'hole = "12 H7"\ndirection = [1,0,0]')
+    )
+    sources = sources_of(read_robot(path))
+    values = sources.draw(0, 100_000, 1)
+    assert values.shape[1] == 3
+    end = 25 * abs(values[:, 0])
+    diametral = 20.5 + 2e6 * values[:, -1]
+    assert (diametral > 2 * np.maximum(0.0, end - 25) + 6 - 1e-9).all()
+    assert end.max() > 33
