@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.assembly.callouts.fits import parse_size
+from forcefit.assembly.callouts.fits import parse_hole
 from forcefit.assembly.callouts.general_tolerances import (
     linear_tolerance,
     parse_general,
@@ -20,6 +20,8 @@ from forcefit.assembly.callouts.zones_of_features import (
     plane_orientation,
     plane_position,
     point_position,
+    round_plane_orientation,
+    round_plane_position,
     shift_along,
 )
 from forcefit.inputs.table import BadInput
@@ -49,12 +51,17 @@ class Datum:
             too, a body holds all.
         axis: (3,) unit vector of its axis or normal, in the frame's axes.
         at: (3,) [m] its middle, in the frame's axes.
+        hole: size of a hole that is a datum at maximum material, such as ``"12 H7"``:
+            the larger the hole, the more the datum shifts.  Empty for other datums.
+        hole_of: as :attr:`Callout.hole_of`.
     """
 
     frame: str
     shape: str = "axis"
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     at: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    hole: str = ""
+    hole_of: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +76,8 @@ class Callout:
         datums: A, B, C in this order, at least one.
         shape: one of :data:`SHAPES`.
         axis: (3,) unit vector of the axis or the normal, in the frame's axes.
-        extent: [m] length of a bore; two sizes of a face, along its x and y.
+        extent: [m] length of a bore; two sizes of a face, along its x and y, or the
+            diameter of a round face.
         widths: [m] of each zone, by the words of :data:`LOCATIONS` and
             :data:`ORIENTATIONS`.
         hole: size of a hole whose position holds at maximum material, such as
@@ -82,6 +90,10 @@ class Callout:
         distribution: see :meth:`forcefit.assembly.callouts.zone.Zone.draw`.
         cp: capability of a normal distribution.
         at: (3,) [m] the middle of the feature, in the frame's axes.
+        envelope: whether a face is within the limits of its length as a whole (envelope
+            principle), not only its middle.
+        hole_of: name of the fit or joint whose hole is at maximum material: its size is
+            the same wherever this name is.
     """
 
     name: str
@@ -99,6 +111,8 @@ class Callout:
     distribution: str = "uniform"
     cp: float = 1.0
     at: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    envelope: bool = False
+    hole_of: str = ""
 
     @property
     def words(self) -> str:
@@ -161,7 +175,10 @@ def zone_of(callout: Callout, offset: NDArray, datum_axis: NDArray | None) -> Zo
         if distance < _SAME_LENGTH:
             fault = "found a length to a datum at the same place"
             raise BadInput(f"{fault}, expected a distance from datum A")
-        zones.append(shift_along(tolerance, away / distance))
+        if callout.envelope:
+            zones.append(_face_within(callout, 2 * tolerance))
+        else:
+            zones.append(shift_along(tolerance, away / distance))
     if callout.general:
         zones += _general(callout, away, datum_axis)
     return intersection(zones)
@@ -190,19 +207,29 @@ def _zone(callout: Callout, kind: str, width: float) -> Zone:
     location = kind in LOCATIONS
     if callout.shape == "point":
         return point_position(width)
+    if callout.shape == "plane" and location:
+        return _face_within(callout, width)
     if callout.shape == "plane":
-        return (plane_position if location else plane_orientation)(
-            width, *callout.extent
-        )
+        is_round = len(callout.extent) == 1
+        leaning = round_plane_orientation if is_round else plane_orientation
+        return leaning(width, *callout.extent)
     (length,) = callout.extent
     if not location:
         return axis_orientation(width, length, direction)
-    if direction is not None:
-        return axis_position_along(width, length, direction)
     bonus = 0.0
     if callout.hole and kind == "position":
-        bonus = float(np.ptp(parse_size(callout.hole)))
+        bonus = float(np.ptp(parse_hole(callout.hole)[1]))
+    if direction is not None:
+        return axis_position_along(width, length, direction, bonus)
     return axis_position(width, length, bonus)
+
+
+def _face_within(callout: Callout, width: float) -> Zone:
+    """The zone of a face between two planes at a distance [m]."""
+    is_round = len(callout.extent) == 1
+    return (round_plane_position if is_round else plane_position)(
+        width, *callout.extent
+    )
 
 
 def _away(shape: str, offset: NDArray, datum_axis: NDArray | None) -> NDArray:
@@ -230,15 +257,17 @@ def _general(callout: Callout, away: NDArray, datum_axis: NDArray | None) -> lis
 
 
 def check_orientation(
-    callout: Callout, axis: NDArray, datum_axis: NDArray | None, same_shape: bool
-) -> None:
+    callout: Callout, axis: NDArray, datum_axis: NDArray | None,
+    same_shape: bool | None,
+) -> None:  # fmt: skip
     """Refuse perpendicularity and parallelism that the nominal geometry does not have.
 
     Args:
         callout: of the feature.
         axis: (3,) unit vector of the feature's axis or normal.
         datum_axis: (3,) of datum A in the same axes, None for a point.
-        same_shape: whether both are axes, or both planes.
+        same_shape: whether both are axes, or both planes; None if datum A may be the
+            face or the bore of a fixed joint.
 
     Raises:
         BadInput: the angle at home is another one, or the datum is a point.
@@ -249,12 +278,13 @@ def check_orientation(
         cosine = abs(float(axis @ datum_axis))
         parallel = cosine > np.sqrt(1 - _ALONG**2)
         square = cosine < _ALONG
+        known = [same_shape] if same_shape is not None else [True, False]
         fits = {
-            "parallelism": parallel if same_shape else square,
-            "perpendicularity": square if same_shape else parallel,
-            "angularity": True,
+            "parallelism": [parallel if same else square for same in known],
+            "perpendicularity": [square if same else parallel for same in known],
+            "angularity": [True],
         }[kind]
-        if not fits:
+        if not any(fits):
             angle = np.degrees(np.arccos(min(1.0, cosine)))
             raise BadInput(
                 f"found {kind} where axis or normal and that of datum A are at "
@@ -263,6 +293,8 @@ def check_orientation(
             )
 
 
-def _expected(kind: str, same_shape: bool) -> int:
+def _expected(kind: str, same_shape: bool | None) -> str:
     """[deg] angle of axes or normals."""
-    return 0 if (kind == "parallelism") == same_shape else 90
+    if same_shape is None:
+        return "0 or 90"
+    return "0" if (kind == "parallelism") == same_shape else "90"

@@ -45,7 +45,10 @@ _DEVIATIONS = {
 }
 LETTERS = ("d", "e", "f", "g", "h", "js", "k", "m", "n", "p")
 _ONE = r"([A-Za-z]{1,2})(\d{1,2})"
-_FIT = re.compile(rf"\s*(\d+\.?\d*)\s*(?:mm)?\s*{_ONE}\s*/\s*{_ONE}\s*")
+_FIT = re.compile(
+    rf"\s*(\d+\.?\d*)\s*(?:mm)?\s*{_ONE}\s*/\s*{_ONE}\s*"
+    r"(?:\+\s*(\d+\.?\d*(?:e[-+]?\d+)?)\s*um\s*)?"
+)
 _SIZE = re.compile(rf"\s*(\d+\.?\d*)\s*(?:mm)?\s*{_ONE}\s*")
 _UM = 1e-6
 _EXPECTED = 'expected a fit such as "12 H7/g6"'
@@ -69,12 +72,14 @@ class Fit:
         size: [m] nominal diameter.
         hole: deviations of the hole.
         shaft: deviations of the shaft.
+        form: [m] radial clearance that the form of the parts adds, >= 0.
     """
 
     text: str
     size: float
     hole: Limits
     shaft: Limits
+    form: float = 0.0
 
     @property
     def diametral(self) -> tuple[float, float]:
@@ -91,14 +96,17 @@ class Fit:
 
     @property
     def radial(self) -> tuple[float, float]:
-        """[m] least and largest radial clearance, half the diametral one, >= 0."""
+        """[m] least and largest radial clearance, >= 0.
+
+        It is half the diametral one, with that of the form.
+        """
         least, most = self.diametral
-        return max(0.0, least / 2), max(0.0, most / 2)
+        return max(0.0, least / 2) + self.form, max(0.0, most / 2) + self.form
 
     @property
     def mean_radial(self) -> float:
         """[m] radial clearance of parts of mean sizes, 0 if they interfere."""
-        return max(0.0, sum(self.diametral) / 4)
+        return max(0.0, sum(self.diametral) / 4) + self.form
 
     def draw(
         self, uniform: NDArray, distribution: str = "uniform", cp: float = 1.0
@@ -125,33 +133,37 @@ class Fit:
                 relative = ndtri(np.maximum(column, 2.0**-54))
                 relative /= _DEVIATIONS_IN_LIMIT * cp
             sizes.append(middle + half * relative)
-        return np.asarray(np.maximum(0.0, (sizes[0] - sizes[1]) / 2))
+        return np.asarray(np.maximum(0.0, (sizes[0] - sizes[1]) / 2) + self.form)
 
 
 @dataclass(frozen=True)
 class FittedEnd:
-    """An end of a bore, or a bearing, that a fit lets tilt about another place.
+    """An end of a bore or a guide, or a bearing, that turns about another place.
 
     Attributes:
-        length: [m] between the two places, > 0: the tilt is at most the radial
+        length: [m] between the two places, > 0: the rotation is at most the radial
             clearance divided by it.
         parts: name of the hole and the shaft; ends of the same parts have the same
             clearance.
+        bound: of the clearance that follows from the fit: ``"tilt"`` of a bore,
+            ``"spin"`` of a guide, whose contacts turn about one axis each.
     """
 
     length: float
     parts: str
+    bound: str = "tilt"
 
-    def tilt(self, radial: float) -> float:
-        """[rad] largest tilt for a radial clearance [m]."""
-        return radial / self.length
+    def bounds(self, radial: float) -> dict[str, float]:
+        """[rad] largest rotation, by its name, for a radial clearance [m]."""
+        return {self.bound: radial / self.length}
 
 
 def parse_fit(text: str) -> Fit:
     """Return the fit that a text states.
 
     Args:
-        text: nominal size in mm, hole and shaft, such as ``"12 H7/g6"``.
+        text: nominal size in mm, hole and shaft, such as ``"12 H7/g6"``; or with the
+            radial clearance that the form of the parts adds, ``"12 H7/g6 + 5 um"``.
 
     Returns:
         The fit, of any kind.
@@ -162,13 +174,13 @@ def parse_fit(text: str) -> Fit:
     match = _FIT.fullmatch(text)
     if match is None:
         raise BadInput(f"found {quoted(text)}, {_EXPECTED}")
-    size, hole, hole_grade, shaft, shaft_grade = match.groups()
+    size, hole, hole_grade, shaft, shaft_grade, form = match.groups()
     if not hole.isupper() or not shaft.islower():
         fault = "capital letters are holes, small letters shafts"
         raise BadInput(f"found {quoted(text)}, {_EXPECTED}: {fault}")
     return Fit(
         text.strip(), float(size) * 1e-3, limits_of(float(size), hole, int(hole_grade)),
-        limits_of(float(size), shaft, int(shaft_grade)),
+        limits_of(float(size), shaft, int(shaft_grade)), float(form or 0.0) * _UM,
     )  # fmt: skip
 
 
@@ -190,16 +202,19 @@ def clearance_fit(text: str) -> Fit:
     return fit
 
 
-def parse_size(text: str) -> Limits:
-    """Return the deviations of one size, such as ``"12 H7"`` or ``"20 k6"``.
+def parse_hole(text: str) -> tuple[float, Limits]:
+    """Return nominal size [m] and deviations of a hole, such as ``"12 H7"``.
 
     Raises:
-        BadInput: it is no such text, or one that the tables do not have.
+        BadInput: it is no such text, a shaft, or a hole that the tables do not have.
     """
     match = _SIZE.fullmatch(text)
     if match is None:
         raise BadInput(f'found {quoted(text)}, expected a size such as "12 H7"')
-    return limits_of(float(match[1]), match[2], int(match[3]))
+    if match[2].islower():
+        expected = 'expected a hole, whose letter is a capital, such as "12 H7"'
+        raise BadInput(f"found {quoted(text)}, a shaft; {expected}")
+    return float(match[1]) * 1e-3, limits_of(float(match[1]), match[2], int(match[3]))
 
 
 def limits_of(size: float, letter: str, grade: int) -> Limits:

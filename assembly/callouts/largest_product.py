@@ -1,6 +1,6 @@
 """The support function of a convex zone, with a certificate."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,45 +10,65 @@ _LEAST_MU = 1e-9  # a smaller barrier leaves no digits in the Newton steps
 _STEPS = 50  # most Newton steps of one barrier
 
 
-def largest_product(w: NDArray, bounds: Sequence[NDArray]) -> tuple[NDArray, float]:
+def largest_product(
+    w: NDArray, bounds: Sequence[NDArray], cones: Sequence[NDArray] = ()
+) -> tuple[NDArray, float]:
     """Return the largest w.x where |bound @ x| <= 1, by an interior-point method.
 
     Args:
         w: (m,).
         bounds: (k, m) each, bounding every direction.
+        cones: (k, m) each, the rows s and S of a double cone |s.x| + |S x| <= 1.
 
     Returns:
         (m,) x in the set, and a certified upper bound of the largest w.x: the sum of
-        the sizes of multipliers with sum bound^T multiplier = w.
+        the sizes of multipliers with sum bound^T multiplier = w.  The size of a cone's
+        multiplier is the larger one of its first entry and of the others together.
     """
     length = float(np.linalg.norm(w))
     if length == 0.0:
         return np.zeros_like(w), 0.0
     # a value that is attained along w itself is the unit of all others
-    reached = 1.0 / max(float(np.linalg.norm(b @ w)) for b in bounds)
+    reached = 1.0 / max(_largest_gauge(w, bounds, cones), 1e-300)
     unit = length * length * reached
     w = w / unit
-    rows, x, mu = np.vstack(bounds), np.zeros_like(w), 1.0
+    rows, x, mu = np.vstack([*bounds, *cones]), np.zeros_like(w), 1.0
     best = float(np.abs(np.linalg.lstsq(rows.T, w, rcond=None)[0]).sum())
-    ends = np.cumsum([len(b) for b in bounds])[:-1]
+    ends = np.cumsum([len(b) for b in (*bounds, *cones)])[:-1]
     while best > (1 + _GAP) * max(float(w @ x), 0.0) and mu > _LEAST_MU:
-        centre = _centre(w, bounds, x, mu)
+        centre = _centre(w, bounds, cones, x, mu)
         if centre is None:  # rounding: what is certified so far remains
             break
         x, multipliers = centre
         # the least change that balances w exactly
         change = np.linalg.lstsq(rows.T, w - rows.T @ multipliers, rcond=None)[0]
         parts = np.split(multipliers + change, ends)
-        best = min(best, sum(float(np.linalg.norm(part)) for part in parts))
+        count = len(bounds)
+        sizes = [float(np.linalg.norm(part)) for part in parts[:count]]
+        sizes += [
+            max(abs(part[0]), float(np.linalg.norm(part[1:]))) for part in parts[count:]
+        ]
+        best = min(best, sum(sizes))
         mu /= 10
-    outside = max(1.0, *(float(np.linalg.norm(b @ x)) for b in bounds))
+    outside = max(1.0, _largest_gauge(x, bounds, cones))
     return x / outside, best * unit
 
 
+def _largest_gauge(
+    x: NDArray, bounds: Sequence[NDArray], cones: Sequence[NDArray]
+) -> float:
+    """The factor by which the set must grow until it reaches x."""
+    sizes = [float(np.linalg.norm(b @ x)) for b in bounds]
+    sizes += [abs(c[0] @ x) + float(np.linalg.norm(c[1:] @ x)) for c in cones]
+    return max(sizes)
+
+
 def _centre(
-    w: NDArray, bounds: Sequence[NDArray], x: NDArray, mu: float
-) -> tuple[NDArray, NDArray] | None:
+    w: NDArray, bounds: Sequence[NDArray], cones: Sequence[NDArray], x: NDArray,
+    mu: float,
+) -> tuple[NDArray, NDArray] | None:  # fmt: skip
     """The largest w.x + mu sum log(1 - |bound x|^2) and its multipliers, from x."""
+    # a double cone adds log((1 - s.x)^2 - |S x|^2) + log((1 + s.x)^2 - |S x|^2)
     for _ in range(_STEPS):
         slacks = [1.0 - float((b @ x) @ (b @ x)) for b in bounds]
         gradient, H = w.copy(), np.zeros((len(w), len(w)))
@@ -56,6 +76,12 @@ def _centre(
             g = b.T @ (b @ x)
             gradient -= 2 * mu / slack * g
             H += 2 * mu / slack * (b.T @ b) + 4 * mu / slack**2 * np.outer(g, g)
+        for signed, f in _halves(cones, x):
+            slacks.append(f)
+            g = _slope(signed, x)
+            gradient += mu / f * g
+            curvature = signed[1:].T @ signed[1:] - np.outer(signed[0], signed[0])
+            H += 2 * mu / f * curvature + mu / f**2 * np.outer(g, g)
         try:
             step = np.linalg.solve(H, gradient)
         except np.linalg.LinAlgError:
@@ -66,5 +92,31 @@ def _centre(
         if decrement < 1e-16:
             break
         x = x + (1.0 / (1.0 + np.sqrt(decrement)) if decrement > 0.1 else 1.0) * step
-    parts = [2 * mu / s * (b @ x) for b, s in zip(bounds, slacks, strict=True)]
+    parts = [
+        2 * mu / slack * (b @ x)
+        for b, slack in zip(bounds, slacks[: len(bounds)], strict=True)
+    ]
+    halves = list(_halves(cones, x))
+    for (plus, f), (minus, h) in zip(halves[::2], halves[1::2], strict=True):
+        along = (1.0 - plus[0] @ x) / f - (1.0 - minus[0] @ x) / h
+        across = (1.0 / f + 1.0 / h) * (plus[1:] @ x)
+        parts.append(2 * mu * np.concatenate([[along], across]))
     return x, np.concatenate(parts)
+
+
+def _halves(cones: Sequence[NDArray], x: NDArray) -> Iterator[tuple[NDArray, float]]:
+    """Each half |S x| <= 1 - s.x of the double cones: its rows, and its slack."""
+    for cone in cones:
+        for sign in (1.0, -1.0):
+            signed = np.vstack([sign * cone[:1], cone[1:]])
+            height = 1.0 - float(signed[0] @ x)
+            across = float(np.linalg.norm(signed[1:] @ x))
+            # (height - across) is negative outside; both factors are positive inside
+            yield signed, (height - across) * (height + across)
+
+
+def _slope(cone: NDArray, x: NDArray) -> NDArray:
+    """(m,) derivative of (1 - s.x)^2 - |S x|^2."""
+    return np.asarray(
+        -2.0 * (1.0 - cone[0] @ x) * cone[0] - 2.0 * cone[1:].T @ (cone[1:] @ x)
+    )

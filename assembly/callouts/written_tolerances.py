@@ -9,7 +9,8 @@ _UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 _NUMBER = r"(\d+\.?\d*|\.\d+)(?:[eE]([-+]?\d+))?"
 _WIDTH = re.compile(rf"\s*{_NUMBER}\s*(m|mm|um|in)\s*(\(M\))?\s*")
 _LENGTH = re.compile(
-    rf"\s*{_NUMBER}\s*(m|mm|um|in)?\s*(?:\+-|\+/-|±)\s*{_NUMBER}\s*(m|mm|um|in)\s*"
+    rf"\s*{_NUMBER}\s*(m|mm|um|in)?\s*(?:\+-|\+/-|±)\s*{_NUMBER}\s*(m|mm|um|in)"
+    r"\s*(\(E\))?\s*"
 )
 
 
@@ -40,7 +41,7 @@ def parse_length(value: object) -> tuple[float, float]:
     """Return a length and its tolerance, plus and minus, both in m.
 
     Args:
-        value: a text such as ``"452 +- 0.1 mm"``.
+        value: a text such as ``"452 +- 0.1 mm"`` or ``"20 +- 0.1 mm (E)"``.
 
     Returns:
         [m] the length, and [m] its tolerance > 0.
@@ -58,6 +59,12 @@ def parse_length(value: object) -> tuple[float, float]:
     if not 0 < tolerance < length:
         raise BadInput(f"found {describe(value)}, {expected}: 0 < tolerance < length")
     return length, tolerance
+
+
+def within_envelope(value: object) -> bool:
+    """Return whether a length is stated with ``(E)``, the envelope principle."""
+    match = _LENGTH.fullmatch(value) if isinstance(value, str) else None
+    return match is not None and bool(match[7])
 
 
 def _value(digits: str, power: str | None) -> float:

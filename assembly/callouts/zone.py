@@ -4,7 +4,7 @@ A zone is the set of screws d [RX RY RZ TX TY TZ] of a feature, in its axes, wit
 ``|bound @ d| <= 1`` for each bound, and no component that no bound sees.  A bound of
 one row is an interval, of two rows a disc, of three a ball.  Bounds that are linearly
 independent are reached all at once: d = columns u, |u_k| <= 1.  The others cut that
-set.
+set, as do double cones ``|s @ d| + |S @ d| <= 1``, the zones of round faces.
 
 Sources:
     Mujezinovic, Davidson, Shah (2004), A new mathematical model for geometric
@@ -38,10 +38,16 @@ class Zone:
         bounds: (k, 6) each, k = 1, 2, 3: rows on the screw [1/rad, 1/m].
         bonus: largest relative growth of the zone with the size of the feature (maximum
             material condition); 0 for none.
+        cones: (3, 6) each: the row s along the axis of a double cone, and the two rows
+            S across it.  Bounds must limit the same components.
+        from_zero: whether the zone grows with a size from a point to the bounds, such
+            as the shift of a datum at maximum material.
     """
 
     bounds: tuple[NDArray, ...]
     bonus: float = 0.0
+    cones: tuple[NDArray, ...] = ()
+    from_zero: bool = False
 
     @cached_property
     def _split(self) -> tuple[list[int], list[int]]:
@@ -72,17 +78,44 @@ class Zone:
         """(k, m) each: the other bounds as rows on u."""
         return tuple(self.bounds[i] @ self.columns for i in self._split[1])
 
+    @cached_property
+    def cones_on_u(self) -> tuple[NDArray, ...]:
+        """(3, m) each: the double cones as rows on u."""
+        return tuple(cone @ self.columns for cone in self.cones)
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether the zone is smaller than the product of its balls."""
+        return bool(self.cuts or self.cones)
+
+    @property
+    def grows(self) -> bool:
+        """Whether the zone grows with the size of a feature."""
+        return self.bonus > 0 or self.from_zero
+
     @property
     def words(self) -> int:
-        """Uniform numbers of one draw: one for each coordinate, one for the bonus."""
-        return sum(self.dimensions) + (self.bonus > 0)
+        """Uniform numbers of one draw: one for each coordinate, the last for a size."""
+        return sum(self.dimensions) + self.grows
+
+    def growth(self, size: NDArray) -> NDArray:
+        """Return the factors of the zone for sizes from least (0) to largest (1)."""
+        return size if self.from_zero else 1.0 + self.bonus * size
 
     def inside(self, u: NDArray, grown: NDArray | float = 1.0) -> NDArray:
         """(k,) whether coordinates (k, m) are in the zone, by a factor of its size."""
         limits = [(part, grown) for part in self._balls(u)]
         limits += [(u @ cut.T, 1.0) for cut in self.cuts]
         marks = [np.linalg.norm(x, axis=-1) <= g * (1 + 1e-12) for x, g in limits]
+        marks += [gauge <= 1 + 1e-12 for gauge in self._cone_gauges(u)]
         return np.asarray(np.all(marks, axis=0))
+
+    def _cone_gauges(self, u: NDArray) -> list[NDArray]:
+        """(k,) for each double cone: 1 on its surface."""
+        return [
+            abs(u @ c[0]) + np.linalg.norm(u @ c[1:].T, axis=-1)
+            for c in self.cones_on_u
+        ]
 
     def _balls(self, u: NDArray) -> list[NDArray]:
         """The coordinates of each ball."""
@@ -114,8 +147,8 @@ class Zone:
 
     def farthest_u(self, w: NDArray) -> tuple[NDArray, float]:
         """Return coordinates u (m,) of the largest w @ u, and an upper bound of it."""
-        if self.cuts:
-            return largest_product(w, self.bounds_on_u)
+        if self.is_cut:
+            return largest_product(w, self.bounds_on_u, self.cones_on_u)
         grown, u = 1.0 + self.bonus, []
         for part in self._balls(w):
             size = float(np.linalg.norm(part))
@@ -129,7 +162,8 @@ class Zone:
 
         Args:
             numbers: function of the attempt, 0, 1, ..: (k, :attr:`words`) independent
-                uniform numbers.  A part outside the zone is drawn again.
+                uniform numbers.  A part outside the zone is drawn again, with the size
+                of its feature in attempt 0.
             distribution: ``"uniform"`` in the zone; ``"normal"``, see
                 :meth:`deviation`; or ``"truncated"``, the normal one without the parts
                 outside the zone.
@@ -143,26 +177,26 @@ class Zone:
         """
         s = 0.0 if distribution == "uniform" else self.deviation(cp)
         first = numbers(0)
-        u, accepted = self._attempt(first, distribution, s)
+        grown = np.ones(len(first))
+        if self.grows:
+            grown = self.growth(first[:, -1])
+        u, accepted = self._attempt(first, distribution, s, grown)
         for attempt in range(1, _MOST_ATTEMPTS):
             if accepted.all():
                 return u
-            again, fits = self._attempt(numbers(attempt), distribution, s)
+            again, fits = self._attempt(numbers(attempt), distribution, s, grown)
             taken = ~accepted & fits
             u[taken], accepted = again[taken], accepted | fits
         raise RuntimeError("a zone was not met by random draws")
 
     def _attempt(
-        self, uniform: NDArray, distribution: str, s: float
+        self, uniform: NDArray, distribution: str, s: float, grown: NDArray
     ) -> tuple[NDArray, NDArray]:
         """Coordinates of one attempt, and whether they are in the zone."""
-        grown = np.ones(len(uniform))
-        if self.bonus:
-            grown = 1.0 + self.bonus * uniform[:, -1]
         u = self._in_balls(uniform, distribution, s) * grown[:, None]
         if distribution == "normal":
             return u, np.ones(len(u), dtype=bool)
-        if distribution == "uniform" and self.cuts and not self.bonus:
+        if distribution == "uniform" and self.is_cut and not self.grows:
             dimensions, to_u = self._tightest
             u = in_balls(uniform, dimensions) @ to_u.T
         return u, self.inside(u, grown)
@@ -214,11 +248,12 @@ class Zone:
             return float(np.prod(gammainc(halves, 0.5 / s**2))) - (1 - outside)
 
         alone = float(brentq(excess, 1e-3, 50.0, xtol=1e-14))
-        if not self.cuts:
+        if not self.is_cut:
             return alone
         u = self._in_balls(_sample(sum(self.dimensions)), "normal", 1.0)
         sizes = [np.linalg.norm(x, axis=1) for x in self._balls(u)]
         sizes += [np.linalg.norm(u @ cut.T, axis=1) for cut in self.cuts]
+        sizes += self._cone_gauges(u)
         return 1.0 / float(np.quantile(np.max(sizes, axis=0), 1 - outside))
 
     def covariance(self, distribution: str = "uniform", cp: float = 1.0) -> NDArray:
@@ -238,7 +273,7 @@ class Zone:
 
     def variance_of_u(self, distribution: str = "uniform", cp: float = 1.0) -> NDArray:
         """Return (m, m) the covariance of the coordinates; see :meth:`covariance`."""
-        if self.cuts and distribution != "normal":
+        if self.is_cut and distribution != "normal":
             u = self.draw(
                 lambda attempt: _sample(self.words, attempt), distribution, cp
             )
@@ -246,13 +281,15 @@ class Zone:
         s = 0.0 if distribution == "uniform" else self.deviation(cp)
         each = [np.full(d, ball_variance(d, distribution, s)) for d in self.dimensions]
         b = self.bonus
-        return np.diag(np.concatenate(each)) * (1 + b + b**2 / 3)
+        growth = 1.0 / 3.0 if self.from_zero else 1 + b + b**2 / 3  # mean square
+        return np.diag(np.concatenate(each)) * growth
 
 
 def intersection(zones: Sequence[Zone]) -> Zone:
     """Return the zone that is within each of the zones; the first one's bonus holds."""
     bounds = tuple(bound for zone in zones for bound in zone.bounds)
-    return Zone(bounds, zones[0].bonus)
+    cones = tuple(cone for zone in zones for cone in zone.cones)
+    return Zone(bounds, zones[0].bonus, cones)
 
 
 def _scale(rows: NDArray) -> NDArray:

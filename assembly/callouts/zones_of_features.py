@@ -8,6 +8,7 @@ an axis at height z is e(z) = (TX + z RY, TY - z RX).
 import numpy as np
 from numpy.typing import NDArray
 
+from forcefit.assembly.callouts.fits import parse_hole
 from forcefit.assembly.callouts.zone import Zone
 
 _SIGNS = ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))
@@ -33,16 +34,19 @@ def axis_position(width: float, length: float, bonus: float = 0.0) -> Zone:
     return Zone(ends, bonus / width)
 
 
-def axis_position_along(width: float, length: float, direction: NDArray) -> Zone:
+def axis_position_along(
+    width: float, length: float, direction: NDArray, bonus: float = 0.0
+) -> Zone:
     """Return the zone of an axis between two planes: position in one direction.
 
     Args:
         width: [m] distance of the planes.
         length: [m] of the bore.
         direction: (2,) unit vector across the planes, in the feature's x and y.
+        bonus: [m] growth of the distance from least to largest hole (M); 0 for none.
     """
     ends = (direction @ offset_rows(z) * 2 / width for z in (length / 2, -length / 2))
-    return Zone(tuple(row[None] for row in ends))
+    return Zone(tuple(row[None] for row in ends), bonus / width)
 
 
 def axis_orientation(
@@ -82,9 +86,42 @@ def plane_orientation(width: float, size_x: float, size_y: float) -> Zone:
     return Zone(tuple(row * 2 / width for row in rows))
 
 
+def round_plane_position(width: float, diameter: float) -> Zone:
+    """Return the zone of a round plane: position or profile.
+
+    Args:
+        width: [m] distance of the two planes of the zone.
+        diameter: [m] of the face.
+
+    Returns:
+        The double cone |TZ| + diameter/2 |(RX, RY)| <= width/2.
+    """
+    along, across = np.eye(6)[5:] * 2 / width, np.eye(6)[:2] * diameter / width
+    return Zone((along, across), cones=(np.vstack([along, across]),))
+
+
+def round_plane_orientation(width: float, diameter: float) -> Zone:
+    """Return the zone of parallelism or perpendicularity of a round plane."""
+    return Zone((np.eye(6)[:2] * diameter / width,))
+
+
 def point_position(width: float) -> Zone:
     """Return the zone of a point within a ball of a diameter [m]."""
     return Zone((np.hstack([np.zeros((3, 3)), np.eye(3)]) * 2 / width,))
+
+
+def datum_shift(hole: str) -> Zone:
+    """Return the zone of the shift of a hole that is a datum at maximum material.
+
+    Args:
+        hole: its size, such as ``"12 H7"``.
+
+    Returns:
+        A disc across the hole's axis, whose diameter is the size of the hole less the
+        least one: a point at the least hole.
+    """
+    growth = float(np.ptp(parse_hole(hole)[1]))
+    return Zone((offset_rows(0.0) * 2 / growth,), from_zero=True)
 
 
 def shift_along(tolerance: float, direction: NDArray) -> Zone:

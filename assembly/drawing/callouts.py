@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 from forcefit.assembly.callouts.callout import Callout, Datum
 from forcefit.assembly.callouts.fits import FittedEnd
 from forcefit.assembly.drawing.drawing import Drawing, DrawnCallout, DrawnJoint
-from forcefit.assembly.drawing.parts import parts_of
+from forcefit.assembly.drawing.parts import every_part, parts_of
 from forcefit.assembly.drawing.tree import Step
 from forcefit.assembly.model.placed_frames import PlacedFrame, own_motion
+from forcefit.inputs.table import BadInput, quoted
 
 _ROUNDING = 1e-12
 # what a joint of each type holds as a datum; the others are axes
@@ -49,7 +50,7 @@ def frame_fits(
     found = {
         part.name: part.numbers
         for step in steps if isinstance(step.edge.item, DrawnJoint)
-        for part in parts_of(step.edge.item, step.reverse) if part.numbers.fit
+        for part in every_part(step.edge.item, step.reverse) if part.numbers.fit
     }  # fmt: skip
     ends = {name: own.fitted_end for name, own in found.items() if own.fitted_end}
     return {name: own.fit for name, own in found.items()}, ends
@@ -61,23 +62,47 @@ def _of_frames(
 ) -> Callout:  # fmt: skip
     """One callout on the side of a frame that is on its body."""
     callout = drawn.callout
-    frame, after, joint = _side(passed[callout.feature], drawn.body)
+    step = passed[callout.feature]
+    frame, after, joint = _side(step, drawn.body)
     pose = poses[frame][after]
     R = pose[:3, :3]
-    across = joint.across if callout.shape == "plane" else drawn.direction
+    across = None if drawn.direction is None else np.array(drawn.direction)
+    if callout.shape == "plane":  # the direction of the first of two sizes
+        across = joint.across if len(callout.extent) == 2 else None
     datums = []
     for datum in callout.datums:
         name, other, of_datum = _side(passed[datum.frame], drawn.body)
         of = poses[name][other]
         axis = _vector(of[:3, :3].T @ _axis(of_datum, drawn.body))
         shape = _DATUM_SHAPES.get(of_datum.kind, "axis")
-        datums.append(Datum(name, shape, axis, _point(of, of_datum)))
+        hole_of = _hole_of(passed[datum.frame], drawn) if datum.hole else ""
+        datums.append(
+            Datum(name, shape, axis, _point(of, of_datum), datum.hole, hole_of)
+        )
     return replace(
         callout, feature=frame, after=after, datums=tuple(datums),
         axis=_vector(R.T @ _axis(joint, drawn.body)),
-        direction=None if across is None else _vector(R.T @ np.array(across)),
-        at=_point(pose, joint),
+        direction=None if across is None else _vector(R.T @ across),
+        at=_point(pose, joint), hole_of=_hole_of(step, drawn) if callout.hole else "",
     )  # fmt: skip
+
+
+def _hole_of(step: Step, drawn: DrawnCallout) -> str:
+    """The fit of a joint's hole on a body, or the joint without a fit."""
+    joint = step.edge.item
+    assert isinstance(joint, DrawnJoint)
+    fitted = [p for p in parts_of(joint, step.reverse) if p.numbers.fit]
+    if joint.kind == "universal":
+        bearing = "first" if drawn.body == joint.first else "second"
+        fitted = [p for p in fitted if p.name.startswith(f"{joint.name}.{bearing}")]
+    ends = [(p.numbers.fitted_end, p.name) for p in fitted]
+    names = {name if end is None else end.parts for end, name in ends}
+    if len(names) > 1:
+        fault = f"found (M) at {quoted(joint.name)}, which is fitted in two bearings"
+        expected = "expected a fit with the length of one bore"
+        where = f"tolerance of {quoted(drawn.callout.name)}"
+        raise BadInput(f"{where}: {fault}, {expected}")
+    return names.pop() if names else joint.name
 
 
 def _side(step: Step, body: str) -> tuple[str, bool, DrawnJoint]:

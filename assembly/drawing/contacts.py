@@ -103,7 +103,11 @@ def fitted(
 
 
 def guide(
-    gaps: tuple[float, float], length: float, width: float, height: float
+    gaps: tuple[float, float],
+    length: float,
+    width: float,
+    height: float,
+    largest: tuple[float, float] | None = None,
 ) -> tuple[Contact, ...]:
     """Return the contacts of a block in a guide along z, its middle at the origin.
 
@@ -112,13 +116,15 @@ def guide(
         length: [m] L of the guide, > 0.
         width: [m] w along x, > 0.
         height: [m] t along y, > 0.
+        largest: [m] the largest gaps where they vary, as by a fit; by default `gaps`.
 
     Returns:
         Two chains, which roll about two opposite edges of the block.
     """
     edge = np.array([width / 2, height / 2, 0.0])
     # the slabs hold the roll within half of the bound of the first chain
-    most = 2 * min(2 * gaps[1] / width, 2 * gaps[0] / height)
+    c_x, c_y = largest or gaps
+    most = 2 * min(2 * c_y / width, 2 * c_x / height)
     rolls = Clearance(spin=most), Clearance(spin=np.inf, axial=np.inf)
     contacts: list[Contact] = []
     for chain, (name, side) in enumerate((("guide", 1.0), ("guide_far", -1.0))):
@@ -139,6 +145,28 @@ def _tilts(
             pose = transform([0.0, 0.0, z], R)
             bound = Clearance(spin=gap / length)
             yield Contact(f"{name}_{turn}_{end}", pose, bound, chain=chain)
+
+
+def fitted_guide(
+    contacts: tuple[Contact, ...], fits: tuple[str, str], length: float
+) -> tuple[Contact, ...]:
+    """Return the contacts of :func:`guide` with the fits along x and y.
+
+    Args:
+        contacts: of a guide, for the mean gaps of the fits.
+        fits: along x and y.
+        length: [m] of the guide.
+    """
+    turns = {"yaw": (fits[0], "x"), "pitch": (fits[1], "y")}
+    found = []
+    for contact in contacts:
+        fit, parts = next(
+            (own for turn, own in turns.items() if f"_{turn}_" in contact.suffix),
+            ("", ""),
+        )
+        end = FittedEnd(length, parts, "spin") if fit else None
+        found.append(replace(contact, fit=fit, end=end))
+    return tuple(found)
 
 
 def pad(gap: float, length: float, width: float) -> tuple[Contact, ...]:

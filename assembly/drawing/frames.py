@@ -17,6 +17,7 @@ from forcefit.assembly.drawing.links import link_at_tip
 from forcefit.assembly.drawing.parts import (
     Parallel,
     Part,
+    every_part,
     joint_axes,
     parallel_parts,
     parts_of,
@@ -129,8 +130,7 @@ def _part_names(drawing: Drawing) -> set[str]:
     """Names of the frames of all joints, which must be different."""
     owners: dict[str, str] = {}
     for joint in drawing.joints:
-        chain = parallel_parts(joint)
-        for part in [*parts_of(joint), *(chain.parts if chain else ())]:
+        for part in every_part(joint):
             if part.name in owners:
                 raise BadInput(
                     f"joint {quoted(joint.name)}: found {quoted(part.name)} as the "

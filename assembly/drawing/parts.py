@@ -90,6 +90,12 @@ def parallel_parts(joint: DrawnJoint, reverse: bool = False) -> Parallel | None:
     return Parallel(start, [*_passed(chain, reverse), end], meets)
 
 
+def every_part(joint: DrawnJoint, reverse: bool = False) -> list[Part]:
+    """The frames of a joint, those of a second chain of contacts last."""
+    chain = parallel_parts(joint, reverse)
+    return [*parts_of(joint, reverse), *(chain.parts if chain else ())]
+
+
 def _bare(joint: DrawnJoint, suffix: str) -> Part:
     """A fixed frame at a joint's point, where two chains of contacts meet."""
     name = f"{joint.name}.{suffix}"

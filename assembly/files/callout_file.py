@@ -4,41 +4,50 @@ In a file of frames a feature is a frame, in a file of bodies a joint of the bod
 ``docs/drawing_tolerances.md``.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Any, TypeVar
 
 import numpy as np
 
 from forcefit.assembly.callouts.callout import (
-    HELD,
     LOCATIONS,
     ORIENTATIONS,
     SHAPES,
     Callout,
     Datum,
 )
-from forcefit.assembly.callouts.fits import parse_size
+from forcefit.assembly.callouts.fits import parse_hole
 from forcefit.assembly.callouts.general_tolerances import parse_general
-from forcefit.assembly.callouts.written_tolerances import parse_length, parse_width
+from forcefit.assembly.callouts.written_tolerances import (
+    parse_length,
+    parse_width,
+    within_envelope,
+)
 from forcefit.assembly.callouts.zone import DISTRIBUTIONS
 from forcefit.assembly.drawing.drawing import DrawnBody, DrawnCallout, DrawnJoint
+from forcefit.assembly.files.datum_file import (
+    Z_AXIS,
+    Vector,
+    check_frame,
+    frame_datums,
+    joint_datums,
+    parsed_value,
+    read_direction,
+    read_point,
+)
 from forcefit.assembly.files.drawn_body import Copy
-from forcefit.assembly.model.largest import LARGEST_LENGTH
+from forcefit.assembly.files.form_file import FORMS, read_form
 from forcefit.assembly.model.robot import BASE
 from forcefit.inputs.table import BadInput, Table, describe, nearest, quoted
 
-Parsed = TypeVar("Parsed")
-Vector = tuple[float, float, float]
-_Z = (0.0, 0.0, 1.0)
-_ORIGIN = (0.0, 0.0, 0.0)
+_ZONES = (*LOCATIONS, *ORIENTATIONS, "length", "general")
 _LARGEST_CP = 5.0
 _ACROSS = 1e-3  # largest cosine of two directions at right angles
 _NOT_ACROSS = "found one that is not at right angles to the axis, expected 90 deg"
 _SIZES = {"axis": 1, "plane": 2, "point": 0}  # numbers of "extent"
 _EXTENTS = {
     "axis": 'the length of the bore, such as "20 mm"',
-    "plane": 'two sizes of the face, such as ["40 mm", "30 mm"]',
+    "plane": 'two sizes of the face, such as ["40 mm", "30 mm"], or "diameter"',
 }
 # words that a shape cannot have
 _EXCLUDED = {
@@ -65,14 +74,19 @@ def read_frame_callouts(root: Table, frames: list[str]) -> tuple[Callout, ...]:
     for table in root.tables("tolerance"):
         feature = table.text("feature", expected="the name of a frame")
         table.place = f"tolerance of {quoted(feature)}"
-        _check_known(table, "feature", feature, frames)
-        datums = tuple(_datum(table, value, frames) for value in _datum_list(table))
+        check_frame(table, "feature", feature, frames)
+        for word in FORMS:
+            if table.has(word):
+                fault = "found one in a file of frames, expected half its width added"
+                raise table.bad(word, f"{fault} to the clearance of the frame")
+        datums = frame_datums(table, frames)
         shape = table.choice("shape", SHAPES, "axis")
         name = table.text("name", feature)
         after = table.boolean("after", False)
-        axis = _direction(table, "axis") or _Z
+        axis = read_direction(table, "axis") or Z_AXIS
         callout = _callout(table, name, feature, datums, shape, after, axis)
-        found.append(replace(callout, at=_point(table)))
+        hole_of = table.text("hole_of", feature) if callout.hole else ""
+        found.append(replace(callout, at=read_point(table), hole_of=hole_of))
         table.finish()
     return tuple(found)
 
@@ -99,13 +113,15 @@ def read_drawn_callouts(
         owners.append((BASE, copied.table))
     for body, owner in owners:
         for table in owner.tables("tolerance"):
-            yield _drawn(table, copied, body, joints)
+            drawn = _drawn(table, copied, body, joints)
+            if drawn is not None:
+                yield drawn
 
 
 def _drawn(
     table: Table, copied: Copy, body: str, joints: list[DrawnJoint]
-) -> DrawnCallout:
-    """The callouts of one joint of a body."""
+) -> DrawnCallout | None:
+    """The callouts of one joint of a body, None if only its form is stated."""
     here = {j.name: j for j in joints if body in (j.first, j.second)}
     short = body.removeprefix(copied.prefix)
 
@@ -120,16 +136,18 @@ def _drawn(
     given = table.text("feature", expected="the name of a joint of the body")
     table.place = f"tolerance of {quoted(given)} on {quoted(short)}"
     feature = find(given, "feature")
-    datums = []
-    for value in _datum_list(table):
-        if not isinstance(value, str):
-            fault = f"found {describe(value)}, expected names of joints"
-            raise table.bad("datums", fault)
-        datums.append(Datum(find(value, "datums").name))
     shape = {"planar": "plane", "spherical": "point"}.get(feature.kind, "axis")
+    form = read_form(table, shape)
+    if form and not any(table.has(word) for word in _ZONES):
+        for key in [k for k in table.content if k not in ("feature", "name", *FORMS)]:
+            fault = "found one of a feature whose form alone is stated"
+            raise table.bad(key, f"{fault}, expected none")
+        return None
+    datums = joint_datums(table, feature.name, find)
     name = copied.prefix + table.text("name", f"{given} on {short}")
     callout = _callout(table, name, feature.name, tuple(datums), shape, False, None)
     table.finish()
+    _check_form(table, form, callout.widths)
     direction = callout.direction
     if direction is not None:
         direction = tuple((copied.T[:3, :3] @ direction).tolist())
@@ -150,51 +168,19 @@ def _check_direction(
         raise table.bad("direction", _NOT_ACROSS)
 
 
-def _datum_list(table: Table) -> list:
-    """The datums as written: at least one, at most three."""
-    value = table.require("datums", "names of features, A first")
-    if not isinstance(value, list) or not 1 <= len(value) <= 3:
-        fault = f"found {describe(value)}, expected a list of one to three names"
-        raise table.bad("datums", fault)
-    return value
-
-
-def _datum(table: Table, value: Any, frames: list[str]) -> Datum:
-    """A datum: the name of a frame, or a table with shape and axis."""
-    if isinstance(value, dict):
-        inner = Table(value, table.file, f"{table.place}.datums")
-        name = inner.text("frame", expected="the name of a frame")
-        shape = inner.choice("shape", HELD, "axis")
-        axis, at = _direction(inner, "axis") or _Z, _point(inner)
-        inner.finish()
-    else:
-        if not isinstance(value, str):
-            fault = f"found {describe(value)}, expected names of frames"
-            raise table.bad("datums", fault)
-        name, shape, axis, at = value, "axis", _Z, _ORIGIN
-    _check_known(table, "datums", name, frames)
-    return Datum(name, shape, axis, at)
-
-
-def _check_known(table: Table, key: str, name: str, frames: list[str]) -> None:
-    """Refuse a name that is not that of a frame."""
-    if name not in frames:
-        fault = f"found {quoted(name)}, expected the name of a frame"
-        raise table.bad(key, fault + nearest(name, frames))
-
-
 def _callout(
     table: Table, name: str, feature: str, datums: tuple[Datum, ...], shape: str,
     after: bool, axis: Vector | None,
 ) -> Callout:  # fmt: skip
     """The keys that both formats have."""
-    if len(set(datums)) < len(datums):
+    if len({replace(d, hole="", hole_of="") for d in datums}) < len(datums):
         names = [datum.frame for datum in datums]
         raise table.bad("datums", f"found {names}, expected each datum once")
     widths, hole = _widths(table, shape)
     extent = _extent(table, shape, widths)
+    envelope = within_envelope(table.content.get("length"))
     across = _across(table, axis)
-    if across is not None and (shape == "point" or not widths):
+    if across is not None and (shape == "point" or not (widths or envelope)):
         fault = "a point" if shape == "point" else "a feature without a zone"
         raise table.bad("direction", f"found one of {fault}, expected none")
     distribution = table.choice("distribution", DISTRIBUTIONS, "uniform")
@@ -203,17 +189,22 @@ def _callout(
         raise table.bad("cp", f"found one of a uniform distribution, {expected}")
     length = general = None
     if table.has("length"):
-        length = _parsed(table, "length", parse_length)
+        length = parsed_value(table, "length", parse_length)
+    if envelope and shape != "plane":
+        fault = "found (E) of a feature that is no face"
+        raise table.bad("length", f"{fault}, expected none")
+    if envelope and not extent:
+        raise table.bad("extent", f"missing; expected {_EXTENTS[shape]}")
     if table.has("general"):
-        _parsed(table, "general", parse_general)
+        parsed_value(table, "general", parse_general)
         general = table.text("general")
     if not (widths or length or general):
-        words = " | ".join((*LOCATIONS, *ORIENTATIONS, "length", "general"))
+        words = " | ".join(_ZONES)
         raise table.bad("", f"found no tolerance, expected one of {words}")
     return Callout(
-        name, feature, datums, after, shape, axis or _Z, extent, widths, hole,
+        name, feature, datums, after, shape, axis or Z_AXIS, extent, widths, hole,
         across, length, general or "", distribution,
-        table.number("cp", "", 1.0, above=0.0, largest=_LARGEST_CP),
+        table.number("cp", "", 1.0, above=0.0, largest=_LARGEST_CP), envelope=envelope,
     )  # fmt: skip
 
 
@@ -223,7 +214,7 @@ def _widths(table: Table, shape: str) -> tuple[dict[str, float], str]:
     used = False
     hole = table.text("hole", "") if table.has("hole") else ""
     if hole:
-        _parsed(table, "hole", parse_size)
+        parsed_value(table, "hole", parse_hole)
     for word in (*LOCATIONS, *ORIENTATIONS):
         if not table.has(word):
             continue
@@ -231,7 +222,7 @@ def _widths(table: Table, shape: str) -> tuple[dict[str, float], str]:
             article = "an" if shape == "axis" else "a"
             fault = f"found one of a feature that is {article} {shape}"
             raise table.bad(word, f"{fault}, expected none")
-        widths[word], at_most = _parsed(table, word, parse_width)
+        widths[word], at_most = parsed_value(table, word, parse_width)
         if at_most and (word != "position" or shape != "axis" or not hole):
             fault = 'found (M), expected it with the position of a bore and "hole"'
             raise table.bad(word, f'{fault}, such as hole = "12 H7"')
@@ -253,8 +244,20 @@ def _check_widths(table: Table, widths: dict[str, float]) -> None:
             raise table.bad(word, f"{found}, expected {expected}")
 
 
+def _check_form(table: Table, form: float, widths: Mapping[str, float]) -> None:
+    """Refuse a form zone that is not smaller than every other zone of the feature."""
+    least = min(widths.values(), default=1.0)
+    if form and not form < least:
+        word = next(word for word in FORMS if table.has(word))
+        name = next(word for word, width in widths.items() if width == least)
+        expected = f"less than the {name}, {least * 1e3:g} mm"
+        raise table.bad(word, f"found {form * 1e3:g} mm, expected {expected}")
+
+
 def _extent(table: Table, shape: str, widths: dict[str, float]) -> tuple[float, ...]:
     """[m] the length of a bore, or the sizes of a face."""
+    if table.has("diameter"):
+        return _diameter(table, shape)
     count = _SIZES[shape]
     if not table.has("extent"):
         if widths and count:
@@ -272,83 +275,29 @@ def _extent(table: Table, shape: str, widths: dict[str, float]) -> tuple[float, 
         raise table.bad("extent", fault) from None
 
 
+def _diameter(table: Table, shape: str) -> tuple[float, ...]:
+    """[m] the diameter of a round face."""
+    if shape != "plane":
+        article = "an" if shape == "axis" else "a"
+        fault = f"found one of a feature that is {article} {shape}, expected none"
+        raise table.bad("diameter", f"{fault}; only a face has one")
+    if table.has("extent"):
+        fault = 'found it together with "extent", the sizes of a rectangular face'
+        raise table.bad("diameter", f"{fault}; expected one of them")
+    value = table.content["diameter"]
+    try:
+        return (parse_width(value)[0],)
+    except BadInput:
+        fault = f"found {describe(value)}"
+        raise table.bad(
+            "diameter", f'{fault}, expected that of a round face, such as "40 mm"'
+        ) from None
+
+
 def _across(table: Table, axis: Vector | None) -> Vector | None:
     """Unit vector in which the zones are, at right angles to a known axis."""
-    direction = _direction(table, "direction")
+    direction = read_direction(table, "direction")
     if direction is not None and axis is not None:
         if abs(float(np.dot(direction, axis))) > _ACROSS:
             raise table.bad("direction", _NOT_ACROSS)
     return direction
-
-
-def _point(table: Table) -> Vector:
-    """[m] the middle of a feature in its frame's axes."""
-    default = np.zeros(3)
-    x, y, z = table.array("at", (3,), "m", default, largest=LARGEST_LENGTH).tolist()
-    return x, y, z
-
-
-def _direction(table: Table, key: str) -> Vector | None:
-    """A unit vector, None if absent."""
-    if not table.has(key):
-        return None
-    vector = table.array(key, (3,), "direction", largest=LARGEST_LENGTH)
-    size = float(np.linalg.norm(vector))
-    if size < 1e-12:
-        raise table.bad(key, "found no direction, expected 3 numbers, not all 0")
-    x, y, z = (vector / size).tolist()
-    return x, y, z
-
-
-def _parsed(table: Table, key: str, parse: Callable[[Any], Parsed]) -> Parsed:
-    """The value of a key by a function that refuses what it is not."""
-    try:
-        return parse(table.content[key])
-    except BadInput as error:
-        raise table.bad(key, str(error)) from None
-    except TypeError:  # a text was expected
-        fault = f"found {describe(table.content[key])}, expected a text"
-        raise table.bad(key, fault) from None
-
-
-def callout_table(callout: Callout) -> dict[str, Any]:
-    """Return the content of ``[[tolerance]]`` of a frames file, without defaults."""
-    table: dict[str, Any] = {"feature": callout.feature}
-    if callout.name != callout.feature:
-        table["name"] = callout.name
-    table["datums"] = [_datum_value(datum) for datum in callout.datums]
-    if callout.after:
-        table["after"] = True
-    if callout.shape != "axis":
-        table["shape"] = callout.shape
-    if callout.axis != _Z:
-        table["axis"] = list(callout.axis)
-    if callout.at != _ORIGIN:
-        table["at"] = list(callout.at)
-    if callout.extent:
-        table["extent"] = list(callout.extent)
-    for word, width in callout.widths.items():
-        at_most = callout.hole and word == "position"
-        table[word] = f"{width!r} m (M)" if at_most else width
-    if callout.hole:
-        table["hole"] = callout.hole
-    if callout.direction is not None:
-        table["direction"] = list(callout.direction)
-    if callout.length is not None:
-        length, tolerance = callout.length
-        table["length"] = f"{length!r} +- {tolerance!r} m"
-    if callout.general:
-        table["general"] = callout.general
-    if callout.distribution != "uniform":
-        table["distribution"] = callout.distribution
-    if callout.cp != 1.0:
-        table["cp"] = callout.cp
-    return table
-
-
-def _datum_value(datum: Datum) -> str | dict[str, Any]:
-    """A datum as it is written."""
-    if datum == Datum(datum.frame):
-        return datum.frame
-    table = {"frame": datum.frame, "shape": datum.shape, "axis": list(datum.axis)}
-    return table if datum.at == _ORIGIN else table | {"at": list(datum.at)}

@@ -23,6 +23,7 @@ from forcefit.assembly.files.drawn_body import (
     with_ends,
 )
 from forcefit.assembly.files.drawn_joint import read_drawn_joint
+from forcefit.assembly.files.form_file import forms_of_joints, widen_clearance
 from forcefit.assembly.files.written_units import without_units
 from forcefit.assembly.model.largest import LARGEST_LENGTH
 from forcefit.assembly.model.robot import BASE
@@ -63,7 +64,8 @@ def read_drawing(root: Table, name: str, description: str) -> Drawing:
     found = [(body, copied) for copied in copies for body in read_bodies(copied)]
     names = [body.name for body, _ in found]
     _check_distinct(root, "body", [BASE, *names])
-    joints = [joint for copied in copies for joint in _joints(copied, names)]
+    forms = forms_of_joints(copies)
+    joints = [joint for copied in copies for joint in _joints(copied, names, forms)]
     _check_distinct(root, "joint", [BASE, *(joint.name for joint in joints)])
     if platform not in names:
         hint = nearest(platform, names)
@@ -73,7 +75,7 @@ def read_drawing(root: Table, name: str, description: str) -> Drawing:
         with_ends(body, copied, joints, at if body.name == platform else None)
         for body, copied in found
     ]
-    remarks = link_remarks(bodies, joints, copies)
+    remarks = (*link_remarks(bodies, joints, copies), *_form_remarks(forms))
     callouts = [
         callout for copied in copies
         for callout in read_drawn_callouts(copied, bodies, joints)
@@ -124,7 +126,9 @@ def _repeated(leg: Table, name: str) -> Iterator[Copy]:
         yield Copy(leg, f"{name}{k + 1}.", transform(at - R @ at, R))
 
 
-def _joints(copied: Copy, names: list[str]) -> Iterator[DrawnJoint]:
+def _joints(
+    copied: Copy, names: list[str], forms: dict[str, tuple[str, float]]
+) -> Iterator[DrawnJoint]:
     """The joints of a copy, between bodies of it or of the whole robot."""
 
     def find(name: str) -> str | None:
@@ -135,6 +139,8 @@ def _joints(copied: Copy, names: list[str]) -> Iterator[DrawnJoint]:
         name = table.text("name", longest=LONGEST_NAME)
         table.place = place_of(copied.table, "joint", name)
         first, second = _between(table, find, names)
+        if copied.prefix + name in forms:
+            widen_clearance(table, *forms[copied.prefix + name])
         joint = read_drawn_joint(table, copied.prefix + name, first, second)
         yield turned_joint(joint, copied.T)
     if copied.prefix:
@@ -163,6 +169,15 @@ def _between(
     if found[0] == found[1]:
         raise table.bad("between", f"found {quoted(value[0])} twice, expected two")
     return found
+
+
+def _form_remarks(forms: dict[str, tuple[str, float]]) -> tuple[str, ...]:
+    """A remark on the clearances that the form of features widens."""
+    texts = [
+        f"{quoted(joint)} by {added * 1e6:.4g} um ({word})"
+        for joint, (word, added) in forms.items()
+    ]
+    return (f"clearance widened by form: {'; '.join(texts)}",) if texts else ()
 
 
 def _check_distinct(root: Table, kind: str, names: list[str]) -> None:

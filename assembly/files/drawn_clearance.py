@@ -1,9 +1,11 @@
 """Clearance of a joint of a robot file of ``format = 2``: bounds, or contacts."""
 
+from forcefit.assembly.callouts.fits import Fit
 from forcefit.assembly.drawing.contacts import (
     Contact,
     bearings,
     fitted,
+    fitted_guide,
     guide,
     pad,
 )
@@ -45,9 +47,9 @@ def read_drawn_clearance(table: Table, kind: str) -> _Clearance:
         fault = f"found together with {quoted(contacts[0])}"
         raise inner.bad(contacts[1], f"{fault}, expected one of them")
     if contacts not in ([], ["length"]) and inner.has("fit"):
-        in_bearings = contacts == ["bearings"]
-        expected = "it in each bearing" if in_bearings else "only a gap in m"
-        fault = f"found together with {quoted(contacts[0])}, expected {expected}"
+        expected = {"bearings": "it in each bearing", "guide": "it in the guide"}
+        instead = expected.get(contacts[0], "only a gap in m")
+        fault = f"found together with {quoted(contacts[0])}, expected {instead}"
         raise inner.bad("fit", fault)
     found: _Clearance = bounds, ()
     for key in contacts:
@@ -122,16 +124,45 @@ def _in_guide(table: Table, kind: str, bounds: Clearance) -> _Clearance:
     _refuse_type(table, "guide", kind, "prismatic")
     _refuse_with(table, "guide", ("radial", "tilt", "spin", "ball"))
     inner = _sizes(table, "guide", ("gap", "length", "width", "height"))
-    gap = inner.content.get("gap")
-    if isinstance(gap, list):
-        x, y = inner.array("gap", (2,), "m", largest=LARGEST_LENGTH).tolist()
-        if min(x, y) < 0:
-            raise inner.bad("gap", f"found {min(x, y):g}, expected 2 numbers >= 0 [m]")
-    else:
-        x = y = inner.number("gap", "m", least=0.0, largest=LARGEST_LENGTH)
+    fits = _guide_fits(inner)
+    x, y = _guide_gaps(inner) if fits is None else (fit.mean_radial for fit in fits)
     length, width, height = (_length(inner, k) for k in ("length", "width", "height"))
     inner.finish()
-    return _of_shaft(bounds), guide((x, y), length, width, height)
+    if fits is None:
+        return _of_shaft(bounds), guide((x, y), length, width, height)
+    largest = fits[0].radial[1], fits[1].radial[1]
+    contacts = guide((x, y), length, width, height, largest)
+    names = fits[0].text, fits[1].text
+    return _of_shaft(bounds), fitted_guide(contacts, names, length)
+
+
+def _guide_gaps(inner: Table) -> tuple[float, float]:
+    """[m] c_x and c_y of a guide."""
+    if not isinstance(inner.content.get("gap"), list):
+        gap = inner.number("gap", "m", least=0.0, largest=LARGEST_LENGTH)
+        return gap, gap
+    x, y = inner.array("gap", (2,), "m", largest=LARGEST_LENGTH).tolist()
+    if min(x, y) < 0:
+        raise inner.bad("gap", f"found {min(x, y):g}, expected 2 numbers >= 0 [m]")
+    return x, y
+
+
+def _guide_fits(inner: Table) -> tuple[Fit, Fit] | None:
+    """The fits of a guide along x and y, None if its gaps are stated."""
+    value = inner.content.get("fit")
+    if value is not None and inner.has("gap"):
+        raise inner.bad("gap", 'found it together with "fit", expected one of them')
+    if not isinstance(value, list):
+        fit = fit_of(inner)
+        return None if fit is None else (fit, fit)
+    inner.has("fit")
+    if len(value) != 2:
+        expected = 'expected one fit, or two, such as ["40 H7/g6", "30 H7/g6"]'
+        raise inner.bad("fit", f"found a list of {len(value)}, {expected}")
+    one, other = (fit_of(Table({"fit": v}, inner.file, inner.place)) for v in value)
+    assert one is not None
+    assert other is not None
+    return one, other
 
 
 def _on_pad(table: Table, kind: str, bounds: Clearance) -> _Clearance:

@@ -67,9 +67,9 @@ def read_clearance(table: Table, joint: str) -> Clearance | None:
     end = _fitted_end(inner)
     bounds = read_bounds(inner, joint)
     if end is not None:
-        # the tilt follows from the fit, in place of the radial clearance
-        tilt = end.tilt(bounds.radial or 0.0)
-        bounds = replace(bounds, radial=None, tilt=tilt)
+        # the rotation follows from the fit, in place of the radial clearance
+        rotation = end.bounds(bounds.radial or 0.0)
+        bounds = replace(bounds, radial=None, **rotation)
     inner.finish()
     return bounds
 
@@ -135,17 +135,18 @@ def read_fitted_end(table: Table) -> FittedEnd | None:
 
 
 def _fitted_end(inner: Table) -> FittedEnd | None:
-    """Return the ``length`` and the ``parts`` of a clearance with a fit."""
+    """Return ``length``, ``parts`` and ``bound`` of a clearance with a fit."""
     if not inner.has("length"):
         return None
     for key, fault in (("fit", "missing"), ("parts", "missing")):
         if not inner.has(key):
             raise inner.bad(key, f'{fault}; expected one with "length"')
-    if inner.has("tilt"):
+    bound = inner.choice("bound", ("tilt", "spin"), "tilt")
+    if inner.has(bound):
         fault = 'found it together with "length", from which it follows'
-        raise inner.bad("tilt", f"{fault}; expected one of them")
+        raise inner.bad(bound, f"{fault}; expected one of them")
     length = inner.number("length", "m", above=_LEAST_LENGTH, largest=LARGEST_LENGTH)
-    return FittedEnd(length, inner.text("parts"))
+    return FittedEnd(length, inner.text("parts"), bound)
 
 
 def fit_of(inner: Table) -> Fit | None:

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from forcefit.assembly.callouts.fits import FittedEnd, parse_fit
 from forcefit.assembly.drawing.frames import robot_of_drawing
 from forcefit.assembly.files.bolt_file import read_locked_at
-from forcefit.assembly.files.callout_file import callout_table, read_frame_callouts
+from forcefit.assembly.files.callout_file import read_frame_callouts
+from forcefit.assembly.files.callout_writing import callout_table
 from forcefit.assembly.files.drawing_file import is_drawing, read_drawing
 from forcefit.assembly.files.effect_file import effect_tables, with_effects
 from forcefit.assembly.files.inertia_file import read_inertia
@@ -27,6 +28,7 @@ from forcefit.assembly.files.joint_file import (
 from forcefit.assembly.files.link_file import link_table, read_link
 from forcefit.assembly.files.toml_text import file_text
 from forcefit.assembly.kinematics.callout_maps import place_callouts
+from forcefit.assembly.kinematics.placed_callout import fits_by_parts
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.model.frame import FORCE_CONTROL
 from forcefit.assembly.model.inertia import six_moments
@@ -263,12 +265,7 @@ def _fitted_ends(tables: list[Table]) -> dict[str, FittedEnd]:
 def _fit_remarks(robot: Robot) -> tuple[str, ...]:
     """Return a remark on the fits, of which one clearance is used."""
     texts = []
-    ends = robot.fitted_ends
-    by_parts = {
-        ends[frame].parts if frame in ends else frame: text
-        for frame, text in robot.fits.items()
-    }
-    for name, text in by_parts.items():
+    for name, text in fits_by_parts(robot).items():
         fit = parse_fit(text)
         mean, (least, most) = 1e6 * fit.mean_radial, (1e6 * r for r in fit.radial)
         texts.append(
@@ -479,10 +476,11 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
 def _write_fit(clearance: dict[str, Any], robot: Robot, name: str) -> None:
     """Replace the mean of a frame's fit by the fit."""
     end = robot.fitted_ends.get(name)
-    del clearance["radial" if end is None else "tilt"]
+    del clearance["radial" if end is None else end.bound]
     clearance["fit"] = robot.fits[name]
     if end is not None:
         clearance |= {"length": end.length, "parts": end.parts}
+        clearance |= {} if end.bound == "tilt" else {"bound": end.bound}
 
 
 def root_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:

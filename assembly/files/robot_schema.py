@@ -76,6 +76,7 @@ _CLEARANCE = record(
     fit_=_FIT,
     length_=number("length of the bore, or distance of two bearings", "m"),
     parts_=text("name of the hole and the shaft of a fit with length"),
+    bound_=Words(("tilt", "spin")),
 )  # fmt: skip
 _FRAME = record(
     name=text("name"), parent=text('name of a frame, or "base"'),
@@ -105,7 +106,7 @@ _WIDTH = Either((number("width", "m"), text('width, such as "0.05 mm"')))
 _CALLOUT = record(
     feature=text("frame, or joint of the body"), name_=text("name in tables"),
     **{f"{word}_": _WIDTH for word in (*LOCATIONS, *ORIENTATIONS)},
-    extent_=Either((_WIDTH, Listed(_WIDTH))),
+    extent_=Either((_WIDTH, Listed(_WIDTH))), diameter_=_WIDTH,
     hole_=text('size of a hole with (M), such as "12 H7"'),
     direction_=_DIRECTION, length_=text('length, such as "452 +- 0.1 mm"'),
     general_=text('"ISO 2768-mK"'), distribution_=Words((*DISTRIBUTIONS,)),
@@ -117,10 +118,16 @@ _OF_FRAME_FEATURE = record(
     datums=Listed(Either((
         text("frame"),
         record(frame=text("frame"), shape_=Words((*HELD,)), axis_=_DIRECTION,
-               at_=_POINT),
+               at_=_POINT, hole_=text("size of a hole at maximum material"),
+               hole_of_=text("its fit or joint")),
     ))),
+    hole_of_=text("fit or joint of the hole"),
 )  # fmt: skip
-_OF_BODY_FEATURE = record("", _CALLOUT, datums=text("joints, A first", "joint"))
+_OF_BODY_FEATURE = record(
+    "", _CALLOUT, datums=text('joints, A first; "B (M)" at maximum material', "joint"),
+    datum_hole_=text('size of the datum with (M), such as "12 H7"'),
+    flatness_=_WIDTH, cylindricity_=_WIDTH,
+)  # fmt: skip
 _NUMBERS = Each(number("parameter", ""))
 _EFFECT = record(
     name=Words((*LIBRARY, FUNCTION)), parameters_=_NUMBERS, session_=text("session"),
@@ -147,7 +154,8 @@ _CONTACTS = record(
     "", _CLEARANCE,
     bearings_=Listed(record(z=number("height", "m"), radial_=_GAP, fit_=_FIT)),
     guide_=record(
-        gap=Either((_GAP, number("gaps along x and y", "m", "axis"))),
+        gap_=Either((_GAP, number("gaps along x and y", "m", "axis"))),
+        fit_=Either((_FIT, Listed(_FIT))),
         length=number("length along the axis", "m"),
         width=number("width along x", "m"), height=number("height along y", "m"),
     ),

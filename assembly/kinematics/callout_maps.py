@@ -24,6 +24,12 @@ from forcefit.assembly.callouts.callout import (
     zone_of,
 )
 from forcefit.assembly.callouts.zone import Zone
+from forcefit.assembly.callouts.zones_of_features import datum_shift
+from forcefit.assembly.kinematics.placed_callout import (
+    PlacedCallout,
+    check_holes,
+    fault_of,
+)
 from forcefit.assembly.kinematics.posture import Posture
 from forcefit.assembly.model.placed_frames import own_motion
 from forcefit.assembly.model.robot import Robot
@@ -33,27 +39,6 @@ from forcefit.stiffness.screws import screw_map, transform
 _RANK = 1e-9  # singular values below it are rounding
 
 Side = tuple[str, bool]  # a frame, and whether on the body after its joint
-
-
-@dataclass(frozen=True, eq=False)
-class PlacedCallout:
-    """A callout with its zone, and the errors of the frames that it causes.
-
-    Attributes:
-        callout: as the drawing states it.
-        zone: of the feature, in its axes.
-        errors: (n, 6, m) [rad, m] delta l of all frames for unit coordinates of the
-            zone.
-    """
-
-    callout: Callout
-    zone: Zone
-    errors: NDArray
-
-    @property
-    def name(self) -> str:
-        """Name in tables: ``"position of bore 2 on link_a"``."""
-        return f"{self.callout.words} of {self.callout.name}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +67,8 @@ def place_callouts(home: Posture) -> tuple[PlacedCallout, ...]:
         home: home posture of the robot.
 
     Returns:
-        In the order of the robot's callouts.
+        In the order of the robot's callouts, then the shifts of datums at maximum
+        material.
 
     Raises:
         BadInput: a feature has callouts twice, a datum is not on the feature's body,
@@ -98,27 +84,45 @@ def place_callouts(home: Posture) -> tuple[PlacedCallout, ...]:
             c for k, c in enumerate(callouts) if sides[c.feature, c.after] != k
         )
         fault = "found the feature twice, expected one [[tolerance]] with all"
-        raise BadInput(_fault(twice, fault))
+        raise BadInput(fault_of(twice, fault))
     datums = [_datum_sides(bodies, c, sides) for c in callouts]
     zones = [_zone(bodies, c, d[0], callouts, sides)
              for c, d in zip(callouts, datums, strict=True)]  # fmt: skip
+    shifting = [(k, j) for k, c in enumerate(callouts)
+                for j, datum in enumerate(c.datums) if datum.hole]  # fmt: skip
+    zones += [datum_shift(callouts[k].datums[j].hole) for k, j in shifting]
     widths = np.cumsum([0, *(sum(zone.dimensions) for zone in zones)])
+    own = [_own_screw(zone, end, widths[-1])
+           for zone, end in zip(zones, widths[1:], strict=True)]  # fmt: skip
     screws = np.zeros((len(callouts), 6, widths[-1]))
     for k in _order(callouts, datums, sides):
-        # in the feature's axes
-        own = np.zeros((6, widths[-1]))
-        own[:, widths[k] : widths[k + 1]] = zones[k].columns
-        frame = _datum_frame(bodies, callouts[k], datums[k], callouts, sides, screws)
-        screws[k] = own + _to_feature(_feature_pose(bodies, callouts[k])) @ frame
+        pairs = zip(shifting, own[len(callouts) :], strict=True)
+        shifts = {j: screw for (of, j), screw in pairs if of == k}
+        frame = _datum_frame(
+            bodies, callouts[k], datums[k], callouts, sides, screws, shifts
+        )
+        screws[k] = own[k] + _to_feature(_feature_pose(bodies, callouts[k])) @ frame
     errors = np.zeros((len(bodies.robot.frames), 6, widths[-1]))
     for k, callout in enumerate(callouts):
         _add_errors(errors, bodies, callout, screws[k])
     parts = np.split(errors, widths[1:-1], axis=2)
-    found = tuple(
-        PlacedCallout(*row) for row in zip(callouts, zones, parts, strict=True)
-    )
+    n = len(callouts)
+    found = [
+        PlacedCallout(*row) for row in zip(callouts, zones[:n], parts[:n], strict=True)
+    ]
     _check_names([placed.name for placed in found], callouts)
-    return found
+    for (k, j), zone, part in zip(shifting, zones[n:], parts[n:], strict=True):
+        callout = replace(callouts[k], distribution="uniform")
+        found.append(PlacedCallout(callout, zone, part, callouts[k].datums[j]))
+    check_holes(home.robot, found, bodies.body)
+    return tuple(found)
+
+
+def _own_screw(zone: Zone, end: int, total: int) -> NDArray:
+    """(6, total) screw of a zone whose coordinates end before a column."""
+    screw = np.zeros((6, total))
+    screw[:, end - sum(zone.dimensions) : end] = zone.columns
+    return screw
 
 
 def _check_names(names: list[str], callouts: tuple[Callout, ...]) -> None:
@@ -126,12 +130,7 @@ def _check_names(names: list[str], callouts: tuple[Callout, ...]) -> None:
     for k, name in enumerate(names):
         if name in names[:k]:
             fault = f"found {quoted(name)} twice, expected another name of the feature"
-            raise BadInput(_fault(callouts[k], fault))
-
-
-def _fault(callout: Callout, found: str) -> str:
-    """The message on a callout."""
-    return f"tolerance of {quoted(callout.name)}: {found}"
+            raise BadInput(fault_of(callouts[k], fault))
 
 
 def _bodies(home: Posture) -> _Bodies:
@@ -167,11 +166,11 @@ def _datum_sides(
         if not here:
             fault = f"found the datum {quoted(name)} on another body"
             fault += ", expected a feature of the same body"
-            raise BadInput(_fault(callout, fault))
+            raise BadInput(fault_of(callout, fault))
         if name == callout.feature and (name, callout.after) in here:
             fault = f"found the datum {quoted(name)}, which is the feature itself"
             fault += ", expected another feature of the body"
-            raise BadInput(_fault(callout, fault))
+            raise BadInput(fault_of(callout, fault))
         # of two sides of a rigid connection the one that has callouts
         found.append(next((side for side in here if side in sides), here[0]))
     return found
@@ -190,7 +189,7 @@ def _order(
     except CycleError as error:
         names = " -> ".join(quoted(callouts[k].name) for k in error.args[1])
         fault = f"found circular datums: {names}, expected an order"
-        raise BadInput(_fault(callouts[error.args[1][0]], fault)) from None
+        raise BadInput(fault_of(callouts[error.args[1][0]], fault)) from None
 
 
 def _feature_pose(bodies: _Bodies, callout: Callout) -> NDArray:
@@ -221,11 +220,13 @@ def _zone(
     offset = R.T @ (pose[:3, 3] - of_datum[:3, 3])
     axis = None if shape == "point" else R.T @ of_datum[:3, 2]
     try:
-        planes = (shape == "plane", callout.shape == "plane")
-        check_orientation(callout, np.eye(3)[2], axis, planes[0] == planes[1])
+        same = None  # a fixed joint may be a face or a bore
+        if shape != "body":
+            same = (shape == "plane") == (callout.shape == "plane")
+        check_orientation(callout, np.eye(3)[2], axis, same)
         return zone_of(callout, offset, axis)
     except BadInput as error:
-        raise BadInput(_fault(callout, str(error))) from None
+        raise BadInput(fault_of(callout, str(error))) from None
 
 
 def _to_feature(pose: NDArray) -> NDArray:
@@ -237,12 +238,15 @@ def _to_feature(pose: NDArray) -> NDArray:
 def _datum_frame(
     bodies: _Bodies, callout: Callout, datums: list[Side],
     callouts: tuple[Callout, ...], sides: Mapping[Side, int], screws: NDArray,
+    shifts: Mapping[int, NDArray],
 ) -> NDArray:  # fmt: skip
     """(6, M) screw of the datum frame at the base's origin for unit coordinates."""
     D, free = np.zeros(screws.shape[1:]), np.eye(6)
-    for datum, side in zip(callout.datums, datums, strict=True):
+    for j, (datum, side) in enumerate(zip(callout.datums, datums, strict=True)):
         pose = _datum_pose(bodies, datum, side, callouts, sides)
         own = screws[sides[side]] if side in sides else np.zeros_like(D)
+        if j in shifts:
+            own = own + shifts[j]
         to_datum = _to_feature(pose)
         # lengths over the distance from the feature, so that rad and m weigh alike
         gap = pose[:3, 3] - _feature_pose(bodies, callout)[:3, 3]
@@ -274,7 +278,7 @@ def _add_errors(
     children = np.flatnonzero(robot.parents == row)
     if not len(children):
         fault = "found no frame that its joint carries, expected one or more"
-        raise BadInput(_fault(callout, fault))
+        raise BadInput(fault_of(callout, fault))
     for child in children:
         errors[child] -= _carried(pose, bodies.before[child]) @ screw
 

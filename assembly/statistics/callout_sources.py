@@ -12,37 +12,24 @@ from functools import cache, cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.assembly.callouts.fits import Fit, FittedEnd, parse_fit
+from forcefit.assembly.callouts.fits import FittedEnd
 from forcefit.assembly.callouts.zone import DISTRIBUTIONS
-from forcefit.assembly.kinematics.callout_maps import PlacedCallout, place_callouts
+from forcefit.assembly.kinematics.callout_maps import place_callouts
+from forcefit.assembly.kinematics.placed_callout import PlacedCallout
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.model.error_distributions import ErrorSources
-from forcefit.assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.statistics.joint_fits import (
+    JointFit,
+    fits_of,
+    kind_of_fit,
+    with_clearance,
+)
 from forcefit.assembly.statistics.ranking import group_of, kind_of
 from forcefit.inputs.table import BadInput
 
 _SAMPLE = 1 << 14  # draws of a fit for its variance
 _WORDS = 4  # random numbers of one step of Philox
-
-
-@dataclass(frozen=True, eq=False)
-class JointFit:
-    """A fit of a hole and a shaft.
-
-    Attributes:
-        frame: name of the joint's frame, or of the parts.
-        fit: the fit.
-        bounds: rows of the frames that it bounds, and how: None for ``radial``.
-    """
-
-    frame: str
-    fit: Fit
-    bounds: tuple[tuple[int, FittedEnd | None], ...]
-
-    @property
-    def name(self) -> str:
-        """Name in tables: ``"fit 12 H7/g6 of elbow"``."""
-        return f"fit {self.fit.text} of {self.frame}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,17 +104,26 @@ class CalloutSources:
 
         Returns:
             (m,) names.  A callout is always whole; by kind the callouts of the same
-            name in every leg are one group.
+            name in every leg are one group.  What depends on the size of one hole is
+            one group: its position at maximum material, the shift of a datum, its fit.
         """
         labels = () if self.independent is None else self.independent.labels
-        own = [group_of(label, by) for label in labels]
+        names, holes, counts = list[str](), list[str](), list[int]()
         for placed in self.placed:
-            callout = placed.callout
-            name = kind_of(callout.name) if by == "kind" else callout.name
-            own += [f"{callout.words} of {name}"] * sum(placed.zone.dimensions)
+            name = placed.callout.name
+            names.append(f"{placed.words} of {kind_of(name) if by == 'kind' else name}")
+            holes.append(placed.hole_of if placed.hole else "")
+            counts.append(sum(placed.zone.dimensions))
         for fit in self.fits:
-            short = kind_of(fit.frame) if by == "kind" else fit.frame
-            own.append(f"fit {fit.fit.text} of {short}")
+            short = kind_of_fit(self.robot, fit) if by == "kind" else fit.frame
+            names.append(f"fit {fit.fit.text} of {short}")
+            holes.append(fit.frame)
+            counts.append(1)
+        own = [group_of(label, by) for label in labels]
+        for name, hole, count in zip(names, holes, counts, strict=True):
+            of_hole = [n for n, h in zip(names, holes, strict=True) if h == hole]
+            whole = " and ".join(dict.fromkeys(of_hole)) if hole else name
+            own += [whole] * count
         return own
 
     def draw(self, first: int, count: int, seed: int, stream: int = 0) -> NDArray:
@@ -139,7 +135,9 @@ class CalloutSources:
         @cache
         def uniforms(attempt: int) -> list[NDArray]:
             rows = _uniforms(first, count, seed, stream, int(ends[-1]), attempt)
-            return np.split(rows, ends[:-1], axis=1)
+            parts = np.split(rows, ends[:-1], axis=1)
+            self._share_sizes(parts)
+            return parts
 
         parts = []
         if self.independent is not None:
@@ -157,6 +155,15 @@ class CalloutSources:
             parts.append(radial[:, None] - one.fit.mean_radial)
         return np.hstack(parts)
 
+    def _share_sizes(self, parts: list[NDArray]) -> None:
+        """Give what depends on the size of one hole the same uniform numbers of it."""
+        sizes: dict[str, NDArray] = {}
+        for part, placed in zip(parts[1:], self.placed, strict=False):
+            if placed.hole:
+                part[:, -1] = sizes.setdefault(placed.hole_of, part[:, -1])
+        for part, fit in zip(parts[1 + len(self.placed) :], self.fits, strict=True):
+            part[:, 0] = sizes.get(fit.frame, part[:, 0])
+
     def with_clearances(self, values: NDArray) -> Robot:
         """Return the robot with the clearances of one draw's numbers (m,)."""
         more = values[len(self) - len(self.fits) :]
@@ -173,8 +180,8 @@ class CalloutSources:
         for one, bound in zip(self.fits, radial, strict=True):
             gap = max(0.0, bound)
             for row, end in one.bounds:
-                new = {"radial": gap} if end is None else {"tilt": end.tilt(gap)}
-                frames[row] = _with_clearance(frames[row], new)
+                new = {"radial": gap} if end is None else end.bounds(gap)
+                frames[row] = with_clearance(frames[row], new)
         return replace(self.robot, frames=tuple(frames))
 
     def errors(self, values: NDArray) -> NDArray:
@@ -209,7 +216,10 @@ class CalloutSources:
         own = [] if self.independent is None else self.independent.identity
         for p in self.placed:
             law = [DISTRIBUTIONS.index(p.callout.distribution), p.callout.cp]
-            own += [*p.zone.bounds, np.array([p.zone.bonus, *law]), p.errors]
+            growth = [p.zone.bonus, *law, *([1.0] if p.zone.from_zero else [])]
+            if p.hole:  # which fit has the same hole
+                growth += [float(f.frame == p.hole_of) for f in self.fits]
+            own += [*p.zone.bounds, *p.zone.cones, np.array(growth), p.errors]
         for f in self.fits:
             rows = [x for row, end in f.bounds for x in (row, *_length(end))]
             own.append(np.array([*f.fit.hole, *f.fit.shaft, *rows]))
@@ -219,30 +229,9 @@ class CalloutSources:
 Sources = ErrorSources | CalloutSources
 
 
-def _with_clearance(frame: Frame, new: dict[str, float]) -> Frame:
-    """The frame with other bounds; those of a bolted joint hold before it is bolted."""
-    bolt = frame.locked_at
-    if bolt is not None:
-        clearance = replace(bolt.clearance, **new)
-        return replace(frame, locked_at=replace(bolt, clearance=clearance))
-    return replace(frame, clearance=replace(frame.clearance or Clearance(), **new))
-
-
 def _length(end: FittedEnd | None) -> list[float]:
     """The length of a fitted end, nothing of a radial clearance."""
     return [] if end is None else [end.length]
-
-
-def _fits_of(robot: Robot) -> tuple[JointFit, ...]:
-    """The fits of a robot, each hole and shaft once."""
-    found: dict[str, JointFit] = {}
-    for frame, text in robot.fits.items():
-        end = robot.fitted_ends.get(frame)
-        name = frame if end is None else end.parts
-        one = found.get(name, JointFit(name, parse_fit(text), ()))
-        bound = robot.index(frame), end
-        found[name] = replace(one, bounds=(*one.bounds, bound))
-    return tuple(found.values())
 
 
 def _nth(uniforms: Callable[[int], list[NDArray]], i: int) -> Callable[[int], NDArray]:
@@ -280,7 +269,7 @@ def sources_of(
     Raises:
         BadInput: there are neither.
     """
-    fits = _fits_of(robot)
+    fits = fits_of(robot)
     if robot.callouts or fits:
         placed = place_callouts(home_posture(robot))
         return CalloutSources(robot, placed, independent, fixed, fits)

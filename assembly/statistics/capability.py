@@ -136,6 +136,33 @@ def quantile_cpk(
     return index(middle["value"], tail["value"]), min(corners), max(corners)
 
 
+def quantile_cp(
+    values: ArrayLike, limit: float, level: float = 0.95
+) -> tuple[float, float, float]:
+    """Return Cp of draws of a size, which lies between zero and an upper limit.
+
+    Cp is limit / (99.865 % quantile - 0.135 % quantile), which is the usual index of
+    a normal distribution between the limits zero and ``limit``.
+
+    Args:
+        values: (k,) draws; inf where there is no answer.
+        limit: upper limit.
+        level: as for :func:`quantile_cpk`.
+
+    Returns:
+        Value, lower, upper; 0 below a quantile that so few draws do not bound.
+    """
+    each = (1 + level) / 2
+    low, tail = (quantile(values, share, each) for share in (1 - _TAIL, _TAIL))
+
+    def index(a: float, b: float) -> float:
+        return limit / (b - max(a, 0.0)) if b > max(a, 0.0) else float("inf")
+
+    ends = itertools.product(("lower", "upper"), repeat=2)
+    corners = [index(low[a], tail[b]) for a, b in ends]
+    return index(low["value"], tail["value"]), min(corners), max(corners)
+
+
 def draws_capability(
     values: ArrayLike, exceeds: Mapping[str, Any], level: float = 0.95
 ) -> dict[str, Any]:
@@ -148,14 +175,16 @@ def draws_capability(
         level: level of confidence.
 
     Returns:
-        ``limit``, ``unit``, and ``cpk`` and ``ppm`` with value, lower, upper.
+        ``limit``, ``unit``, and ``cp``, ``cpk`` and ``ppm`` with value, lower, upper;
+        ``cp`` is that of a size, see :func:`quantile_cp`.
     """
     values = np.where(np.isnan(values), np.inf, values)
     words, limit = ("value", "lower", "upper"), exceeds["limit"]
     ppm = [1e6 * exceeds[k] for k in ("probability", "lower", "upper")]
-    cpk = quantile_cpk(values, limit, level)
+    cp, cpk = (index(values, limit, level) for index in (quantile_cp, quantile_cpk))
     return {
         "limit": limit, "unit": exceeds["unit"],
+        "cp": dict(zip(words, cp, strict=True)),
         "cpk": dict(zip(words, cpk, strict=True)),
         "ppm": dict(zip(words, ppm, strict=True)),
     }  # fmt: skip
@@ -163,9 +192,13 @@ def draws_capability(
 
 def capability_text(results: Mapping[str, Any]) -> str:
     """Return capabilities of draws by quantity as text, a line each."""
+
+    def index(one: Mapping[str, float]) -> str:
+        return f"{one['value']:.3g} ({one['lower']:.3g} to {one['upper']:.3g})"
+
     return "\n".join(
-        f"{key} up to {one['limit']:.4g} {one['unit']}: Cpk {one['cpk']['value']:.3g} "
-        f"({one['cpk']['lower']:.3g} to {one['cpk']['upper']:.3g}) by quantiles, "
+        f"{key} up to {one['limit']:.4g} {one['unit']}: Cp {index(one['cp'])} and Cpk "
+        f"{index(one['cpk'])} by quantiles, "
         f"{one['ppm']['value']:.4g} ppm above ({one['ppm']['lower']:.4g} to "
         f"{one['ppm']['upper']:.4g})"
         for key, one in results.items()

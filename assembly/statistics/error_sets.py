@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from forcefit.assembly.callouts.zone import Zone
-from forcefit.assembly.kinematics.callout_maps import PlacedCallout
+from forcefit.assembly.kinematics.placed_callout import PlacedCallout
 from forcefit.assembly.kinematics.ranks import RANK
 from forcefit.assembly.linear.reference.reduction import complement
 from forcefit.assembly.model.contact_closures import contact_closures

@@ -1,11 +1,14 @@
 """Possible ranks of sampled shares, and joint names of undistinguished contributors."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.stiffness.screws import SCREW
+
+_IN_SENTENCE = 3  # most contributors of a sentence
 
 NOT_DISTINGUISHED = (
     "rank: the ranks that the intervals allow; errors with a rank in common are not "
@@ -40,6 +43,45 @@ def rank_text(rank: Sequence[int] | None) -> str:
         return ""
     first, last = rank
     return f"{first}" if first == last else f"{first}-{last}"
+
+
+def ranked(summary: Mapping[str, Any], key: str) -> list[tuple[str, list[float]]]:
+    """Return the total shares of a quantity's variance by error, largest first.
+
+    Args:
+        summary: result of :func:`forcefit.assembly.statistics.summary.summarise`.
+        key: name of the quantity.
+
+    Returns:
+        Names with (value, lower, upper); empty if there are no shares.
+    """
+    one = summary.get("importance", {}).get("quantities", {}).get(key, {})
+    if "reason" in one or "total_index" not in one:
+        return []
+    shares = [(name, list(map(float, v))) for name, v in one["total_index"].items()]
+    known = [(name, v) for name, v in shares if np.isfinite(v[0]) and v[0] > 1e-6]
+    return sorted(known, key=lambda item: -item[1][0])
+
+
+def shares_sentence(
+    shares: Sequence[tuple[str, Sequence[float]]], quantity: str
+) -> str:
+    """Return the largest shares of a quantity's variance as a sentence.
+
+    Args:
+        shares: names with value, lower and upper bound, the largest first.
+        quantity: name of the quantity.
+
+    Returns:
+        Such as ``"position of bore 2 on link_a: 31 % of the variance of the
+        translation (27 to 36 %); .."``.
+    """
+    parts = [
+        f"{name}: {100 * value:.0f} % ({100 * low:.0f} to {100 * high:.0f} %)"
+        for name, (value, low, high) in shares[:_IN_SENTENCE]
+    ]
+    parts[0] = parts[0].replace(" % (", f" % of the variance of the {quantity} (", 1)
+    return "; ".join(parts)
 
 
 def leaders(ranks: Mapping[str, Sequence[int]]) -> list[str]:

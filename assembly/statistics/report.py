@@ -8,9 +8,14 @@ from numpy.typing import NDArray
 
 from forcefit.assembly.statistics.plot import NAMES
 from forcefit.assembly.statistics.quantities import POSE_ERRORS, UNITS
-from forcefit.assembly.statistics.ranking import NOT_DISTINGUISHED, rank_text
+from forcefit.assembly.statistics.ranking import (
+    NOT_DISTINGUISHED,
+    rank_text,
+    ranked,
+    shares_sentence,
+)
 from forcefit.assembly.statistics.summary import WORDS
-from forcefit.assembly.statistics.tightening import ranked, tightening_tiles
+from forcefit.assembly.statistics.tightening import tightening_tiles
 from forcefit.assembly.statistics.worst_pose_report import worst_section
 from forcefit.page.charts import BLUE, GREY, RED, Axis, bars, chart, grid
 from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
@@ -206,11 +211,12 @@ def _capability(summary: Mapping[str, Any]) -> str:
     """Return the table of Cpk and parts per million."""
     rows: list[list[Cell]] = [
         [NAMES[key], Value(one["limit"], one["unit"]),
-         *(one["cpk"][k] for k in ("value", "lower", "upper")),
-         *(one["ppm"][k] for k in ("value", "lower", "upper"))]
+         *(one[index][k] for index in ("cp", "cpk", "ppm")
+           for k in ("value", "lower", "upper"))]
         for key, one in summary.get("capability", {}).items()
     ]  # fmt: skip
-    words = ("Cpk", "at least", "at most", "ppm above", "ppm at least", "ppm at most")
+    words = [word for name in ("Cp", "Cpk", "ppm above")
+             for word in (name, f"{name}, at least", f"{name}, at most")]  # fmt: skip
     head: list[str | Column] = ["", "limit", *map(Column, words)]
     return section("Capability", table(head, rows, "capability")) if rows else ""
 
@@ -234,6 +240,7 @@ def _importance(summary: Mapping[str, Any]) -> str:
         words = ("share, with others", "at least", "at most", "share alone")
         head: list[str | Column] = ["error", *map(Column, words), "rank"]
         pieces += [
+            paragraph(f"{shares_sentence(shares, key)}."),
             bars({name: v[0] for name, v in shares}, axis, title, np.nan),
             table(head, rows, "shares"),
         ]

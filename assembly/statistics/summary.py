@@ -28,6 +28,7 @@ from forcefit.assembly.statistics.importance_table import (
 )
 from forcefit.assembly.statistics.perfect_parts import limits_broken, perfect_text
 from forcefit.assembly.statistics.quantities import POSE_ERRORS, UNITS
+from forcefit.assembly.statistics.ranking import ranked, shares_sentence
 from forcefit.assembly.statistics.stiffness_spread import (
     stiffness_report,
     stiffness_spread_text,
@@ -259,6 +260,8 @@ def summary_text(summary: Mapping[str, Any]) -> str:
         lines.append(stiffness_spread_text(summary["stiffness"]))
     if "importance" in summary:
         lines.append(importance_text(summary["importance"]))
+        if shares := ranked(summary, "translation"):
+            lines.append(shares_sentence(shares, "translation"))
     if "worst_case" in summary:
         from forcefit.assembly.statistics.worst_pose_report import worst_text
 

@@ -3,32 +3,12 @@
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from forcefit.assembly.statistics.quantities import POSE_ERRORS
-from forcefit.assembly.statistics.ranking import leaders, named_together
+from forcefit.assembly.statistics.ranking import leaders, named_together, ranked
 from forcefit.page.page import Tile
 from forcefit.page.tables import Value
 
 _NAMED = 3  # largest number of contributors named in a tile
-
-
-def ranked(summary: Mapping[str, Any], key: str) -> list[tuple[str, list[float]]]:
-    """Return the total shares of a quantity's variance by error, largest first.
-
-    Args:
-        summary: result of :func:`forcefit.assembly.statistics.summary.summarise`.
-        key: name of the quantity.
-
-    Returns:
-        Names with (value, lower, upper); empty if there are no shares.
-    """
-    one = summary.get("importance", {}).get("quantities", {}).get(key, {})
-    if "reason" in one or "total_index" not in one:
-        return []
-    shares = [(name, list(map(float, v))) for name, v in one["total_index"].items()]
-    known = [(name, v) for name, v in shares if np.isfinite(v[0]) and v[0] > 1e-6]
-    return sorted(known, key=lambda item: -item[1][0])
 
 
 def tightening_tiles(summary: Mapping[str, Any]) -> list[Tile]:

@@ -176,6 +176,11 @@ def _callouts(table: Table, robot: Robot, callouts: dict[int, int], number: int)
         if not found:
             raise table.bad("callouts", f"found {quoted(name)}{nearest(name, names)}")
         for k in found:
+            one = robot.callouts[k]
+            if one.hole or any(datum.hole for datum in one.datums):
+                fault = f"found {quoted(names[k])}, which is at maximum material"
+                expected = "expected callouts without (M): their zones have one width"
+                raise table.bad("callouts", f"{fault}, {expected}")
             if callouts.setdefault(k, number) != number:
                 raise table.bad("callouts", f"found {quoted(names[k])} again")
     if not value:

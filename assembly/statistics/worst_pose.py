@@ -95,21 +95,9 @@ def worst_pose(
         BadInput: a joint is bolted at a pose, the posture is loaded, or an independent
             error is unbounded or not symmetric about zero.
     """
-    refuse_bolted(prepared.posture.robot, "worst case")
-    if prepared.loads is not None:
-        raise BadInput("worst case: found a load, expected none: it is not linear then")
-    if isinstance(sources, CalloutSources) and sources.fits:
-        robot = sources.with_largest_clearances()
-        prepared = linear_response(replace(prepared.posture, robot=robot))
-        sources = replace(sources, fits=())
+    prepared, sources = _at_largest_clearances(prepared, sources)
     sets, half = error_sets(prepared, sources), 3 * POSE_ERRORS.index(quantity)
-    # contacts of a joint hold each other, but no part
-    held = len(sets.rigid_rows) > len(sets.contact_rows)
-    sprung = len(sets.spring_rows) > 0
-    if sprung and sets.clearances:
-        reading = "equilibrium"
-    else:
-        reading = "elastic" if sprung else "rigid" if held else "linear"
+    reading = _reading(sets)
     (low, high), screw = _farthest(sets, sets.rigid_rows, half)
     rigid = float("nan")
     if reading == "equilibrium":
@@ -137,8 +125,58 @@ def worst_pose(
     )
 
 
+def bound_worst_pose(
+    prepared: LinearResponse, sources: Sources, tolerance: float = _TOLERANCE
+) -> tuple[str, dict[str, float]]:
+    """Return certified upper bounds of the worst pose error, without attaining it.
+
+    Args:
+        prepared: as for :func:`worst_pose`.
+        sources: likewise.
+        tolerance: [-] the bounds are within this share of the supports along x, y and
+            z above the largest value of the convex problem.
+
+    Returns:
+        The reading, a key of :data:`MEANINGS`, and the bounds of the ``rotation`` [rad]
+        and the ``translation`` [m].
+
+    Raises:
+        BadInput: as for :func:`worst_pose`.
+    """
+    sets = error_sets(*_at_largest_clearances(prepared, sources))
+    bounds = {
+        quantity: _farthest(sets, sets.rigid_rows, 3 * half, tolerance)[0][1]
+        for half, quantity in enumerate(POSE_ERRORS)
+    }
+    return _reading(sets), bounds
+
+
+def _at_largest_clearances(
+    prepared: LinearResponse, sources: Sources
+) -> tuple[LinearResponse, Sources]:
+    """The posture with the largest clearances of the fits, and the other sources."""
+    refuse_bolted(prepared.posture.robot, "worst case")
+    if prepared.loads is not None:
+        raise BadInput("worst case: found a load, expected none: it is not linear then")
+    if isinstance(sources, CalloutSources) and sources.fits:
+        robot = sources.with_largest_clearances()
+        prepared = linear_response(replace(prepared.posture, robot=robot))
+        sources = replace(sources, fits=())
+    return prepared, sources
+
+
+def _reading(sets: ErrorSets) -> str:
+    """The reading of the worst case, a key of :data:`MEANINGS`."""
+    # contacts of a joint hold each other, but no part
+    held = len(sets.rigid_rows) > len(sets.contact_rows)
+    sprung = len(sets.spring_rows) > 0
+    if sprung and sets.clearances:
+        return "equilibrium"
+    return "elastic" if sprung else "rigid" if held else "linear"
+
+
 def farthest_screw(sets: ErrorSets, half: int) -> tuple[tuple[float, float], NDArray]:
-    """Bracket the largest half screw over the zones without any condition.
+    """Bracket the largest half screw over the zones, without a condition of the loops.
 
     Args:
         sets: zones of errors and clearances.
@@ -147,18 +185,18 @@ def farthest_screw(sets: ErrorSets, half: int) -> tuple[tuple[float, float], NDA
     Returns:
         [rad or m] value attained and certified bound, and (6,) the screw attained.
     """
-    return _farthest(sets, sets.rigid_rows[:0], half)
+    return _farthest(sets, sets.contact_rows, half)
 
 
 def _farthest(
-    sets: ErrorSets, rows: NDArray, half: int
+    sets: ErrorSets, rows: NDArray, half: int, tolerance: float = _TOLERANCE
 ) -> tuple[tuple[float, float], NDArray]:
     """Bracket the largest half screw over the zones where rows @ z = 0."""
     support = _support(sets, rows, half)
     sizes = [support(direction)[0] for direction in np.eye(3)]
     if not max(sizes) > 0:
         return (0.0, 0.0), np.zeros(6)
-    bounds, screw, _ = farthest(np.zeros(6), half, _TOLERANCE * max(sizes), support)
+    bounds, screw, _ = farthest(np.zeros(6), half, tolerance * max(sizes), support)
     low = bounds[0]
     # the farthest screw in its own direction is not shorter
     for _ in range(50):
@@ -197,14 +235,12 @@ def _support(
 
         return closed_form
     N = np.linalg.svd(rows)[2][len(rows) :].T
-    bounds = [
-        bound @ N[columns]
-        for zone, columns in zip(sets.zones, sets.columns, strict=True)
-        for bound in zone.bounds_on_u
-    ]
+    own = list(zip(sets.zones, sets.columns, strict=True))
+    bounds = [b @ N[columns] for zone, columns in own for b in zone.bounds_on_u]
+    cones = [c @ N[columns] for zone, columns in own for c in zone.cones_on_u]
 
     def programme(direction: NDArray) -> tuple[float, NDArray, NDArray]:
-        y, height = largest_product(direction @ P @ N, bounds)
+        y, height = largest_product(direction @ P @ N, bounds, cones)
         return height, sets.screws @ (N @ y), N @ y
 
     return programme

@@ -125,7 +125,7 @@ def statistics(
     capability: Annotated[
         bool,
         typer.Option(
-            "--capability", help="Also Cpk and parts per million of every --limit."
+            "--capability", help="Also Cp, Cpk and parts per million of every --limit."
         ),
     ] = False,
     worst_case: Annotated[

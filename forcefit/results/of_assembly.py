@@ -196,7 +196,7 @@ STATISTICS = record(
     stress_error_=number("its error", "1", "link"),
     stiffness_=_STIFFNESS_OF_DRAWS, importance_=_IMPORTANCE,
     capability_=Each(
-        record("limit unit", cpk=_ESTIMATE, ppm=_ESTIMATE)
+        record("limit unit", cp=_ESTIMATE, cpk=_ESTIMATE, ppm=_ESTIMATE)
     ),
     worst_case_=Each(
         record(

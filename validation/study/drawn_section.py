@@ -26,18 +26,36 @@ def drawn_section(results: StudyResults) -> str:
     return "".join([title, *draws_sections(found, results.draws)])
 
 
-def drawn_tiles(found: dict[str, Any] | None) -> list[Tile]:
-    """Return the tile of the worst case over all parts within the tolerances."""
-    if found is None or "worst_case" not in found:
+def drawn_tiles(found: dict[str, Any] | None, worst: dict[str, Any]) -> list[Tile]:
+    """Return the tile of the worst case over all parts within the tolerances.
+
+    Args:
+        found: statistics of the study, or None.
+        worst: certified bounds, from
+            :func:`forcefit.validation.study.headline.worst_clearance`.
+
+    Returns:
+        One tile, none without such a bound.
+    """
+    if found is None or "drawn" not in worst:
         return []
-    worst = found["worst_case"]
-    shift, turn = (worst[key] for key in ("translation", "rotation"))
-    bound: list[str | Value] = [
-        Value(shift["bound"], "m", 3), " and ", Value(turn["bound"], "rad", 3)
-    ]  # fmt: skip
+    shift, over = found["worst_case"]["translation"], worst["drawn"]["map"]
     name, share = max(shift["shares"].items(), key=lambda pair: pair[1])
     total = sum(shift["shares"].values())
-    note = [f"Over all parts and clearances; {shift['means']}."]
+    note = [
+        "Over all parts within the tolerances of the drawing and all clearances, at "
+        "this pose",
+        *(["; over the map ", *_pair(over)] if over is not None else []),
+        f"; {worst['drawn']['assumption']}.",
+    ]  # fmt: skip
     if total > 0:
         note.append(f" Largest part of the translation: {name}, {share / total:.0%}.")
-    return [Tile("Worst case of the drawing", bound, note)]
+    return [Tile("Certified worst case", _pair(worst["drawn"]["pose"]), note)]
+
+
+def _pair(bounds: dict[str, float]) -> list[str | Value]:
+    """Return bounds of a translation and of a rotation."""
+    return [
+        Value(bounds["translation"], "m", 3), " and ",
+        Value(bounds["rotation"], "rad", 3),
+    ]  # fmt: skip

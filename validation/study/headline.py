@@ -10,6 +10,7 @@ import numpy as np
 
 from forcefit.assembly.model.statuses import BEYOND_LIMITS, SINGULAR
 from forcefit.results.text import in_unit
+from forcefit.validation.study.drawn_tolerances import DRAWN_ERRORS
 from forcefit.validation.study.study import StudyResults
 
 # assumption of (27): all motions within the clearances, without elastic deformation
@@ -33,6 +34,8 @@ def worst_clearance(results: StudyResults) -> dict[str, Any]:
         ``frozen`` of (27), at the study's pose (``pose``) and the largest over its
         ``map``; ``points`` is the number of points with bounds, ``of`` the number of
         all points.  None where there is no bound; infinite where the pose is unbounded.
+        ``drawn``, of a robot with tolerances of a drawing, has the same bounds over all
+        parts within them, and the assumption.
     """
     parts = ("rotation", "translation")
     error = results.error.get(WORST)
@@ -45,6 +48,28 @@ def worst_clearance(results: StudyResults) -> dict[str, Any]:
         known = ~np.isnan(bounds["rotation"]) & ~np.isnan(bounds["translation"])
         if known.any():
             largest = {part: float(v[known].max()) for part, v in bounds.items()}
+            points = {"points": int(known.sum()), "of": known.size}
+            table["map"] = largest | points
+    drawn = _worst_drawn(results)
+    return table if drawn is None else table | {"drawn": drawn}
+
+
+def _worst_drawn(results: StudyResults) -> dict[str, Any] | None:
+    """Return certified upper bounds over all parts within the tolerances, if any."""
+    found = results.statistics
+    if found is None or "worst_case" not in found:
+        return None
+    worst, parts = found["worst_case"], ("rotation", "translation")
+    means = "; ".join(dict.fromkeys(worst[part]["means"] for part in parts))
+    table: dict[str, Any] = {
+        "assumption": means, "pose": {part: worst[part]["bound"] for part in parts},
+        "map": None,
+    }  # fmt: skip
+    if results.maps is not None and DRAWN_ERRORS["rotation"] in results.maps:
+        values = {part: results.maps[DRAWN_ERRORS[part]].values for part in parts}
+        known = ~np.isnan(values["rotation"])
+        if known.any():
+            largest = {part: float(v[known].max()) for part, v in values.items()}
             points = {"points": int(known.sum()), "of": known.size}
             table["map"] = largest | points
     return table
@@ -118,39 +143,43 @@ def _pose_error_text(results: StudyResults) -> str:
     at_rest = f"in the least-energy solution it is {_pose_text(turn, shift)} away."
     if worst["pose"] is None:
         return f"No bound of its pose error within the clearances was found; {at_rest}"
-    bound = _bound_text(worst["pose"])
-    sentence = [
-        f"For all positions within the clearances its platform is {bound} from the "
-        "nominal pose"
-    ]
+    where, drawn = "For all positions within the clearances", ""
+    if "drawn" in worst:
+        one = worst["drawn"]
+        drawn = "For all parts within the tolerances of the drawing and all positions "
+        drawn += f"within the clearances its platform is {_bounds_text(one)} "
+        drawn += f"(certified bounds; {one['assumption']}). "
+        at_mean = ", with fits at their mean clearance," if results.robot.fits else ""
+        where = f"Without these tolerances{at_mean} and for all positions within the "
+        where += "clearances"
+    others = _other_assumptions(results)
+    return (
+        f"{drawn}{where} its platform is {_bounds_text(worst)} (certified bounds of "
+        f"(27), assumption {WORST}{others}); {at_rest}"
+    )
+
+
+def _bounds_text(worst: dict[str, Any]) -> str:
+    """Return bounds at the pose, and the largest over the map, as text."""
+    text = f"{_bound_text(worst['pose'])} from the nominal pose"
     if worst["map"] is not None:
         over = worst["map"]
         some = f" {over['points']} of" if over["points"] < over["of"] else ""
-        sentence.append(
-            f", {_bound_text(over)} over{some} the {over['of']} poses of the map"
-        )
-    others = _other_assumptions(results)
-    return "".join(sentence) + (
-        f" (certified bounds of (27), assumption {WORST}{others}); {at_rest}"
-    )
+        text += f", {_bound_text(over)} over{some} the {over['of']} poses of the map"
+    return text
 
 
 def _drawn_text(results: StudyResults) -> str:
     """Return sentences on the parts within the tolerances of the drawing."""
     if not (results.robot.callouts or results.robot.fits):
         return ""
-    text = "The certified bounds leave out the tolerances of the drawing"
-    text += ", with fits at their mean." if results.robot.fits else "."
-    found = results.statistics
+    found, text = results.statistics, ""
+    if found is None or "worst_case" not in found:
+        text = "The certified bounds leave out the tolerances of the drawing"
+        text += ", with fits at their mean. " if results.robot.fits else ". "
     if found is None:
-        return text
-    if "worst_case" in found:
-        worst = found["worst_case"]
-        most = {key: one["bound"] for key, one in worst.items()}
-        means = "; ".join(dict.fromkeys(one["means"] for one in worst.values()))
-        text += f" Over all parts within them its pose error is {_bound_text(most)}"
-        text += f" ({means})."
-    text += f" Of {found['draws']} drawn machines {found['assembled']} assemble"
+        return text.strip()
+    text += f"Of {found['draws']} drawn machines {found['assembled']} assemble"
     sizes = {key: found["quantities"][key] for key in ("rotation", "translation")}
     if all("quantiles" in one for one in sizes.values()):
         high = {key: one["quantiles"]["0.95"]["value"] for key, one in sizes.items()}

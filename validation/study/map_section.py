@@ -12,6 +12,7 @@ from forcefit.page.page import paragraph, section
 from forcefit.page.tables import Cell, Value, table
 from forcefit.results.quantities import unit_of
 from forcefit.stiffness.screws import WRENCH
+from forcefit.validation.study.drawn_tolerances import DRAWN_ERRORS
 
 # quantities that are shown as maps: name in the results, description
 MAPPED = {
@@ -52,6 +53,11 @@ def mapped(maps: Any) -> Iterator[Mapped]:
     for key, words in MAPPED.items():
         one = maps[key].sel(bound="upper") if "bound" in maps[key].dims else maps[key]
         yield Mapped(key, words, unit_of(key), one)
+    for part, unit in (("translation", "m"), ("rotation", "rad")):
+        key = DRAWN_ERRORS[part]
+        if key in maps:
+            words = f"largest {part} over all parts within the tolerances"
+            yield Mapped(key, words, unit, maps[key])
     if "deflection" in maps:
         for part, name, half, unit in (
             ("shift", "translation", slice(3, 6), "m"),

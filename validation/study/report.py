@@ -169,12 +169,13 @@ def _tiles(results: StudyResults) -> list[Tile]:
     if worst["pose"] is not None:
         over = worst["map"]
         drawn = study_robot.callouts or study_robot.fits
-        tiles.append(Tile("Certified worst case", _bound(worst["pose"]), [
+        tiles += drawn_tiles(results.statistics, worst)
+        title = "Worst case of given parts" if tiles else "Certified worst case"
+        tiles.append(Tile(title, _bound(worst["pose"]), [
             "Over all positions within the clearances, at this pose",
             *(["; over the map ", *_bound(over)] if over is not None else []), ".",
             " Without the tolerances of the drawing." if drawn else "",
         ]))  # fmt: skip
-        tiles += drawn_tiles(results.statistics)
         tiles += _governing_tiles(results, worst["pose"])
     tiles.append(_force_tile(results.assembly))
     tiles += service_tile(results.service)

@@ -41,7 +41,7 @@ from forcefit.validation.multibody.simulation import (
     closing_sequence,
     without_clearance,
 )
-from forcefit.validation.study.drawn_tolerances import drawn_at_pose
+from forcefit.validation.study.drawn_tolerances import bounds_over_grid, drawn_at_pose
 from forcefit.validation.study.governing import governing
 from forcefit.validation.study.printed_problems import compare_printed
 from forcefit.validation.study.service import at_pose, over_grid
@@ -208,6 +208,10 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
         statistics, draws = drawn_at_pose(
             posture, study.statistics, lambda d, n: progress("drawn parts", d, n)
         )
+        if maps is not None and "worst_case" in statistics:
+            maps = bounds_over_grid(
+                maps, robot, lambda d, n: progress("maps of drawn parts", d, n)
+            )
     check, failure, closing = None, {"reason": ""}, None
     if "crosscheck" in wanted and solved:
         progress("cross-check", 0, 1)

@@ -33,7 +33,7 @@ from forcefit.stiffness.surface.surface import UNITS
 from forcefit.stiffness.surface.surface_files import named_solid
 from forcefit.validation.crosscheck.verdict import SCALES, check_scales
 from forcefit.validation.study.drawn_tolerances import (
-    NOT_IN_BOUNDS,
+    IN_BOUNDS,
     DrawnTolerances,
     read_statistics,
 )
@@ -117,7 +117,7 @@ def read_study(
     service = read_service(root, robot, links)
     statistics = read_statistics(root, robot)
     if robot.callouts or robot.fits:
-        errors = f"{errors}; {NOT_IN_BOUNDS}"
+        errors = f"{errors}; {IN_BOUNDS}"
     checks, named = _checks(root, bool(meshes), bool(grid), bool(scales))
     threads = [quoted(frame.name) for frame in robot.frames if frame.pitch]
     if threads and "crosscheck" in checks:

@@ -7,7 +7,7 @@ from forcefit.assembly.callouts.fits import (
     clearance_fit,
     limits_of,
     parse_fit,
-    parse_size,
+    parse_hole,
 )
 from forcefit.inputs.table import BadInput
 
@@ -82,8 +82,42 @@ def test_transition_fit_interferes_in_31_percent_of_normal_pairs():
     assert np.mean(fit.draw(numbers, "normal") == 0.0) == pytest.approx(0.31, abs=0.005)
 
 
-def test_size_at_maximum_material_grows_by_its_width():
-    assert np.ptp(parse_size("12 H7")) == pytest.approx(18e-6)
+def test_hole_at_maximum_material_has_the_worked_sizes():
+    """12 H7 grows by 18 um; with a position of 0.05 mm (M) a pin of 11.95 mm, the
+    virtual size, always fits."""
+    size, limits = parse_hole("12 H7")
+    assert np.ptp(limits) == pytest.approx(18e-6)
+    assert size + limits.lower - 0.05e-3 == pytest.approx(11.95e-3)
+
+
+# rows of ISO 286-1 in um: IT5 to IT11, then the deviations d e f g k m n p
+TABLE = """
+0-3 4 6 10 14 25 40 60 -20 -14 -6 -2 0 2 4 6
+3-6 5 8 12 18 30 48 75 -30 -20 -10 -4 1 4 8 12
+6-10 6 9 15 22 36 58 90 -40 -25 -13 -5 1 6 10 15
+10-18 8 11 18 27 43 70 110 -50 -32 -16 -6 1 7 12 18
+18-30 9 13 21 33 52 84 130 -65 -40 -20 -7 2 8 15 22
+30-50 11 16 25 39 62 100 160 -80 -50 -25 -9 2 9 17 26
+50-80 13 19 30 46 74 120 190 -100 -60 -30 -10 2 11 20 32
+80-120 15 22 35 54 87 140 220 -120 -72 -36 -12 3 13 23 37
+120-180 18 25 40 63 100 160 250 -145 -85 -43 -14 3 15 27 43
+180-250 20 29 46 72 115 185 290 -170 -100 -50 -15 4 17 31 50
+250-315 23 32 52 81 130 210 320 -190 -110 -56 -17 4 20 34 56
+315-400 25 36 57 89 140 230 360 -210 -125 -62 -18 4 21 37 62
+400-500 27 40 63 97 155 250 400 -230 -135 -68 -20 5 23 40 68
+"""
+
+
+@pytest.mark.parametrize("row", TABLE.split("\n")[1:-1])
+def test_table_has_the_195_values_of_the_transcription(row):
+    step, *values = row.split()
+    size, values = float(step.split("-")[1]), [float(value) for value in values]
+    for grade, width in zip(range(5, 12), values[:7], strict=True):
+        assert np.ptp(limits_of(size, "H", grade)) * 1e6 == pytest.approx(width)
+    for letter, deviation in zip("defgkmnp", values[7:], strict=True):
+        limits = limits_of(size, letter, 6)
+        found = limits.upper if letter in "defg" else limits.lower
+        assert found * 1e6 == pytest.approx(deviation)
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,28 @@ def test_length_has_the_tolerance_of_its_class(mm, kind, tolerance):
     assert linear_tolerance(mm * 1e-3, kind) == pytest.approx(tolerance * 1e-3)
 
 
+# ISO 2768-1 in mm up to the length: f m c v
+LENGTHS = """
+3 .05 .1 .2 -
+6 .05 .1 .3 .5
+30 .1 .2 .5 1
+120 .15 .3 .8 1.5
+400 .2 .5 1.2 2.5
+1000 .3 .8 2 4
+2000 .5 1.2 3 6
+4000 - 2 4 8
+"""
+
+
+@pytest.mark.parametrize("row", LENGTHS.split("\n")[1:-1])
+def test_lengths_have_the_transcribed_tolerances(row):
+    length, *values = row.split()
+    for kind, value in zip("fmcv", values, strict=True):
+        if value != "-":
+            found = linear_tolerance(float(length) * 1e-3, kind)
+            assert found == pytest.approx(float(value) * 1e-3)
+
+
 def test_coarser_class_and_longer_length_are_never_tighter():
     lengths = np.array([2.9, 5, 20, 100, 300, 900, 1500]) * 1e-3
     table = [[linear_tolerance(x, k) for x in lengths] for k in "fmc"]
@@ -29,8 +51,13 @@ def test_coarser_class_and_longer_length_are_never_tighter():
 
 
 def test_perpendicularity_has_the_width_of_its_class():
-    assert perpendicularity_tolerance(0.1, "H") == pytest.approx(0.2e-3)
-    assert perpendicularity_tolerance(0.2, "K") == pytest.approx(0.6e-3)
+    worked = {"H": (0.2, 0.3, 0.4, 0.5), "K": (0.4, 0.6, 0.8, 1.0)}
+    for kind, widths in worked.items():
+        sides = (0.1, 0.3, 1.0, 3.0)
+        found = [perpendicularity_tolerance(side, kind) for side in sides]
+        assert found == pytest.approx([1e-3 * width for width in widths])
+    found = [perpendicularity_tolerance(side, "L") for side in (0.3, 1.0, 3.0)]
+    assert found == pytest.approx([1e-3, 1.5e-3, 2e-3])
 
 
 @pytest.mark.parametrize(

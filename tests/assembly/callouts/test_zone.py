@@ -13,6 +13,8 @@ from forcefit.assembly.callouts.zones_of_features import (
     plane_orientation,
     plane_position,
     point_position,
+    round_plane_orientation,
+    round_plane_position,
     shift_along,
 )
 
@@ -132,6 +134,7 @@ def test_normal_interval_has_three_cp_deviations_to_its_limit(cp):
 
 @pytest.mark.parametrize("zone", [
     POSITION, BOTH,
+    pytest.param(round_plane_position(4e-5, 0.04), marks=pytest.mark.slow),
     pytest.param(plane_position(4e-5, 0.04, 0.03), marks=pytest.mark.slow),
 ])  # fmt: skip
 def test_truncated_draws_stay_in_the_zone_and_have_its_covariance(zone):
@@ -143,7 +146,7 @@ def test_truncated_draws_stay_in_the_zone_and_have_its_covariance(zone):
         assert screws[:, i].var() == pytest.approx(C[i, i], rel=0.02)
 
 
-@pytest.mark.parametrize("zone", [POSITION, BOTH])
+@pytest.mark.parametrize("zone", [POSITION, BOTH, round_plane_position(4e-5, 0.04)])
 def test_normal_draws_leave_the_zone_as_often_as_one_dimension(zone):
     u = zone.draw(numbers_of(zone), "normal", 0.7)
     # 2 Phi(-2.1) = 3.57 %
@@ -163,6 +166,66 @@ def test_plane_zone_is_an_octahedron():
     C = zone.covariance()
     assert C[5, 5] == pytest.approx(g**2 / 10, rel=0.01)
     assert C[0, 0] == pytest.approx((g / B) ** 2 / 10, rel=0.01)
+
+
+def test_round_face_zone_is_a_double_cone():
+    """Support g max(|w_TZ|, |(w_RX, w_RY)|/r).  Sections at a height are discs of
+    radius (g - |TZ|)/r, so the variances are g^2/10 and 3 (g/r)^2/20."""
+    g, r = 20e-6, 0.020
+    zone = round_plane_position(2 * g, 2 * r)
+    rng = np.random.default_rng(1)
+    for _ in range(10):
+        w = rng.normal(size=6) * [r, r, 0, 1, 1, 1]
+        expected = g * max(abs(w[5]), np.hypot(w[0], w[1]) / r)
+        assert zone.support(w) == pytest.approx(expected, rel=1e-7)
+        screw = zone.farthest(w)
+        assert w @ screw == pytest.approx(expected, rel=1e-7)
+        assert abs(screw[5]) + r * np.hypot(screw[0], screw[1]) <= g * (1 + 1e-9)
+    C = zone.covariance()
+    assert C[5, 5] == pytest.approx(g**2 / 10, rel=0.01)
+    assert C[0, 0] == pytest.approx(3 / 20 * (g / r) ** 2, rel=0.01)
+    screws = drawn(zone, count=20_000)
+    gauge = abs(screws[:, 5]) + r * np.hypot(screws[:, 0], screws[:, 1])
+    # the share of the volume within a factor f of the zone is f^3
+    assert np.mean(gauge < 0.5 * g) == pytest.approx(0.125, abs=0.01)
+    assert gauge.max() <= g * (1 + 1e-9)
+
+
+def test_parallelism_cuts_the_double_cone_of_a_round_face():
+    """Corners: the tip (g, 0) and the circle (g - r b, b) with b = t/(2 r)."""
+    g, r, b = 20e-6, 0.020, 0.4e-3
+    zone = intersection([
+        round_plane_position(2 * g, 2 * r), round_plane_orientation(2 * r * b, 2 * r)
+    ])  # fmt: skip
+    rng = np.random.default_rng(2)
+    for _ in range(10):
+        w = rng.normal(size=6) * [r, r, 0, 1, 1, 1]
+        circle = (g - r * b) * abs(w[5]) + b * np.hypot(w[0], w[1])
+        expected = max(g * abs(w[5]), circle)
+        assert zone.support(w) == pytest.approx(expected, rel=1e-7)
+    assert zone.support(np.eye(6)[0]) == pytest.approx(b, rel=1e-7)
+
+
+@pytest.mark.parametrize("size", [0.0, 0.4, 1.0])
+def test_position_in_a_zone_that_grows_depends_on_the_size_alone(size):
+    """A size is drawn first, then the position in the zone of that size: uniform in
+    the part of the tilts that perpendicularity allows."""
+    zone = intersection([
+        axis_position(WIDTH, LENGTH, bonus=18e-6), axis_orientation(20e-6, LENGTH)
+    ])  # fmt: skip
+    fixed = intersection([
+        axis_position(WIDTH + size * 18e-6, LENGTH), axis_orientation(20e-6, LENGTH)
+    ])  # fmt: skip
+
+    def numbers(attempt):
+        uniform = numbers_of(zone, 40_000)(attempt)
+        if attempt == 0:  # later attempts keep the size of the part
+            uniform[:, -1] = size
+        return uniform
+
+    screws = zone.draw(numbers) @ zone.columns.T
+    C = fixed.covariance()
+    assert screws.var(axis=0)[[0, 3]] == pytest.approx(np.diag(C)[[0, 3]], rel=0.03)
 
 
 def test_support_of_a_polyhedron_agrees_with_a_linear_programme():
@@ -190,10 +253,47 @@ def test_position_in_one_direction_leaves_the_other_exact():
     assert zone.support(np.eye(6)[0]) == pytest.approx(0, abs=1e-15)
 
 
+def test_position_in_one_direction_at_maximum_material_grows_with_the_hole():
+    """Between planes 0.05 to 0.068 mm apart: at most 34 um, E[x^2] = E[R^2]/3 at one
+    end for uniform ends and R uniform in 25 to 34 um."""
+    zone = axis_position_along(WIDTH, LENGTH, np.array([1.0, 0.0]), bonus=18e-6)
+    assert zone.support(np.eye(6)[3]) == pytest.approx(34e-6)
+    ends = drawn(zone, count=400_000) @ offset_rows(LENGTH / 2)[0]
+    assert 33.9e-6 < abs(ends).max() <= 34e-6
+    mean_square = (34e-6**3 - 25e-6**3) / (3 * 9e-6) / 3
+    assert np.mean(ends**2) == pytest.approx(mean_square, rel=0.01)
+
+
 def test_orientation_in_one_direction_is_an_interval():
     zone = axis_orientation(20e-6, LENGTH, np.array([1.0, 0.0]))
     assert zone.support(np.eye(6)[1]) == pytest.approx(1e-3)
     assert zone.support(np.eye(6)[0]) == pytest.approx(0, abs=1e-15)
+
+
+def test_independent_uniform_coordinates_are_no_position_zone():
+    """Uniform along x and y: deviation R / sqrt 3 = 14.4 um against 12.5 um in the
+    disc, which the largest square around the zone exceeds in 21.5 %."""
+    square = intersection([
+        shift_along(25e-6, [1, 0, 0]), shift_along(25e-6, [0, 1, 0])
+    ])  # fmt: skip
+    assert np.sqrt(square.covariance()[3, 3]) * 1e6 == pytest.approx(14.4, abs=0.05)
+    outside = np.linalg.norm(drawn(square)[:, 3:5], axis=1) > 25e-6
+    assert outside.mean() == pytest.approx(0.215, abs=0.005)
+
+
+def test_support_of_a_bore_is_the_sum_of_its_two_ends():
+    """|B+^T w| + |B-^T w| with (TX, TY) = c (u+ + u-)/2, (RY, -RX) = c (u+ - u-)/L."""
+    c = WIDTH / 2
+    columns = []
+    for sign in (1, -1):
+        B = np.zeros((6, 2))
+        B[[3, 4], [0, 1]] = c / 2
+        B[[1, 0], [0, 1]] = sign * np.array([c, -c]) / LENGTH
+        columns.append(B)
+    rng = np.random.default_rng(5)
+    for w in rng.normal(size=(10, 6)) * [0.01, 0.01, 1, 1, 1, 1]:
+        expected = sum(np.linalg.norm(B.T @ w) for B in columns)
+        assert POSITION.support(w) == pytest.approx(expected, rel=1e-12)
 
 
 def test_point_zone_is_a_ball():

@@ -86,6 +86,45 @@ def test_datum_that_an_earlier_one_holds_takes_only_what_is_left():
     assert np.abs(moved[[0, 1, 2, 5]]).max() < 1e-12
 
 
+def test_datum_at_maximum_material_shifts_with_its_hole():
+    """Bore 12 H7 after face A: 0 to 18 um larger than its least size, so the datum
+    shifts by up to 9 um along x and y; uniform sizes and positions: 9 um / sqrt 12."""
+    robot = replace(
+        PLATE,
+        frames=(*PLATE.frames, Frame("bore", "plate", np.array([0.0, 0.05, 0]))),
+    )
+    shifting = Datum("bore", hole="12 H7", hole_of="bore")
+    _, shift = placed(robot, hole(A, shifting))
+    moved = shift.errors[robot.index("hole")]
+    for row in (3, 4):
+        toward = _on_screw(shift, moved[row])
+        assert shift.zone.support(toward) == pytest.approx(9e-6, rel=1e-9)
+    C = moved @ shift.zone.variance_of_u() @ moved.T
+    assert np.sqrt(C[3, 3]) * 1e6 == pytest.approx(9 / np.sqrt(12), rel=1e-9)
+    draws = shift.zone.draw(
+        lambda attempt: np.random.default_rng(attempt).random((200_000, 3))
+    )
+    assert (draws @ moved[3]).std() == pytest.approx(np.sqrt(C[3, 3]), rel=0.01)
+    assert np.abs(moved[[0, 1, 2, 5]]).max() < 1e-12
+    assert shift.name == "shift of datum bore of hole"
+
+
+def test_shifting_second_bore_turns_what_is_measured_from_it():
+    """Bore A at the origin holds all but the turn.  Bore B, 50 mm from A, shifts by
+    9 um: the hole, 80 mm from A, moves by 9 um x 80/50 = 14.4 um around A."""
+    robot = replace(
+        PLATE,
+        frames=(*PLATE.frames, Frame("bore", "plate", np.array([0.05, 0, 0]))),
+    )
+    shifting = Datum("bore", hole="12 H7", hole_of="bore")
+    _, shift = placed(robot, hole(Datum("A"), shifting))
+    moved = shift.errors[robot.index("hole")]
+    supports = [shift.zone.support(_on_screw(shift, row)) for row in moved]
+    assert supports[4] == pytest.approx(14.4e-6, rel=1e-9)
+    assert supports[2] == pytest.approx(9e-6 / 0.05, rel=1e-9)
+    assert max(supports[0], supports[1], supports[3], supports[5]) < 1e-12
+
+
 # crank 0.4 m, rod 0.3 m, the elbow's bore on the rod's side 20 mm long
 SERIAL = Robot(
     "serial",

@@ -17,6 +17,7 @@ from forcefit.assembly.statistics.monte_carlo import run_draws
 from forcefit.assembly.statistics.worst_pose import worst_pose
 from forcefit.inputs.table import BadInput
 from tests.drawn_four_bar_for_tests import COEFFICIENTS, LEVER, four_bar_file
+from tests.pages_for_tests import parse
 
 
 @pytest.fixture(scope="module")
@@ -129,6 +130,64 @@ def test_worst_case_has_the_largest_clearance_of_a_fit(tmp_path):
     assert found.attained == pytest.approx(17.5e-6, rel=1e-6)
 
 
+LOOSE = """
+format = 2
+name = "arm"
+platform = "rod"
+platform_at = [0.4, 0, 0]
+[[tolerance]]
+feature = "shoulder"
+datums = ["foot"]
+position = "0.05 mm (M)"
+hole = "12 H7"
+extent = "20 mm"
+[[body]]
+name = "rod"
+[[body]]
+name = "stand"
+[[joint]]
+name = "foot"
+type = "fixed"
+between = ["base", "stand"]
+at = [0.1, 0, 0]
+[[joint]]
+name = "shoulder"
+type = "revolute"
+between = ["base", "rod"]
+at = [0, 0, 0]
+axis = [0, 0, 1]
+actuated = true
+clearance = { fit = "12 H7/g6" }
+"""
+
+
+def test_larger_hole_has_a_larger_zone_and_a_larger_clearance(tmp_path):
+    """Hole 12 H7 of size s above its least one: ends of the bore within R = 25 um +
+    s/2, diametral clearance s + 6 to 17 um.  Uniform s in 0 to 18 um and ends in their
+    discs: the covariance of r^2 and the clearance is cov(R^2/2, s) = 398.25 um^3."""
+    path = tmp_path / "arm.toml"
+    path.write_text(LOOSE)
+    sources = sources_of(read_robot(path))
+    values = sources.draw(0, 200_000, 1)
+    radius = 25 * np.linalg.norm(values[:, :2], axis=1)
+    diametral = 20.5 + 2e6 * values[:, -1]
+    size = 2 * np.maximum(0.0, radius - 25)  # the hole is at least so large
+    assert (diametral > size + 6 - 1e-9).all()
+    assert np.cov(radius**2, diametral)[0, 1] == pytest.approx(398.25, rel=0.03)
+    assert diametral.std() == pytest.approx(6.09, abs=0.03)
+    groups = dict(source_groups(sources, "source"))
+    name = "position of shoulder on base and fit 12 H7/g6 of shoulder"
+    assert sorted(groups[name]) == list(range(5))
+
+
+def test_hole_at_maximum_material_is_that_of_the_fit(tmp_path):
+    path = tmp_path / "arm.toml"
+    path.write_text(LOOSE.replace('hole = "12 H7"', 'hole = "12 H8"'))
+    expected = 'found the hole "12 H8", expected that of the fit "12 H7/g6"'
+    with pytest.raises(BadInput, match=expected):
+        read_robot(path)
+
+
 def test_command_reports_the_importance_by_callout(tmp_path):
     from forcefit.commands.app import app
 
@@ -151,6 +210,35 @@ def test_command_reports_the_importance_by_callout(tmp_path):
     assert turned["attained"] == pytest.approx(0.1903e-3, abs=5e-8)
     assert turned["reading"] == "linear"
     assert sum(turned["shares"].values()) == pytest.approx(0.1903e-3, abs=5e-8)
+    shares = results["importance"]["quantities"]["translation"]["total_index"]
+    name = max(shares, key=lambda group: shares[group][0])
+    value, low, high = (round(100 * share) for share in shares[name])
+    sentence = f"{name}: {value} % of the variance of the translation ({low} to {high}"
+    assert sentence in result.output
+    page = (tmp_path / "page.html").read_text()
+    assert sentence in page.replace("&nbsp;", " ")
+    columns = parse(page).table("", "limit", "Cp")[1]
+    for index in ("cp", "cpk", "ppm"):
+        one = results["capability"]["translation"][index]
+        assert str(one["value"]) != "nan"
+        assert one["lower"] <= one["value"] <= one["upper"]
+    assert len(columns) == 11
     above = results["exceeds"]["translation"]["probability"]
     assert results["capability"]["translation"]["ppm"]["value"] == above * 1e6
     assert "certified bound" in (tmp_path / "page.html").read_text()
+
+
+def test_position_in_one_direction_at_maximum_material_shares_its_hole(tmp_path):
+    """Ends within 25 um + s/2 along x alone; the diametral clearance is s + 6 at least
+    for a hole s above its least size."""
+    path = tmp_path / "arm.toml"
+    path.write_text(
+        LOOSE.replace('hole = "12 H7"', 'hole = "12 H7"\ndirection = [1,0,0]')
+    )
+    sources = sources_of(read_robot(path))
+    values = sources.draw(0, 100_000, 1)
+    assert values.shape[1] == 3
+    end = 25 * abs(values[:, 0])
+    diametral = 20.5 + 2e6 * values[:, -1]
+    assert (diametral > 2 * np.maximum(0.0, end - 25) + 6 - 1e-9).all()
+    assert end.max() > 33

@@ -8,6 +8,7 @@ from forcefit.assembly.statistics.capability import (
     cp_interval,
     cpk_interval,
     cpk_interval_one_sided,
+    quantile_cp,
     quantile_cpk,
     share_outside,
 )
@@ -16,7 +17,13 @@ from forcefit.assembly.statistics.estimates import proportion
 
 @pytest.mark.parametrize(
     ("cpk", "ppm", "tol"),
-    [(1.0, 2700, 0.5), (4 / 3, 63.3, 0.05), (1.33, 66.1, 0.05), (2.0, 0.00197, 5e-6)],
+    [
+        (1.0, 2700, 0.5),
+        (4 / 3, 63.3, 0.05),
+        (1.33, 66.1, 0.05),
+        (1.67, 0.544, 5e-4),
+        (2.0, 0.00197, 5e-6),
+    ],
 )
 def test_share_outside_of_a_centred_process_is_the_known_ppm(cpk, ppm, tol):
     assert share_outside(cpk, cpk) * 1e6 == pytest.approx(ppm, abs=tol)
@@ -67,5 +74,15 @@ def test_cpk_by_quantiles_of_a_disc_is_that_of_its_radius():
     assert lower < value < upper
 
 
+def test_cp_by_quantiles_of_a_disc_is_that_of_its_radius():
+    """Rayleigh: quantiles s sqrt(-2 ln(1 - p)) of 0.135 % and 99.865 %; limit 4 s."""
+    x = np.random.default_rng(3).normal(size=(400_000, 2))
+    low, tail = np.sqrt(-2 * np.log(0.99865)), np.sqrt(-2 * np.log(0.00135))
+    value, lower, upper = quantile_cp(np.linalg.norm(x, axis=1), 4.0)
+    assert value == pytest.approx(4 / (tail - low), rel=0.01)
+    assert lower < 4 / (tail - low) < upper
+
+
 def test_cpk_of_few_draws_has_no_lower_bound_above_zero():
     assert quantile_cpk(np.arange(100.0), 200.0)[1] == 0.0
+    assert quantile_cp(np.arange(100.0), 200.0)[1] == 0.0

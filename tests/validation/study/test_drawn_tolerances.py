@@ -2,7 +2,9 @@
 
 import json
 
+import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from forcefit.inputs.table import BadInput
 from forcefit.validation.study.headline import verdict
@@ -66,9 +68,15 @@ def test_study_page_has_the_numbers_of_its_results(results):
         assert rows[key][2].value == worst[key]["bound"]
     shown = [number.value for number in page.numbers]
     assert worst["translation"]["bound"] in shown
-    assert "tolerances of the drawing are not among these errors" in table["errors"]
+    assert "are in the certified worst case and in the statistics" in table["errors"]
+    drawn = table["worst_clearance"]["drawn"]
+    for key in ("rotation", "translation"):
+        assert drawn["pose"][key] == worst[key]["bound"]
     text = verdict(found)
-    assert "The certified bounds leave out the tolerances of the drawing. Over" in text
+    begin = "For all parts within the tolerances of the drawing and all positions"
+    assert f"{begin} within the clearances its platform is at most" in text
+    assert f"{worst['rotation']['bound'] * 1e3:.3g} mrad from the nominal pose" in text
+    assert "Without these tolerances and for all positions within the clear" in text
     assert "Of 4000 drawn machines 4000 assemble" in text
 
 
@@ -76,12 +84,57 @@ def test_study_of_fits_states_that_bounds_use_their_mean(tmp_path):
     """The largest radial clearance of 12 H7/g6 is 1.71 of its mean."""
     study = study_of(tmp_path, 'fit = "12 H7/g6"', STATISTICS.format(draws=20, base=0))
     found = run_study(study)
-    assert "fits have their mean clearance" in study.errors
-    assert "with fits at their mean" in verdict(found)
+    assert (
+        "energies and margins use the errors above alone, and the mean" in study.errors
+    )
+    assert "tolerances, with fits at their mean clearance, and for" in verdict(found)
     worst = found.statistics["worst_case"]["rotation"]
     alone = 20e-6 * sum(COEFFICIENTS.values()) / LEVER
     # 0.1692 mrad by four pins of 10 um, at 17.5 um each
     assert worst["attained"] == pytest.approx(alone + 0.1692e-3 * 1.75, rel=2e-3)
+
+
+def turned_by_hand(tx):
+    """Sum of the coefficients over the lever where the coupler's point is at x."""
+
+    def coupler(theta):
+        B = 0.1 * np.array([np.cos(theta), np.sin(theta)])
+        across = np.array([0.3, 0.0]) - B
+        size = np.linalg.norm(across)
+        along = (0.25**2 - 0.2**2 + size**2) / (2 * size)
+        normal = np.array([-across[1], across[0]]) / size
+        C = B + along * across / size + np.sqrt(0.25**2 - along**2) * normal
+        e3, e4 = (C - B) / 0.25, (C - [0.3, 0.0]) / 0.2
+        point = (B + C) / 2 + 0.05 * np.array([-e3[1], e3[0]])
+        return B / 0.1, e3, e4, point
+
+    theta = brentq(lambda angle: coupler(angle)[3][0] - tx, 0.6, 1.7)
+    e2, e3, e4, _ = coupler(theta)
+    lever = 0.25 * (e4[1] * e3[0] - e4[0] * e3[1])
+    return (abs(e2 @ e4) + abs(e3 @ e4) + 1 + abs(e4[0])) / abs(lever)
+
+
+def test_map_bounds_the_rotation_over_all_parts_as_by_hand(tmp_path):
+    """At each pose 20 um times the sum of the coefficients of that pose over the lever;
+    bounds are within 1e-3 above it."""
+    assert turned_by_hand(0.13949) == pytest.approx(
+        sum(COEFFICIENTS.values()) / LEVER, rel=2e-3
+    )
+    table = 'grid = "tx=0.12:0.15:0.01"\n' + STATISTICS.format(draws=2, base=0)
+    quiet = table.replace("[statistics]", "[pose]\n[statistics]")
+    found = run_study(study_of(tmp_path, "", quiet))
+    write_study(found)
+    bounds = found.maps["drawn_rotation_error"]
+    by_hand = np.array([20e-6 * turned_by_hand(tx) for tx in bounds["tx"].values])
+    assert (bounds.values >= by_hand * (1 - 1e-9)).all()
+    assert bounds.values == pytest.approx(by_hand, rel=1.5e-3)
+    table = json.loads((tmp_path / "out" / "results.json").read_text())
+    over = table["worst_clearance"]["drawn"]["map"]
+    assert over["rotation"] == bounds.values.max()
+    assert over["points"] == 4
+    assert f"{1e3 * bounds.values.max():.3g} mrad over the 4 poses" in verdict(found)
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "largest rotation over all parts within the tolerances" in page
 
 
 def test_study_without_tolerances_has_no_statistics(tmp_path):

@@ -1,0 +1,163 @@
+"""Datums of ``[[tolerance]]`` in robot files, and the values of its keys."""
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numpy as np
+
+from forcefit.assembly.callouts.callout import HELD, Datum
+from forcefit.assembly.callouts.fits import parse_hole
+from forcefit.assembly.drawing.drawing import DrawnJoint
+from forcefit.assembly.model.largest import LARGEST_LENGTH
+from forcefit.inputs.table import BadInput, Table, describe, nearest, quoted
+
+Parsed = TypeVar("Parsed")
+Vector = tuple[float, float, float]
+Z_AXIS = (0.0, 0.0, 1.0)
+ORIGIN = (0.0, 0.0, 0.0)
+_HOLES = ("revolute", "cylindrical")  # joints with one hole on a body
+
+
+def frame_datums(table: Table, frames: list[str]) -> tuple[Datum, ...]:
+    """Return the datums of a feature in a file of frames.
+
+    Raises:
+        BadInput: a rule of the format is broken.
+    """
+    datums = tuple(_datum(table, value, frames) for value in _datum_list(table))
+    if datums[0].hole:
+        fault = "found a hole at maximum material as datum A, whose tilt would shift"
+        raise table.bad("datums", f"{fault} too; expected it at B or C")
+    return datums
+
+
+def joint_datums(
+    table: Table, feature: str, find: Callable[[str, str], DrawnJoint]
+) -> list[Datum]:
+    """Return the datums of a feature in a file of bodies and joints.
+
+    Args:
+        table: of the tolerances of the feature.
+        feature: name of its joint in the whole robot.
+        find: function of a name as written and its key, which returns the joint.
+
+    Returns:
+        The datums by names of joints; ``"B (M)"`` is at maximum material.
+
+    Raises:
+        BadInput: a rule of the format is broken.
+    """
+    datums = []
+    hole = table.text("datum_hole", "")
+    if hole:
+        parsed_value(table, "datum_hole", parse_hole)
+    for number, value in enumerate(_datum_list(table)):
+        if not isinstance(value, str):
+            fault = f"found {describe(value)}, expected names of joints"
+            raise table.bad("datums", fault)
+        name, at_most = value, value.endswith(" (M)")
+        if at_most:
+            name = value.removesuffix("(M)").strip()
+        joint = find(name, "datums")
+        if joint.name == feature:
+            fault = f"found {quoted(value)}, which is the feature itself"
+            raise table.bad("datums", f"{fault}, expected another joint of the body")
+        if at_most:
+            _check_shifting(table, value, number, joint.kind, hole)
+        datums.append(Datum(joint.name, hole=hole if at_most else ""))
+    shifting = [datum.frame for datum in datums if datum.hole]
+    if hole and len(shifting) != 1:
+        fault = f"found one with {len(shifting)} datums at maximum material"
+        raise table.bad("datum_hole", f'{fault}, expected one such as "B (M)"')
+    return datums
+
+
+def _check_shifting(
+    table: Table, value: str, number: int, kind: str, hole: str
+) -> None:
+    """Refuse (M) at a datum that is no hole, and at one that holds a tilt."""
+    if kind not in _HOLES:
+        fault = f"found {quoted(value)}, a {kind} joint"
+        expected = f"expected (M) at a {' or '.join(_HOLES)} joint"
+        raise table.bad("datums", f"{fault}; {expected}")
+    if number == 0:
+        fault = f"found {quoted(value)} as datum A, whose tilt would shift too"
+        raise table.bad("datums", f"{fault}; expected (M) at datum B or C")
+    if not hole:
+        expected = 'expected "datum_hole" too, such as datum_hole = "12 H7"'
+        raise table.bad("datums", f"found {quoted(value)} without a size, {expected}")
+
+
+def _datum_list(table: Table) -> list:
+    """The datums as written: at least one, at most three."""
+    value = table.require("datums", "names of features, A first")
+    if not isinstance(value, list) or not 1 <= len(value) <= 3:
+        fault = f"found {describe(value)}, expected a list of one to three names"
+        raise table.bad("datums", fault)
+    return value
+
+
+def _datum(table: Table, value: Any, frames: list[str]) -> Datum:
+    """A datum: the name of a frame, or a table with shape and axis."""
+    if isinstance(value, dict):
+        inner = Table(value, table.file, f"{table.place}.datums")
+        name = inner.text("frame", expected="the name of a frame")
+        shape = inner.choice("shape", HELD, "axis")
+        axis, at = read_direction(inner, "axis") or Z_AXIS, read_point(inner)
+        hole, hole_of = _hole_of_datum(inner, name, shape)
+        inner.finish()
+    else:
+        if not isinstance(value, str):
+            fault = f"found {describe(value)}, expected names of frames"
+            raise table.bad("datums", fault)
+        name, shape, axis, at, hole, hole_of = value, "axis", Z_AXIS, ORIGIN, "", ""
+    check_frame(table, "datums", name, frames)
+    return Datum(name, shape, axis, at, hole, hole_of)
+
+
+def _hole_of_datum(table: Table, name: str, shape: str) -> tuple[str, str]:
+    """Size of a datum at maximum material, and the fit or joint of this hole."""
+    if not table.has("hole"):
+        return "", ""
+    if shape != "axis":
+        fault = f"found one of a datum that is a {shape}"
+        raise table.bad("hole", f"{fault}, expected none")
+    parsed_value(table, "hole", parse_hole)
+    return table.text("hole"), table.text("hole_of", name)
+
+
+def check_frame(table: Table, key: str, name: str, frames: list[str]) -> None:
+    """Refuse a name that is not that of a frame."""
+    if name not in frames:
+        fault = f"found {quoted(name)}, expected the name of a frame"
+        raise table.bad(key, fault + nearest(name, frames))
+
+
+def read_point(table: Table) -> Vector:
+    """[m] the middle of a feature in its frame's axes."""
+    default = np.zeros(3)
+    x, y, z = table.array("at", (3,), "m", default, largest=LARGEST_LENGTH).tolist()
+    return x, y, z
+
+
+def read_direction(table: Table, key: str) -> Vector | None:
+    """A unit vector, None if absent."""
+    if not table.has(key):
+        return None
+    vector = table.array(key, (3,), "direction", largest=LARGEST_LENGTH)
+    size = float(np.linalg.norm(vector))
+    if size < 1e-12:
+        raise table.bad(key, "found no direction, expected 3 numbers, not all 0")
+    x, y, z = (vector / size).tolist()
+    return x, y, z
+
+
+def parsed_value(table: Table, key: str, parse: Callable[[Any], Parsed]) -> Parsed:
+    """The value of a key by a function that refuses what it is not."""
+    try:
+        return parse(table.content[key])
+    except BadInput as error:
+        raise table.bad(key, str(error)) from None
+    except TypeError:  # a text was expected
+        fault = f"found {describe(table.content[key])}, expected a text"
+        raise table.bad(key, fault) from None

@@ -1,0 +1,59 @@
+"""Fits of joints: the frames that a fit bounds, and frames with other clearances."""
+
+from dataclasses import dataclass, replace
+
+from forcefit.assembly.callouts.fits import Fit, FittedEnd, parse_fit
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.statistics.ranking import kind_of
+
+# frames of a universal, a cylindrical and a planar joint, whose name is before the dot
+_PARTS_OF_JOINTS = ("first", "second", "turn", "slide")
+
+
+@dataclass(frozen=True, eq=False)
+class JointFit:
+    """A fit of a hole and a shaft.
+
+    Attributes:
+        frame: name of the joint's frame, or of the parts.
+        fit: the fit.
+        bounds: rows of the frames that it bounds, and how: None for ``radial``.
+    """
+
+    frame: str
+    fit: Fit
+    bounds: tuple[tuple[int, FittedEnd | None], ...]
+
+    @property
+    def name(self) -> str:
+        """Name in tables: ``"fit 12 H7/g6 of elbow"``."""
+        return f"fit {self.fit.text} of {self.frame}"
+
+
+def fits_of(robot: Robot) -> tuple[JointFit, ...]:
+    """Return the fits of a robot, each hole and shaft once."""
+    found: dict[str, JointFit] = {}
+    for frame, text in robot.fits.items():
+        end = robot.fitted_ends.get(frame)
+        name = frame if end is None else end.parts
+        one = found.get(name, JointFit(name, parse_fit(text), ()))
+        bound = robot.index(frame), end
+        found[name] = replace(one, bounds=(*one.bounds, bound))
+    return tuple(found.values())
+
+
+def kind_of_fit(robot: Robot, fit: JointFit) -> str:
+    """Return the name of a fit without that of its leg, if it begins with one."""
+    joint, _, rest = fit.frame.partition(".")
+    frames = {frame.name for frame in robot.frames}
+    of_joint = joint in frames or rest.split(".")[0] in _PARTS_OF_JOINTS
+    return fit.frame if of_joint else kind_of(fit.frame)
+
+
+def with_clearance(frame: Frame, new: dict[str, float]) -> Frame:
+    """Return the frame with other bounds: of a bolted joint those before its bolt."""
+    bolt = frame.locked_at
+    if bolt is not None:
+        clearance = replace(bolt.clearance, **new)
+        return replace(frame, locked_at=replace(bolt, clearance=clearance))
+    return replace(frame, clearance=replace(frame.clearance or Clearance(), **new))

@@ -1,0 +1,157 @@
+"""Flatness and cylindricity add half their width to the clearance of a joint."""
+
+import re
+
+import pytest
+
+from forcefit.assembly.files.robot_file import read_robot, write_robot
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.statistics.callout_sources import sources_of
+from forcefit.assembly.statistics.linear_response import linear_response
+from forcefit.assembly.statistics.worst_pose import worst_pose
+from forcefit.inputs.table import BadInput
+
+ARM = """
+format = 2
+name = "arm"
+platform = "rod"
+platform_at = ["200 mm", 0, 0]
+[[tolerance]]
+feature = "pin"
+cylindricity = "0.004 mm"
+[[body]]
+name = "rod"
+[[body.tolerance]]
+feature = "pin"
+cylindricity = "0.006 mm"
+[[joint]]
+name = "pin"
+type = "revolute"
+between = ["base", "rod"]
+at = [0, 0, 0]
+axis = [0, 0, 1]
+actuated = true
+clearance = { fit = "12 H7/g6", length = "40 mm" }
+"""
+PAD = (
+    ARM.replace("revolute", "planar").replace("cylindricity", "flatness")
+    .replace("actuated = true\n", "")
+    .replace('fit = "12 H7/g6", length = "40 mm"',
+             'pad = { gap = "10 um", length = "60 mm", width = "40 mm" }')
+)  # fmt: skip
+
+
+def read(tmp_path, text):
+    path = tmp_path / "robot.toml"
+    path.write_text(text)
+    return read_robot(path)
+
+
+def worst(robot):
+    prepared = linear_response(home_posture(robot))
+    return worst_pose(prepared, sources_of(robot), "rotation").attained
+
+
+def test_cylindricity_of_both_parts_widens_a_fit(tmp_path):
+    """Largest radial clearance 17.5 um of the fit, 2 + 3 um of the form: the rod tilts
+    by 2 x 22.5 um / 40 mm = 1.125 mrad."""
+    robot = read(tmp_path, ARM)
+    assert worst(robot) == pytest.approx(1.125e-3, rel=1e-6)
+    assert any('"pin" by 5 um (cylindricity)' in remark for remark in robot.remarks)
+    assert not robot.callouts
+    sources = sources_of(robot)
+    radial = sources.fits[0].fit.mean_radial + sources.draw(0, 2000, 1)[:, 0]
+    assert 8e-6 <= radial.min() <= radial.max() <= 22.5e-6  # 3 .. 17.5 um, and 5 um
+    assert radial.mean() == pytest.approx(15.25e-6, abs=0.3e-6)
+
+
+def test_form_stays_in_a_file_of_frames(tmp_path):
+    robot = read(tmp_path, ARM)
+    write_robot(robot, tmp_path / "frames.toml")
+    again = read_robot(tmp_path / "frames.toml")
+    assert worst(again) == pytest.approx(1.125e-3, rel=1e-6)
+
+
+def test_cylindricity_widens_every_gap_of_a_shaft(tmp_path):
+    """Two bearings 50 mm apart, 10 um and 19.5 um at most (12 H7/h6 leaves 14.5 um),
+    each with 5 um more: tilt (15 + 19.5) um / 50 mm."""
+    fit = '{ fit = "12 H7/g6", length = "40 mm" }'
+    one, two = '{ z = 0, radial = "10 um" }', '{ z = "50 mm", fit = "12 H7/h6" }'
+    robot = read(tmp_path, ARM.replace(fit, f"{{ bearings = [ {one}, {two} ] }}"))
+    assert worst(robot) == pytest.approx((15e-6 + 19.5e-6) / 0.05, rel=1e-6)
+
+
+def test_flatness_widens_the_gap_of_a_pad(tmp_path):
+    """Gaps of 10 and 15 um from the middle: all screws of the pad grow by 1.5."""
+    of_form = [
+        '[[tolerance]]\nfeature = "pin"\nflatness = "0.004 mm"\n',
+        '[[body.tolerance]]\nfeature = "pin"\nflatness = "0.006 mm"\n',
+    ]
+    exact = PAD
+    for table in of_form:
+        assert table in exact
+        exact = exact.replace(table, "")
+    wide, narrow = (
+        linear_response(home_posture(read(tmp_path, text))).joints.cones
+        for text in (PAD, exact)
+    )
+    assert wide == pytest.approx(1.5 * narrow, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"0.006 mm"', '"0.006"', 'tolerance of "pin".cylindricity: found \'0.006\''),
+        ('"0.006 mm"', '"-0.006 mm"', "found '-0.006 mm', expected a width > 0"),
+        ('"0.006 mm"', '"0.006 mm (M)"', "found (M), expected a width alone"),
+        ("cylindricity", "flatness", "found no gap that the flatness of its features"),
+        ('{ fit = "12 H7/g6", length = "40 mm" }', '{ axial = "5 um" }',
+         'joint "pin".clearance: found no gap that the cylindricity of its features '
+         "could widen, expected a radial clearance, a fit or bearings"),
+        ('{ fit = "12 H7/g6", length = "40 mm" }', '{ fit = "25 H7/p6" }',
+         'clearance.fit: found "25 H7/p6", an interference fit'),
+        ('cylindricity = "0.006 mm"', 'cylindricity = "0.006 mm"\ndatums = ["pin"]',
+         "datums: found one of a feature whose form alone is stated, expected none"),
+        ('[[body.tolerance]]\nfeature = "pin"', '[[body.tolerance]]\nfeature = "pn"',
+         'found "pn", expected a joint of "rod"; did you mean "pin"'),
+    ],
+)  # fmt: skip
+def test_form_that_is_not_modelled_is_refused_in_one_line(tmp_path, old, new, message):
+    assert old in ARM
+    with pytest.raises(BadInput, match=re.escape(message)) as error:
+        read(tmp_path, ARM.replace(old, new))
+    assert "\n" not in str(error.value)
+
+
+TWO_PINS = (
+    ARM
+    + """
+[[joint]]
+name = "tip"
+type = "revolute"
+between = ["rod", "wheel"]
+at = ["200 mm", 0, 0]
+axis = [0, 0, 1]
+clearance = { radial = "10 um" }
+[[body]]
+name = "wheel"
+"""
+)
+
+
+@pytest.mark.parametrize(
+    ("zones", "message"),
+    [
+        ('position = "0.05 mm"\nparallelism = "0.02 mm"\ncylindricity = "0.03 mm"',
+         "found 0.03 mm, expected less than the parallelism, 0.02 mm"),
+        ('position = "0.05 mm"\ncylindricity = "0.05 mm"',
+         "found 0.05 mm, expected less than the position, 0.05 mm"),
+        ('position = "0.05 mm"\nparallelism = "0.05 mm"',
+         "parallelism: found 0.05 mm, expected less than that of the location"),
+    ],
+)  # fmt: skip
+def test_zones_of_form_orientation_and_location_become_larger(tmp_path, zones, message):
+    table = f'[[body.tolerance]]\nfeature = "tip"\ndatums = ["pin"]\n{zones}\n'
+    text = TWO_PINS.replace("[[joint]]", f'{table}extent = "20 mm"\n[[joint]]', 1)
+    with pytest.raises(BadInput, match=re.escape(message)):
+        read(tmp_path, text)
