@@ -69,8 +69,9 @@ def _spec(
     """Return the numbers of a scene, with its size, units and exaggeration."""
     ends = bodies.ends
     size = float(np.ptp(np.vstack([ends, np.zeros(3)]), axis=0).max()) or 1.0
-    middle = (ends.max(axis=0) + ends.min(axis=0)) / 2
-    half = np.maximum(np.ptp(ends, axis=0) / 2, 0.15 * size) + 0.15 * size
+    drawn = np.vstack([bodies.starts, ends])
+    middle = (drawn.max(axis=0) + drawn.min(axis=0)) / 2
+    half = np.maximum(np.ptp(drawn, axis=0) / 2, 0.15 * size) + 0.15 * size
     largest = float(np.linalg.norm(bodies.end_screws[:, 3:], axis=1).max())
     return {
         "bodies": [_body(posture.robot, bodies, i) for i in range(len(ends))],

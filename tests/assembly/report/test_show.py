@@ -67,6 +67,13 @@ def test_figure_of_a_loaded_bar_follows_the_elastic_line():
     assert figure.axes[0].get_zlabel() == "z [mm]"
 
 
+def test_axes_of_a_single_bar_contain_both_of_its_ends():
+    """The bar lies from 0 to 400 mm along x; its only frame is at the tip."""
+    low, high = cantilever().show(interactive=False).axes[0].get_xlim()
+    assert low < 0
+    assert high > 1e3 * LENGTH
+
+
 def test_figure_of_a_robot_shows_its_home_pose():
     """A crank of 0.3 m turned to 90 degrees, and a bar of 0.2 m straight on."""
     drive = Frame("drive", joint="revolute", actuated=True, position=np.pi / 2)
