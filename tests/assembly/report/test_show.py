@@ -138,6 +138,36 @@ def test_notebook_gets_the_interactive_scene(monkeypatch):
     assert "http://" not in picture.html.replace("http://www.w3.org/", "")
 
 
+class Formatter(dict):
+    """The functions of a format by type, as IPython keeps them."""
+
+    for_type = dict.__setitem__
+
+
+def maps(monkeypatch, known):
+    """PNG of a sweep's figure in a notebook; ``known`` formats figures already."""
+    formats = {"image/png": Formatter(), "image/svg+xml": Formatter(known)}
+    shell = SimpleNamespace(
+        kernel=object(), display_formatter=SimpleNamespace(formatters=formats)
+    )
+    module = SimpleNamespace(get_ipython=lambda: shell)
+    monkeypatch.setitem(sys.modules, "IPython", module)
+    data = ff.sweep("hexapod", grid="tx=0:0.02:0.01,tz=0.53", quantities=["energy"])
+    return ff.figure_of(data.squeeze(), quantities=["energy"]), formats["image/png"]
+
+
+def test_notebook_shows_the_maps_of_a_sweep_as_the_result_of_a_cell(monkeypatch):
+    pytest.importorskip("xarray")
+    figure, functions = maps(monkeypatch, {})
+    assert functions[type(figure)](figure).startswith(b"\x89PNG")
+
+
+def test_format_of_figures_that_the_user_chose_is_kept(monkeypatch):
+    pytest.importorskip("xarray")
+    _, functions = maps(monkeypatch, {pyplot.Figure: str})
+    assert not functions
+
+
 @pytest.mark.parametrize(
     ("thing", "options", "message"),
     [
