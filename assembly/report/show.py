@@ -82,7 +82,7 @@ def _scene(
     many = isinstance(thing, Assembly) and thing.of_many
     if many or posture.transforms.ndim > 3:
         kind = type(thing).__name__
-        raise BadInput(f"show: found a {kind} of many points, expected one of them")
+        raise BadInput(f"show: found {kind} of many points, expected one of them")
     if isinstance(thing, Posture):
         return nominal_scene(thing), thing.robot.name, _NOMINAL
     body, caption = None, _FORCED
