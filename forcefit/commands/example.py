@@ -52,6 +52,11 @@ EXAMPLES = {
         ("examples/notebooks",),
         "jupyter lab examples/notebooks/own_robot.ipynb",
     ),
+    "extension": _Example(
+        "a package that adds a reader, an effect and a link model",
+        ("examples/extension",),
+        "pip install ./examples/extension",
+    ),
     "campaign": _Example(
         "measurements of an arm whose model lacks an effect",
         ("examples/campaign",),
