@@ -9,11 +9,14 @@ It is imported when it is first used.  Names of forcefit's own effects cannot be
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields, replace
+from typing import Any
 
 from forcefit.assembly.effects.effect import Effect
 from forcefit.inputs.entry_points import (
     installed_names,
     load_installed,
+    naming_owner,
     version_of_installed,
 )
 from forcefit.inputs.errors import BadInput
@@ -58,7 +61,7 @@ class Library(Mapping[str, Effect]):
                 f"{words}: found the name {effect.name!r}, expected {name!r} as in its "
                 "entry point"
             )
-        return effect
+        return _naming_owner(effect, words)
 
     def __iter__(self) -> Iterator[str]:
         *first, last = self._own
@@ -69,3 +72,15 @@ class Library(Mapping[str, Effect]):
 
     def __contains__(self, name: object) -> bool:
         return name in self._own or name in self.others
+
+
+def _naming_owner(effect: Effect, words: str) -> Effect:
+    """Return an effect whose functions name its distribution if they fail."""
+    functions = {
+        one.name: getattr(effect, one.name) for one in fields(effect)
+        if callable(getattr(effect, one.name))
+    }  # fmt: skip
+    named: dict[str, Any] = {
+        name: naming_owner(one, words) for name, one in functions.items()
+    }
+    return replace(effect, **named)

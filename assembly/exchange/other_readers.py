@@ -12,7 +12,7 @@ message for the user.
 from pathlib import Path
 
 from forcefit.assembly.model.robot import Robot
-from forcefit.inputs.entry_points import installed_names, load_installed
+from forcefit.inputs.entry_points import installed_names, load_installed, naming_owner
 from forcefit.inputs.errors import BadInput
 
 GROUP = "forcefit.readers"
@@ -34,13 +34,13 @@ def read_by_other(path: Path) -> Robot:
 
     Raises:
         BadInput: several distributions read this ending; the reader cannot be imported,
-            returns something else, or raises it.
+            fails, or returns something else.
     """
     try:
         read, words = load_installed(GROUP, _ending(path), "reader")
     except BadInput as error:
         raise BadInput(f"{path}: {error}") from None
-    robot = read(path)
+    robot = naming_owner(read, f"{path}: {words}")(path)
     if not isinstance(robot, Robot):
         kind = type(robot).__name__
         raise BadInput(f"{path}: {words} returned {kind}, expected a Robot")

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.assembly.model.robot import MatrixLink
-from forcefit.inputs.entry_points import installed_names, load_installed
+from forcefit.inputs.entry_points import installed_names, load_installed, naming_owner
 from forcefit.inputs.table import BadInput, Table, nearest, quoted
 from forcefit.stiffness.link import check_definite
 
@@ -55,13 +55,13 @@ def model_link(link: Table, span: NDArray) -> MatrixLink:
 
 def _computed(compute: Any, words: str, span: NDArray, values: dict) -> NDArray:
     """Return the (6, 6) stiffness of a model, after a check."""
+    found = naming_owner(compute, words)(span, values)
     try:
-        K = np.array(compute(span, values), dtype=float)
-    except BadInput:
-        raise
-    except Exception as error:  # whatever the code of others raises
-        text = " ".join(f"{type(error).__name__}: {error}".split())
-        raise BadInput(f"{words} failed: {text}") from None
+        K = np.asarray(found, dtype=float)
+    except (TypeError, ValueError):
+        raise BadInput(
+            f"{words} returned no array of numbers, expected (6, 6)"
+        ) from None
     if K.shape != (6, 6) or not np.isfinite(K).all():
         raise BadInput(
             f"{words} returned an array of shape {K.shape}, expected (6, 6) of finite "

@@ -10,11 +10,14 @@ docs/extensions.md describes them.
 """
 
 import sys
-from functools import lru_cache
+from collections.abc import Callable
+from functools import lru_cache, wraps
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any
+from typing import Any, TypeVar
 
-from forcefit.inputs.errors import BadInput
+from forcefit.inputs.errors import BadInput, one_line
+
+Result = TypeVar("Result")
 
 
 def installed_names(group: str) -> tuple[str, ...]:
@@ -54,6 +57,35 @@ def load_installed(group: str, name: str, kind: str) -> tuple[Any, str]:
         raise BadInput(
             f"{words} cannot be imported: {' '.join(text.split())}"
         ) from None
+
+
+def naming_owner(function: Callable[..., Result], words: str) -> Callable[..., Result]:
+    """Return a function of another distribution, whose faults name the distribution.
+
+    Args:
+        function: any function.
+        words: words that name it, of :func:`load_installed`.
+
+    Returns:
+        The function; instead of an error other than ``BadInput`` it raises a
+        ``BadInput`` with the words, caused by that error.
+    """
+
+    @wraps(function)
+    def call(*values: Any, **options: Any) -> Result:
+        try:
+            return function(*values, **options)
+        except BadInput:
+            raise
+        except Exception as error:  # whatever the code of others raises
+            raise BadInput(f"{words} failed: {_fault(error)}") from error
+
+    return call
+
+
+def _fault(error: Exception) -> str:
+    """Return the kind and the text of an error in one line."""
+    return one_line(f"{type(error).__name__}: {error}", 200)
 
 
 def version_of_installed(group: str, name: str) -> str:

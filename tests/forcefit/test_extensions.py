@@ -48,6 +48,34 @@ parameters = { joint1 = 1e-3 }
 """
 
 
+BROKEN = """
+from forcefit.assembly.effects.effect import Effect
+
+def fails(span, values):
+    return values["absent"]
+
+def small(span, values):
+    return [1.0]
+
+def ragged(span, values):
+    return [[1.0], [1.0, 2.0]]
+
+def loose(span, values):
+    return [[0.0] * 6] * 6
+
+def read(path):
+    return int("three")
+
+def apply(conditions, values):
+    return conditions.nothing
+
+FAILS, OTHER = (
+    Effect(name, apply, lambda robot, name: "1", None, ("",), lambda robot: ())
+    for name in ("failing", "another")
+)
+"""
+
+
 def install(folder, name, groups):
     """Write the metadata of an installed distribution; groups as in pyproject.toml."""
     info = folder / f"{name}-0.1.0.dist-info"
@@ -81,18 +109,16 @@ def example(packages):
 @pytest.fixture
 def broken(packages):
     """A distribution whose module raises an error, and returns wrong objects."""
-    (packages / "broken.py").write_text(
-        "import forcefit as ff\n"
-        "def fails(span, values):\n    return values['absent']\n"
-        "def small(span, values):\n    return [1.0]\n"
-        "def loose(span, values):\n    return [[0.0] * 6] * 6\n"
-    )
+    (packages / "broken.py").write_text(BROKEN)
     (packages / "raises.py").write_text("1 / 0\n")
     install(packages, "their-tools", {
         "forcefit.effects": {"drive_gain": "broken:fails", "raising": "raises:GAIN",
-                             "gone": "no_such_module:GAIN"},
+                             "gone": "no_such_module:GAIN",
+                             "failing": "broken:FAILS", "misnamed": "broken:OTHER"},
+        "forcefit.readers": {"three": "broken:read"},
         "forcefit.link_models": {"fails": "broken:fails", "small": "broken:small",
-                                 "loose": "broken:loose", "cone": "broken:absent"},
+                                 "loose": "broken:loose", "ragged": "broken:ragged",
+                                 "cone": "broken:absent"},
     })  # fmt: skip
 
 
@@ -265,6 +291,7 @@ def test_broken_effect_names_its_distribution_in_one_line(
             "loose",
             "the link model broken:loose of their-tools: stiffness is not positive",
         ),
+        ("ragged", "the link model broken:ragged of their-tools returned no array of "),
         ("cine", 'found "cine", expected a link model of a distribution; did you mean'),
     ],
 )
@@ -276,6 +303,26 @@ def test_broken_link_model_names_its_distribution_in_one_line(
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert message in err
     assert f'{path}: frame "tip".link.model' in err
+
+
+def test_fault_within_an_effect_or_a_reader_names_its_distribution(
+    broken, tmp_path, run
+):
+    text = ARM.replace("drive_gain", "failing").replace("{ joint1 = 1e-3 }", "{ }")
+    (tmp_path / "arm.three").write_text("3")
+    for path, message in (
+        (
+            written(tmp_path, text),
+            "the effect broken:FAILS of their-tools failed: Attrib",
+        ),
+        (
+            tmp_path / "arm.three",
+            "the reader broken:read of their-tools failed: ValueEr",
+        ),
+    ):
+        code, out, err = run("assembly", "solve", path)
+        assert (code, out, err.count("\n")) == (2, "", 1)
+        assert message in err
 
 
 def test_broken_effect_stops_no_robot_that_does_not_have_it(broken, tmp_path):
