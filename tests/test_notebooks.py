@@ -80,7 +80,10 @@ def test_notebook_of_a_cad_link_has_the_deflection_of_a_cone(tmp_path, monkeypat
     assert sag == pytest.approx(found["by_elements"], rel=1e-9)
     volume = pi * L / 3 * (R**2 + R * r + r**2)
     assert found["arm"].mass == pytest.approx(2700 * volume, rel=1e-4)
+    # Saint-Venant's torsion is exact for a round bar with rigid faces
+    assert found["twist"] == pytest.approx(1, abs=2e-4)
     # K of a solid bar is at most that of a bar shorter by its radius
+    assert 1 < found["stretch"] < 0.452 / (0.452 - 0.04)
     assert sum(frame.link is not None for frame in found["solids"].frames) == 4
     assert (found["ratio"] > 1).all()
     assert (found["ratio"] < 0.452 / (0.452 - 0.04)).all()

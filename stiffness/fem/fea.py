@@ -39,7 +39,7 @@ from forcefit.stiffness.mesh.regions import cut_by_regions
 from forcefit.stiffness.mesh.slender_bar import slender_bar
 from forcefit.stiffness.mesh.solid import Solid
 from forcefit.stiffness.mesh.straight_bar import straight_bar
-from forcefit.stiffness.surface.interface import Interface
+from forcefit.stiffness.surface.interface import Interface, parse_interface
 from forcefit.stiffness.surface.patches import (
     find_patches,
     refuse_common_edges,
@@ -118,8 +118,8 @@ class MeshedLink:
 
 def mesh_link(
     surface: Path | str,
-    base: Interface,
-    tip: Interface,
+    base: Interface | str,
+    tip: Interface | str,
     material: Material,
     *,
     unit: str = "m",
@@ -129,7 +129,8 @@ def mesh_link(
 
     Args:
         surface: file of the closed surface (STL, OBJ, PLY, VTK, MSH, STEP).
-        base: the held interface, in metres, in the axes of the surface.
+        base: the held interface, in metres, in the axes of the surface; or its text,
+            such as ``"z=0"``, see :func:`forcefit.stiffness.surface.interface.parse_interface`.
         tip: the interface that moves.
         material: material of the link; without a density it has no mass and inertia.
         unit: unit of the surface file's coordinates.
@@ -147,7 +148,11 @@ def mesh_link(
         error.
     """
     shape = read_surface(Path(surface), unit)
-    return solve_link(shape, base, tip, (material,), options=options).link
+    held, moved = (
+        parse_interface(side, name) if isinstance(side, str) else side
+        for side, name in ((base, "base"), (tip, "tip"))
+    )
+    return solve_link(shape, held, moved, (material,), options=options).link
 
 
 def solve_link(
