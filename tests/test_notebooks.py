@@ -37,6 +37,17 @@ def test_notebook_has_no_stored_outputs(name):
         assert cell["execution_count"] is None
 
 
+@pytest.mark.parametrize("name", sorted(NOTEBOOKS))
+def test_notebook_uses_the_public_names_only(name):
+    """Modules of the packages may move; ``forcefit`` and its names stay."""
+    source = "\n".join("".join(cell["source"]) for cell in cells(name))
+    modules = re.findall(r"^(?:from|import) ([\w.]+)", source, re.MULTILINE)
+    assert "forcefit" in modules
+    assert not {"assembly", "stiffness", "validation"} & {
+        m.split(".")[0] for m in modules
+    }
+
+
 def test_page_of_notebooks_lists_every_notebook():
     page = (ROOT / "docs/notebooks.md").read_text(encoding="utf-8")
     listed = re.findall(r"\[(\w+)\.ipynb\]\(notebooks/\1\.ipynb\)", page)
