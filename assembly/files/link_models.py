@@ -42,7 +42,9 @@ def model_link(link: Table, span: NDArray) -> MatrixLink:
     name, names = inner.text("name"), installed_names(GROUP)
     if name not in names:
         hint = nearest(name, names) or "; none is installed"
-        fault = f"found {quoted(name)}, expected a link model of a distribution{hint}"
+        fault = (
+            f"found {quoted(name)}, expected a link model of an installed package{hint}"
+        )
         raise inner.bad("name", fault)
     values = {key: value for key, value in inner.content.items() if key != "name"}
     try:

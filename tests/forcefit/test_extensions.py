@@ -292,7 +292,10 @@ def test_broken_effect_names_its_distribution_in_one_line(
             "the link model broken:loose of their-tools: stiffness is not positive",
         ),
         ("ragged", "the link model broken:ragged of their-tools returned no array of "),
-        ("cine", 'found "cine", expected a link model of a distribution; did you mean'),
+        (
+            "cine",
+            'found "cine", expected a link model of an installed package; did you mean',
+        ),
     ],
 )
 def test_broken_link_model_names_its_distribution_in_one_line(

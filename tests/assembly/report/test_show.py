@@ -67,6 +67,36 @@ def test_figure_of_a_loaded_bar_follows_the_elastic_line():
     assert figure.axes[0].get_zlabel() == "z [mm]"
 
 
+def test_picture_of_a_finite_rotation_has_its_true_size():
+    """A rigid bar on a torsion spring: k a = F L cos a; the tip is at L (cos a, sin a).
+
+    With k = 10 N m/rad and F L = 20 N m the angle is 1.0298665 rad.
+    """
+    hinge = Frame("hinge", joint_stiffness=[np.inf, np.inf, 10.0, *[np.inf] * 3])
+    tip = Frame("tip", "hinge", translation=[LENGTH, 0, 0])
+    posture = home_posture(Robot("bar", "tip", (hinge, tip)))
+    found = ff.solve_exact(posture, load={"fy": 20.0 / LENGTH})
+    angle = 1.0298665
+    assert 10 * angle == pytest.approx(20 * np.cos(angle), rel=1e-7)
+    figure = found.plot(interactive=False)
+    assert figure.axes[0].get_title() == "bar, displacements x 1"
+    end = lines_of(figure)["forced, rigid"]
+    end = end[np.isfinite(end).all(axis=1)][-1]
+    place = 1e3 * LENGTH * np.array([np.cos(angle), np.sin(angle), 0])
+    np.testing.assert_allclose(end, place, atol=1e-3)
+    assert figure.axes[0].get_ylim()[1] > place[1]
+
+
+def test_small_finite_motions_are_drawn_as_those_of_the_linear_model():
+    """The tip's F L^3 / (3 E I), a thousandth of the length, to 1e-5 of it."""
+    posture, load = cantilever(), {"fz": -FORCE / 100}
+    exact, linear = (
+        lines_of(one.plot(interactive=False))["forced, elastic"]
+        for one in (ff.solve_exact(posture, load), ff.solve_assembly(posture, load))
+    )
+    np.testing.assert_allclose(exact[:9], linear[:9], rtol=0, atol=1e-3)
+
+
 def test_axes_of_a_single_bar_contain_both_of_its_ends():
     """The bar lies from 0 to 400 mm along x; its only frame is at the tip."""
     low, high = cantilever().show(interactive=False).axes[0].get_xlim()
