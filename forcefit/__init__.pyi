@@ -23,9 +23,11 @@ from forcefit.assembly.platform_stiffness.deflection import deflection_curve
 from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from forcefit.assembly.platform_stiffness.vibration import natural_modes
 from forcefit.assembly.report.show import show
+from forcefit.assembly.statistics.callout_sources import sources_of
 from forcefit.assembly.statistics.experiment import Experiment
 from forcefit.assembly.statistics.monte_carlo import run_draws
 from forcefit.assembly.statistics.summary import summarise
+from forcefit.assembly.statistics.worst_pose import worst_pose
 from forcefit.assembly.steps.bolted import bolt_joints
 from forcefit.assembly.steps.run import assemble_in_steps
 from forcefit.assembly.sweeps.dataset import open_dataset
@@ -96,8 +98,10 @@ __all__ = [
     "show",
     "solve_assembly",
     "solve_exact",
+    "sources_of",
     "summarise",
     "sweep",
+    "worst_pose",
     "write_robot",
     "write_study",
     "zone_margin",

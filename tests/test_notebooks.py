@@ -1,7 +1,10 @@
 """The notebooks of the examples: without outputs, and their cells run in order."""
 
 import json
+import re
+from math import pi
 
+import numpy as np
 import pytest
 
 from tests.test_tutorials import ROOT
@@ -34,6 +37,23 @@ def test_notebook_has_no_stored_outputs(name):
         assert cell["execution_count"] is None
 
 
+@pytest.mark.parametrize("name", sorted(NOTEBOOKS))
+def test_notebook_uses_the_public_names_only(name):
+    """Modules of the packages may move; ``forcefit`` and its names stay."""
+    source = "\n".join("".join(cell["source"]) for cell in cells(name))
+    modules = re.findall(r"^(?:from|import) ([\w.]+)", source, re.MULTILINE)
+    assert "forcefit" in modules
+    assert not {"assembly", "stiffness", "validation"} & {
+        m.split(".")[0] for m in modules
+    }
+
+
+def test_page_of_notebooks_lists_every_notebook():
+    page = (ROOT / "docs/notebooks.md").read_text(encoding="utf-8")
+    listed = re.findall(r"\[(\w+)\.ipynb\]\(notebooks/\1\.ipynb\)", page)
+    assert sorted(listed) == sorted(NOTEBOOKS)
+
+
 @pytest.mark.slow
 @pytest.mark.exudyn
 def test_notebook_of_ones_own_robot_ends_with_a_report(tmp_path, monkeypatch):
@@ -54,3 +74,100 @@ def test_notebook_of_seoul_has_the_rotations_of_the_closed_form(tmp_path, monkey
     assert found["distances"][1] == pytest.approx(0.02)
     assert found["rotations"][1] == pytest.approx(48.033e-3, rel=1e-4)
     assert found["slope"] == pytest.approx(-1, abs=0.01)
+
+
+@pytest.mark.slow
+def test_notebook_of_a_cad_link_has_the_deflection_of_a_cone(tmp_path, monkeypatch):
+    """Bending and shear of a cone by hand, which a rigid end stiffens by 1 to 2 %.
+
+    F L^3 / (3 E I) R / r + F L / (k G pi R r); mass pi L / 3 (R^2 + R r + r^2) rho.
+    """
+    found = variables("link_from_cad", tmp_path, monkeypatch)
+    F, L, R, r, E, nu = 100.0, 0.35, 0.045, 0.025, 7e10, 0.33
+    k, G = 6 * (1 + nu) / (7 + 6 * nu), E / (2 * (1 + nu))
+    cone = F * L**3 / (3 * E * pi * R**4 / 4) * R / r + F * L / (k * G * pi * R * r)
+    assert 0.98 * cone < found["by_elements"] < 0.99 * cone
+    sag = -found["loaded"].platform_screw[5]
+    assert sag == pytest.approx(found["by_elements"], rel=1e-9)
+    volume = pi * L / 3 * (R**2 + R * r + r**2)
+    assert found["arm"].mass == pytest.approx(2700 * volume, rel=1e-4)
+    # Saint-Venant's torsion is exact for a round bar with rigid faces
+    assert found["twist"] == pytest.approx(1, abs=2e-4)
+    # K of a solid bar is at most that of a bar shorter by its radius
+    assert 1 < found["stretch"] < 0.452 / (0.452 - 0.04)
+    assert sum(frame.link is not None for frame in found["solids"].frames) == 4
+    assert (found["ratio"] > 1).all()
+    assert (found["ratio"] < 0.452 / (0.452 - 0.04)).all()
+
+
+@pytest.mark.slow
+def test_notebook_of_a_campaign_has_the_numbers_of_the_command(
+    tmp_path, monkeypatch, run
+):
+    """Held-out errors of the command; commands compensate what the machine deviates."""
+    pytest.importorskip("xarray")
+    found = variables("campaign_to_machine", tmp_path, monkeypatch)
+    code, text, _ = run(
+        "validation", "diagnose", "examples/campaign", "--json", "o.json"
+    )
+    assert code == 0
+    assert found["diagnosis"].summary() in text
+    printed = json.loads((tmp_path / "o.json").read_text())["error"]
+    for when in ("before", "after"):
+        assert vars(getattr(found["diagnosis"], when)) == pytest.approx(printed[when])
+    assert found["diagnosis"].verdict == "explained"
+    # noise of the campaign's file, and none of the deviation with the offsets
+    assert printed["after"]["position"] == pytest.approx(5e-6, rel=0.1)
+    assert found["after"] < 1e-3 < 100 < found["before"]  # [um]
+
+
+@pytest.mark.slow
+def test_notebook_of_drawing_tolerances_encloses_all_draws(tmp_path, monkeypatch):
+    """No machine exceeds the bound; parts of the drawing are as in the robot file.
+
+    The shares sum to the support along the direction of the value attained, which is
+    at least that value, and at most the bound.
+    """
+    pytest.importorskip("xarray")
+    found = variables("drawing_tolerances", tmp_path, monkeypatch)
+    worst = found["worst"]
+    assert found["translation"].max() < 1e6 * worst.attained <= 1e6 * worst.bound
+    share = float(np.mean(found["translation"] <= 150))
+    assert found["share"]["probability"] == pytest.approx(share)
+    assert found["share"]["lower"] < share < found["share"]["upper"]
+    fits = [fit.fit for fit in found["experiment"].sources.fits]
+    assert [fit.text for fit in fits] == ["12 H7/g6", "12 H7/g6"]
+    assert len(found["robot"].callouts) == 4
+    assert worst.attained <= sum(x for _, x in worst.shares) <= worst.bound
+
+
+@pytest.mark.slow
+def test_notebook_of_stiffness_maps_agrees_with_the_sum_over_struts(
+    tmp_path, monkeypatch
+):
+    """K = sum of k w w'; the robot is symmetric about the plane x = 0."""
+    pytest.importorskip("xarray")
+    found = variables("stiffness_maps", tmp_path, monkeypatch)
+    assert found["error"].max() < 1e-9
+    stiffness = found["data"]["stiffness"]
+    np.testing.assert_allclose(stiffness, stiffness[::-1], rtol=1e-6)
+    along = 1 / np.linalg.inv(found["by_hand"])[5, 5]
+    home = stiffness.sel(tx=0, ty=0, wrench_component="FZ", method=None)
+    assert float(home) == pytest.approx(along, rel=1e-6)
+    np.testing.assert_allclose(found["data"]["share"].sum("part"), 1.0)
+
+
+@pytest.mark.slow
+def test_notebook_of_the_paper_has_the_numbers_of_the_reference(tmp_path, monkeypatch):
+    """Two or three digits of another program, as in tests of the paper's study."""
+    pytest.importorskip("xarray")
+    found = variables("paper_figures", tmp_path, monkeypatch)
+    assert (len(found["frames"]), found["mobility"].freedoms) == (21, 2)
+    assert int(found["reached"].sum()) == 1113
+    assert found["share"] == pytest.approx(15.9, abs=0.1)
+    for name, row in found["reference"].items():
+        # half a unit of the second digit
+        assert found["found"][name] == pytest.approx(row[2:], rel=0.05), name
+    alone = found["alone"]
+    # the bounds are as accurate as in the paper, to 1 um
+    assert np.nanmax(np.abs(alone - alone[::-1])) <= 1e-6

@@ -1,6 +1,7 @@
 """Effects that a declared model may lack, each in a separate file.
 
-Begin at ``effect.py``, which defines an effect.  Effects are applied in the order of
+Begin at ``effect.py``, which defines an effect; ``library.py`` adds those of other
+distributions.  Effects are applied in the order of
 :data:`LIBRARY`.  Friction acts on a joint's spring, so drive compliance comes before
 it; the foundation adds a frame, so it comes last.
 """
@@ -14,13 +15,14 @@ from forcefit.assembly.effects.delayed_expansion import DELAYED_EXPANSION
 from forcefit.assembly.effects.device_scale import DEVICE_SCALE
 from forcefit.assembly.effects.drift import DRIFT
 from forcefit.assembly.effects.drive_compliance import DRIVE_COMPLIANCE
-from forcefit.assembly.effects.effect import Effect, Values
+from forcefit.assembly.effects.effect import Values
 from forcefit.assembly.effects.encoder_eccentricity import ENCODER_ECCENTRICITY
 from forcefit.assembly.effects.encoder_offset import ENCODER_OFFSET
 from forcefit.assembly.effects.friction_hysteresis import FRICTION_HYSTERESIS
 from forcefit.assembly.effects.functions import apply_functions, in_session_alone
 from forcefit.assembly.effects.geometric_stiffening import GEOMETRIC_STIFFENING
 from forcefit.assembly.effects.joint_clearance import JOINT_CLEARANCE
+from forcefit.assembly.effects.library import Library
 from forcefit.assembly.effects.link_length import LINK_LENGTH
 from forcefit.assembly.effects.load_gain import LOAD_GAIN
 from forcefit.assembly.effects.modulus_scale import MODULUS_SCALE
@@ -30,29 +32,26 @@ from forcefit.assembly.effects.thermal_expansion import THERMAL_EXPANSION
 from forcefit.assembly.measurement.conditions import Conditions
 from forcefit.assembly.model.robot import Robot
 
-LIBRARY: dict[str, Effect] = {
-    effect.name: effect
-    for effect in (
-        SELF_WEIGHT,
-        THERMAL_EXPANSION,
-        DELAYED_EXPANSION,
-        DRIVE_COMPLIANCE,
-        ENCODER_OFFSET,
-        ENCODER_ECCENTRICITY,
-        LINK_LENGTH,
-        REGISTRATION,
-        DEVICE_SCALE,
-        MODULUS_SCALE,
-        BODY_MASS,
-        JOINT_CLEARANCE,
-        FRICTION_HYSTERESIS,
-        CONTACT_STIFFENING,
-        LOAD_GAIN,
-        GEOMETRIC_STIFFENING,
-        DRIFT,
-        BASE_COMPLIANCE,
-    )
-}
+LIBRARY = Library((
+    SELF_WEIGHT,
+    THERMAL_EXPANSION,
+    DELAYED_EXPANSION,
+    DRIVE_COMPLIANCE,
+    ENCODER_OFFSET,
+    ENCODER_ECCENTRICITY,
+    LINK_LENGTH,
+    REGISTRATION,
+    DEVICE_SCALE,
+    MODULUS_SCALE,
+    BODY_MASS,
+    JOINT_CLEARANCE,
+    FRICTION_HYSTERESIS,
+    CONTACT_STIFFENING,
+    LOAD_GAIN,
+    GEOMETRIC_STIFFENING,
+    DRIFT,
+    BASE_COMPLIANCE,
+))
 
 
 def apply_effects(conditions: Conditions, effects: Mapping[str, Values]) -> Conditions:
@@ -71,9 +70,9 @@ def apply_effects(conditions: Conditions, effects: Mapping[str, Values]) -> Cond
     unknown = set(effects) - set(LIBRARY)
     if unknown:
         raise KeyError(f"no effect {sorted(unknown)}; there are {sorted(LIBRARY)}")
-    for name, effect in LIBRARY.items():
+    for name in LIBRARY:
         if name in effects:
-            conditions = effect.apply(conditions, effects[name])
+            conditions = LIBRARY[name].apply(conditions, effects[name])
     return conditions
 
 

@@ -70,7 +70,7 @@ from forcefit.assembly.model.given_load import Load, given_load
 from forcefit.assembly.model.links import own_screws
 from forcefit.assembly.solvers.cones import into_cones
 from forcefit.assembly.solvers.method import Method, check_method
-from forcefit.results.display import Figures, html_table, short_repr
+from forcefit.results.display import Figures, html_table, short_repr, show
 from forcefit.results.text import forced_lines
 from forcefit.stiffness.screws import rotation_matrix, screw_map, transform
 
@@ -136,6 +136,7 @@ class ExactAssembly:
     method: Method
 
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
+    plot = show
 
     def _figures(self) -> Figures:
         """Return the numbers that ``assembly solve --state exact`` prints."""

@@ -58,10 +58,12 @@ def mjcf_of_model(model: Any) -> str:
         raise BadInput("MjModel: found a flex, expected rigid bodies")
     root = Element("mujoco", model=_model_name(model))
     SubElement(root, "compiler", angle="radian")
-    for i in range(model.ntext):
-        data = model.text(i)
-        text = bytes(data.data).decode().rstrip("\0")
-        SubElement(SubElement(root, "custom"), "text", name=data.name, data=text)
+    for i, (start, size) in enumerate(
+        zip(model.text_adr, model.text_size, strict=True)
+    ):
+        text = bytes(model.text_data[start : start + size]).decode().rstrip("\0")
+        name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_TEXT, i)
+        SubElement(SubElement(root, "custom"), "text", name=name, data=text)
     elements = _bodies(mujoco, model, root)
     _ties(mujoco, model, root, elements)
     if model.ntendon:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.assembly.files.link_file import read_link
+from forcefit.assembly.files.link_models import model_link
 from forcefit.assembly.files.written_units import without_units
 from forcefit.assembly.model.largest import LARGEST
 from forcefit.assembly.model.robot import Link, MatrixLink
@@ -17,13 +18,13 @@ from forcefit.stiffness.beam.curve_file import read_pieces
 _LENGTHS = ("radius", "inner_radius", "width", "height", "length", "wall", "web",
             "flange")  # fmt: skip
 _CURVE = ("curve", "young", "poisson", "density", "theory")
-_KINDS = ("beam", "curve", "stiffness", "mesh", "library")
+_KINDS = ("beam", "curve", "stiffness", "mesh", "library", "model")
 _GAP = 1e-6  # [1] of the beam's reach by which it may miss the joint at its end
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A beam along a curve, by its table.
+    """A beam along a curve, or a model of another distribution, by its table.
 
     Attributes:
         table: of the link; its keys are checked when the joints' points are known.
@@ -48,10 +49,12 @@ def read_drawn_link(body: Table) -> Link | Curve | None:
     link = body.content.get("link")
     if isinstance(link, dict) and not set(_KINDS) & set(link):
         _refuse_no_kind(body.table("link"))
+    if isinstance(link, dict) and set(link) == {"model"}:
+        return Curve(body.table("link"))
     if not isinstance(link, dict) or "curve" not in link:
         if isinstance(link, dict) and isinstance(link.get("beam"), dict):
             _plain_lengths(link["beam"], body, "link.beam")
-        return read_link(body)
+        return read_link(body, np.zeros(3))
     table = body.table("link")
     for key in table.content:
         if key not in _CURVE:
@@ -80,11 +83,11 @@ def _plain_lengths(content: dict[str, Any], body: Table, place: str) -> None:
 def curve_link(
     curve: Curve, start: NDArray, tip: NDArray
 ) -> tuple[MatrixLink, float, NDArray, NDArray]:
-    """Return stiffness and mass of a beam along a curve between two joints.
+    """Return stiffness and mass of a beam along a curve, or of a model.
 
     Args:
         curve: as read.
-        start: (3,) [m] point of the joint at which it begins, axes of the file.
+        start: (3,) [m] point of the joint at which the link begins, axes of the file.
         tip: (4, 4) point and axes of the joint at its end, axes of the file.
 
     Returns:
@@ -95,6 +98,9 @@ def curve_link(
         BadInput: a piece or a material is not proper, or the curve ends elsewhere.
     """
     table = curve.table
+    if table.has("model"):
+        span = tip[:3, :3].T @ (tip[:3, 3] - start)
+        return model_link(table, span), 0.0, np.zeros(3), np.zeros((3, 3))
     young = table.number("young", "Pa", above=0.0, largest=LARGEST)
     poisson = table.number("poisson", "-", above=-1.0, below=0.5)
     theory = table.choice("theory", ("timoshenko", "euler"), "timoshenko")

@@ -13,7 +13,7 @@ from forcefit.assembly.files.function_file import (
     read_function,
 )
 from forcefit.assembly.model.robot import Robot
-from forcefit.inputs.table import Table, nearest, quoted
+from forcefit.inputs.table import BadInput, Table, nearest, quoted
 
 
 def with_effects(robot: Robot, tables: Sequence[Table]) -> Robot:
@@ -39,8 +39,12 @@ def with_effects(robot: Robot, tables: Sequence[Table]) -> Robot:
         if name == FUNCTION:
             functions.append(read_function(table, robot))
             continue
+        try:
+            effect = LIBRARY[name]
+        except BadInput as error:  # of another distribution
+            raise table.bad("name", str(error)) from None
         session = table.text("session", longest=200) if table.has("session") else None
-        if session is not None and not LIBRARY[name].by_row:
+        if session is not None and not effect.by_row:
             raise table.bad(
                 "session",
                 f"found a session, but {name} acts in all sessions; remove session",

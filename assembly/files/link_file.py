@@ -4,8 +4,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from forcefit.assembly.files.joint_file import definite
+from forcefit.assembly.files.link_models import model_link
 from forcefit.assembly.model.largest import LARGEST, LARGEST_LENGTH
 from forcefit.assembly.model.robot import (
     BeamLink,
@@ -24,7 +26,7 @@ _ONE_SECTION = (
     '"radius" [, "inner_radius"] or "width", "height" or '
     '"area", "I_y", "I_z", "J", "shear_y", "shear_z"'
 )
-_KINDS = ("beam", "stiffness", "mesh", "library")
+_KINDS = ("beam", "stiffness", "mesh", "library", "model")
 _MATERIAL = ("young", "poisson", "density")
 _SECTIONS: dict[str, dict[str, str]] = {  # keys of each kind, and their units
     "round": {"radius": "m", "inner_radius": "m"},
@@ -36,11 +38,13 @@ _SECTIONS: dict[str, dict[str, str]] = {  # keys of each kind, and their units
 }  # fmt: skip
 
 
-def read_link(frame: Table) -> Link | None:
-    """Return link of a ``[[frame]]``: exactly one of beam, stiffness, mesh, library.
+def read_link(frame: Table, span: NDArray) -> Link | None:
+    """Return link of a ``[[frame]]``, of exactly one kind.
 
     Args:
         frame: the frame's table; its keys ``link`` and ``up`` are read.
+        span: (3,) [m] from the parent's origin to the frame's, in the frame's axes, for
+            models of other distributions.
 
     Returns:
         The link, None if the body is rigid.
@@ -66,6 +70,8 @@ def read_link(frame: Table) -> Link | None:
         result = MatrixLink(definite(link, "stiffness", K))
     elif kinds == ["mesh"]:
         result = _mesh_link(link, frame)
+    elif kinds == ["model"]:
+        result = model_link(link, span)
     else:
         result = _library_link(link)
     link.finish()

@@ -307,7 +307,7 @@ def _frame(table: Table) -> Frame:
         locked_at=bolt,
         joint_stiffness=read_joint_stiffness(table, own),
         drive_force=_drive_force(table, passive),
-        link=read_link(table),
+        link=read_link(table, rotation_matrix(rotation).T @ translation),
         mass=table.number("mass", "kg", 0.0, least=0.0, largest=1e40),
         centre_of_mass=_numbers(table, "centre_of_mass", 3, "m"),
         inertia=read_inertia(table),

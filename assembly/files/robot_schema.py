@@ -57,6 +57,10 @@ _STIFFNESS = number("stiffness", "N m/rad .. N/m", "screw", "wrench_component")
 _LINK = record(
     beam_=_BEAM, mesh_=_MESH, stiffness_=_STIFFNESS,
     library_=text("entry of a stiffness library: path#key"),
+    model_=Each(Either((
+        number("value for a link model of another distribution", ""),
+        text("name of the model, and values"),
+    ))),
     young_=number("Young's modulus", "Pa"), poisson_=number("Poisson's ratio"),
     density_=number("density", "kg/m^3"), up_=_DIRECTION,
     pieces_=number("springs in series of a beam"),

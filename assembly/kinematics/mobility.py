@@ -17,6 +17,7 @@ from forcefit.assembly.kinematics.nominal import mobile, motion_screws, size_of
 from forcefit.assembly.kinematics.posture import Posture
 from forcefit.assembly.kinematics.ranks import MISMATCH_FACTOR, rank_of
 from forcefit.assembly.model.contact_closures import contact_closures
+from forcefit.results.display import html_table
 
 # relative size of singular values that count as zero: those of files rounded at 6
 # digits, and of singular postures, which closures to 1e-10 determine to its root
@@ -72,6 +73,8 @@ class Mobility:
     local_freedoms: int
     actuation_redundancy: int
     singular_value_gap: float
+
+    _repr_html_ = html_table
 
 
 @dataclass(frozen=True)

@@ -121,7 +121,8 @@ class Frame(EqualData):
         locked_at: where the joint is bolted, with its clearance before; None if it is
             not.
         joint_stiffness: (6, 6) K_B with ``inf`` on the diagonal where rigid, or None;
-            0 along a passive joint's own motion (its row and column) leaves it free.
+            (6,) its diagonal, as in robot files, becomes a matrix; 0 along a passive
+            joint's own motion (its row and column) leaves it free.
         drive_force: [N m or N] with which a drive pushes a passive joint along its
             motion, independent of its coordinate; positive where the coordinate grows.
         link: elasticity of the body, None if rigid.
@@ -159,6 +160,8 @@ class Frame(EqualData):
         for name, shape in _SHAPES.items():
             value = getattr(self, name)
             if value is not None:
+                if name == "joint_stiffness" and np.ndim(value) == 1:
+                    value = np.diag(value)
                 value = locked(value, shape, f"frame '{self.name}': {name}")
                 object.__setattr__(self, name, value)
         if self.locked_at is not None and (self.joint != "fixed" or self.clearance):

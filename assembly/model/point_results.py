@@ -64,6 +64,8 @@ class PointResults:
         from forcefit.assembly.model.tables import points_dataset
 
         arrays = {name: getattr(self, own) for name, own in self.VARIABLES.items()}
+        if not self.of_many:
+            arrays = {name: np.asarray(value)[None] for name, value in arrays.items()}
         return points_dataset(arrays)
 
     def to_pandas(self) -> "pandas.DataFrame":

@@ -6,7 +6,7 @@ use.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -22,8 +22,10 @@ if TYPE_CHECKING:
 
 # variables whose quantity has another name in the table
 _RENAMED = {
-    "clearance_screw": "clearance", "link_screw": "link", "joint_screw": "joint"
+    "clearance_screw": "clearance", "link_screw": "link", "joint_screw": "joint",
+    "stiffness": "axis_stiffness", "stiffness_matrix": "stiffness", "read_at": "point",
 }  # fmt: skip
+NO_LABELS: Mapping[str, Sequence[Any]] = {}
 
 
 class PlacedRobot(Protocol):
@@ -92,12 +94,12 @@ def assembly_dataset(assembly: ForcedAssembly) -> "xarray.Dataset":
         name: getattr(assembly, name)
         for name in ("energy", "potential", "platform_screw", "load")
     }
-    data = _dataset(frames, "frame", [f.name for f in robot.frames])
+    data = labelled(frames, "frame", [f.name for f in robot.frames])
     pose = {
         name: ((), value, {"units": "m" if name[0] == "t" else "rad"})
         for name, value in assembly.posture.pose().items()
     }
-    data = data.merge(_dataset(single)).assign_coords(pose)
+    data = data.merge(labelled(single)).assign_coords(pose)
     about = QUANTITIES["closure_wrench"]
     data["closure_wrench"] = (
         ("closure", *about.dims), assembly.closure_wrenches, about.attributes
@@ -116,7 +118,7 @@ def points_dataset(values: Mapping[str, NDArray]) -> "xarray.Dataset":
         Data set with their units.
     """
     count = len(next(iter(values.values())))
-    return _dataset(values, "point", np.arange(count))
+    return labelled(values, "point", np.arange(count))
 
 
 def frame_table(data: "xarray.Dataset", *rows: str) -> "pandas.DataFrame":
@@ -184,15 +186,34 @@ def component_unit(unit: str, component: str) -> str:
     return unit
 
 
-def _dataset(values: Mapping[str, Any], *points: Any) -> "xarray.Dataset":
-    """Values with units and meaning; ``points`` names their first axis and labels."""
+def labelled(
+    values: Mapping[str, Any],
+    axis: str = "",
+    points: Sequence[Any] | NDArray = (),
+    labels: Mapping[str, Sequence[Any]] = NO_LABELS,
+) -> "xarray.Dataset":
+    """Return arrays as a data set with units and meaning.
+
+    Args:
+        values: by variable the array of the quantity of this name; or the pair of
+            another :class:`~forcefit.results.quantities.Quantity` and its array.
+        axis: name of the first dimension of every array; empty if there is none.
+        points: labels of that dimension.
+        labels: labels of dimensions of which the table of quantities has none.
+
+    Returns:
+        The data set.
+    """
     import xarray
 
-    first = points[:1]
     data: dict[str, Any] = {}
-    labels = dict([points] if points else [])
+    coords: dict[str, Any] = {axis: points} if axis else {}
     for name, value in values.items():
-        known = QUANTITIES[_RENAMED.get(name, name)]
-        data[name] = ((*first, *known.dims), np.asarray(value), known.attributes)
-        labels |= {dim: list(LABELS[dim]) for dim in known.dims}
-    return xarray.Dataset(data, labels)
+        known, array = (
+            value if isinstance(value, tuple)
+            else (QUANTITIES[_RENAMED.get(name, name)], value)
+        )  # fmt: skip
+        dims = (axis, *known.dims) if axis else known.dims
+        data[name] = (dims, np.asarray(array), known.attributes)
+        coords |= {dim: list({**LABELS, **labels}[dim]) for dim in known.dims}
+    return xarray.Dataset(data, coords)

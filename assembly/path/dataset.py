@@ -8,15 +8,16 @@ import numpy as np
 from forcefit.assembly.kinematics.nominal import mobile
 from forcefit.assembly.kinematics.posture import POSE, pose_components
 from forcefit.assembly.model.link_stress import stressed_links
-from forcefit.assembly.path.path_errors import PathErrors
 from forcefit.assembly.sweeps.identity import program_hash, robot_hash
 from forcefit.results.quantities import LABELS, QUANTITIES
 
 if TYPE_CHECKING:
     import xarray
 
+    from forcefit.assembly.path.path_errors import PathErrors
 
-def path_dataset(errors: PathErrors, command: str = "") -> "xarray.Dataset":
+
+def path_dataset(errors: "PathErrors", command: str = "") -> "xarray.Dataset":
     """Return the errors along a path as a data set.
 
     Args:

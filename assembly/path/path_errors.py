@@ -8,6 +8,7 @@ the first natural frequency and its acceleration does not jump.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,6 +38,10 @@ from forcefit.inputs.table import BadInput, nearest
 from forcefit.results.display import Figures, html_table, largest, short_repr
 
 ASSUMPTIONS = ("none", "frozen", "free")  # of the bounds of problem (27) under load
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
 _BLOCK = 2000  # points solved and stored together
 _BLOCK_OF_TANGENTS = 100  # likewise, where each has a tangent of its own
 # results that exist wherever the path does
@@ -97,6 +102,18 @@ class PathErrors:
             "path time": f"{self.trajectory.duration:.4g} s, {self.periods:.3g} "
             "periods of the first natural frequency",
         }
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return a data set over ``time``, as ``--output`` writes it."""
+        from forcefit.assembly.path.dataset import path_dataset
+
+        return path_dataset(self)
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Return a row for each instant, columns (variable, component)."""
+        from forcefit.assembly.model.tables import frame_table
+
+        return frame_table(self.to_xarray(), "time")
 
     @property
     def inertial(self) -> NDArray:

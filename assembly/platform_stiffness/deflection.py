@@ -14,7 +14,7 @@ follows that part.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -42,6 +42,10 @@ from forcefit.assembly.solvers.method import Method, check_method
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.renamed import renamed_keywords
 from forcefit.results.display import html_table, largest_row, numbers, short_repr
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 _HALVINGS = 14  # bisections that locate an event to 6e-5 of a load step
 _CARRIES = 1e-6  # relative to the largest force times bound: smaller ones count as zero
@@ -103,6 +107,18 @@ class DeflectionCurve:
     method: Method
 
     __repr__, _repr_html_ = short_repr, html_table
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return a data set over ``point``; see :mod:`.tables`."""
+        from forcefit.assembly.platform_stiffness.tables import curve_dataset
+
+        return curve_dataset(self)
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Return a row for each load, columns (variable, component)."""
+        from forcefit.assembly.model.tables import frame_table
+
+        return frame_table(self.to_xarray(), "point")
 
     @property
     def deflection(self) -> NDArray:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +20,10 @@ from forcefit.assembly.platform_stiffness.matrices import Part, PlatformStiffnes
 from forcefit.assembly.solvers.method import Method, log_reference
 from forcefit.results.display import html_table, short_repr
 from forcefit.stiffness.screws import screw_map
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 _RANK = 1e-10  # relative size below which a compliance's root counts as rigid
 
@@ -77,6 +82,18 @@ class Stiffnesses:
             free=np.zeros((6, 0)),
             method=self.method[i],
         )
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return a data set over ``point``, as of a sweep."""
+        from forcefit.assembly.platform_stiffness.tables import stiffnesses_dataset
+
+        return stiffnesses_dataset(self)
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Return a row for each point, columns (variable, component)."""
+        from forcefit.assembly.model.tables import frame_table
+
+        return frame_table(self.to_xarray(), "point")
 
     def at(self, points: NDArray) -> "Stiffnesses":
         """Return the stiffnesses read at other points of the platforms.

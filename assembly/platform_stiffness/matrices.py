@@ -27,7 +27,7 @@ Sources:
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,6 +39,10 @@ from forcefit.inputs.errors import BadInput
 from forcefit.inputs.number_arrays import find_fault
 from forcefit.results.display import Figures, html_table, numbers, short_repr, show
 from forcefit.stiffness.screws import screw_map
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 _RANK = 1e-10  # relative size below which a motion counts as zero
 _ROUNDING = 1e-12  # relative size of rounding of motions of the platform
@@ -54,6 +58,12 @@ class Part(NamedTuple):
 
     frame: str
     kind: str
+
+    @property
+    def words(self) -> str:
+        """Name in tables, such as ``"leg1.link_a link"``."""
+        known = f"{self.frame} {self.kind}"
+        return known if self.frame else "internal forces and loads"
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,6 +141,18 @@ class PlatformStiffness:
             "eigenstiffnesses": f"{numbers(eigen.values)} N/m",
             "length": f"{self.length:g} m",
         }
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return a data set; see :mod:`forcefit.assembly.platform_stiffness.tables`."""
+        from forcefit.assembly.platform_stiffness.tables import stiffness_dataset
+
+        return stiffness_dataset(self)
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Return a row for each part: its shares in the compliance along each axis."""
+        from forcefit.assembly.model.tables import frame_table
+
+        return frame_table(self.to_xarray(), "part")
 
     def at(self, point: ArrayLike, length: float | None = None) -> "PlatformStiffness":
         """Return the stiffness read at another point of the platform.

@@ -20,7 +20,7 @@ Sources:
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -44,6 +44,10 @@ from forcefit.results.display import html_table, short_repr
 from forcefit.stiffness.beam.beam import section_axes
 from forcefit.stiffness.beam.sections import declared_section
 from forcefit.stiffness.screws import screw_map
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 _NULL = 1e-12  # relative to the largest eigenvalue: below it neither mass nor stiffness
 _ROUNDING = 1e-14  # of the largest entry of the mass matrix: rounding of its entries
@@ -72,6 +76,18 @@ class NaturalModes:
     method: Method
 
     __repr__, _repr_html_ = short_repr, html_table
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return a data set over ``mode``; see :mod:`.tables`."""
+        from forcefit.assembly.platform_stiffness.tables import modes_dataset
+
+        return modes_dataset(self)
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Return a row for each mode, columns (variable, component)."""
+        from forcefit.assembly.model.tables import frame_table
+
+        return frame_table(self.to_xarray(), "mode")
 
 
 @renamed_keywords(exact=("state", {True: "exact", False: "nominal"}))

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from forcefit.assembly.exact.exact import ExactAssembly
 from forcefit.assembly.kinematics.posture import Posture
 from forcefit.assembly.linear.energy import Assembly
 from forcefit.assembly.model.contact_closures import contact_frames
 from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.report.error_body import ErrorBody, possible_errors
-from forcefit.stiffness.screws import rotation_matrix, screw_map
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector, screw_map
 
 _SHORT = 1e-9  # [m] length below which a body is not drawn
 
@@ -229,6 +230,32 @@ def displaced_bodies(assembly: Assembly, closing: float = 1.0) -> DisplacedBodie
         at_end[i] = carried + body[i, :, 0]
     bends = turned @ links[..., None]
     return DisplacedBodies(starts, ends, at_start, at_end, bends[:, :3, 0])
+
+
+def finitely_displaced_bodies(assembly: ExactAssembly) -> DisplacedBodies:
+    """Return the displacements of all bodies by finite motions.
+
+    Args:
+        assembly: assembly of a robot of n frames with finite motions.
+
+    Returns:
+        The bodies; their ends have the exact displacements, and their rotations are
+        rotation vectors.
+    """
+    posture = assembly.posture
+    nominal = posture.transforms
+    ends = assembly.placement.body_ends[assembly.cut.last]
+    # the base stands still, at row -1
+    at_start, at_end = np.zeros((len(nominal) + 1, 6)), np.zeros((len(nominal), 6))
+    for screws, T in ((at_start[:-1], assembly.transforms), (at_end, ends)):
+        turned = T[:, :3, :3] @ np.swapaxes(nominal[:, :3, :3], 1, 2)
+        screws[:, :3] = rotation_vector(turned)
+        screws[:, 3:] = T[:, :3, 3] - nominal[:, :3, 3]
+    bends = nominal[:, :3, :3] @ assembly.link_screws[:, :3, None]
+    return DisplacedBodies(
+        body_starts(posture), nominal[:, :3, 3], at_start[posture.robot.parents],
+        at_end, bends[..., 0],
+    )  # fmt: skip
 
 
 def body_starts(posture: Posture) -> NDArray:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from forcefit.assembly.exact.exact import ExactAssembly
 from forcefit.assembly.kinematics.posture import Posture
 from forcefit.assembly.linear.energy import Assembly
 from forcefit.assembly.model.contact_closures import contact_frames, loops
@@ -15,6 +16,7 @@ from forcefit.assembly.report.plot import (
     DisplacedBodies,
     body_starts,
     displaced_bodies,
+    finitely_displaced_bodies,
     readable_factor,
 )
 from forcefit.page.charts import scene
@@ -52,7 +54,23 @@ def forced_scene(
     ends = posture.transforms[:, :3, 3]
     moved = [] if closing is None else closing[:, :, :3, 3] - ends
     shape = None if body is None else _error_body(body, posture.platform[:3, 3])
-    return _spec(posture, displaced_bodies(assembly), moved, _forces(assembly), shape)
+    forces = _forces(assembly, posture.transforms)
+    return _spec(posture, displaced_bodies(assembly), moved, forces, shape)
+
+
+def exact_scene(assembly: ExactAssembly) -> dict[str, Any]:
+    """Return the numbers of a scene of an assembly with finite motions.
+
+    Small displacements are exaggerated, large ones are drawn as they are.
+    """
+    bodies = finitely_displaced_bodies(assembly)
+    forces = _forces(assembly, assembly.transforms)
+    spec = _spec(assembly.posture, bodies, [], forces, None)
+    factor = spec["exaggeration"] = max(1.0, spec["exaggeration"])
+    box, displaced = spec["box"], bodies.ends + factor * bodies.end_screws[:, 3:]
+    box[:, 0] = np.minimum(box[:, 0], displaced.min(axis=0))
+    box[:, 1] = np.maximum(box[:, 1], displaced.max(axis=0))
+    return spec
 
 
 def nominal_scene(posture: Posture) -> dict[str, Any]:
@@ -70,8 +88,9 @@ def _spec(
     """Return the numbers of a scene, with its size, units and exaggeration."""
     ends = bodies.ends
     size = float(np.ptp(np.vstack([ends, np.zeros(3)]), axis=0).max()) or 1.0
-    middle = (ends.max(axis=0) + ends.min(axis=0)) / 2
-    half = np.maximum(np.ptp(ends, axis=0) / 2, 0.15 * size) + 0.15 * size
+    drawn = np.vstack([bodies.starts, ends])
+    middle = (drawn.max(axis=0) + drawn.min(axis=0)) / 2
+    half = np.maximum(np.ptp(drawn, axis=0) / 2, 0.15 * size) + 0.15 * size
     largest = float(np.linalg.norm(bodies.end_screws[:, 3:], axis=1).max())
     return {
         "bodies": [_body(posture.robot, bodies, i) for i in range(len(ends))],
@@ -119,10 +138,12 @@ def _moved(bodies: DisplacedBodies, i: int, s: NDArray) -> NDArray:
     )  # fmt: skip
 
 
-def _forces(assembly: Assembly) -> list[dict[str, Any]]:
+def _forces(
+    assembly: Assembly | ExactAssembly, transforms: NDArray
+) -> list[dict[str, Any]]:
     """Return the forces [N] that elastic links transmit at their tips, base axes."""
     posture = assembly.posture
-    turned = posture.transforms[:, :3, :3] @ assembly.tip_wrenches[:, 3:, None]
+    turned = transforms[:, :3, :3] @ assembly.tip_wrenches[:, 3:, None]
     largest = float(np.abs(turned).max(initial=0.0))
     return [
         {"body": i, "force": force}

@@ -2,13 +2,14 @@
 
 from typing import TYPE_CHECKING, Any
 
+from forcefit.assembly.exact.exact import ExactAssembly
 from forcefit.assembly.kinematics.posture import Posture, home_posture
 from forcefit.assembly.linear.energy import Assembly
 from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.platform_stiffness.matrices import PlatformStiffness
 from forcefit.assembly.report.error_body import possible_errors
 from forcefit.assembly.report.platform_stiffness import stiffness_values
-from forcefit.assembly.report.scene import forced_scene, nominal_scene
+from forcefit.assembly.report.scene import exact_scene, forced_scene, nominal_scene
 from forcefit.assembly.report.scene_figure import scene_figure
 from forcefit.assembly.report.share_pictures import plot_shares, share_chart
 from forcefit.inputs.errors import BadInput
@@ -19,9 +20,10 @@ from forcefit.page.picture import Picture, in_notebook, picture
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Shown = Robot | Posture | Assembly | PlatformStiffness
+Shown = Robot | Posture | Assembly | ExactAssembly | PlatformStiffness
 _NOMINAL = "Red: elastic links; blue: rigid bodies; orange: driven joints."
 _FORCED = f"Nominal (grey) and forced robot of least energy. {_NOMINAL}"
+_EXACT = f"Nominal (grey) and forced robot with finite motions. {_NOMINAL}"
 _SHARES = "Shares of the parts in the compliance of the platform along each axis."
 
 
@@ -36,7 +38,8 @@ def show(
 
     Args:
         thing: a robot, drawn in its home pose; a posture; an assembly, nominal and
-            forced, its displacements exaggerated; or a stiffness of the platform, the
+            forced, its displacements exaggerated; the same with finite motions, large
+            displacements as they are; or a stiffness of the platform, the
             shares of its parts.
         errors: ``"translation"`` or ``"rotation"`` adds the possible platform errors
             within the clearances to an assembly.
@@ -75,14 +78,16 @@ def _scene(
     """Return the numbers of a scene, the robot's name, and a caption."""
     if isinstance(thing, Robot):
         return nominal_scene(home_posture(thing)), thing.name, _NOMINAL
+    if isinstance(thing, ExactAssembly):
+        return exact_scene(thing), thing.posture.robot.name, _EXACT
     if not isinstance(thing, Posture | Assembly):
-        expected = "expected a Robot, Posture, Assembly or PlatformStiffness"
+        expected = "expected a Robot, Posture, assembly or PlatformStiffness"
         raise BadInput(f"show: found {type(thing).__name__}, {expected}")
     posture = thing if isinstance(thing, Posture) else thing.posture
     many = isinstance(thing, Assembly) and thing.of_many
     if many or posture.transforms.ndim > 3:
         kind = type(thing).__name__
-        raise BadInput(f"show: found a {kind} of many points, expected one of them")
+        raise BadInput(f"show: found {kind} of many points, expected one of them")
     if isinstance(thing, Posture):
         return nominal_scene(thing), thing.robot.name, _NOMINAL
     body, caption = None, _FORCED

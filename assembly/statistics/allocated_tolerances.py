@@ -20,6 +20,7 @@ from forcefit.results.display import html_table, short_repr
 from forcefit.results.text import in_unit
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
 
 
@@ -71,6 +72,12 @@ class Allocation:
     def to_xarray(self) -> "xarray.Dataset":
         """Return the tolerances over ``class``, as ``--output`` writes them."""
         return tolerance_dataset(self)
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Return a row for each class, columns (variable, component)."""
+        from forcefit.assembly.model.tables import frame_table
+
+        return frame_table(self.to_xarray(), "class")
 
 
 def allocation_of(allocation: Allocation) -> dict[str, Any]:

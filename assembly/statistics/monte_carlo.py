@@ -51,7 +51,7 @@ def run_draws(
     path: Path | str | None = None,
     workers: int = 1,
     progress: Callable[[int, int], None] = lambda done, total: None,
-    importance: ImportanceOptions | None = None,
+    importance: ImportanceOptions | int | None = None,
     held: ExitStack | None = None,
 ) -> "xarray.Dataset":
     """Solve the draws 0 .. count - 1.
@@ -63,7 +63,8 @@ def run_draws(
             removed.
         workers: number of threads.
         progress: called with the number of finished draws and the number of all draws.
-        importance: options for the importance of errors; None if it is not computed.
+        importance: options for the importance of errors, or its number of base draws;
+            None if it is not computed.
         held: context that keeps the journal until it is closed, as in
             :func:`forcefit.assembly.sweeps.sweep.run_sweep`.
 
@@ -77,6 +78,8 @@ def run_draws(
         ModuleNotFoundError: xarray is missing.
     """
     need("xarray")
+    if isinstance(importance, int):
+        importance = ImportanceOptions(importance)
     with ExitStack() as own:
         return _run_draws(
             experiment, count, path, workers, progress, importance, held or own

@@ -37,6 +37,8 @@ from forcefit.assembly.statistics.quantities import POSE_ERRORS
 from forcefit.assembly.statistics.responses import respond
 from forcefit.assembly.steps.bolted import refuse_bolted
 from forcefit.inputs.table import BadInput
+from forcefit.results.display import Figures, html_table, short_repr
+from forcefit.results.text import in_unit
 
 _TOLERANCE = 3e-4  # relative to the sum of the supports along x, y and z
 _STARTS = 24  # random corners from which the equilibrium climbs
@@ -74,6 +76,19 @@ class WorstPose:
     direction: NDArray
     shares: tuple[tuple[str, float], ...]
     rigid: float = float("nan")
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    def _figures(self) -> Figures:
+        """Return lines with both bounds and the three largest shares."""
+        unit = "mrad" if self.quantity == "rotation" else "um"
+        return {
+            "quantity": self.quantity,
+            "reading": self.reading,
+            "attained": in_unit(self.attained, unit),
+            "bound": in_unit(self.bound, unit),
+            **{f"share of {name}": in_unit(x, unit) for name, x in self.shares[:3]},
+        }
 
 
 def worst_pose(

@@ -8,6 +8,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from functools import cache
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 import forcefit.assembly
 import forcefit.inputs
 import forcefit.stiffness
+from forcefit.assembly.effects import LIBRARY
 from forcefit.assembly.files.robot_file import robot_table
 from forcefit.assembly.kernels.choice import kernels
 from forcefit.assembly.model.links import link_compliance
@@ -36,7 +38,9 @@ def program_hash() -> str:
 
 
 def robot_hash(robot: Robot) -> str:
-    """Return the SHA-256 of a robot's file content, and of the meshes that it names.
+    """Return the SHA-256 of a robot's file content, and of what the file names.
+
+    These are meshes, libraries, and versions of effects of other distributions.
 
     Args:
         robot: the robot.
@@ -55,6 +59,8 @@ def robot_hash(robot: Robot) -> str:
             digest.update(mesh_solution(frame).digest.encode())
         if isinstance(frame.link, LibraryLink):
             digest.update(link_compliance(frame).tobytes())
+    for name in (*robot.effects, *chain(*robot.session_effects.values())):
+        digest.update(LIBRARY.version(name).encode())  # empty for effects of forcefit
     return digest.hexdigest()
 
 

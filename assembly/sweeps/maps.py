@@ -13,6 +13,7 @@ from forcefit.assembly.model.statuses import OK
 from forcefit.assembly.sweeps.panels import Panel, named_panels, quantity, usual_panels
 from forcefit.inputs.errors import plot_label
 from forcefit.inputs.table import BadInput, nearest, quoted
+from forcefit.page.picture import show_figures_of_cells
 
 if TYPE_CHECKING:
     import xarray
@@ -36,7 +37,8 @@ def figure_of(
             figure 5.
 
     Returns:
-        A figure with a panel for each quantity, with six panels by default.
+        A figure with a panel for each quantity, with six panels by default.  It is
+        not shown, except by a notebook as the result of a cell.
 
     Raises:
         BadInput: an axis or a quantity is unknown, or more than two axes remain.
@@ -49,6 +51,7 @@ def figure_of(
     axes = {str(d): view.sizes[d] for d in view["status"].dims}
     check_axes(axes)
     panels = named_panels(view, quantities) if quantities else None
+    show_figures_of_cells()
     figure = (map_figure if len(axes) == 2 else path_figure)(view, panels)
     if note:
         figure.text(0.995, 0.995, plot_label(note), ha="right", va="top", fontsize=8)

@@ -5,7 +5,6 @@ share it.  A tangent is computed point by point: of problem (22), with clearance
 or in contact, or of the exact equilibrium, with its internal forces.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -25,6 +24,10 @@ from forcefit.assembly.platform_stiffness.exact_tangent import exact_tangent
 from forcefit.assembly.platform_stiffness.linear_tangent import in_contact, owners
 from forcefit.assembly.platform_stiffness.matrices import Part, PlatformStiffness
 from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.platform_stiffness.tables import (
+    many_quantities,
+    tangent_quantities,
+)
 from forcefit.assembly.solvers.conic import SolverFailed
 
 STATES = {
@@ -45,7 +48,7 @@ def stiffness_parts(robot: Robot, state: str) -> tuple[str, ...]:
     Returns:
         Links and joints; for a tangent also clearances in contact, or existing forces.
     """
-    return tuple(map(_name, _parts(robot, state)))
+    return tuple(part.words for part in _parts(robot, state))
 
 
 def _parts(robot: Robot, state: str) -> list[Part]:
@@ -56,11 +59,6 @@ def _parts(robot: Robot, state: str) -> list[Part]:
         rows = np.unique(np.abs(joints.cones).argmax(axis=0) // 6)
         parts += [Part(shown_name(robot, row), "clearance") for row in rows.tolist()]
     return parts + [_FORCES] * (state == "exact")
-
-
-def _name(part: Part) -> str:
-    """Return the label of a part."""
-    return f"{part.frame} {part.kind}" if part.frame else "internal forces and loads"
 
 
 def nominal_stiffnesses(
@@ -75,15 +73,7 @@ def nominal_stiffnesses(
         Quantities by name, with k rows each; and the free motions by row.
     """
     many: Any = platform_stiffness(posture)  # of many postures: Stiffnesses
-    by_axis = [list(many.shares(axis).values()) for axis in np.eye(6)]
-    quantities = {
-        "compliance": many.compliance,
-        "stiffness": np.stack([many.along(axis) for axis in np.eye(6)], axis=1),
-        "eigen_stiffness": many.eigen_stiffnesses,
-        "stiffness_condition": many.condition,
-        "share": np.array(by_axis).transpose(2, 1, 0),
-    }
-    return quantities, {i: one.free_text for i, one in many.apart.items()}
+    return many_quantities(many), {i: one.free_text for i, one in many.apart.items()}
 
 
 def tangent_stiffnesses(
@@ -108,7 +98,7 @@ def tangent_stiffnesses(
             rows.append(_unknown(len(parts)))
             reasons[i] = f"no tangent: {error}"
             continue
-        rows.append(_quantities(tangent, parts))
+        rows.append(tangent_quantities(tangent, parts))
         if tangent.free.size:
             reasons[i] = tangent.free_text
         elif not tangent.stable:
@@ -129,19 +119,6 @@ def _tangent(conditions: Conditions, i: int, state: str) -> PlatformStiffness:
     if isinstance(assembly, ExactAssembly):
         return exact_tangent(assembly, "letting go")
     return in_contact(assembly, "letting go")
-
-
-def _quantities(tangent: PlatformStiffness, parts: list[Part]) -> dict[str, NDArray]:
-    """Return the stored quantities of a tangent."""
-    eigen = tangent.eigen
-    shares: list[Mapping[Part, float]] = [tangent.shares(axis) for axis in np.eye(6)]
-    return {
-        "compliance": tangent.compliance,
-        "stiffness": np.array([tangent.along(axis)[0] for axis in np.eye(6)]),
-        "eigen_stiffness": eigen.values,
-        "stiffness_condition": np.array(eigen.condition),
-        "share": np.array([[one.get(part, 0.0) for one in shares] for part in parts]),
-    }
 
 
 def _unknown(parts: int) -> dict[str, NDArray]:

@@ -48,9 +48,14 @@ EXAMPLES = {
         "forcefit assembly solve examples/drawn/tricept.toml --load fx=100",
     ),
     "notebooks": _Example(
-        "notebooks for Jupyter: a five-bar from robot file to report, a 3-UPU",
+        "notebooks for Jupyter: robot, CAD link, campaign, tolerances, maps, paper",
         ("examples/notebooks",),
         "jupyter lab examples/notebooks/own_robot.ipynb",
+    ),
+    "extension": _Example(
+        "a package that adds a reader, an effect and a link model",
+        ("examples/extension",),
+        "pip install ./examples/extension",
     ),
     "campaign": _Example(
         "measurements of an arm whose model lacks an effect",

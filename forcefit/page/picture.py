@@ -3,9 +3,14 @@
 import html
 import sys
 from dataclasses import dataclass
+from io import BytesIO
+from typing import TYPE_CHECKING, Any
 
 from forcefit.page.markup import packaged, piece
 from forcefit.page.page import packed_plotly
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _HEIGHT = 760  # [px] of a scene with its controls and its caption
 
@@ -51,5 +56,31 @@ def picture(title: str, figure: str) -> Picture:
 
 def in_notebook() -> bool:
     """Return whether a notebook shows what its cells return: IPython with a kernel."""
-    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
-    return getattr(shell, "kernel", None) is not None
+    return getattr(_shell(), "kernel", None) is not None
+
+
+def show_figures_of_cells() -> None:
+    """Let a notebook show a figure of matplotlib that is the result of a cell.
+
+    IPython does so itself only after the first figure of pyplot.  A way that the user
+    chose, such as ``%matplotlib inline``, is left as it is.
+    """
+    if not in_notebook():
+        return
+    from matplotlib.figure import Figure
+
+    formatters = _shell().display_formatter.formatters
+    if not any(Figure in known for known in formatters.values()):
+        formatters["image/png"].for_type(Figure, _png)
+
+
+def _png(figure: "Figure") -> bytes:
+    """Return a figure as a PNG picture."""
+    content = BytesIO()
+    figure.savefig(content, format="png")
+    return content.getvalue()
+
+
+def _shell() -> Any:
+    """Return IPython's shell, None outside IPython."""
+    return getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()

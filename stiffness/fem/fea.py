@@ -40,7 +40,7 @@ from forcefit.stiffness.mesh.regions import cut_by_regions
 from forcefit.stiffness.mesh.slender_bar import slender_bar
 from forcefit.stiffness.mesh.solid import Solid
 from forcefit.stiffness.mesh.straight_bar import straight_bar
-from forcefit.stiffness.surface.interface import Interface
+from forcefit.stiffness.surface.interface import Interface, parse_interface
 from forcefit.stiffness.surface.patches import (
     find_patches,
     refuse_common_edges,
@@ -119,8 +119,8 @@ class MeshedLink:
 
 def mesh_link(
     surface: Path | str,
-    base: Interface,
-    tip: Interface,
+    base: Interface | str,
+    tip: Interface | str,
     material: Material,
     *,
     unit: str = "m",
@@ -130,7 +130,9 @@ def mesh_link(
 
     Args:
         surface: file of the closed surface (STL, OBJ, PLY, VTK, MSH, STEP).
-        base: the held interface, in metres, in the axes of the surface.
+        base: the held interface, in metres, in the axes of the surface; or its text,
+            such as ``"z=0"``, see
+            :func:`forcefit.stiffness.surface.interface.parse_interface`.
         tip: the interface that moves.
         material: material of the link; without a density it has no mass and inertia.
         unit: unit of the surface file's coordinates.
@@ -148,7 +150,11 @@ def mesh_link(
         for the error.
     """
     shape = read_surface(Path(surface), unit)
-    return solve_link(shape, base, tip, (material,), options=options).link
+    held, moved = (
+        parse_interface(side, name) if isinstance(side, str) else side
+        for side, name in ((base, "base"), (tip, "tip"))
+    )
+    return solve_link(shape, held, moved, (material,), options=options).link
 
 
 def solve_link(

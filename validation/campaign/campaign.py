@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -9,6 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from forcefit.assembly.model.robot import Robot
 from forcefit.results.display import Figures, html_table, short_repr
 from forcefit.results.text import in_unit
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 # components of a deviation, in the order of a screw
 READING = ("rx", "ry", "rz", "tx", "ty", "tz")
@@ -126,6 +131,18 @@ class Campaign:
             object.__setattr__(self, "common", _locked(self, "common", shape))
         covariates = {k: _column(v, R, k) for k, v in self.covariates.items()}
         object.__setattr__(self, "covariates", covariates)
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return a data set over ``row``; see :mod:`.tables`."""
+        from forcefit.validation.campaign.tables import campaign_dataset
+
+        return campaign_dataset(self)
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Return a row for each measurement, columns (variable, component)."""
+        from forcefit.assembly.model.tables import frame_table
+
+        return frame_table(self.to_xarray(), "row")
 
     def __len__(self) -> int:
         return len(self.ids)

@@ -22,6 +22,7 @@ Sources:
 """
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +40,10 @@ from forcefit.stiffness.screws import rotation_matrix, rotation_vector
 from forcefit.validation.campaign.campaign import Campaign
 from forcefit.validation.correction.spread import deviation_spread
 from forcefit.validation.diagnosis.prediction import finite_conditions
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 _STEPS = 25
 _HALVINGS = 8
@@ -80,6 +85,20 @@ class Compensation:
     reason: NDArray
 
     __repr__, _repr_html_ = short_repr, html_table
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return a data set over ``row``: commands, offsets and errors."""
+        from forcefit.validation.correction.compensation_table import (
+            compensation_dataset,
+        )
+
+        return compensation_dataset(self)
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Return a row for each command, columns (variable, component)."""
+        from forcefit.assembly.model.tables import frame_table
+
+        return frame_table(self.to_xarray(), "row")
 
     @property
     def offsets(self) -> NDArray:

@@ -1,19 +1,25 @@
 """Results of a compensation for controllers, as plain values and as text."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.assembly.kinematics.posture import POSE, pose_components
+from forcefit.results.quantities import Quantity, flag, text
 from forcefit.results.text import readings_text
 from forcefit.validation.campaign.campaign import LOAD
-from forcefit.validation.correction.compensation import Compensation
+from forcefit.validation.campaign.tables import row_dataset, screw
 from forcefit.validation.correction.prediction import csv_text
 
+if TYPE_CHECKING:
+    import xarray
 
-def command_table(compensation: Compensation) -> str:
+    from forcefit.validation.correction.compensation import Compensation
+
+
+def command_table(compensation: "Compensation") -> str:
     """Return the corrected commands as a table with the columns of the targets.
 
     Args:
@@ -42,7 +48,7 @@ def command_table(compensation: Compensation) -> str:
     return _text(compensation, columns)
 
 
-def offset_table(compensation: Compensation) -> str:
+def offset_table(compensation: "Compensation") -> str:
     """Return the controller's offsets, and the error before and after, as a table.
 
     compensation: result of :func:`.compensation.compensate`.
@@ -64,7 +70,38 @@ def offset_table(compensation: Compensation) -> str:
     return _text(compensation, columns)
 
 
-def _text(compensation: Compensation, columns: dict[str, Any]) -> str:
+def compensation_dataset(compensation: "Compensation") -> "xarray.Dataset":
+    """Return a compensation over ``row``.
+
+    Args:
+        compensation: result of :func:`.compensation.compensate`.
+
+    Returns:
+        Data set with the ``command`` and the ``offset`` of each drive, the errors
+        ``before`` and ``after`` as screws, the standard deviation ``spread`` of
+        ``after``, ``limited`` and ``reason``.
+    """
+    drives = list(compensation.drives)
+    of_drive = ("drive",)
+    values = {
+        "command": (
+            Quantity("corrected command", "rad or m", of_drive), compensation.commands
+        ),
+        "offset": (
+            Quantity("offset of the command", "rad or m", of_drive),
+            compensation.offsets,
+        ),
+        "before": (screw("error of the given command"), compensation.before),
+        "after": (screw("error of the corrected command"), compensation.after),
+        "spread": (screw("standard deviation of the error"), compensation.spread),
+        "limited": (flag("a joint's limit prevents the correction"),
+                    compensation.limited),
+        "reason": (text("reason"), compensation.reason),
+    }  # fmt: skip
+    return row_dataset(compensation.targets, values, {"drive": drives})
+
+
+def _text(compensation: "Compensation", columns: dict[str, Any]) -> str:
     """Return the columns as CSV with their names."""
     rows = {
         label: {
@@ -77,7 +114,7 @@ def _text(compensation: Compensation, columns: dict[str, Any]) -> str:
 
 
 def summary(
-    compensation: Compensation, diagnosed: Mapping[str, float] | None = None
+    compensation: "Compensation", diagnosed: Mapping[str, float] | None = None
 ) -> dict[str, Any]:
     """Return plain values: expected errors, and rows without a solution.
 
@@ -145,7 +182,7 @@ def _sizes(error: NDArray) -> dict[str, float | None]:
     return {"position": rms(error[:, 3:]), "rotation": rms(error[:, :3])}
 
 
-def summary_text(compensation: Compensation, table: Mapping[str, Any]) -> str:
+def summary_text(compensation: "Compensation", table: Mapping[str, Any]) -> str:
     """Return the text of ``table``, the result of :func:`summary`."""
     lines = [f"{table['rows']} commands, drives {', '.join(compensation.drives)}"]
     says = {

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +14,19 @@ from forcefit.assembly.measurement.predict import predict as predict_rows
 from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.errors import BadInput
 from forcefit.results.display import html_table, short_repr
+from forcefit.results.quantities import text
 from forcefit.validation.campaign.campaign import READING, Campaign
+from forcefit.validation.campaign.tables import row_dataset, screw
 from forcefit.validation.correction.spread import deviation_spread
 from forcefit.validation.diagnosis.learned_range import beyond_by_row
 from forcefit.validation.diagnosis.prediction import finite_conditions
 from forcefit.validation.diagnosis.registration import register
 from forcefit.validation.diagnosis.sequence import Errors, errors_of, rms
 from forcefit.validation.diagnosis.unknowns import effects_in, with_effects_in
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 _MOVED = 3.0  # factor on the residual above which the measuring device has been moved
 
@@ -55,6 +61,26 @@ class PredictedReadings:
     point: tuple[float, float, float] | None
 
     __repr__, _repr_html_ = short_repr, html_table
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return a data set over ``row``: measured and predicted readings."""
+        return row_dataset(
+            self.commands,
+            {
+                "reading": self.commands.measured,
+                "predicted": (screw("predicted reading"), self.prediction.deviation),
+                "spread": (screw("standard deviation of the prediction"), self.spread),
+                "noise": (screw("standard deviation of a reading"), self.noise),
+                "extrapolated": (text("extrapolated variables"), self.extrapolated),
+                "reason": (text("reason"), self.prediction.reason),
+            },
+        )
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Return a row for each reading, columns (variable, component)."""
+        from forcefit.assembly.model.tables import frame_table
+
+        return frame_table(self.to_xarray(), "row")
 
     def table(self) -> dict[str, Any]:
         """Return plain values."""

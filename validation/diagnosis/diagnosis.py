@@ -6,6 +6,8 @@ that makes the text, so that this module does not import them.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +15,9 @@ from numpy.typing import NDArray
 from forcefit.assembly.measurement.conditions import Conditions
 from forcefit.assembly.model.robot import Robot
 from forcefit.results.display import Figures, html_table, short_repr
+from forcefit.results.quantities import flag
 from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.campaign.tables import row_dataset, screw
 from forcefit.validation.diagnosis.fit import MachineFit
 from forcefit.validation.diagnosis.holdout import HeldOut
 from forcefit.validation.diagnosis.lack_of_fit import LackOfFit, Trend
@@ -22,6 +26,10 @@ from forcefit.validation.diagnosis.noise_in_time import NoiseInTime
 from forcefit.validation.diagnosis.sequence import Errors, Step
 from forcefit.validation.diagnosis.setup_blunders import SetupBlunder
 from forcefit.validation.diagnosis.trace import Traced
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +58,6 @@ class Diagnosis:
         with_outliers: errors before and after with the held-out outliers included.
         uncertainty: [-] standard error of ``after.normalised``, from the scatter of
             blocks.
-        noise_scale: ratio of true to stated sigma, and its standard deviation.
         noise_scale: ratio of true to stated sigma, and the standard deviation of the
             ratio.
         noise_in_time: correlation of the noise in time, which widens the intervals of
@@ -127,6 +134,39 @@ class Diagnosis:
     def findings(self) -> tuple[str, ...]:
         """Sentences on the noise: its scale, its repeatability, its memory."""
         return self.traced.selected.noise.findings
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return a data set over ``row``: residuals, held-out rows, outliers."""
+        return row_dataset(
+            self.campaign,
+            {
+                "residual_before": (screw("residual before"), self.residual_before),
+                "residual_after": (screw("residual after"), self.residual_after),
+                "held_out": (flag("held out"), self.held.rows),
+                "outlier": (flag("outlier"), self.outliers),
+                "open": (flag("pose undetermined within clearances"), self.open),
+            },
+        )
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Return a row for each measurement, columns (variable, component)."""
+        from forcefit.assembly.model.tables import frame_table
+
+        return frame_table(self.to_xarray(), "row")
+
+    def save(self, path: Path | str) -> None:
+        """Write the machine found as a robot file, and its covariance.
+
+        Args:
+            path: path of the robot file; the covariance is written to the same name
+                with the suffix ``.npz``.
+
+        Raises:
+            BadInput: a file cannot be written.
+        """
+        from forcefit.validation.diagnosis.saving import save
+
+        save(self, path)
 
     def summary(self) -> str:
         """Return the text that ``forcefit validation diagnose`` prints."""

@@ -9,7 +9,7 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from forcefit.assembly.files.robot_file import write_robot
 from forcefit.assembly.model.function import Function
 from forcefit.assembly.model.robot import Robot
 from forcefit.validation.campaign.campaign import Campaign
-from forcefit.validation.diagnosis.diagnosis import Diagnosis
 from forcefit.validation.diagnosis.fit import MachineFit
 from forcefit.validation.diagnosis.learned_range import learned_range
 from forcefit.validation.diagnosis.nuisance import GEOMETRY
@@ -27,8 +26,11 @@ from forcefit.validation.diagnosis.saved_covariance import (
 )
 from forcefit.validation.diagnosis.unknowns import Small
 
+if TYPE_CHECKING:
+    from forcefit.validation.diagnosis.diagnosis import Diagnosis
 
-def corrected(diagnosis: Diagnosis) -> Robot:
+
+def corrected(diagnosis: "Diagnosis") -> Robot:
     """Return the robot to be saved.
 
     Returns:
@@ -48,7 +50,7 @@ def corrected(diagnosis: Diagnosis) -> Robot:
     )
 
 
-def functions_of(diagnosis: Diagnosis) -> list[list[Function]]:
+def functions_of(diagnosis: "Diagnosis") -> list[list[Function]]:
     """Return the learned functions, with coefficients and standard deviations.
 
     Returns:
@@ -104,7 +106,7 @@ def _with_tolerances(fit: MachineFit) -> Robot:
     return robot
 
 
-def _record(diagnosis: Diagnosis) -> dict[str, Any]:
+def _record(diagnosis: "Diagnosis") -> dict[str, Any]:
     """Return the record of the diagnosis for the file."""
     campaign, noise = diagnosis.campaign, asdict(diagnosis.noise)
     record: dict[str, Any] = {
@@ -133,7 +135,7 @@ def _digest(campaign: Campaign) -> str:
     return text.hexdigest()[:16]
 
 
-def save(diagnosis: Diagnosis, path: Path | str) -> None:
+def save(diagnosis: "Diagnosis", path: Path | str) -> None:
     """Write the machine found as a robot file, and its covariance to another file.
 
     Args:

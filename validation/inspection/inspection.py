@@ -2,11 +2,15 @@
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
 
+import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.assembly.measurement.predict import predict
+from forcefit.assembly.model.tables import frame_table, labelled
 from forcefit.results.display import html_table, short_repr
+from forcefit.results.quantities import flag, number, text
 from forcefit.validation.campaign.campaign import READING, Campaign
 from forcefit.validation.diagnosis.separability import Separability, compare_signatures
 from forcefit.validation.diagnosis.signatures import conditions_of
@@ -25,6 +29,10 @@ from forcefit.validation.inspection.design_signatures import (
 from forcefit.validation.inspection.measuring_order import Revisits, revisits
 from forcefit.validation.inspection.remark import CAREFUL, LOST, Remark
 from forcefit.validation.inspection.repeats import RepeatNoise, repeat_noise
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +61,26 @@ class Inspection:
     open: NDArray
 
     __repr__, _repr_html_ = short_repr, html_table
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return a data set over ``effect``: which effects the design can show."""
+        s, absent = self.separability, self.signatures.untestable
+        no, unknown = [False] * len(absent), [np.nan] * len(absent)
+        size = number("norm of the change of the readings over sigma")
+        rank = number("number of unknowns that the design distinguishes")
+        values = {
+            "testable": (flag("can be tested"), [*s.traced, *no]),
+            "shows": (flag("shows at plausible size"), [*s.visible, *no]),
+            "strength": (size, [*s.strength, *unknown]),
+            "rank": (rank, [*s.rank, *unknown]),
+            "reason": (text("reason"), [*[""] * len(s.names), *absent.values()]),
+        }
+        data = labelled(values, "effect", [*s.names, *absent])
+        return data.assign_attrs(campaign=self.campaign.name)
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Return a row for each effect, columns (variable, component)."""
+        return frame_table(self.to_xarray(), "effect")
 
     def table(self) -> dict:
         """Return the whole inspection as plain values for JSON."""

@@ -38,6 +38,19 @@ def test_compiled_model_moves_as_mujoco_moves_it(kind, tmp_path):
     assert answer.bodies == model.nbody - 1
 
 
+def test_model_of_a_written_robot_keeps_its_platform(tmp_path):
+    """A written MJCF names the platform in a custom text."""
+    path = tmp_path / "delta.xml"
+    ff.write_robot(ff.load_robot("delta"), path)
+    robot = ff.load_robot(mujoco.MjModel.from_xml_path(str(path)))
+    assert robot.platform == ff.load_robot(path).platform == "leg1.a_tip"
+    height = {"tz": -0.8}
+    found, read = (
+        ff.place_robot(one, pose=height).pose() for one in (robot, ff.load_robot(path))
+    )
+    assert found == pytest.approx(read, abs=1e-9)
+
+
 @pytest.mark.parametrize("kind", ["MjModel", "MjSpec"])
 def test_robot_of_a_model_is_that_of_its_file(kind, tmp_path):
     path = file_of(tmp_path, FOUR_BAR, "four_bar.xml")

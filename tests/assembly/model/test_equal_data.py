@@ -128,3 +128,13 @@ def test_equal_robots_are_equal_in_another_process(tmp_path):
         "assert {robot: 1} == {ff.load_robot('hexapod'): 1}"
     )
     subprocess.run([sys.executable, "-c", code, tmp_path / "robot"], check=True)
+
+
+def test_diagonal_of_a_joint_stiffness_is_that_of_the_matrix():
+    diagonal = [np.inf, np.inf, 10.0, np.inf, np.inf, 2e5]
+    short, full = (
+        Frame("hinge", joint_stiffness=K) for K in (diagonal, np.diag(diagonal))
+    )
+    assert short == full
+    with pytest.raises(ValueError, match=r"hinge.: joint_stiffness has shape \(3, 3\)"):
+        Frame("hinge", joint_stiffness=[1.0, 2.0, 3.0])

@@ -130,6 +130,9 @@ def test_deflection_grows_with_the_square_of_the_speed():
     )
     np.testing.assert_allclose(fast.inertial, 4 * slow.inertial, rtol=1e-8, atol=1e-15)
     assert fast.periods == pytest.approx(slow.periods / 2)
+    table = fast.to_pandas()
+    np.testing.assert_allclose(table.index, np.linspace(0, 0.1, 21))
+    np.testing.assert_array_equal(table["inertial_screw"], fast.inertial)
 
 
 def test_clearance_adds_to_the_deflection_of_an_accelerated_arm():

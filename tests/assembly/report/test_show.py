@@ -67,6 +67,43 @@ def test_figure_of_a_loaded_bar_follows_the_elastic_line():
     assert figure.axes[0].get_zlabel() == "z [mm]"
 
 
+def test_picture_of_a_finite_rotation_has_its_true_size():
+    """A rigid bar on a torsion spring: k a = F L cos a; the tip is at L (cos a, sin a).
+
+    With k = 10 N m/rad and F L = 20 N m the angle is 1.0298665 rad.
+    """
+    hinge = Frame("hinge", joint_stiffness=[np.inf, np.inf, 10.0, *[np.inf] * 3])
+    tip = Frame("tip", "hinge", translation=[LENGTH, 0, 0])
+    posture = home_posture(Robot("bar", "tip", (hinge, tip)))
+    found = ff.solve_exact(posture, load={"fy": 20.0 / LENGTH})
+    angle = 1.0298665
+    assert 10 * angle == pytest.approx(20 * np.cos(angle), rel=1e-7)
+    figure = found.plot(interactive=False)
+    assert figure.axes[0].get_title() == "bar, displacements x 1"
+    end = lines_of(figure)["forced, rigid"]
+    end = end[np.isfinite(end).all(axis=1)][-1]
+    place = 1e3 * LENGTH * np.array([np.cos(angle), np.sin(angle), 0])
+    np.testing.assert_allclose(end, place, atol=1e-3)
+    assert figure.axes[0].get_ylim()[1] > place[1]
+
+
+def test_small_finite_motions_are_drawn_as_those_of_the_linear_model():
+    """The tip's F L^3 / (3 E I), a thousandth of the length, to 1e-5 of it."""
+    posture, load = cantilever(), {"fz": -FORCE / 100}
+    exact, linear = (
+        lines_of(one.plot(interactive=False))["forced, elastic"]
+        for one in (ff.solve_exact(posture, load), ff.solve_assembly(posture, load))
+    )
+    np.testing.assert_allclose(exact[:9], linear[:9], rtol=0, atol=1e-3)
+
+
+def test_axes_of_a_single_bar_contain_both_of_its_ends():
+    """The bar lies from 0 to 400 mm along x; its only frame is at the tip."""
+    low, high = cantilever().show(interactive=False).axes[0].get_xlim()
+    assert low < 0
+    assert high > 1e3 * LENGTH
+
+
 def test_figure_of_a_robot_shows_its_home_pose():
     """A crank of 0.3 m turned to 90 degrees, and a bar of 0.2 m straight on."""
     drive = Frame("drive", joint="revolute", actuated=True, position=np.pi / 2)
@@ -129,6 +166,36 @@ def test_notebook_gets_the_interactive_scene(monkeypatch):
     assert moved[-1, 2] == pytest.approx(-FORCE * LENGTH**3 / (3 * STIFFNESS))
     assert "<i>" not in picture.html
     assert "http://" not in picture.html.replace("http://www.w3.org/", "")
+
+
+class Formatter(dict):
+    """The functions of a format by type, as IPython keeps them."""
+
+    for_type = dict.__setitem__
+
+
+def maps(monkeypatch, known):
+    """PNG of a sweep's figure in a notebook; ``known`` formats figures already."""
+    formats = {"image/png": Formatter(), "image/svg+xml": Formatter(known)}
+    shell = SimpleNamespace(
+        kernel=object(), display_formatter=SimpleNamespace(formatters=formats)
+    )
+    module = SimpleNamespace(get_ipython=lambda: shell)
+    monkeypatch.setitem(sys.modules, "IPython", module)
+    data = ff.sweep("hexapod", grid="tx=0:0.02:0.01,tz=0.53", quantities=["energy"])
+    return ff.figure_of(data.squeeze(), quantities=["energy"]), formats["image/png"]
+
+
+def test_notebook_shows_the_maps_of_a_sweep_as_the_result_of_a_cell(monkeypatch):
+    pytest.importorskip("xarray")
+    figure, functions = maps(monkeypatch, {})
+    assert functions[type(figure)](figure).startswith(b"\x89PNG")
+
+
+def test_format_of_figures_that_the_user_chose_is_kept(monkeypatch):
+    pytest.importorskip("xarray")
+    _, functions = maps(monkeypatch, {pyplot.Figure: str})
+    assert not functions
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import forcefit as ff
 from forcefit.assembly.exact.exact import solve_exact
 from forcefit.assembly.kinematics.posture import place_robot
 from forcefit.assembly.linear.energy import solve_assembly
@@ -88,3 +89,72 @@ def test_table_of_many_points_has_a_row_for_each_point(batches):
     upper = errors["translation_error", "upper"]
     np.testing.assert_array_equal(upper, batches[2].translation_error[:, 1])
     assert set(errors["status", ""]) == {"ok"}
+
+
+def test_table_of_one_point_has_one_row(answer):
+    bound, zone = bound_pose_error(answer), zone_margin(answer.posture)
+    assert zone.to_pandas()["margin", ""].tolist() == [zone.margin]
+    upper = bound.to_pandas()["translation_error", "upper"]
+    assert upper.tolist() == [bound.translation_error[1]]
+
+
+def small_stiffness():
+    """A bar of length L = 0.4 m along x with a round section, held at its base."""
+    beam = ff.BeamLink({"radius": 0.01}, 2e11, 0.3, 7850.0, theory="euler")
+    tip = ff.Frame("tip", translation=[0.4, 0, 0], link=beam)
+    return ff.place_robot(ff.Robot("bar", "tip", (tip,)))
+
+
+def test_stiffness_data_set_of_a_bar_has_the_handbook_values():
+    """Axial force: E A / L; lateral force: 3 E I / L^3; one part has all of it."""
+    tangent = ff.platform_stiffness(small_stiffness())
+    data, table = tangent.to_xarray(), tangent.to_pandas()
+    axial, lateral = 2e11 * np.pi * 1e-4 / 0.4, 3 * 2e11 * np.pi * 1e-8 / 4 / 0.4**3
+    stiffness = data["stiffness"].sel(wrench_component=["FX", "FY", "FZ"])
+    np.testing.assert_allclose(stiffness, [axial, lateral, lateral], rtol=1e-9)
+    slope = data["compliance"].sel(screw="RZ", wrench_component="FY")
+    assert float(slope) == pytest.approx(1.5 / lateral / 0.4)
+    product = data["stiffness_matrix"].values @ data["compliance"].values
+    np.testing.assert_allclose(product, np.eye(6), atol=1e-9)
+    assert list(table.index) == ["tip link"]
+    np.testing.assert_allclose(table["share"], 1.0)
+    assert data["stiffness"].attrs["units"] == "N m/rad, N/m"
+
+
+def test_stiffness_table_of_many_points_equals_the_points_and_a_sweep():
+    robot = ff.load_robot("hexapod")
+    poses = [{"tx": x, "tz": 0.53} for x in (-0.05, 0.0, 0.05)]
+    many = ff.platform_stiffness([ff.place_robot(robot, pose=p) for p in poses])
+    data = many.to_xarray()
+    swept = ff.sweep(robot, grid="tx=-0.05:0.05:0.05,tz=0.53", state="nominal",
+                     assumption="none").squeeze()  # fmt: skip
+    for name in ("stiffness", "compliance", "share", "stiffness_condition"):
+        np.testing.assert_allclose(data[name], swept[name], rtol=1e-9, atol=1e-12)
+        assert data[name].attrs["units"] == swept[name].attrs["units"]
+        assert data[name].dims[1:] == swept[name].dims[1:]
+    assert list(data["part"].values) == list(swept["part"].values)
+    np.testing.assert_allclose(
+        data["read_at"].sel(axis="x"), [-0.05, 0, 0.05], atol=1e-9
+    )
+    one = many[1].to_xarray()
+    np.testing.assert_allclose(one["stiffness"], data["stiffness"][1], rtol=1e-9)
+    axial = many.to_pandas()["stiffness", "FZ"]
+    np.testing.assert_array_equal(axial, data["stiffness"].sel(wrench_component="FZ"))
+
+
+def test_modes_table_has_a_row_for_each_mode_and_shares_that_sum_to_one():
+    modes = ff.natural_modes(small_stiffness(), 3)
+    table = modes.to_pandas()
+    assert list(table.index) == [1, 2, 3]
+    np.testing.assert_array_equal(table["frequency", ""], modes.frequencies)
+    np.testing.assert_allclose(table["share"].sum(axis=1), 1.0)
+    assert table.attrs["units"]["frequency"] == "Hz"
+
+
+def test_curve_table_of_a_bar_follows_hookes_law():
+    lateral = 3 * 2e11 * np.pi * 1e-8 / 4 / 0.4**3
+    table = ff.deflection_curve(small_stiffness(), 5, [-10, 0, 20]).to_pandas()
+    np.testing.assert_array_equal(table["load", ""], [-10, 0, 20])
+    np.testing.assert_allclose(table["deflection", ""], table["load", ""] / lateral)
+    np.testing.assert_allclose(table["stiffness", ""], lateral)
+    assert table.attrs["units"]["stiffness"] == "N/m"

@@ -126,6 +126,9 @@ def test_allocation_data_set_contains_tolerances_and_provenance():
     np.testing.assert_array_equal(data["scaled_alike"], found.uniformly_scaled)
     np.testing.assert_array_equal(data["loosest_allowed"], [1e-2, 0.1])
     np.testing.assert_array_equal(data["cost"], [3.0, 5.0])
+    table = found.to_pandas()
+    assert list(table.index) == ["length", "angle"]
+    np.testing.assert_array_equal(table["tolerance", ""], found.tolerances)
     attributes = data.attrs
     assert (attributes["seed"], attributes["yield"]) == (7, 0.9)
     assert (attributes["price"], attributes["price_alike"]) == (20.0, 25.0)

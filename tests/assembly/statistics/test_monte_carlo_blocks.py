@@ -60,7 +60,7 @@ def test_killed_run_resumes_with_another_confidence_level(arm, tmp_path):
 
     path = tmp_path / "draws.nc"
     with pytest.raises(RuntimeError):
-        run_draws(arm, 3, path, progress=kill, importance=ImportanceOptions(4))
+        run_draws(arm, 3, path, progress=kill, importance=4)
     with pytest.raises(BadInput, match="importance"):
         run_draws(arm, 3, path, importance=ImportanceOptions(5))
     seen = []

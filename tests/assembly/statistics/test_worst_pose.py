@@ -63,6 +63,7 @@ def test_serial_arm_has_the_worst_case_of_all_corners_in_finite_geometry():
     angle = np.degrees(np.arctan(found.direction[1] / found.direction[0]))
     assert angle == pytest.approx(9.8, abs=0.05)
     assert sum(share for _, share in found.shares) == pytest.approx(156.18e-6, rel=1e-4)
+    assert " 156.2 um" in repr(found)
 
 
 def test_columns_of_the_serial_arm_are_the_worked_ones():

@@ -1,5 +1,7 @@
 """Finite elements of whole links from their surfaces: requested accuracy and budget."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from forcefit.stiffness.fem.fea import (
     Budget,
     FemOptions,
     interface_center,
+    mesh_link,
     solve_bar,
     solve_link,
 )
@@ -158,3 +161,9 @@ def test_failed_first_mesh_is_retried_with_smaller_edges_while_time_remains(
         with pytest.raises(MeshFailed):
             fea.first_mesh(surface, *PLANES, budget)
         assert edges == pytest.approx(expected)
+
+
+def test_text_of_an_interface_that_cannot_be_read_is_named():
+    surface = Path(__file__).parents[3] / "meshes/tapered_arm.stl"
+    with pytest.raises(BadInput, match="base: found 'q=0', expected"):
+        mesh_link(surface, "q=0", "z=0.35", Material(E=7e10, nu=0.33))

@@ -36,6 +36,22 @@ def test_campaign_has_the_values_of_its_files(tmp_path):
     assert not campaign.measured.flags.writeable
 
 
+def test_table_of_a_campaign_has_the_columns_of_its_file(tmp_path):
+    pytest.importorskip("xarray")
+    table = read_campaign(write_campaign(tmp_path)).to_pandas()
+    assert list(table.index) == ["m1", "m2", "m3", "m4"]
+    np.testing.assert_array_equal(table["load", "FX"], [0, 10, 0, 10])
+    np.testing.assert_array_equal(
+        table["joint_coordinate", "two"], [0.2, 0.4, 0.2, 0.2]
+    )
+    np.testing.assert_array_equal(
+        table["reading", "TY"], [2e-5, math.nan, 2.1e-5, 2e-5]
+    )
+    np.testing.assert_array_equal(table["cov.time", ""], [0, 60, 120, 180])
+    units = table.attrs["units"]
+    assert (units["cov.time"], units["reading"]) == ("s", "rad, m")
+
+
 def test_take_keeps_the_requested_order_and_the_configuration_numbers(tmp_path):
     campaign = read_campaign(write_campaign(tmp_path))
     some = campaign.take([3, 1])

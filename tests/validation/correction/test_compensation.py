@@ -4,6 +4,7 @@ import csv
 import json
 from dataclasses import replace
 from math import acos, atan2, cos, sin
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,6 +31,20 @@ def written(tmp_path, robot, rows, head="id,q.one,q.two"):
     path.write_text(robot)
     table.write_text("\n".join([head, *rows]) + "\n")
     return str(path), str(table)
+
+
+def test_compensation_table_equals_the_arrays(tmp_path):
+    """An offset of 2 mrad of a zero needs the opposite offset of its command."""
+    pytest.importorskip("xarray")
+    robot, targets = written(tmp_path, ARM + ZERO, ["a,0.3,0.9", "b,-0.2,1.2"])
+    found = compensate(read_commands(Path(targets), load_robot(robot)))
+    table = found.to_pandas()
+    assert list(table.index) == ["a", "b"]
+    np.testing.assert_allclose(table["offset", "one"], -2e-3, rtol=1e-6)
+    np.testing.assert_allclose(table["offset", "two"], 0.0, atol=1e-9)
+    np.testing.assert_array_equal(table["command"], found.commands)
+    np.testing.assert_array_equal(table["before"], found.before)
+    assert table.attrs["units"]["offset"] == "rad or m"
 
 
 def rows_of(path):

@@ -56,6 +56,17 @@ def test_predict_reads_a_table_of_commands(tmp_path, run):
         assert found == pytest.approx([turn, -turn * y, turn * x], abs=2e-7)
 
 
+def test_table_of_a_prediction_has_measured_and_predicted_readings(tmp_path):
+    """A rotation of the first joint by a sin q, read at the tool."""
+    pytest.importorskip("xarray")
+    folder = write_campaign(tmp_path / "campaign")
+    commands = read_commands(folder, load_robot(robot_file(tmp_path)))
+    table = predict(commands).to_pandas()
+    q = table.index.map({"m1": 0.1, "m2": 0.3, "m3": 0.1, "m4": 0.1})
+    np.testing.assert_allclose(table["predicted", "RZ"], 1e-3 * np.sin(q), rtol=1e-6)
+    np.testing.assert_array_equal(table["reading"], commands.measured)
+
+
 def test_predict_keeps_the_names_of_a_campaign(tmp_path, run):
     head = "id,q.one,q.two,meas.A.tx,meas.B.ty"
     folder = write_campaign(

@@ -57,6 +57,26 @@ def test_saved_robot_predicts_the_printed_errors(found, saved):
     assert written["error"]["saved"] == pytest.approx(printed)
 
 
+def test_table_of_a_diagnosis_has_the_printed_errors(found):
+    """The rms of the residuals over all rows except outliers is that of the text."""
+    pytest.importorskip("xarray")
+    table = found.to_pandas()
+    kept = table[~table["outlier", ""].astype(bool)]
+    shift = kept["residual_after"][["TX", "TY", "TZ"]].to_numpy()
+    rms = np.sqrt(np.nanmean(shift**2))
+    assert rms == pytest.approx(found.saved.position, rel=1e-9)
+    assert table["held_out", ""].sum() == found.held.rows.sum()
+
+
+def test_method_save_writes_the_files_of_the_command(found, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    save(found, "robot.toml")
+    files = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    found.save(tmp_path / "robot.toml")
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == files
+    assert sorted(files) == ["robot.npz", "robot.toml"]
+
+
 def test_error_after_comes_from_a_fit_without_the_held_out_rows(found):
     """The same unknowns are fitted to the other rows alone."""
     assert found.held.how == "split"

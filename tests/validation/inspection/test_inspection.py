@@ -51,6 +51,19 @@ def elastic_campaign(folder, rng, temperature=None, heat=0.0, device=None, **mor
     return read_campaign(write_campaign(folder, HEAD, lines, robot=ELASTIC, **more))
 
 
+def test_table_of_an_inspection_has_a_row_for_each_effect(tmp_path):
+    """A length of 0.1 mm moves the tool by 20 sigma, in 48 rows and for 2 links."""
+    pytest.importorskip("xarray")
+    found = inspect_campaign(elastic_campaign(tmp_path, np.random.default_rng(1)))
+    table = found.to_pandas()
+    assert sorted(table.index) == sorted(found.table()["effects"])
+    length = table.loc["link_length"]
+    assert length["strength", ""] == pytest.approx(20 * np.sqrt(48 * 2), rel=1e-6)
+    assert length["rank", ""] == 2
+    assert not table.loc["body_mass", ("testable", "")]
+    assert "gravity" in table.loc["body_mass", ("reason", "")]
+
+
 def texts(campaign):
     """All sentences on a campaign's design, by subject and weight."""
     repeats = revisits(campaign, campaign.repeat)

@@ -1,0 +1,382 @@
+"""Readers, effects and link models of the example of another distribution."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from math import pi
+
+import numpy as np
+import pytest
+
+import forcefit as ff
+from forcefit.inputs.errors import BadInput
+from tests.test_tutorials import ROOT
+
+EXAMPLE = ROOT / "examples/extension"
+R, r, L, E, NU = 0.045, 0.025, 0.35, 7e10, 0.33
+SIZES = f"start_radius = {R}, end_radius = {r}, young = {E}, poisson = {NU}"
+LINK = f'link = {{ model = {{ name = "cone", {SIZES} }} }}'
+CONE = f"""
+name = "one_arm"
+platform = "tip"
+[[frame]]
+name = "tip"
+parent = "base"
+rotation = [0.0, 0.0, 1.5707963267948966]
+translation = [0.0, {L}, 0.0]
+{LINK}
+"""
+ARM = """
+name = "arm"
+platform = "tip"
+[[frame]]
+name = "joint1"
+parent = "base"
+joint = "revolute"
+actuated = true
+position = 0.5
+[[frame]]
+name = "tip"
+parent = "joint1"
+translation = [0.8, 0.0, 0.0]
+[[effect]]
+name = "drive_gain"
+parameters = { joint1 = 1e-3 }
+"""
+
+
+BROKEN = """
+from forcefit.assembly.effects.effect import Effect
+
+def fails(span, values):
+    return values["absent"]
+
+def small(span, values):
+    return [1.0]
+
+def ragged(span, values):
+    return [[1.0], [1.0, 2.0]]
+
+def loose(span, values):
+    return [[0.0] * 6] * 6
+
+def read(path):
+    return int("three")
+
+def apply(conditions, values):
+    return conditions.nothing
+
+FAILS, OTHER = (
+    Effect(name, apply, lambda robot, name: "1", None, ("",), lambda robot: ())
+    for name in ("failing", "another")
+)
+"""
+
+
+def install(folder, name, groups):
+    """Write the metadata of an installed distribution; groups as in pyproject.toml."""
+    info = folder / f"{name}-0.1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Name: {name}\nVersion: 0.1.0\n")
+    lines = []
+    for group, points in groups.items():
+        lines += [f"[{group}]", *(f"{key} = {value}" for key, value in points.items())]
+    (info / "entry_points.txt").write_text("\n".join(lines) + "\n")
+
+
+@pytest.fixture
+def packages(tmp_path, monkeypatch):
+    """A folder on the path, in which distributions are installed."""
+    folder = tmp_path / "packages"
+    folder.mkdir()
+    monkeypatch.syspath_prepend(folder)
+    yield folder
+    for name in ("forcefit_extension", "broken"):
+        sys.modules.pop(name, None)
+
+
+@pytest.fixture
+def example(packages):
+    """The example, as pip installs it."""
+    project = tomllib.loads((EXAMPLE / "pyproject.toml").read_text())["project"]
+    shutil.copy(EXAMPLE / "forcefit_extension.py", packages)
+    install(packages, project["name"], project["entry-points"])
+
+
+@pytest.fixture
+def broken(packages):
+    """A distribution whose module raises an error, and returns wrong objects."""
+    (packages / "broken.py").write_text(BROKEN)
+    (packages / "raises.py").write_text("1 / 0\n")
+    install(packages, "their-tools", {
+        "forcefit.effects": {"drive_gain": "broken:fails", "raising": "raises:GAIN",
+                             "gone": "no_such_module:GAIN",
+                             "failing": "broken:FAILS", "misnamed": "broken:OTHER"},
+        "forcefit.readers": {"three": "broken:read"},
+        "forcefit.link_models": {"fails": "broken:fails", "small": "broken:small",
+                                 "loose": "broken:loose", "ragged": "broken:ragged",
+                                 "cone": "broken:absent"},
+    })  # fmt: skip
+
+
+def written(tmp_path, text):
+    path = tmp_path / "robot.toml"
+    path.write_text(text)
+    return path
+
+
+def test_link_model_of_a_cone_has_the_compliance_of_handbooks(example, tmp_path):
+    """F L^3/(3 E I) R/r, F L/(E pi R r), and torsion; I and J of the base."""
+    robot = ff.load_robot(written(tmp_path, CONE))
+    C = ff.platform_stiffness(ff.place_robot(robot)).compliance
+    second, G = pi * R**4 / 4, E / (2 * (1 + NU))
+    bending = L**3 / (3 * E * second) * R / r
+    axial = L / (E * pi * R * r)
+    q = R / r
+    torsion = L / (2 * G * second) * (q + q**2 + q**3) / 3
+    # the base's y is along the cone
+    assert np.diag(C)[3:] == pytest.approx([bending, axial, bending], rel=1e-9)
+    assert C[1, 1] == pytest.approx(torsion, rel=1e-9)
+
+
+def test_written_robot_keeps_the_stiffness_without_the_model(example, tmp_path):
+    robot = ff.load_robot(written(tmp_path, CONE))
+    ff.write_robot(robot, tmp_path / "again.toml")
+    assert "model" not in (tmp_path / "again.toml").read_text()
+    assert ff.load_robot(tmp_path / "again.toml") == robot
+
+
+def test_radius_of_a_link_model_is_a_design_parameter_of_a_sweep(example, tmp_path):
+    """The bending compliance changes as 1/(R^3 r) with the radius of the end."""
+    path = written(tmp_path, CONE)
+    data = ff.sweep(path, vary=["tip.link.model.end_radius=0.025,0.05"],
+                    quantities=["compliance"], state="nominal",
+                    poses=_home(tmp_path))  # fmt: skip
+    bending = data["compliance"].sel(screw="TX", wrench_component="FX").values.ravel()
+    assert bending[1] / bending[0] == pytest.approx(0.5, rel=1e-9)
+
+
+def _home(tmp_path):
+    path = tmp_path / "poses.csv"
+    path.write_text(f"ty\n{L}\n")
+    return path
+
+
+def test_link_model_of_a_drawn_body_lies_between_its_joints(example, tmp_path):
+    """The same cone in a file of bodies: a pin at its start, the platform's point."""
+    drawn = f"""
+format = 2
+name = "drawn"
+platform = "arm"
+platform_at = [0, {L}, 0]
+[[body]]
+name = "arm"
+{LINK}
+[[joint]]
+name = "pin"
+type = "fixed"
+between = ["base", "arm"]
+at = [0, 0, 0]
+"""
+    found, frames = (
+        ff.platform_stiffness(ff.place_robot(ff.load_robot(written(tmp_path, text))))
+        for text in (drawn, CONE)
+    )
+    np.testing.assert_allclose(
+        found.compliance, frames.compliance, rtol=1e-9, atol=1e-16
+    )
+
+
+def test_effect_turns_a_drive_by_its_gain(example, tmp_path, run):
+    """1e-3 of 0.5 rad moves the tip by 0.5 mrad times 0.8 m across the arm."""
+    path = written(tmp_path, ARM)
+    code, _, err = run("assembly", "solve", path, "--json", tmp_path / "o.json")
+    assert (code, err) == (0, "")
+    screw = json.loads((tmp_path / "o.json").read_text())["platform_screw"]
+    across = 0.4e-3 * np.array([-np.sin(0.5), np.cos(0.5)])
+    assert screw[2] == pytest.approx(5e-4)
+    assert screw[3:5] == pytest.approx(across)
+    robot = ff.load_robot(path)
+    ff.write_robot(robot, tmp_path / "again.toml")
+    assert ff.load_robot(tmp_path / "again.toml") == robot
+
+
+def test_unknown_parameter_of_an_effect_is_named(example, tmp_path):
+    path = written(tmp_path, ARM.replace("joint1 = 1e-3", "joint2 = 1e-3"))
+    with pytest.raises(
+        BadInput, match='found "joint2", which is no parameter of drive_g'
+    ):
+        ff.load_robot(path)
+
+
+def test_diagnosis_finds_the_effect_of_another_distribution(example, tmp_path):
+    """Readings of an arm whose first drive moves by 1.002 times its command.
+
+    Finite kinematics by hand: x = a cos q1 + b cos(q1 + q2), y likewise.
+    """
+    names, rng = ("one", "two"), np.random.default_rng(2)
+    frames = [
+        ff.Frame("one", joint="revolute", actuated=True),
+        ff.Frame("two", "one", translation=[1, 0, 0], joint="revolute", actuated=True),
+        ff.Frame("tool", "two", translation=[0.8, 0, 0]),
+    ]
+    folder = tmp_path / "campaign"
+    folder.mkdir()
+    ff.write_robot(ff.Robot("arm", "tool", tuple(frames)), folder / "robot.toml")
+    (folder / "campaign.toml").write_text(
+        'robot = "robot.toml"\nmeasurements = "m.csv"\nregistration = "known"\n'
+        "reference_point = [0.0, 0.0, 0.0]\n[noise]\nrotation = 1e-5\nposition = 1e-5\n"
+    )
+
+    def tool(q):
+        angles = np.cumsum(q, axis=1)
+        return np.stack([angles[:, 1], np.cos(angles) @ [1, 0.8],
+                         np.sin(angles) @ [1, 0.8]], axis=1)  # fmt: skip
+
+    q = rng.uniform(-2.5, 2.5, (70, 2))
+    meas = tool(q * [1.002, 1.0]) - tool(q) + 1e-5 * rng.normal(size=(70, 3))
+    rows = [",".join(["id", *(f"q.{n}" for n in names), "meas.rz,meas.tx,meas.ty"])]
+    rows += [
+        f"r{i}," + ",".join(f"{v:.9g}" for v in [*q[i], *meas[i]]) for i in range(70)
+    ]
+    (folder / "m.csv").write_text("\n".join(rows) + "\n")
+    found = ff.diagnose(ff.read_campaign(folder), odds={"function": 0.0})
+    assert found.claimed == ("drive_gain",)
+    assert found.robot.effects["drive_gain"]["one"] == pytest.approx(2e-3, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        (
+            "raising",
+            "the effect raises:GAIN of their-tools cannot be imported: ZeroDiv",
+        ),
+        (
+            "gone",
+            "the effect no_such_module:GAIN of their-tools cannot be imported: No",
+        ),
+        (
+            "drive_gain",
+            "the effect broken:fails of their-tools: found function, expected",
+        ),
+    ],
+)
+def test_broken_effect_names_its_distribution_in_one_line(
+    name, message, broken, tmp_path, run
+):
+    path = written(tmp_path, ARM.replace("drive_gain", name))
+    code, out, err = run("assembly", "solve", path)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert message in err
+    assert f'{path}: effect "{name}"' in err
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("cone", "the link model broken:absent of their-tools cannot be imported: "),
+        (
+            "fails",
+            "the link model broken:fails of their-tools failed: KeyError: 'absent'",
+        ),
+        (
+            "small",
+            "the link model broken:small of their-tools returned an array of shape ",
+        ),
+        (
+            "loose",
+            "the link model broken:loose of their-tools: stiffness is not positive",
+        ),
+        ("ragged", "the link model broken:ragged of their-tools returned no array of "),
+        (
+            "cine",
+            'found "cine", expected a link model of an installed package; did you mean',
+        ),
+    ],
+)
+def test_broken_link_model_names_its_distribution_in_one_line(
+    name, message, broken, tmp_path, run
+):
+    path = written(tmp_path, CONE.replace('"cone"', f'"{name}"'))
+    code, out, err = run("assembly", "solve", path)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert message in err
+    assert f'{path}: frame "tip".link.model' in err
+
+
+def test_fault_within_an_effect_or_a_reader_names_its_distribution(
+    broken, tmp_path, run
+):
+    text = ARM.replace("drive_gain", "failing").replace("{ joint1 = 1e-3 }", "{ }")
+    (tmp_path / "arm.three").write_text("3")
+    for path, message in (
+        (
+            written(tmp_path, text),
+            "the effect broken:FAILS of their-tools failed: Attrib",
+        ),
+        (
+            tmp_path / "arm.three",
+            "the reader broken:read of their-tools failed: ValueEr",
+        ),
+    ):
+        code, out, err = run("assembly", "solve", path)
+        assert (code, out, err.count("\n")) == (2, "", 1)
+        assert message in err
+
+
+def test_broken_effect_stops_no_robot_that_does_not_have_it(broken, tmp_path):
+    text = ARM.replace("drive_gain", "encoder_offset")
+    robot = ff.load_robot(written(tmp_path, text))
+    assert robot.effects == {"encoder_offset": {"joint1": 1e-3}}
+
+
+def test_effect_of_two_distributions_is_refused(example, packages, tmp_path):
+    points = {"forcefit.effects": {"drive_gain": "forcefit_extension:DRIVE_GAIN"}}
+    install(packages, "another", points)
+    with pytest.raises(BadInput, match="drive_gain in another and forcefit-extension"):
+        ff.load_robot(written(tmp_path, ARM))
+
+
+def test_effects_of_forcefit_cannot_be_replaced(example, packages, tmp_path):
+    points = {"forcefit.effects": {"encoder_offset": "forcefit_extension:DRIVE_GAIN"}}
+    install(packages, "another", points)
+    robot = ff.load_robot(
+        written(tmp_path, ARM.replace("drive_gain", "encoder_offset"))
+    )
+    screw = ff.sweep(robot, grid="q.joint1=0.5").squeeze()["platform_screw"]
+    assert float(screw.sel(screw="RZ")) == pytest.approx(1e-3)  # not times 0.5 rad
+
+
+def test_message_of_the_example_s_reader_is_the_user_s_message(example, tmp_path):
+    (tmp_path / "arm.chain").write_text("0.4 0.3")
+    robot = ff.load_robot(tmp_path / "arm.chain")
+    assert ff.place_robot(robot).pose()["tx"] == pytest.approx(0.7)
+    (tmp_path / "arm.chain").write_text("")
+    with pytest.raises(BadInput, match="found no lengths"):
+        ff.load_robot(tmp_path / "arm.chain")
+
+
+def test_page_of_extensions_shows_the_lines_of_the_example():
+    page = (ROOT / "docs/extensions.md").read_text(encoding="utf-8")
+    source = (EXAMPLE / "forcefit_extension.py").read_text(encoding="utf-8")
+    project = (EXAMPLE / "pyproject.toml").read_text(encoding="utf-8")
+    shown = re.findall(r"```text\n(def .*?|DRIVE_GAIN.*?|\[project.*?)```", page, re.S)
+    assert len(shown) == 3
+    for block in shown:
+        assert block in source or block in project, block
+
+
+@pytest.mark.slow
+def test_example_is_found_by_a_new_process(example, packages, tmp_path):
+    """Entry points are found where Python starts, not only in this process."""
+    path = written(tmp_path, CONE)
+    command = "import forcefit as ff, sys; print(ff.load_robot(sys.argv[1]).name)"
+    found = subprocess.run(
+        [sys.executable, "-c", command, str(path)], capture_output=True, text=True,
+        env={"PYTHONPATH": f"{packages}:{ROOT}", "PATH": "/usr/bin:/bin"}, check=False,
+    )  # fmt: skip
+    assert (found.returncode, found.stdout.strip()) == (0, "one_arm"), found.stderr
