@@ -11,7 +11,7 @@ from forcefit.assembly.path.path_errors import PathErrors
 from forcefit.assembly.path.summary import LARGEST, LAWS, LEAST_PERIODS, sizes
 from forcefit.inputs.errors import plot_label
 from forcefit.page.charts import BLUE, GREY, RED, Axis, chart, grid
-from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
+from forcefit.page.page import Page, Provenance, Tile, listed, page, section
 from forcefit.page.tables import Value, table
 from forcefit.stiffness.screws import SCREW
 
@@ -82,20 +82,30 @@ def path_page(
         Page(
             title=f"{summary['robot']}: errors along a path",
             verdict=_verdict(summary),
-            good=None if summary["status"] == OK else False,
+            good=_good(summary),
             tiles=_tiles(summary),
             about=f"{summary['points']} instants, {summary['solved']} solved; law of "
             f"the motion: {LAWS.get(summary['law'], summary['law'])}.",
             body=[
                 section("Largest values", _largest(summary)) if peaks else "",
                 section("Over time", *_charts(errors)) if peaks else "",
-                *(paragraph(f"Note: {one}.") for one in summary["remarks"]),
+                section("Notes", listed([f"{one}." for one in summary["remarks"]]))
+                if summary["remarks"]
+                else "",
             ],
             assumed=_ASSUMED,
             provenance=provenance,
             results=summary,
         )
     )
+
+
+def _good(summary: Mapping[str, Any]) -> bool | None:
+    """Return whether every instant has a result; None if vibration may exceed it."""
+    if summary["status"] != OK:
+        return False
+    periods = summary["periods"] or 0.0
+    return True if LEAST_PERIODS <= periods < np.inf else None
 
 
 def _verdict(summary: Mapping[str, Any]) -> str:
@@ -108,6 +118,8 @@ def _verdict(summary: Mapping[str, Any]) -> str:
     else:
         size = Value(peak["value"], "m").text
         verdict = f"Acceleration deflects the platform by at most {size}"
+    if _good(summary) is None:
+        verdict += "; vibration, which is left out, may exceed it"
     if summary["status"] != OK:
         verdict += f"; {summary['status']} {summary.get('reason', '')}"
     return verdict + "."
@@ -147,7 +159,7 @@ def _largest(summary: Mapping[str, Any]) -> str:
         ]
         for name, peak in summary["drives"].items()
     ]
-    return table(["", "largest", "at", "body"], rows, "largest values")
+    return table(["quantity", "largest", "at", "body"], rows, "largest values")
 
 
 def _charts(errors: PathErrors) -> list[str]:

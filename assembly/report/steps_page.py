@@ -42,15 +42,11 @@ def steps_page(
         HTML, which needs no other file.
     """
     done = results["status"] == "ok"
-    verdict = (
-        f"All {len(results['steps'])} steps are carried out: "
-        if done else f"{results.get('reason', '')}; "
-    )  # fmt: skip
     return page(
         Page(
             title=f"{results['robot']}: the order of assembly",
-            verdict=f"{verdict}{results['remarks'][0]}.",
-            good=None if done else False,
+            verdict=_verdict(results),
+            good=_good(results),
             tiles=_tiles(results) if done else [],
             about=f"{len(results['steps'])} steps.",
             body=[
@@ -64,6 +60,24 @@ def steps_page(
             results=results,
         )
     )
+
+
+def _verdict(results: Mapping[str, Any]) -> str:
+    """Return whether the steps are carried out, and the first remark."""
+    verdict = results.get("reason", "")
+    if results["status"] == "ok":
+        verdict = f"All {len(results['steps'])} steps are carried out"
+    exceeded = sum(bool(step.get("exceeded")) for step in results["steps"])
+    if exceeded:
+        verdict += f", {exceeded} with more than the allowed force"
+    return f"{verdict}; {results['remarks'][0]}."
+
+
+def _good(results: Mapping[str, Any]) -> bool | None:
+    """Return whether all steps are done; None if one needs more than its force."""
+    if results["status"] != "ok":
+        return False
+    return None if any(step.get("exceeded") for step in results["steps"]) else True
 
 
 def _tiles(results: Mapping[str, Any]) -> list[Tile]:

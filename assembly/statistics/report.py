@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import xarray
 
 _BINS = 60
-_GOOD = 0.95  # a yield below this value is shown as a warning
+_GOOD = 0.95  # yield that the interval of a favourable result exceeds
 _LISTED = 20  # largest number of errors in a table of shares
 _ASSUMED = (
     "Small screws: the closures are linear in the errors of each draw.",
@@ -53,7 +53,7 @@ def draws_page(
         Page(
             title=f"{summary['robot']}: random errors",
             verdict=verdict + ".",
-            good=_share(summary)["probability"] >= _GOOD,
+            good=_good(_share(summary)),
             tiles=_draws_tiles(summary),
             about=f"{summary['draws']} draws, seed {summary['seed']}; pose errors: "
             f"clearance {summary['clearance']}: {summary['clearance_means']}.",
@@ -85,6 +85,13 @@ def _share(summary: Mapping[str, Any]) -> Mapping[str, float]:
     limits: Mapping[str, float] | None = summary.get("within_limits")
     forced: Mapping[str, float] = summary["assembles"]["forced"]
     return limits or forced
+
+
+def _good(share: Mapping[str, float]) -> bool | None:
+    """Return whether the yield is at least 95 %; None if its interval contains it."""
+    if share["lower"] >= _GOOD:
+        return True
+    return None if share["upper"] >= _GOOD else False
 
 
 def _share_text(interval: Mapping[str, float]) -> str:
@@ -127,7 +134,7 @@ def _yields(summary: Mapping[str, Any]) -> str:
     ]  # fmt: skip
     level = f"{summary['confidence']:.0%}"
     words = ("probability", f"at least ({level})", "at most", "draws undecided")
-    head: list[str | Column] = ["", *(Column(one, digits=5) for one in words)]
+    head: list[str | Column] = ["event", *(Column(one, digits=5) for one in words)]
     return table(head, rows, "yields")
 
 
@@ -164,7 +171,7 @@ def _quantities(summary: Mapping[str, Any]) -> str:
         values = [one["mean"]["value"], one["most_probable"]["value"]]
         values += [one["quantiles"][q]["value"] for q in ("0.5", "0.95", "0.99")]
         rows.append([NAMES[key] + clearance, *(Value(v, one["unit"]) for v in values)])
-    head = ["", "mean", "most probable", "median", "95 % below", "99 % below"]
+    head = ["quantity", "mean", "most probable", "median", "95 % below", "99 % below"]
     text = f"Of the {summary['assembled']} of {summary['draws']} draws that assemble:"
     return paragraph(text) + table(head, rows, "sizes")
 
@@ -211,7 +218,7 @@ def _capability(summary: Mapping[str, Any]) -> str:
         for key, one in summary.get("capability", {}).items()
     ]  # fmt: skip
     words = ("Cpk", "at least", "at most", "ppm above", "ppm at least", "ppm at most")
-    head: list[str | Column] = ["", "limit", *map(Column, words)]
+    head: list[str | Column] = ["quantity", "limit", *map(Column, words)]
     return section("Capability", table(head, rows, "capability")) if rows else ""
 
 

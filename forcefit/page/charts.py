@@ -111,8 +111,9 @@ def bars(values: Mapping[str, float], x: Axis, caption: str, line: float = 1.0) 
 
 
 def matrix(
-    values: ArrayLike, names: Sequence[str], title: str, caption: str, around: bool
-) -> str:
+    values: ArrayLike, names: Sequence[str], title: str, caption: str, around: bool,
+    most: float = 1.0,
+) -> str:  # fmt: skip
     """Return a chart of a square matrix: coloured cells with numbers.
 
     Args:
@@ -121,7 +122,8 @@ def matrix(
         title: title of the colour scale.
         caption: text below the chart.
         around: True: the colour scale is centred at zero; False: it extends from 0 to
-            1.
+            ``most``.
+        most: upper end of the colour scale.
 
     Returns:
         HTML.
@@ -131,7 +133,7 @@ def matrix(
         "type": "heatmap", "z": np.asarray(values), "x": [label(n) for n in names],
         "y": [label(n) for n in names], "texttemplate": "%{z:.2f}",
         "colorscale": "RdBu" if around else "Blues", "reversescale": True,
-        "zmin": -size if around else 0, "zmax": size if around else 1,
+        "zmin": -size if around else 0, "zmax": size if around else most,
         "colorbar": {"title": {"text": title, "side": "right"}},
     }  # fmt: skip
     if not around:

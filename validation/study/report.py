@@ -8,16 +8,18 @@ import numpy as np
 
 from forcefit.assembly.linear.assembled import Assembly, without_rounding
 from forcefit.assembly.linear.zone import ASSEMBLABLE
+from forcefit.assembly.model.statuses import FAILED, OK, PASSED
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import write_json, write_text
 from forcefit.page.page import Page, Provenance, Tile, command_line, page
 from forcefit.page.tables import Value
 from forcefit.results.display import largest_row
+from forcefit.results.quantities import in_words
 from forcefit.validation.study.drawn_section import drawn_section, drawn_tiles
 from forcefit.validation.study.headline import (
     by_force,
+    conclusions,
     covered,
-    verdict,
     worst_clearance,
 )
 from forcefit.validation.study.map_section import finite, mapped, maps_section
@@ -140,7 +142,7 @@ def report_page(results: StudyResults) -> str:
     return page(
         Page(
             title=study.title,
-            verdict=verdict(results),
+            verdict=_verdict(results),
             good=_good(results),
             tiles=_tiles(results),
             about=about,
@@ -148,15 +150,31 @@ def report_page(results: StudyResults) -> str:
             assumed=[f"{study.errors[0].upper()}{study.errors[1:]}.", *_ASSUMED],
             provenance=Provenance(command, study.files),
             results=results_table(results),
+            details=" ".join(conclusions(results)[1:]),
         )
     )
 
 
+def _verdict(results: StudyResults) -> str:
+    """Return the sentence on the assembly, with the checks that did not pass."""
+    first = conclusions(results)[0].removesuffix(".")
+    missed = [
+        f"{in_words(name)} {outcome}"
+        for name, outcome in results.verdicts.items()
+        if outcome != PASSED
+    ]
+    return f"{'; '.join([first, *missed])}."
+
+
 def _good(results: StudyResults) -> bool | None:
-    """Return whether the result is favourable; None if assembly needs force."""
-    if not results.passed:
+    """Return whether the result is favourable, without force and with all checks.
+
+    None if assembly needs force or a check has no outcome; False without a solution, or
+    if a check failed.
+    """
+    if results.solution["status"] != OK or FAILED in results.verdicts.values():
         return False
-    return None if by_force(results) else True
+    return True if results.passed and not by_force(results) else None
 
 
 def _tiles(results: StudyResults) -> list[Tile]:
