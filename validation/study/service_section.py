@@ -6,9 +6,7 @@ import numpy as np
 
 from forcefit.page.page import Tile, paragraph, section
 from forcefit.page.tables import Cell, Value, table
-from forcefit.stiffness.screws import SCREW
-
-_POSE = ("rad", "rad", "rad", "m", "m", "m")
+from forcefit.stiffness.screws import SCREW, SCREW_UNITS
 
 
 def service_section(service: dict[str, Any] | None) -> str:
@@ -44,11 +42,12 @@ def _loaded(service: dict[str, Any]) -> list[str]:
         return [about, paragraph(f"{service['status']}: {service.get('reason', '')}.")]
     solution = service["solution"]
     rows: list[list[Cell]] = [
-        [SCREW[k], Value(solution["platform_screw"][k], _POSE[k], 6),
-         Value(service["deflection"][k], _POSE[k], 6)]
-        for k in range(6)
+        [SCREW[k], Value(solution["platform_screw"][k], unit, 6),
+         Value(service["deflection"][k], unit, 6)]
+        for k, unit in enumerate(SCREW_UNITS)
     ]  # fmt: skip
-    head = ["", "platform error with load and weight", "part due to load and weight"]
+    head = ["component", "platform error with load and weight",
+            "part due to load and weight"]  # fmt: skip
     return [about, table(head, rows, "platform under load")]
 
 

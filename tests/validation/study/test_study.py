@@ -15,13 +15,8 @@ from forcefit.assembly.kinematics.posture import place_robot
 from forcefit.assembly.report.pose_errors import pose_error_of
 from forcefit.assembly.robots import BUILT_IN
 from forcefit.inputs.table import BadInput
-from forcefit.validation.study.headline import worst_clearance
-from forcefit.validation.study.report import (
-    report_page,
-    results_table,
-    verdict,
-    write_study,
-)
+from forcefit.validation.study.headline import verdict, worst_clearance
+from forcefit.validation.study.report import report_page, results_table, write_study
 from forcefit.validation.study.study import run_study
 from forcefit.validation.study.study_file import read_study
 from tests.pages_for_tests import parse
@@ -121,7 +116,9 @@ def test_numbers_on_the_study_page_equal_the_results(results):
     for row, one in zip(rows, table["governing"], strict=True):
         assert (row[0].text, row[1].text) == (one["part"], one["what"])
         assert [row[2].value, row[4].value] == [one["translation"], one["rotation"]]
-    solution = {row[0].text: row[1].value for row in seen.table("quantity")[1:]}
+    solution = {
+        row[0].text: row[1].value for row in seen.table("quantity", "value")[1:]
+    }
     assert solution["energy, eq. (22)"] == table["solution"]["energy"]
     for name, *wrench in seen.table("link")[1:]:
         expected = table["solution"]["frames"][name.text]["wrench"]
