@@ -10,7 +10,7 @@ from forcefit.assembly.model.statuses import OK
 from forcefit.assembly.path.path_errors import PathErrors
 from forcefit.assembly.path.summary import LARGEST, LAWS, LEAST_PERIODS, sizes
 from forcefit.inputs.errors import plot_label
-from forcefit.page.charts import BLUE, GREY, RED, Axis, chart, grid
+from forcefit.page.charts import COLOURS, Axis, chart, grid
 from forcefit.page.page import Page, Provenance, Tile, listed, page, section
 from forcefit.page.tables import Value, table
 from forcefit.stiffness.screws import SCREW
@@ -18,7 +18,6 @@ from forcefit.stiffness.screws import SCREW
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_COLOURS = (BLUE, RED, GREY, "#2e8b57", "#8e5ea2", "#d98b1f")
 _ASSUMED = (
     "Quasi-static: inertia and weight act as loads at each instant. Vibration, damping "
     "and the inertia of the deflection itself are left out.",
@@ -128,7 +127,7 @@ def _verdict(summary: Mapping[str, Any]) -> str:
 def _tiles(summary: Mapping[str, Any]) -> list[Tile]:
     """Return tiles of deflection, drive force and periods."""
     tiles = []
-    for key in ("inertial_translation", "inertial_rotation", "stress"):
+    for key in ("inertial_rotation", "inertial_translation", "stress"):
         peak = summary.get("largest", {}).get(key)
         if peak is not None:
             words, unit, _ = LARGEST[key]
@@ -169,10 +168,10 @@ def _charts(errors: PathErrors) -> list[str]:
     of_size = sizes(errors)
     return [
         grid(
-            _chart(errors, dict(zip(SCREW[3:], screws[3:], strict=True)), "m",
-                   "deflection by acceleration"),
             _chart(errors, dict(zip(SCREW[:3], screws[:3], strict=True)), "rad",
                    "rotation by acceleration"),
+            _chart(errors, dict(zip(SCREW[3:], screws[3:], strict=True)), "m",
+                   "deflection by acceleration"),
         ),
         grid(
             _chart(errors, forces, "N m or N", "drive force"),
@@ -185,10 +184,11 @@ def _charts(errors: PathErrors) -> list[str]:
 def _chart(
     errors: PathErrors, lines: Mapping[str, NDArray], unit: str, title: str
 ) -> str:
-    """Return a chart of lines over time."""
+    """Return a chart of lines over time, with its title as the caption."""
     traces = [
         {"type": "scatter", "mode": "lines", "x": errors.trajectory.times, "y": values,
-         "name": name, "line": {"color": _COLOURS[k % len(_COLOURS)]}}
+         "name": name, "line": {"color": COLOURS[k % len(COLOURS)]}}
         for k, (name, values) in enumerate(lines.items())
     ]  # fmt: skip
-    return chart(traces, Axis("time", "s"), Axis(title, unit), "")
+    caption = f"{title[0].upper()}{title[1:]}."
+    return chart(traces, Axis("time", "s"), Axis(title, unit), caption)

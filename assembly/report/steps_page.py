@@ -91,7 +91,7 @@ def _tiles(results: Mapping[str, Any]) -> list[Tile]:
         Tile("Energy that stays", [Value(energy, "J")], lost),
         Tile(
             "Platform error",
-            [Value(float(shift), "m"), " and ", Value(float(turn), "rad")],
+            [Value(float(turn), "rad"), " and ", Value(float(shift), "m")],
             ["of the assembled machine."],
         ),
     ]
@@ -102,14 +102,14 @@ def _table(results: Mapping[str, Any]) -> str:
     head: list[str | Column] = [
         "step", Column("energy", "J"), Column("work", "J"), Column("lost", "J"),
         Column("closing force", "N"), Column("closing moment", "N m"),
-        Column("platform, translation", "m"), Column("platform, rotation", "rad"),
+        Column("platform, rotation", "rad"), Column("platform, translation", "m"),
     ]  # fmt: skip
     rows: list[list[Cell]] = []
     for step in results["steps"]:
         screw = np.asarray(step["platform_screw"])
         name = step["name"] + (" (too much force)" if step.get("exceeded") else "")
         keys = ("energy", "work", "lost", "closing_force", "closing_moment")
-        sizes = [float(np.linalg.norm(part)) for part in (screw[3:], screw[:3])]
+        sizes = [float(np.linalg.norm(part)) for part in (screw[:3], screw[3:])]
         rows.append([name, *(step[key] for key in keys), *sizes])
     return table(head, rows, "steps")
 
@@ -196,13 +196,13 @@ def _machines(results: Mapping[str, Any]) -> str:
         return ""
     head: list[str | Column] = [
         "step", Column("force, median", "N"), Column("force, 95 %", "N"),
-        Column("energy, 95 %", "J"), Column("translation, 95 %", "m"),
-        Column("rotation, 95 %", "rad"),
+        Column("energy, 95 %", "J"), Column("rotation, 95 %", "rad"),
+        Column("translation, 95 %", "m"),
     ]  # fmt: skip
     rows: list[list[Cell]] = [
         [
             name, q["closing_force"]["0.5"], q["closing_force"]["0.95"],
-            q["energy"]["0.95"], q["translation"]["0.95"], q["rotation"]["0.95"],
+            q["energy"]["0.95"], q["rotation"]["0.95"], q["translation"]["0.95"],
         ]
         for name, q in results["quantiles"].items()
     ]  # fmt: skip

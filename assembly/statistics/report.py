@@ -107,7 +107,7 @@ def _draws_tiles(summary: Mapping[str, Any]) -> list[Tile]:
     words = "all limits kept" if "within_limits" in summary else WORDS["forced"]
     tiles = [Tile("Yield", [f"{100 * share['probability']:.4g} %"],
                   [f"{words}; {low:.4g} to {high:.4g} %."])]  # fmt: skip
-    sizes = {k: summary["quantities"].get(k, {}) for k in ("translation", "rotation")}
+    sizes = {k: summary["quantities"].get(k, {}) for k in ("rotation", "translation")}
     high95 = [
         Value(one["quantiles"]["0.95"]["value"], UNITS[key], 3)
         for key, one in sizes.items() if "quantiles" in one

@@ -123,9 +123,13 @@ def _present_section(present: Mapping[str, Any]) -> str:
     ]  # fmt: skip
     shares = {one["error"]: one["share_of_margin"] for one in present["slopes"]}
     most = dict(list(shares.items())[:_LISTED])
+    rest = f"{len(shares) - len(most)} others"
+    if len(shares) > len(most):
+        most[rest] = sum(list(shares.values())[_LISTED:])
+    axis = Axis("share of the largest margin")
     return section(
         "The errors there are",
-        bars(most, Axis("share of the largest margin"), "The steepest first.", np.nan),
+        bars(most, axis, "The steepest first.", np.nan, rest),
         table(["error", "size", Column("share of the margin")], rows, "errors"),
     )
 

@@ -18,7 +18,12 @@ from forcefit.page.markup import piece
 from forcefit.page.tables import Value
 from forcefit.results.units import shown_in
 
-BLUE, RED, GREY = "#1f6fb4", "#c0392b", "#9aa3ab"
+BLUE, RED, GREY = "#1f6fb4", "#c0392b", "#858e97"
+# lines and bars of one chart; grey is reserved for the sum of the others
+COLOURS = (
+    BLUE, RED, "#2e8b57", "#8e5ea2", "#d98b1f", "#179cb0", "#a3541c", "#d2679f",
+    "#7d8f14", "#5b63d3", "#e2703a", "#0f7a6c",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -83,7 +88,10 @@ def chart(
     return _figure(spec, "chart", caption)
 
 
-def bars(values: Mapping[str, float], x: Axis, caption: str, line: float = 1.0) -> str:
+def bars(
+    values: Mapping[str, float], x: Axis, caption: str, line: float = 1.0,
+    rest: str = "",
+) -> str:  # fmt: skip
     """Return horizontal bars, the first on top, with their numbers.
 
     Args:
@@ -91,13 +99,15 @@ def bars(values: Mapping[str, float], x: Axis, caption: str, line: float = 1.0) 
         x: the horizontal axis.
         caption: text below the chart.
         line: [SI] coordinate of a line across all bars; NaN for no line.
+        rest: name of a bar that is the sum of the others, which is grey.
 
     Returns:
         HTML.
     """
     trace: dict[str, Any] = {
         "type": "bar", "orientation": "h", "x": list(values.values()),
-        "y": [label(name) for name in values], "marker": {"color": BLUE},
+        "y": [label(name) for name in values],
+        "marker": {"color": [GREY if name == rest else BLUE for name in values]},
     }  # fmt: skip
     traces = [trace]
     if np.isfinite(line):

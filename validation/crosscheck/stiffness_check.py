@@ -28,7 +28,7 @@ from forcefit.assembly.platform_stiffness.linear_tangent import (
     without_clearance as classical,
 )
 from forcefit.assembly.platform_stiffness.matrices import PlatformStiffness
-from forcefit.results.display import html_table, numbers, short_repr
+from forcefit.results.display import html_table, numbers, pose_text, short_repr
 from forcefit.stiffness.screws import SCREW, rotation_vector
 from forcefit.validation.crosscheck.link_models import link_models
 from forcefit.validation.multibody.simulation import TIME_LIMIT, without_clearance
@@ -213,7 +213,7 @@ class StiffnessCheck:
         """Return the results as text."""
         posture = self.exact.posture
         lines = [
-            f"{posture.robot.name} at {numbers(posture.pose().values())} [m, rad], "
+            f"{posture.robot.name} at {pose_text(posture.pose())}, "
             f"links as {self.links}s",
             f"{'':12s}" + "".join(f"{name:>12s}" for name in SCREW),
         ]

@@ -27,7 +27,7 @@ _COLOURS = {"before": RED, "after": BLUE}
 def error_chart(diagnosis: Diagnosis) -> str:
     """Return bars of the errors before and after and of the noise, on held-out rows."""
     charts = []
-    for kind, unit in (("position", "m"), ("rotation", "rad")):
+    for kind, unit in (("rotation", "rad"), ("position", "m")):
         names = ("before", "after", "noise")
         values = {name: getattr(getattr(diagnosis, name), kind) for name in names}
         known = {name: v for name, v in values.items() if np.isfinite(v)}

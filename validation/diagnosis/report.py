@@ -117,7 +117,7 @@ def _tiles(diagnosis: Diagnosis) -> list[Tile]:
     """Return tiles: verdict, errors, most probable effect, next measurement."""
     before, after = diagnosis.before, diagnosis.after
     tiles = [Tile("Verdict", [diagnosis.verdict.replace("_", " ")])]
-    for kind, unit in (("position", "m"), ("rotation", "rad")):
+    for kind, unit in (("rotation", "rad"), ("position", "m")):
         values = [getattr(errors, kind) for errors in (before, after)]
         if all(v == v for v in values):  # NaN if not measured
             tiles.append(Tile(f"Error of {kind}, rms", [

@@ -31,9 +31,9 @@ def drawn_tiles(found: dict[str, Any] | None) -> list[Tile]:
     if found is None or "worst_case" not in found:
         return []
     worst = found["worst_case"]
-    shift, turn = (worst[key] for key in ("translation", "rotation"))
+    turn, shift = (worst[key] for key in ("rotation", "translation"))
     bound: list[str | Value] = [
-        Value(shift["bound"], "m", 3), " and ", Value(turn["bound"], "rad", 3)
+        Value(turn["bound"], "rad", 3), " and ", Value(shift["bound"], "m", 3)
     ]  # fmt: skip
     name, share = max(shift["shares"].items(), key=lambda pair: pair[1])
     total = sum(shift["shares"].values())

@@ -183,8 +183,8 @@ def _bound_text(bounds: dict[str, float]) -> str:
 
 
 def _pose_text(rotation: float, translation: float) -> str:
-    """Return a pose error [rad, m] as text in mm and mrad."""
-    return f"{in_unit(translation, 'mm', 3)} and {in_unit(rotation, 'mrad', 3)}"
+    """Return a pose error [rad, m] as text in mrad and mm."""
+    return f"{in_unit(rotation, 'mrad', 3)} and {in_unit(translation, 'mm', 3)}"
 
 
 def covered(results: StudyResults) -> list[str]:

@@ -204,17 +204,17 @@ def _tiles(results: StudyResults) -> list[Tile]:
 
 
 def _force_tile(assembly: Assembly) -> Tile:
-    """Return the tile of the largest force and largest moment through a body."""
+    """Return the tile of the largest moment and largest force through a body."""
     wrenches = without_rounding(assembly.tip_wrenches)
     shown: list[str | Value] = []
     names = []
-    for part, unit in ((slice(3, 6), "N"), (slice(0, 3), "N m")):
+    for part, unit in ((slice(0, 3), "N m"), (slice(3, 6), "N")):
         sizes = np.linalg.norm(wrenches[:, part], axis=1)
         row = largest_row(sizes)
         names.append(assembly.posture.robot.frames[row].name)
         shown += [" and " if shown else "", Value(float(sizes[row]), unit)]
-    return Tile("Force and moment of assembly", shown, [
-        f"Largest values through a body, at  {names[0]} and {names[1]}; energy ",
+    return Tile("Moment and force of assembly", shown, [
+        f"Largest values through a body, at {names[0]} and {names[1]}; energy ",
         Value(assembly.energy, "J"), ".",
     ])  # fmt: skip
 
@@ -254,5 +254,5 @@ def _percent(ratio: float) -> str:
 
 def _bound(bounds: dict[str, float]) -> list[str | Value]:
     """Return the text of an upper bound of a pose error."""
-    return [Value(bounds["translation"], "m", 3), " and ",
-            Value(bounds["rotation"], "rad", 3)]  # fmt: skip
+    return [Value(bounds["rotation"], "rad", 3), " and ",
+            Value(bounds["translation"], "m", 3)]  # fmt: skip

@@ -27,8 +27,8 @@ _CLEARANCE_OF = {
     "free": "any position; compliant joints also rotate about their axis",
     "budget": "any position and deformation of at most 5 % more than the least energy",
 }
-_PARTS = ("translation", "rotation")
-_UNITS = {"tx": "m", "ty": "m", "tz": "m", "rx": "rad", "ry": "rad", "rz": "rad"}
+_PARTS = ("rotation", "translation")
+_UNITS = {"rx": "rad", "ry": "rad", "rz": "rad", "tx": "m", "ty": "m", "tz": "m"}
 
 
 def unchecked_section(results: StudyResults) -> str:
@@ -85,8 +85,8 @@ def governing_section(results: StudyResults) -> str:
     return section(
         "Parts that govern the worst case",
         paragraph(
-            "The certified bound at this pose is ", Value(worst["translation"], "m"),
-            " and ", Value(worst["rotation"], "rad"),
+            "The certified bound at this pose is ", Value(worst["rotation"], "rad"),
+            " and ", Value(worst["translation"], "m"),
             ". The table gives it with one imperfection removed. Errors may cancel "
             "each other; the bound then rises.",
         ),
@@ -109,10 +109,10 @@ def solution_section(results: StudyResults) -> str:
     solution = results.solution
     pose = [
         text
-        for k, v in solution["pose"].items()
+        for k, unit in _UNITS.items()
         for text in (
-            f"{', ' if k != 'tx' else ''}{k} = ",
-            Value(round(v, 9), _UNITS[k]),
+            f"{', ' if k != 'rx' else ''}{k} = ",
+            Value(round(solution["pose"][k], 9), unit),
         )
     ]
     rows: list[list[Any]] = [[in_words(k), str(v)] if isinstance(v, int) else

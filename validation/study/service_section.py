@@ -76,9 +76,9 @@ def service_tile(service: dict[str, Any] | None) -> list[Tile]:
         turn, shift = (float(np.linalg.norm(half)) for half in (screw[:3], screw[3:]))
         note = "The platform's motion at this pose, least-energy solution."
         motion: list[str | Value] = [
-            Value(shift, "m", 3),
-            " and ",
             Value(turn, "rad", 3),
+            " and ",
+            Value(shift, "m", 3),
         ]
         tiles.append(Tile("By load and weight", motion, [note]))
     modes = service.get("frequencies", {}).get("modes")

@@ -192,19 +192,19 @@ def test_click_sorts_a_table_and_the_button_copies_all_digits(tab, results):
     (text,) = wait(tab, "return window.copied.length && window.copied")
     head, *rows = csv.reader(io.StringIO(text))
     assert head[:3] == [
-        "part", "made perfect", "largest platform translation",
+        "part", "made perfect", "largest platform rotation",
     ]  # fmt: skip
-    turns = [float(row[4].removesuffix(" rad")) for row in rows]
-    assert turns == sorted(turns)
+    shifts = [float(row[4].removesuffix(" m")) for row in rows]
+    assert shifts == sorted(shifts)
     bounds = {(one["part"], one["what"]): one for one in results.governing}
     for row in rows:
         one = bounds[row[0], row[1]]
-        assert row[2] == f"{one['translation']!r} m"
-        assert row[4] == f"{one['rotation']!r} rad"
+        assert row[2] == f"{one['rotation']!r} rad"
+        assert row[4] == f"{one['translation']!r} m"
 
 
 def test_unit_switch_changes_to_si_and_back(tab, results):
-    first = "return document.querySelector('.tile .answer span').textContent"
+    first = "return document.querySelectorAll('.tile .answer span')[1].textContent"
     axis = "return document.querySelector('figure.map .plot').layout.xaxis.title.text"
     own = tab.execute_script(first)
     assert (own, tab.execute_script(axis)) == ("0.794 mm", "tx [mm]")

@@ -22,7 +22,8 @@ MESH = {
 def bar(**mesh):
     """A round bar along x, as if it had been computed by finite elements."""
     return LinkStiffness(
-        "finite elements", beam_compliance(LENGTH, round_section(RADIUS, 0.3), YOUNG, 0.3),
+        "finite elements",
+        beam_compliance(LENGTH, round_section(RADIUS, 0.3), YOUNG, 0.3),
         np.array([LENGTH, 0, 0]), np.zeros(3), mesh=MESH | mesh,
     )  # fmt: skip
 
