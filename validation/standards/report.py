@@ -91,22 +91,22 @@ def _tiles(figures: StandardFigures) -> list[Tile]:
         known = [one for one in figures.poses if getattr(one, key) is not None]
         if known:
             worst = max(known, key=lambda one: getattr(one, key))
-            note = f"at {worst.label}, {worst.cycles} cycles."
+            size, at = Value(getattr(worst, key), "m"), f"at {worst.label}, "
             tiles.append(
-                Tile(f"{words}, worst", [Value(getattr(worst, key), "m")], [note])
+                Tile(f"{words}, worst", [size], [f"{at}{worst.cycles} cycles."])
             )
     if figures.distances:
         far = max(figures.distances, key=lambda pair: abs(pair.accuracy))
-        note = [f"{far.labels[0]} to {far.labels[1]}, ", Value(far.commanded, "m"), "."]
+        a, b = far.labels
+        commanded = Value(far.commanded, "m")
         tiles.append(Tile("Distance accuracy AD, worst", [Value(far.accuracy, "m")],
-                          note))  # fmt: skip
-    for kind, unit in (("r", "rad"), ("t", "m")):
-        axes = {k: v for k, v in figures.axes.items() if k.startswith(kind)}
-        if axes:
-            name = max(axes, key=lambda one: axes[one].reversal)
-            worst_axis = [Value(axes[name].reversal, unit)]
-            tiles.append(Tile("Reversal B, worst", worst_axis, [f"of {name}."]))
-    return tiles
+                          [f"{a} to {b}, ", commanded, "."]))  # fmt: skip
+    return tiles + [
+        Tile("Reversal B, worst", [Value(axes[name].reversal, unit)], [f"of {name}."])
+        for kind, unit in (("r", "rad"), ("t", "m"))
+        if (axes := {k: v for k, v in figures.axes.items() if k[0] == kind})
+        for name in [max(axes, key=lambda one: axes[one].reversal)]
+    ]
 
 
 def _poses(figures: StandardFigures) -> str:
