@@ -15,7 +15,7 @@ from forcefit.assembly.steps.machine import Machine
 from forcefit.assembly.steps.state import State
 from forcefit.page.charts import BLUE, RED, Axis, chart, grid
 from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
-from forcefit.page.tables import Cell, Column, Value, table
+from forcefit.page.tables import Cell, Column, Value, rotation_and_translation, table
 
 _ASSUMED = (
     "Small screws at one pose: every step is linear, contacts of clearances excepted.",
@@ -91,7 +91,7 @@ def _tiles(results: Mapping[str, Any]) -> list[Tile]:
         Tile("Energy that stays", [Value(energy, "J")], lost),
         Tile(
             "Platform error",
-            [Value(float(turn), "rad"), " and ", Value(float(shift), "m")],
+            rotation_and_translation(float(turn), float(shift)),
             ["of the assembled machine."],
         ),
     ]

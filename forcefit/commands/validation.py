@@ -261,11 +261,8 @@ def _crosscheck_page(
 ) -> str:  # fmt: skip
     """Return the page of a comparison at one pose."""
     from forcefit.validation.crosscheck.crosscheck import Crosscheck
-    from forcefit.validation.crosscheck.report import (
-        crosscheck_page,
-        failure_page,
-        stiffness_check_page,
-    )
+    from forcefit.validation.crosscheck.report import crosscheck_page, failure_page
+    from forcefit.validation.crosscheck.stiffness_page import stiffness_check_page
 
     if results is None:
         return failure_page(failure, source)

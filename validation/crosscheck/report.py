@@ -1,4 +1,4 @@
-"""Pages of cross-checks: one pose, many poses, and the stiffness of the platform."""
+"""Pages of cross-checks at one pose and at many poses."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -20,12 +20,12 @@ from forcefit.stiffness.screws import SCREW, SCREW_UNITS
 from forcefit.validation.crosscheck.crosscheck import Crosscheck
 from forcefit.validation.crosscheck.pose_metric import PoseMetric
 from forcefit.validation.crosscheck.poses import outcome_text, poses_table
-from forcefit.validation.crosscheck.stiffness_check import StiffnessCheck
 from forcefit.validation.crosscheck.verdict import NOT_CHECKED, verdict, verdict_text
 
-_GOOD = {PASSED: True, NOT_DECIDED: None, NO_SIGNAL: None, FAILED: False}
+# colour of the verdict by outcome
+GOOD = {PASSED: True, NOT_DECIDED: None, NO_SIGNAL: None, FAILED: False}
 _LISTED = 30  # largest number of parameters of which the smallest change is listed
-_ASSUMED = (
+ASSUMED = (
     "The simulation (Exudyn) has geometrically exact motions; the virtual-joint model "
     "is linear in errors and loads.",
     "Both models read the same robot file, so a wrong number in it is not found.",
@@ -48,7 +48,7 @@ def crosscheck_page(check: Crosscheck, provenance: Provenance) -> str:
         Page(
             title=f"{check.posture.robot.name}: comparison with a multibody simulation",
             verdict=_verdict(check),
-            good=_GOOD[verdict(check)],
+            good=GOOD[verdict(check)],
             tiles=_tiles(check),
             about=f"{check.metric.notes()[0]}; links in the simulation: {check.links}.",
             body=[
@@ -57,7 +57,7 @@ def crosscheck_page(check: Crosscheck, provenance: Provenance) -> str:
                 _platform(check),
                 _resolutions(check),
             ],
-            assumed=_ASSUMED,
+            assumed=ASSUMED,
             provenance=provenance,
             results=check.table(),
         )
@@ -153,7 +153,7 @@ def _checks(check: Crosscheck) -> str:
 def _platform(check: Crosscheck) -> str:
     """Return the platform's displacement by both models at the largest scale."""
     first = check.pairs[0]
-    rows = _screw_rows(first.linear.platform_screw, first.simulated.platform_screw)
+    rows = screw_table(first.linear.platform_screw, first.simulated.platform_screw)
     text = paragraph(
         "Displacement of the platform's origin from the nominal pose, base axes, at "
         f"scale {first.scale:g}."
@@ -161,8 +161,8 @@ def _platform(check: Crosscheck) -> str:
     return section("The platform at full size", text, rows)
 
 
-def _screw_rows(ours: Any, theirs: Any) -> str:
-    """Return the table of a screw by both models, rotations first."""
+def screw_table(ours: Any, theirs: Any) -> str:
+    """Return the table of a screw (6,) [rad, m] by both models, rotations first."""
     rows: Cells = [
         [
             name,
@@ -211,7 +211,7 @@ def failure_page(failure: Mapping[str, Any], provenance: Provenance) -> str:
             tiles=[],
             about=f"Status: {failure['status']}.",
             body=[],
-            assumed=_ASSUMED,
+            assumed=ASSUMED,
             provenance=provenance,
             results=failure,
         )
@@ -254,7 +254,7 @@ def poses_page(
                         [f"{len(rows)} poses requested."])],
             about="At every pose both models are compared at several scales.",
             body=[section("Poses", table(head, cells, "poses"))],
-            assumed=_ASSUMED,
+            assumed=ASSUMED,
             provenance=provenance,
             results=answer,
         )
@@ -265,82 +265,3 @@ def _slope(row: Mapping[str, Any]) -> float:
     """Return the slope at a pose; NaN without one."""
     slope = row.get("slope")
     return np.nan if slope is None else float(slope)
-
-
-def stiffness_check_page(check: StiffnessCheck, provenance: Provenance) -> str:
-    """Return the page of the platform's stiffness by several methods.
-
-    Args:
-        check: result of :func:`forcefit.validation.crosscheck.stiffness_check.check_stiffness`.
-        provenance: command and files.
-
-    Returns:
-        HTML, which needs no other file.
-    """
-    robot = check.exact.posture.robot.name
-    words = {PASSED: "agrees with", FAILED: "differs from"}.get(
-        check.outcome, "cannot be compared with"
-    )
-    return page(
-        Page(
-            title=f"{robot}: stiffness of the platform by a multibody simulation",
-            verdict=f"The exact stiffness {words} the simulation: {check.reason}.",
-            good=_GOOD[check.outcome],
-            tiles=_stiffness_tiles(check),
-            about=f"Links in the simulation: {check.links}.",
-            body=[_compliances(check), _methods(check), _displacements(check)],
-            assumed=_ASSUMED,
-            provenance=provenance,
-            results=check.table(),
-        )
-    )
-
-
-def _stiffness_tiles(check: StiffnessCheck) -> list[Tile]:
-    """Return tiles of the differences of the exact stiffness."""
-    return [
-        Tile(words, [f"{100 * check.differences[name]:.2g} %"],
-             [f"known to {100 * check.uncertainties[name]:.2g} %; at most "
-              f"{100 * check.tolerance:g} %."])
-        for name, words in (("exact", "Difference from load steps"),
-                            ("linearised", "Difference from the linearised simulation"))
-        if check.uncertainties[name] <= check.tolerance
-    ]  # fmt: skip
-
-
-def _compliances(check: StiffnessCheck) -> str:
-    """Return the diagonals of the compliances by every method."""
-    names = ["exact", "linear", "load steps", "linearised simulation"]
-    matrices = [check.exact.compliance, check.linear.compliance,
-                check.simulated.stepped, check.simulated.linearised]  # fmt: skip
-    rows: Cells = [
-        [name, *(Value(float(C[k, k]), ("rad/(N m)", "m/N")[k // 3], 5)
-                 for C in matrices)]
-        for k, name in enumerate(SCREW)
-    ]  # fmt: skip
-    text = paragraph("Motion along an axis for a unit wrench along the same axis.")
-    return section("Diagonal of the compliance", text,
-                   table(["component", *names], rows, "compliance"))  # fmt: skip
-
-
-def _methods(check: StiffnessCheck) -> str:
-    """Return the differences and the uncertainties of the methods."""
-    words = {"exact": "exact minus load steps", "linearised": "exact minus linearised "
-             "simulation", "linear": "linear minus linearised simulation"}  # fmt: skip
-    rows: Cells = [
-        [text, check.differences[name], check.uncertainties.get(name, np.nan)]
-        for name, text in words.items()
-    ]
-    head: list[str | Column] = [
-        "methods", Column("largest difference of sqrt(C_ii C_jj)", digits=2),
-        Column("known to", digits=2),
-    ]  # fmt: skip
-    return section("Differences of the methods", table(head, rows, "methods"))
-
-
-def _displacements(check: StiffnessCheck) -> str:
-    """Return the displacement of the platform at both equilibria."""
-    return section(
-        "The platform at the equilibrium",
-        _screw_rows(check.moved, check.simulated_moved),
-    )

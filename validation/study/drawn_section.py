@@ -4,7 +4,7 @@ from typing import Any
 
 from forcefit.assembly.statistics.report import draws_sections
 from forcefit.page.page import Tile, paragraph, section
-from forcefit.page.tables import Value
+from forcefit.page.tables import rotation_and_translation
 from forcefit.validation.study.study import StudyResults
 
 
@@ -32,9 +32,7 @@ def drawn_tiles(found: dict[str, Any] | None) -> list[Tile]:
         return []
     worst = found["worst_case"]
     turn, shift = (worst[key] for key in ("rotation", "translation"))
-    bound: list[str | Value] = [
-        Value(turn["bound"], "rad", 3), " and ", Value(shift["bound"], "m", 3)
-    ]  # fmt: skip
+    bound = rotation_and_translation(turn["bound"], shift["bound"], 3)
     name, share = max(shift["shares"].items(), key=lambda pair: pair[1])
     total = sum(shift["shares"].values())
     note = [f"Over all parts and clearances; {shift['means']}."]

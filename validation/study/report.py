@@ -12,7 +12,7 @@ from forcefit.assembly.model.statuses import FAILED, OK, PASSED
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import write_json, write_text
 from forcefit.page.page import Page, Provenance, Tile, command_line, page
-from forcefit.page.tables import Value
+from forcefit.page.tables import Value, rotation_and_translation
 from forcefit.results.display import largest_row
 from forcefit.results.quantities import in_words
 from forcefit.validation.study.drawn_section import drawn_section, drawn_tiles
@@ -185,10 +185,14 @@ def _tiles(results: StudyResults) -> list[Tile]:
     tiles = []
     if worst["pose"] is not None:
         over = worst["map"]
+        bounds = [
+            rotation_and_translation(one["rotation"], one["translation"], 3)
+            for one in (worst["pose"], over) if one is not None
+        ]  # fmt: skip
         drawn = study_robot.callouts or study_robot.fits
-        tiles.append(Tile("Certified worst case", _bound(worst["pose"]), [
+        tiles.append(Tile("Certified worst case", bounds[0], [
             "Over all positions within the clearances, at this pose",
-            *(["; over the map ", *_bound(over)] if over is not None else []), ".",
+            *(["; over the map ", *bounds[1]] if over is not None else []), ".",
             " Without the tolerances of the drawing." if drawn else "",
         ]))  # fmt: skip
         tiles += drawn_tiles(results.statistics)
@@ -250,9 +254,3 @@ def _governing_tiles(results: StudyResults, worst: dict[str, float]) -> list[Til
 def _percent(ratio: float) -> str:
     """Return the change by a factor in per cent."""
     return f"{100 * (ratio - 1):+.0f} %"
-
-
-def _bound(bounds: dict[str, float]) -> list[str | Value]:
-    """Return the text of an upper bound of a pose error."""
-    return [Value(bounds["rotation"], "rad", 3), " and ",
-            Value(bounds["translation"], "m", 3)]  # fmt: skip

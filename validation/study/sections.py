@@ -12,7 +12,7 @@ from forcefit.assembly.report.scene import robot_scene
 from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.page.charts import matrix
 from forcefit.page.page import paragraph, section
-from forcefit.page.tables import Cell, Column, Value, table
+from forcefit.page.tables import Cell, Column, Value, rotation_and_translation, table
 from forcefit.results.quantities import in_words, unit_of
 from forcefit.stiffness.link import scaled
 from forcefit.stiffness.report.link_page import stiffness_unit
@@ -85,8 +85,8 @@ def governing_section(results: StudyResults) -> str:
     return section(
         "Parts that govern the worst case",
         paragraph(
-            "The certified bound at this pose is ", Value(worst["rotation"], "rad"),
-            " and ", Value(worst["translation"], "m"),
+            "The certified bound at this pose is ",
+            *rotation_and_translation(worst["rotation"], worst["translation"]),
             ". The table gives it with one imperfection removed. Errors may cancel "
             "each other; the bound then rises.",
         ),

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from forcefit.page.page import Tile, paragraph, section
-from forcefit.page.tables import Cell, Value, table
+from forcefit.page.tables import Cell, Value, rotation_and_translation, table
 from forcefit.stiffness.screws import SCREW, SCREW_UNITS
 
 
@@ -75,12 +75,9 @@ def service_tile(service: dict[str, Any] | None) -> list[Tile]:
         screw = np.asarray(service["deflection"])
         turn, shift = (float(np.linalg.norm(half)) for half in (screw[:3], screw[3:]))
         note = "The platform's motion at this pose, least-energy solution."
-        motion: list[str | Value] = [
-            Value(turn, "rad", 3),
-            " and ",
-            Value(shift, "m", 3),
-        ]
-        tiles.append(Tile("By load and weight", motion, [note]))
+        tiles.append(
+            Tile("By load and weight", rotation_and_translation(turn, shift, 3), [note])
+        )
     modes = service.get("frequencies", {}).get("modes")
     if modes:
         lowest = Value(modes[0]["frequency"], "Hz", 4)
