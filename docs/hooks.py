@@ -17,8 +17,6 @@ from mkdocs.structure.files import File
 
 # a docstring's ":func:`name`", once its name is code
 _ROLE = re.compile(r"(?<![\w:]):(?:func|mod|class|meth|data|attr|math):(?=<code>)")
-# a block of code, which scrolls if its lines are long
-_CODE = re.compile(r"(<pre[^>]*>(?:<span></span>)?)<code>")
 
 # a number of a module, and its reason behind it
 _NUMBER = re.compile(
@@ -92,5 +90,5 @@ def _numbers() -> str:
 
 
 def on_page_content(html: str, **_: Any) -> str:
-    """Remove the roles before names in docstrings; make code scroll by the keyboard."""
-    return _CODE.sub(r'\1<code tabindex="0">', _ROLE.sub("", html))
+    """Names in docstrings without the role that stands before them."""
+    return _ROLE.sub("", html)

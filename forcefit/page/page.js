@@ -50,6 +50,7 @@
     const plot = figure.querySelector(".plot");
     const whole = { margin: { l: 60, r: 20, t: 20, b: 50 }, uirevision: 1,
       legend: { orientation: "h", y: 1.02, yanchor: "bottom" }, ...layout };
+    plot.style.height = `${whole.height}px`; // which plotly.js loses with the width
     shown.set(figure, [traces, whole]);
     pictureSoon(figure);
     return Plotly.react(plot, traces, coloured(whole, onScreen()), SETTINGS);

@@ -130,6 +130,10 @@ def test_page_fits_the_width_of_a_phone_and_of_paper(opened):
     tab, *_ = opened
     wait(tab, "return document.querySelectorAll('img.print').length === "
          "document.querySelectorAll('figure').length")  # fmt: skip
+    before = tab.execute_script("return document.querySelector('.xtitle')?.style.fill")
+    scheme(tab, "dark")  # figures are drawn again
+    wait(tab, "return (document.querySelector('.xtitle')?.style.fill || 0) !== "
+         f"'{before}'")  # fmt: skip
     for width in ("phone", "paper"):
         assert beyond(tab, width) == []
 
@@ -153,8 +157,15 @@ def beyond(tab, width):
     tab.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     try:
         if width == "phone":  # figures are drawn again
-            wait(tab, f"return document.documentElement.scrollWidth === {pixels}")
-            return []
+            wait(tab, "return [document.documentElement.scrollWidth, "
+                 "...[...document.querySelectorAll('.main-svg')].map(svg => "
+                 f"svg.clientWidth)].every(width => width <= {pixels})")  # fmt: skip
+            return tab.execute_script(  # drawings that cover the text below them
+                "return [...document.querySelectorAll('figure')].filter(f => "
+                "[...f.querySelectorAll('.main-svg')].some(svg => "
+                "svg.getBoundingClientRect().bottom > "
+                "f.getBoundingClientRect().bottom + 1)).map(f => f.ariaLabel)"
+            )
         return tab.execute_script(
             "return [...document.querySelectorAll('table, img.print, p, li, .tile')]"
             ".filter(e => e.getBoundingClientRect().right > arguments[0])"
