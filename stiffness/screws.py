@@ -20,6 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 
 SCREW = ("RX", "RY", "RZ", "TX", "TY", "TZ")
 WRENCH = ("MX", "MY", "MZ", "FX", "FY", "FZ")
+SCREW_UNITS = ("rad", "rad", "rad", "m", "m", "m")
+WRENCH_UNITS = ("N m", "N m", "N m", "N", "N", "N")
 UNIT_VECTORS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 

@@ -35,7 +35,9 @@ class ParsedPage(HTMLParser):
         given = dict(attrs)
         self.tags.add(tag)
         links = (given.get(k) for k in ("src", "href", "action", "data"))
-        self.fetched += [link for link in links if link and link[:5] != "data:"]
+        # a link to a section of the page itself begins with a hash
+        own = ("data:", "#")
+        self.fetched += [one for one in links if one and not one.startswith(own)]
         value = given.get("data-v")
         cell = Cell("", None if value is None else float(value), given.get("data-si"))
         if tag == "table":
@@ -89,7 +91,7 @@ def parse(text):
 def tiles(text):
     """Answer and note of each conclusion at the top of a page, by its title."""
     found = re.findall(
-        r"<div class=tile><h3>(.*?)</h3><p class=answer>(.*?)</p>"
+        r"<div class=tile><p class=title>(.*?)</p><p class=answer>(.*?)</p>"
         r"<p class=note>(.*?)</p></div>", text,
     )  # fmt: skip
     return {

@@ -9,6 +9,7 @@ import sys
 
 import pytest
 
+from tests.axe_for_tests import scheme, violations
 from tests.forcefit.page.test_browser import browser
 from tests.test_tutorials import DOCS, ROOT, blocks
 
@@ -58,10 +59,14 @@ def test_no_page_shows_the_source_of_a_formula(site):
     assert (site / "theory.html").read_text(encoding="utf-8").count("<math") > LAST
 
 
+def pages_of(site):
+    """All pages but the one that a server shows in place of one that is missing."""
+    return [path for path in site.rglob("*.html") if path.name != "404.html"]
+
+
 @pytest.mark.slow
 def test_every_page_opens_from_its_folder_without_an_error(site):
-    """All but the page that a server shows in place of one that is missing."""
-    pages = [path for path in site.rglob("*.html") if path.name != "404.html"]
+    pages = pages_of(site)
     assert len(pages) == len(list(DOCS.rglob("*.md")))
     tab = browser()
     try:
@@ -83,5 +88,20 @@ def test_formulas_are_drawn_by_the_browser(site):
             tab.execute_script(height % f"#eq-{n} math") for n in (3, 7, 15)
         )
         assert row < fraction < matrix
+    finally:
+        tab.quit()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("colours", ["light", "dark"])
+def test_no_page_breaks_a_serious_rule_of_accessibility(site, colours):
+    tab = browser()
+    try:
+        scheme(tab, colours)
+        found = {}
+        for path in pages_of(site):
+            tab.get(path.as_uri())
+            found[path.name] = violations(tab)
+        assert {name: broken for name, broken in found.items() if broken} == {}
     finally:
         tab.quit()

@@ -34,7 +34,7 @@ from forcefit.results.display import (
     Figures,
     brief,
     html_table,
-    numbers,
+    pose_text,
     short_repr,
     show,
 )
@@ -78,7 +78,7 @@ class Posture:
             if f.actuated
         ]  # fmt: skip
         return {
-            "pose": f"{numbers(self.pose().values())} m, rad",
+            "pose": pose_text(self.pose()),
             "drives": f"{brief(', '.join(drives)) or 'none'} [rad, m]",
             "frames": str(len(frames)),
             "nominal mismatch": f"{self.mismatch:.2g} rad, m",

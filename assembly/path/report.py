@@ -10,15 +10,14 @@ from forcefit.assembly.model.statuses import OK
 from forcefit.assembly.path.path_errors import PathErrors
 from forcefit.assembly.path.summary import LARGEST, LAWS, LEAST_PERIODS, sizes
 from forcefit.inputs.errors import plot_label
-from forcefit.page.charts import BLUE, GREY, RED, Axis, chart, grid
-from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
+from forcefit.page.charts import COLOURS, Axis, chart, grid
+from forcefit.page.page import Page, Provenance, Tile, listed, page, section
 from forcefit.page.tables import Value, table
 from forcefit.stiffness.screws import SCREW
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_COLOURS = (BLUE, RED, GREY, "#2e8b57", "#8e5ea2", "#d98b1f")
 _ASSUMED = (
     "Quasi-static: inertia and weight act as loads at each instant. Vibration, damping "
     "and the inertia of the deflection itself are left out.",
@@ -82,20 +81,30 @@ def path_page(
         Page(
             title=f"{summary['robot']}: errors along a path",
             verdict=_verdict(summary),
-            good=None if summary["status"] == OK else False,
+            good=_good(summary),
             tiles=_tiles(summary),
             about=f"{summary['points']} instants, {summary['solved']} solved; law of "
             f"the motion: {LAWS.get(summary['law'], summary['law'])}.",
             body=[
                 section("Largest values", _largest(summary)) if peaks else "",
                 section("Over time", *_charts(errors)) if peaks else "",
-                *(paragraph(f"Note: {one}.") for one in summary["remarks"]),
+                section("Notes", listed([f"{one}." for one in summary["remarks"]]))
+                if summary["remarks"]
+                else "",
             ],
             assumed=_ASSUMED,
             provenance=provenance,
             results=summary,
         )
     )
+
+
+def _good(summary: Mapping[str, Any]) -> bool | None:
+    """Return whether every instant has a result; None if vibration may exceed it."""
+    if summary["status"] != OK:
+        return False
+    periods = summary["periods"] or 0.0
+    return True if LEAST_PERIODS <= periods < np.inf else None
 
 
 def _verdict(summary: Mapping[str, Any]) -> str:
@@ -108,6 +117,8 @@ def _verdict(summary: Mapping[str, Any]) -> str:
     else:
         size = Value(peak["value"], "m").text
         verdict = f"Acceleration deflects the platform by at most {size}"
+    if _good(summary) is None:
+        verdict += "; vibration, which is left out, may exceed it"
     if summary["status"] != OK:
         verdict += f"; {summary['status']} {summary.get('reason', '')}"
     return verdict + "."
@@ -116,7 +127,7 @@ def _verdict(summary: Mapping[str, Any]) -> str:
 def _tiles(summary: Mapping[str, Any]) -> list[Tile]:
     """Return tiles of deflection, drive force and periods."""
     tiles = []
-    for key in ("inertial_translation", "inertial_rotation", "stress"):
+    for key in ("inertial_rotation", "inertial_translation", "stress"):
         peak = summary.get("largest", {}).get(key)
         if peak is not None:
             words, unit, _ = LARGEST[key]
@@ -147,7 +158,7 @@ def _largest(summary: Mapping[str, Any]) -> str:
         ]
         for name, peak in summary["drives"].items()
     ]
-    return table(["", "largest", "at", "body"], rows, "largest values")
+    return table(["quantity", "largest", "at", "body"], rows, "largest values")
 
 
 def _charts(errors: PathErrors) -> list[str]:
@@ -157,10 +168,10 @@ def _charts(errors: PathErrors) -> list[str]:
     of_size = sizes(errors)
     return [
         grid(
-            _chart(errors, dict(zip(SCREW[3:], screws[3:], strict=True)), "m",
-                   "deflection by acceleration"),
             _chart(errors, dict(zip(SCREW[:3], screws[:3], strict=True)), "rad",
                    "rotation by acceleration"),
+            _chart(errors, dict(zip(SCREW[3:], screws[3:], strict=True)), "m",
+                   "deflection by acceleration"),
         ),
         grid(
             _chart(errors, forces, "N m or N", "drive force"),
@@ -173,10 +184,11 @@ def _charts(errors: PathErrors) -> list[str]:
 def _chart(
     errors: PathErrors, lines: Mapping[str, NDArray], unit: str, title: str
 ) -> str:
-    """Return a chart of lines over time."""
+    """Return a chart of lines over time, with its title as the caption."""
     traces = [
         {"type": "scatter", "mode": "lines", "x": errors.trajectory.times, "y": values,
-         "name": name, "line": {"color": _COLOURS[k % len(_COLOURS)]}}
+         "name": name, "line": {"color": COLOURS[k % len(COLOURS)]}}
         for k, (name, values) in enumerate(lines.items())
     ]  # fmt: skip
-    return chart(traces, Axis("time", "s"), Axis(title, unit), "")
+    caption = f"{title[0].upper()}{title[1:]}."
+    return chart(traces, Axis("time", "s"), Axis(title, unit), caption)

@@ -1,6 +1,7 @@
 """Pictures of the parts' shares in the compliance of the platform."""
 
 from collections.abc import Mapping
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from forcefit.assembly.report.platform_stiffness import (
     share_rows,
 )
 from forcefit.inputs.errors import plot_label
-from forcefit.page.charts import Axis, chart, label
+from forcefit.page.charts import COLOURS, GREY, Axis, chart, label
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,13 +30,14 @@ def plot_shares(results: Mapping[str, Any], figure: "Figure | None" = None) -> "
     """
     from matplotlib.figure import Figure
 
-    rows = share_rows(results["shares"])
     figure = figure or Figure(figsize=(8.0, 4.5), layout="constrained")
     axes = figure.subplots()
     bottom = np.zeros(6)
-    for name, row in largest_rows(rows).items():
+    for name, (row, colour) in _coloured(results["shares"]).items():
         height = 100 * np.nan_to_num(row)
-        axes.bar(DIRECTIONS, height, bottom=bottom, label=plot_label(name))
+        axes.bar(
+            DIRECTIONS, height, bottom=bottom, label=plot_label(name), color=colour
+        )
         bottom = bottom + height
     axes.set_ylabel("share of the compliance [%]")
     axes.set_title(plot_label(f"{results['robot']}: compliance of the parts"))
@@ -53,10 +55,20 @@ def share_chart(shares: Mapping[str, Any], caption: str) -> str:
     Returns:
         HTML.
     """
-    rows = largest_rows(share_rows(dict(shares)))
     traces = [
-        {"type": "bar", "name": label(name), "x": list(DIRECTIONS), "y": row}
-        for name, row in rows.items()
-    ]
+        {"type": "bar", "name": label(name), "x": list(DIRECTIONS), "y": row,
+         "marker": {"color": colour}}
+        for name, (row, colour) in _coloured(shares).items()
+    ]  # fmt: skip
     share = Axis("share of the compliance", options={"tickformat": ".0%"})
     return chart(traces, Axis(""), share, caption, bars="stack")
+
+
+def _coloured(shares: Mapping[str, Any]) -> dict[str, tuple[list[float], str]]:
+    """Return the largest shares with their colours; the sum of the others is grey."""
+    rows = share_rows(dict(shares))
+    shown = largest_rows(rows).items()
+    return {
+        name: (row, colour if name in rows else GREY)
+        for (name, row), colour in zip(shown, cycle(COLOURS), strict=False)
+    }

@@ -15,7 +15,7 @@ from forcefit.assembly.steps.machine import Machine
 from forcefit.assembly.steps.state import State
 from forcefit.page.charts import BLUE, RED, Axis, chart, grid
 from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
-from forcefit.page.tables import Cell, Column, Value, table
+from forcefit.page.tables import Cell, Column, Value, rotation_and_translation, table
 
 _ASSUMED = (
     "Small screws at one pose: every step is linear, contacts of clearances excepted.",
@@ -42,15 +42,11 @@ def steps_page(
         HTML, which needs no other file.
     """
     done = results["status"] == "ok"
-    verdict = (
-        f"All {len(results['steps'])} steps are carried out: "
-        if done else f"{results.get('reason', '')}; "
-    )  # fmt: skip
     return page(
         Page(
             title=f"{results['robot']}: the order of assembly",
-            verdict=f"{verdict}{results['remarks'][0]}.",
-            good=None if done else False,
+            verdict=_verdict(results),
+            good=_good(results),
             tiles=_tiles(results) if done else [],
             about=f"{len(results['steps'])} steps.",
             body=[
@@ -66,6 +62,24 @@ def steps_page(
     )
 
 
+def _verdict(results: Mapping[str, Any]) -> str:
+    """Return whether the steps are carried out, and the first remark."""
+    verdict = results.get("reason", "")
+    if results["status"] == "ok":
+        verdict = f"All {len(results['steps'])} steps are carried out"
+    exceeded = sum(bool(step.get("exceeded")) for step in results["steps"])
+    if exceeded:
+        verdict += f", {exceeded} with more than the allowed force"
+    return f"{verdict}; {results['remarks'][0]}."
+
+
+def _good(results: Mapping[str, Any]) -> bool | None:
+    """Return whether all steps are done; None if one needs more than its force."""
+    if results["status"] != "ok":
+        return False
+    return None if any(step.get("exceeded") for step in results["steps"]) else True
+
+
 def _tiles(results: Mapping[str, Any]) -> list[Tile]:
     """Return the main figures of the assembled machine."""
     screw = np.asarray(results["platform_screw"])
@@ -77,7 +91,7 @@ def _tiles(results: Mapping[str, Any]) -> list[Tile]:
         Tile("Energy that stays", [Value(energy, "J")], lost),
         Tile(
             "Platform error",
-            [Value(float(shift), "m"), " and ", Value(float(turn), "rad")],
+            rotation_and_translation(float(turn), float(shift)),
             ["of the assembled machine."],
         ),
     ]
@@ -88,14 +102,14 @@ def _table(results: Mapping[str, Any]) -> str:
     head: list[str | Column] = [
         "step", Column("energy", "J"), Column("work", "J"), Column("lost", "J"),
         Column("closing force", "N"), Column("closing moment", "N m"),
-        Column("platform, translation", "m"), Column("platform, rotation", "rad"),
+        Column("platform, rotation", "rad"), Column("platform, translation", "m"),
     ]  # fmt: skip
     rows: list[list[Cell]] = []
     for step in results["steps"]:
         screw = np.asarray(step["platform_screw"])
         name = step["name"] + (" (too much force)" if step.get("exceeded") else "")
         keys = ("energy", "work", "lost", "closing_force", "closing_moment")
-        sizes = [float(np.linalg.norm(part)) for part in (screw[3:], screw[:3])]
+        sizes = [float(np.linalg.norm(part)) for part in (screw[:3], screw[3:])]
         rows.append([name, *(step[key] for key in keys), *sizes])
     return table(head, rows, "steps")
 
@@ -182,13 +196,13 @@ def _machines(results: Mapping[str, Any]) -> str:
         return ""
     head: list[str | Column] = [
         "step", Column("force, median", "N"), Column("force, 95 %", "N"),
-        Column("energy, 95 %", "J"), Column("translation, 95 %", "m"),
-        Column("rotation, 95 %", "rad"),
+        Column("energy, 95 %", "J"), Column("rotation, 95 %", "rad"),
+        Column("translation, 95 %", "m"),
     ]  # fmt: skip
     rows: list[list[Cell]] = [
         [
             name, q["closing_force"]["0.5"], q["closing_force"]["0.95"],
-            q["energy"]["0.95"], q["translation"]["0.95"], q["rotation"]["0.95"],
+            q["energy"]["0.95"], q["rotation"]["0.95"], q["translation"]["0.95"],
         ]
         for name, q in results["quantiles"].items()
     ]  # fmt: skip

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import xarray
 
 _BINS = 60
-_GOOD = 0.95  # a yield below this value is shown as a warning
+_GOOD = 0.95  # yield that the interval of a favourable result exceeds
 _LISTED = 20  # largest number of errors in a table of shares
 _ASSUMED = (
     "Small screws: the closures are linear in the errors of each draw.",
@@ -58,7 +58,7 @@ def draws_page(
         Page(
             title=f"{summary['robot']}: random errors",
             verdict=verdict + ".",
-            good=_share(summary)["probability"] >= _GOOD,
+            good=_good(_share(summary)),
             tiles=_draws_tiles(summary),
             about=f"{summary['draws']} draws, seed {summary['seed']}; pose errors: "
             f"clearance {summary['clearance']}: {summary['clearance_means']}.",
@@ -92,6 +92,13 @@ def _share(summary: Mapping[str, Any]) -> Mapping[str, float]:
     return limits or forced
 
 
+def _good(share: Mapping[str, float]) -> bool | None:
+    """Return whether the yield is at least 95 %; None if its interval contains it."""
+    if share["lower"] >= _GOOD:
+        return True
+    return None if share["upper"] >= _GOOD else False
+
+
 def _share_text(interval: Mapping[str, float]) -> str:
     """Return a probability in per cent, with its interval."""
     low, high = 100 * interval["lower"], 100 * interval["upper"]
@@ -105,7 +112,7 @@ def _draws_tiles(summary: Mapping[str, Any]) -> list[Tile]:
     words = "all limits kept" if "within_limits" in summary else WORDS["forced"]
     tiles = [Tile("Yield", [f"{100 * share['probability']:.4g} %"],
                   [f"{words}; {low:.4g} to {high:.4g} %."])]  # fmt: skip
-    sizes = {k: summary["quantities"].get(k, {}) for k in ("translation", "rotation")}
+    sizes = {k: summary["quantities"].get(k, {}) for k in ("rotation", "translation")}
     high95 = [
         Value(one["quantiles"]["0.95"]["value"], UNITS[key], 3)
         for key, one in sizes.items() if "quantiles" in one
@@ -132,7 +139,7 @@ def _yields(summary: Mapping[str, Any]) -> str:
     ]  # fmt: skip
     level = f"{summary['confidence']:.0%}"
     words = ("probability", f"at least ({level})", "at most", "draws undecided")
-    head: list[str | Column] = ["", *(Column(one, digits=5) for one in words)]
+    head: list[str | Column] = ["event", *(Column(one, digits=5) for one in words)]
     return table(head, rows, "yields")
 
 
@@ -169,7 +176,7 @@ def _quantities(summary: Mapping[str, Any]) -> str:
         values = [one["mean"]["value"], one["most_probable"]["value"]]
         values += [one["quantiles"][q]["value"] for q in ("0.5", "0.95", "0.99")]
         rows.append([NAMES[key] + clearance, *(Value(v, one["unit"]) for v in values)])
-    head = ["", "mean", "most probable", "median", "95 % below", "99 % below"]
+    head = ["quantity", "mean", "most probable", "median", "95 % below", "99 % below"]
     text = f"Of the {summary['assembled']} of {summary['draws']} draws that assemble:"
     return paragraph(text) + table(head, rows, "sizes")
 
@@ -217,7 +224,7 @@ def _capability(summary: Mapping[str, Any]) -> str:
     ]  # fmt: skip
     words = [word for name in ("Cp", "Cpk", "ppm above")
              for word in (name, f"{name}, at least", f"{name}, at most")]  # fmt: skip
-    head: list[str | Column] = ["", "limit", *map(Column, words)]
+    head: list[str | Column] = ["quantity", "limit", *map(Column, words)]
     return section("Capability", table(head, rows, "capability")) if rows else ""
 
 

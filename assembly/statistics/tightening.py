@@ -61,7 +61,7 @@ def _clearance_tiles(summary: Mapping[str, Any]) -> list[Tile]:
     """Return tiles on the pose error of perfect parts."""
     parts = summary["perfect_parts"]
     answer: list[str | Value] = []
-    for key in ("translation", "rotation"):
+    for key in ("rotation", "translation"):
         one = parts.get(key, {})
         if one.get("reached"):
             answer += [" and ", Value(one["reached"], one["unit"], 3)]

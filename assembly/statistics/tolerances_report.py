@@ -47,20 +47,17 @@ def tolerances_page(
     """
     present, allocation = (results.get(key) for key in ("present", "allocation"))
     tiles, body, sentences = [], [], []
-    good = True
     if present is not None:
         share = 100 * present["assemblable_share"]
         sentences.append(
             f"{share:.1f} % of {present['postures']} postures assemble by "
             "clearances alone; all of them with the errors times "
-            f"{present['factor_on_errors']:.4g}."
+            f"{present['factor_on_errors']:.4g}"
         )
         tiles += _present_tiles(present)
         body.append(_present_section(present))
         body += [section("Where it is tight", *pictures)] if any(pictures) else []
     if allocation is not None:
-        check = allocation["verification"]
-        good = (check or {}).get("verdict") != "contradicted"
         sentences.append(_allocation_sentence(allocation))
         tiles += _allocation_tiles(allocation)
         body += [_asked_section(results, allocation), _allocation_section(allocation)]
@@ -68,8 +65,8 @@ def tolerances_page(
     return page(
         Page(
             title=f"{results['robot']}: tolerances",
-            verdict=" ".join(sentences),
-            good=good and (present is None or present["assemblable_share"] == 1.0),
+            verdict=_sentence(sentences),
+            good=_good(present, allocation),
             tiles=tiles,
             about=f"{results['postures']} postures: {results['grid']}.",
             body=body,
@@ -78,6 +75,28 @@ def tolerances_page(
             results=results,
         )
     )
+
+
+def _sentence(parts: Sequence[str]) -> str:
+    """Return the parts as one sentence."""
+    text = "; ".join(parts)
+    return f"{text[:1].upper()}{text[1:]}."
+
+
+def _good(
+    present: Mapping[str, Any] | None, allocation: Mapping[str, Any] | None
+) -> bool | None:
+    """Return whether all postures assemble and the yield is shown by new draws.
+
+    None if some postures assemble only by force, or if new draws do not decide.
+    """
+    verdict = "shown"
+    if allocation is not None:
+        verdict = (allocation["verification"] or {}).get("verdict", "not verified")
+    if verdict == "contradicted":
+        return False
+    loose = present is None or present["assemblable_share"] == 1.0
+    return True if loose and verdict in {"shown", "no draw failed"} else None
 
 
 def _present_tiles(present: Mapping[str, Any]) -> list[Tile]:
@@ -105,9 +124,13 @@ def _present_section(present: Mapping[str, Any]) -> str:
     ]  # fmt: skip
     shares = {one["error"]: one["share_of_margin"] for one in present["slopes"]}
     most = dict(list(shares.items())[:_LISTED])
+    rest = f"{len(shares) - len(most)} others"
+    if len(shares) > len(most):
+        most[rest] = sum(list(shares.values())[_LISTED:])
+    axis = Axis("share of the largest margin")
     return section(
         "The errors there are",
-        bars(most, Axis("share of the largest margin"), "The steepest first.", np.nan),
+        bars(most, axis, "The steepest first.", np.nan, rest),
         table(["error", "size", Column("share of the margin")], rows, "errors"),
     )
 
@@ -119,14 +142,14 @@ def _error_unit(name: str) -> str:
 
 def _allocation_sentence(allocation: Mapping[str, Any]) -> str:
     """Return sentence on whether the tolerances meet the limits, by proof and draws."""
-    text = f"Tolerances for a yield of {allocation['yield']:g}"
+    text = f"tolerances for a yield of {allocation['yield']:g}"
     proven = allocation["proven_scale"]
     if np.isfinite(proven):
         text += f", proven when scaled by {proven:.4f}"
     check = allocation["verification"]
     if check:
-        text += f"; {check['draws']} new draws at all postures: {check['verdict']}"
-    return text + "."
+        text += f", by {check['draws']} new draws at all postures: {check['verdict']}"
+    return text
 
 
 def _allocation_tiles(allocation: Mapping[str, Any]) -> list[Tile]:
@@ -194,7 +217,8 @@ def _asked_section(results: Mapping[str, Any], allocation: Mapping[str, Any]) ->
         ["postures", f"{results['postures']}: {results['grid']}"],
         ["draws", f"{allocation['draws']}, seed {allocation['seed']}{fresh}"],
     ]
-    return section("Requirements", table(["requirement", ""], rows, "requirements"))
+    head = ["requirement", "value"]
+    return section("Requirements", table(head, rows, "requirements"))
 
 
 def _allocation_section(allocation: Mapping[str, Any]) -> str:

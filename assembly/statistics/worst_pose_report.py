@@ -67,7 +67,7 @@ def worst_section(results: Mapping[str, Any]) -> str:
          one["means"]]
         for key, one in results.items()
     ]  # fmt: skip
-    head: list[str | Column] = ["", "attained", "certified bound", "reading"]
+    head: list[str | Column] = ["error", "attained", "certified bound", "reading"]
     shares: list[list[Cell]] = [
         [f"{key}: {name}", Value(share, one["unit"]),
          share / sum(one["shares"].values())]

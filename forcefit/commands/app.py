@@ -92,7 +92,8 @@ def study(
     Writes report.html (self-contained), results.json and results.nc to the folder that
     the study file names.  Exit status 1 if a check fails.
     """
-    from forcefit.validation.study.report import results_table, verdict, write_study
+    from forcefit.validation.study.headline import verdict
+    from forcefit.validation.study.report import results_table, write_study
     from forcefit.validation.study.study import run_study
     from forcefit.validation.study.study_file import read_study
 

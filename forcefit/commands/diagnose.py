@@ -8,7 +8,7 @@ import typer
 from forcefit.commands.inspect import CampaignArgument
 from forcefit.commands.options import JsonOption
 from forcefit.commands.progress import progress_bars
-from forcefit.commands.report import ReportOption, provenance
+from forcefit.commands.report import ReportOption, campaign_provenance
 from forcefit.inputs.errors import BadInput, nearest, quoted
 from forcefit.inputs.writing import ROBOT, check_writable, write_json
 
@@ -92,8 +92,7 @@ def diagnose(
     if report is not None:
         from forcefit.validation.diagnosis.report import write_report
 
-        folder = campaign if campaign.is_dir() else campaign.parent
-        write_report(diagnosis, report, tally, provenance(folder))
+        write_report(diagnosis, report, tally, campaign_provenance(campaign))
     if save is not None:
         if not diagnosis.better:
             typer.echo(f"{save}: not written, because {_worse(diagnosis)}", err=True)

@@ -7,7 +7,8 @@ import typer
 
 from forcefit.commands.options import JsonOption
 from forcefit.commands.progress import progress_bars
-from forcefit.inputs.writing import write_json
+from forcefit.commands.report import ReportOption, campaign_provenance
+from forcefit.inputs.writing import write_json, write_text
 
 CampaignArgument = Annotated[
     Path, typer.Argument(metavar="CAMPAIGN", help="Folder that contains campaign.toml.")
@@ -22,6 +23,7 @@ def inspect(
             "--iso", help="Print the characteristics of ISO 9283 and ISO 230-2 instead."
         ),
     ] = False,
+    report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
     """Inspect measured data; characteristics of ISO 9283 and 230-2.
@@ -40,12 +42,20 @@ def inspect(
         from forcefit.validation.standards.figures import standard_figures
 
         figures = standard_figures(data)
+        if report is not None:
+            from forcefit.validation.standards.report import standards_page
+
+            write_text(standards_page(figures, campaign_provenance(campaign)), report)
         write_json(figures.table(), json)
         if json != "-":
             print(figures.text())
         return
     with progress_bars() as update:
         inspection = inspect_campaign(data, lambda done, n: update("effects", done, n))
+    if report is not None:
+        from forcefit.validation.inspection.report import inspection_page
+
+        write_text(inspection_page(inspection, campaign_provenance(campaign)), report)
     write_json(inspection.table(), json)
     if json != "-":
         print(inspection_text(inspection))

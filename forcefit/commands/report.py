@@ -93,3 +93,8 @@ def provenance(*sources: Path | str | None) -> "Provenance":
         if file.is_file()
     ]
     return Provenance(command_line(), files)
+
+
+def campaign_provenance(campaign: Path) -> "Provenance":
+    """Return the running command and the files of a campaign's folder."""
+    return provenance(campaign if campaign.is_dir() else campaign.parent)

@@ -10,6 +10,7 @@ from forcefit.commands.help import Commands
 from forcefit.commands.library import library
 from forcefit.commands.link_exchange import export, import_
 from forcefit.commands.options import FigureOption, JsonOption
+from forcefit.commands.report import ReportOption, provenance
 from forcefit.commands.stiffness_options import (
     Accuracy,
     Base,
@@ -42,7 +43,13 @@ from forcefit.commands.stiffness_options import (
     tell_progress,
 )
 from forcefit.inputs.errors import BadInput
-from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
+from forcefit.inputs.writing import (
+    PICTURE,
+    check_writable,
+    save_figure,
+    write_json,
+    write_text,
+)
 
 if TYPE_CHECKING:
     from forcefit.commands.beam_options import BeamOptions
@@ -139,6 +146,7 @@ def fea(
     part: Parts = None,
     mass: Masses = None,
     time_limit: TimeLimit = 300.0,
+    report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
     """Compute K_E by finite elements, refined to the required accuracy.
@@ -152,7 +160,7 @@ def fea(
     from forcefit.stiffness.surface.surface import read_surface
 
     if part and "list" in part:
-        if part != ["list"] or base or tip or mass or young or poisson:
+        if part != ["list"] or base or tip or mass or young or poisson or report:
             raise BadInput(
                 "--part list: found together with other options; expected it alone, "
                 "because it only lists the solids of a STEP file"
@@ -169,6 +177,10 @@ def fea(
         read_surface(surface, unit), held, moved, materials,
         options=options, point_masses=masses,
     ).link  # fmt: skip
+    if report is not None:
+        from forcefit.stiffness.report.link_page import link_page
+
+        write_text(link_page(link, provenance(surface)), report)
     write_json(link_results(link), json)
     if json != "-":
         print(link_text(link))

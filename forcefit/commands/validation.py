@@ -34,14 +34,24 @@ from forcefit.commands.options import (
 )
 from forcefit.commands.plan import plan
 from forcefit.commands.progress import progress_bars
+from forcefit.commands.report import ReportOption, provenance
 from forcefit.inputs.errors import BadInput
-from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
+from forcefit.inputs.writing import (
+    PICTURE,
+    check_writable,
+    save_figure,
+    write_json,
+    write_text,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from forcefit.assembly.kinematics.posture import Posture
     from forcefit.assembly.model.robot import Robot
+    from forcefit.page.page import Provenance
+    from forcefit.validation.crosscheck.crosscheck import Crosscheck
+    from forcefit.validation.crosscheck.stiffness_check import StiffnessCheck
 
 app = Commands(no_args_is_help=True)
 app.command()(diagnose)
@@ -154,6 +164,7 @@ def crosscheck(
     ] = None,
     json: JsonOption = None,
     figure: FigureOption = None,
+    report: ReportOption = None,
     time_limit: Annotated[
         float, typer.Option(min=0.0, help="Time limit of each simulation [s].")
     ] = 600.0,
@@ -198,6 +209,7 @@ def crosscheck(
         )
 
     own = errors is None or rest is mismatch is None
+    source = provenance(robot, errors)
 
     def compare(posture: "Posture") -> Crosscheck | StiffnessCheck:
         fixed = None if own else posture.robot.declared_errors
@@ -224,12 +236,14 @@ def crosscheck(
 
     if grid is not None:
         machine = load_robot(robot, closing_of(rest, mismatch, own_errors=own))
-        _crosscheck_grid(machine, grid, compare, json)
+        _crosscheck_grid(machine, grid, compare, json, report, source)
         return
     posture = declared_posture(
         robot, pose, joint, rest, mismatch, own, drive_force=drive_force
     )
     results, failure = attempt(posture.robot.name, lambda: compare(posture))
+    if report is not None:
+        write_text(_crosscheck_page(results, failure, source), report)
     write_json(failure if results is None else results.table(), json)
     if json != "-":
         print(failure["reason"] if results is None else results.text())
@@ -241,9 +255,26 @@ def crosscheck(
         raise typer.Exit(1)
 
 
+def _crosscheck_page(
+    results: "Crosscheck | StiffnessCheck | None", failure: "dict[str, Any]",
+    source: "Provenance",
+) -> str:  # fmt: skip
+    """Return the page of a comparison at one pose."""
+    from forcefit.validation.crosscheck.crosscheck import Crosscheck
+    from forcefit.validation.crosscheck.report import crosscheck_page, failure_page
+    from forcefit.validation.crosscheck.stiffness_page import stiffness_check_page
+
+    if results is None:
+        return failure_page(failure, source)
+    if isinstance(results, Crosscheck):
+        return crosscheck_page(results, source)
+    return stiffness_check_page(results, source)
+
+
 def _crosscheck_grid(
-    machine: "Robot", grid: str, compare: "Callable[[Posture], Any]", json: str | None
-) -> None:
+    machine: "Robot", grid: str, compare: "Callable[[Posture], Any]", json: str | None,
+    report: Path | None, source: "Provenance",
+) -> None:  # fmt: skip
     """Compare at every pose of a grid, with a progress bar."""
     from forcefit.assembly.sweeps.targets import parse_grid
     from forcefit.validation.crosscheck.poses import (
@@ -255,6 +286,10 @@ def _crosscheck_grid(
     axes = parse_grid(grid)
     with progress_bars() as update:
         rows = check_poses(machine, axes, compare, lambda d, n: update("poses", d, n))
+    if report is not None:
+        from forcefit.validation.crosscheck.report import poses_page
+
+        write_text(poses_page(machine.name, rows, source), report)
     write_json(poses_table(rows), json)
     if json != "-":
         print(poses_text(rows))
@@ -290,6 +325,7 @@ def validity(
     ] = None,
     json: JsonOption = None,
     figure: FigureOption = None,
+    report: ReportOption = None,
 ) -> None:
     """Estimate the errors due to the model's assumptions.
 
@@ -344,6 +380,11 @@ def validity(
                 lambda done, total: update("poses", done, total),
             )  # fmt: skip
         table, text = over_poses_table(costs), over_poses_text(costs)
+    if report is not None:
+        from forcefit.validation.assumptions.costs_page import costs_page
+
+        source = provenance(robot, errors, poses)
+        write_text(costs_page(costs, table, source), report)
     write_json(table, json)
     if json != "-":
         print(text)

@@ -18,7 +18,12 @@ from forcefit.page.markup import piece
 from forcefit.page.tables import Value
 from forcefit.results.units import shown_in
 
-BLUE, RED, GREY = "#1f6fb4", "#c0392b", "#9aa3ab"
+BLUE, RED, GREY = "#1f6fb4", "#c0392b", "#858e97"
+# lines and bars of one chart; grey is reserved for the sum of the others
+COLOURS = (
+    BLUE, RED, "#2e8b57", "#8e5ea2", "#d98b1f", "#179cb0", "#a3541c", "#d2679f",
+    "#7d8f14", "#5b63d3", "#e2703a", "#0f7a6c",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -83,7 +88,10 @@ def chart(
     return _figure(spec, "chart", caption)
 
 
-def bars(values: Mapping[str, float], x: Axis, caption: str, line: float = 1.0) -> str:
+def bars(
+    values: Mapping[str, float], x: Axis, caption: str, line: float = 1.0,
+    rest: str = "",
+) -> str:  # fmt: skip
     """Return horizontal bars, the first on top, with their numbers.
 
     Args:
@@ -91,13 +99,15 @@ def bars(values: Mapping[str, float], x: Axis, caption: str, line: float = 1.0) 
         x: the horizontal axis.
         caption: text below the chart.
         line: [SI] coordinate of a line across all bars; NaN for no line.
+        rest: name of a bar that is the sum of the others, which is grey.
 
     Returns:
         HTML.
     """
     trace: dict[str, Any] = {
         "type": "bar", "orientation": "h", "x": list(values.values()),
-        "y": [label(name) for name in values], "marker": {"color": BLUE},
+        "y": [label(name) for name in values],
+        "marker": {"color": [GREY if name == rest else BLUE for name in values]},
     }  # fmt: skip
     traces = [trace]
     if np.isfinite(line):
@@ -111,8 +121,9 @@ def bars(values: Mapping[str, float], x: Axis, caption: str, line: float = 1.0) 
 
 
 def matrix(
-    values: ArrayLike, names: Sequence[str], title: str, caption: str, around: bool
-) -> str:
+    values: ArrayLike, names: Sequence[str], title: str, caption: str, around: bool,
+    most: float = 1.0,
+) -> str:  # fmt: skip
     """Return a chart of a square matrix: coloured cells with numbers.
 
     Args:
@@ -121,7 +132,8 @@ def matrix(
         title: title of the colour scale.
         caption: text below the chart.
         around: True: the colour scale is centred at zero; False: it extends from 0 to
-            1.
+            ``most``.
+        most: upper end of the colour scale.
 
     Returns:
         HTML.
@@ -131,7 +143,7 @@ def matrix(
         "type": "heatmap", "z": np.asarray(values), "x": [label(n) for n in names],
         "y": [label(n) for n in names], "texttemplate": "%{z:.2f}",
         "colorscale": "RdBu" if around else "Blues", "reversescale": True,
-        "zmin": -size if around else 0, "zmax": size if around else 1,
+        "zmin": -size if around else 0, "zmax": size if around else most,
         "colorbar": {"title": {"text": title, "side": "right"}},
     }  # fmt: skip
     if not around:

@@ -253,7 +253,7 @@ def comparison_page(comparison: Comparison, provenance: Provenance) -> str:
         Page(
             title=" and ".join(dict.fromkeys(comparison.titles)) + ": two runs",
             verdict=_sentence(comparison),
-            good=True,
+            good=None if comparison.changes or comparison.only else True,
             tiles=tiles,
             about=f"{a} and {b}.",
             body=body,

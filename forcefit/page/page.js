@@ -50,6 +50,7 @@
     const plot = figure.querySelector(".plot");
     const whole = { margin: { l: 60, r: 20, t: 20, b: 50 }, uirevision: 1,
       legend: { orientation: "h", y: 1.02, yanchor: "bottom" }, ...layout };
+    plot.style.height = `${whole.height}px`; // which plotly.js loses with the width
     shown.set(figure, [traces, whole]);
     pictureSoon(figure);
     return Plotly.react(plot, traces, coloured(whole, onScreen()), SETTINGS);
@@ -73,7 +74,7 @@
       { ...layout, ...room, width: PAPER }, ON_PAPER) },
     { format: turned ? "png" : "svg", width: PAPER, height, scale: turned ? 2 : 1 });
     const old = figure.querySelector("img.print");
-    const img = old || element("img", "", { className: "print", alt: "" });
+    const img = old || element("img", "", { className: "print", alt: figure.ariaLabel });
     img.src = url;
     if (!old) plot.after(img);
     figure.classList.add("pictured");
@@ -380,6 +381,8 @@
     if (figures.length) await load();
     for (const figure of figures) {
       const spec = JSON.parse(figure.querySelector("script.spec").textContent);
+      figure.ariaLabel = figure.querySelector("figcaption")?.textContent
+        || ["y", "x"].map(a => spec.axes[a].title).filter(Boolean).join(" over ");
       kinds[figure.classList[0]](figure, spec);
     }
     const left = new Map(figures.map((figure, k) => [figure, redraw[k]]));

@@ -13,6 +13,7 @@ import base64
 import hashlib
 import json
 import platform
+import re
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -28,6 +29,9 @@ from forcefit.page.tables import Value, table
 
 _PACKAGES = ("numpy", "scipy", "clarabel", "cvxpy", "exudyn")
 _DIGITS = 300  # largest number of digits of an integer that a float can represent
+# class and word of the verdict: favourable, with a reservation, unfavourable
+_STATES = {True: ("good", "OK"), None: ("mixed", "Caution"), False: ("bad", "Not OK")}
+_HEADING = re.compile(r'<section id="([^"]+)"><h2>(.*?) <a class=anchor')
 
 
 @dataclass(frozen=True)
@@ -66,14 +70,16 @@ class Page:
 
     Attributes:
         title: title of the page.
-        verdict: the conclusion in a few sentences.
-        good: whether the result is favourable; None if it is neither good nor bad.
+        verdict: the conclusion in one sentence.
+        good: whether the result is favourable (green); None if it has a reservation
+            (amber).  ``docs/reports.md`` states the rule of each report.
         tiles: main conclusions, at the top.
         about: a text below the title that states what was computed.
         body: pieces of HTML, in their order.
         assumed: assumptions, one sentence for each.
         provenance: origin of the numbers.
         results: plain values, stored in the page for ``forcefit report compare``.
+        details: further sentences, below the verdict.
     """
 
     title: str
@@ -85,6 +91,7 @@ class Page:
     assumed: Sequence[str]
     provenance: Provenance
     results: Mapping[str, Any]
+    details: str = ""
 
 
 def command_line() -> str:
@@ -105,12 +112,17 @@ def page(content: Page) -> str:
     Returns:
         HTML with the results as JSON, in SI and with all digits.
     """
-    drawn = any("class=spec>" in one for one in content.body)
+    sections = [
+        *filter(None, content.body),
+        section("Assumptions", listed(content.assumed)),
+        section("Provenance", _provenance(content.provenance)),
+    ]
+    titles = [found for one in sections for found in _HEADING.findall(one)]
+    drawn = any("class=spec>" in one for one in sections)
     style, script = (packaged(name).decode() for name in ("page.css", "page.js"))
     return piece(
-        "page", content, {True: "good", None: "mixed", False: "bad"}[content.good],
-        _provenance(content.provenance), plain(content.results), style, script,
-        packed_plotly() if drawn else "",
+        "page", content, *_STATES[content.good], sections, titles,
+        plain(content.results), style, script, packed_plotly() if drawn else "",
     )  # fmt: skip
 
 
@@ -149,13 +161,19 @@ def _whole(text: str) -> int | float:
 
 
 def section(title: str, *pieces: str) -> str:
-    """Return a heading and the pieces below it."""
-    return piece("section", title, pieces)
+    """Return a heading with a link to itself, and the pieces below it."""
+    name = re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")
+    return piece("section", title, f"section-{name}", pieces)
 
 
 def paragraph(*texts: str | Value) -> str:
     """Return a paragraph of texts and numbers."""
     return piece("paragraph", texts)
+
+
+def listed(texts: Sequence[str]) -> str:
+    """Return texts as a list."""
+    return piece("list", texts)
 
 
 def _provenance(provenance: Provenance) -> str:

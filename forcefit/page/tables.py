@@ -41,6 +41,13 @@ class Value:
         return marks | ({"data-si": si} if si != self.text else {})
 
 
+def rotation_and_translation(
+    rotation: float, translation: float, digits: int = 4
+) -> list[str | Value]:
+    """Return the sizes of a rotation [rad] and of a translation [m], in this order."""
+    return [Value(rotation, "rad", digits), " and ", Value(translation, "m", digits)]
+
+
 @dataclass(frozen=True)
 class Column:
     """A column of numbers in one unit, which its head states.

@@ -118,6 +118,21 @@ def rounded(value: float) -> float:
     return 0.0 if abs(value) < 1e-9 else float(value)
 
 
+def pose_text(pose: Mapping[str, float]) -> str:
+    """Return a pose as text, rotations first as in a screw.
+
+    Args:
+        pose: components ``rx .. tz`` [rad, m], or some of them.
+
+    Returns:
+        Text such as ``[0 0 0] rad, [0.1 0 -0.5] m``.
+    """
+    halves = {"rad": "r", "m": "t"}
+    parts = {unit: [v for k, v in pose.items() if k[0] == kind]
+             for unit, kind in halves.items()}  # fmt: skip
+    return ", ".join(f"{numbers(v)} {unit}" for unit, v in parts.items() if v)
+
+
 def screw_text(screw: ArrayLike) -> str:
     """Return the text of a platform screw (6,) [rad, m]."""
     s = 1e3 * np.asarray(screw, dtype=float)

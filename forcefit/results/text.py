@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from forcefit.results.display import numbers
+from forcefit.results.display import numbers, pose_text
 from forcefit.results.quantities import QUANTITIES, Quantity
 from forcefit.results.units import FACTORS
 
@@ -31,8 +31,8 @@ def value_text(quantity: Quantity | str, value: Any) -> str:
         return "yes" if value else "no"
     if isinstance(value, str):
         return value
-    if isinstance(value, Mapping):  # a pose
-        return f"{numbers(value.values())} m, rad"
+    if isinstance(value, Mapping):
+        return pose_text(value)
     if known.kind == "string":
         return ", ".join(value) or "none"
     units = known.display_unit.split(", ")

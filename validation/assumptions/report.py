@@ -45,7 +45,7 @@ def over_poses_table(costs: CostsOverPoses) -> dict[str, Any]:
     platform: dict[str, Any] = {"reason": costs.platform}
     if isinstance(costs.platform, PlatformCosts):
         platform = _platform(
-            costs.platform, lambda values: _spread(values, costs.reached)
+            costs.platform, lambda values: spread(values, costs.reached)
         )
     return {
         "robot": costs.robot.name, "reached": len(costs.reached), "limits": _LIMITS,
@@ -80,7 +80,7 @@ def _platform(costs: PlatformCosts, shown: Callable[[NDArray], Any]) -> dict[str
     }  # fmt: skip
 
 
-def _spread(values: NDArray, where: Sequence[_Pose]) -> dict[str, Any]:
+def spread(values: NDArray, where: Sequence[_Pose]) -> dict[str, Any]:
     """Return the median and largest finite value, and the pose of the largest."""
     known = np.isfinite(values)
     if not known.any():
@@ -100,7 +100,7 @@ def _summary(costs: CostsOverPoses, name: str) -> dict[str, Any]:
     where = [asked for asked, _ in known]
     return {
         "known": len(known), "matters": sum(cost.matters for _, cost in known),
-        **{key: _spread(np.array([getattr(cost, key) for _, cost in known]), where)
+        **{key: spread(np.array([getattr(cost, key) for _, cost in known]), where)
            for key in ("position", "rotation", "energy")},
         "reasons": dict(Counter(cost for _, cost in pairs if isinstance(cost, str))),
     }  # fmt: skip
@@ -145,7 +145,7 @@ def over_poses_text(costs: CostsOverPoses) -> str:
                 f"{1e6 * position['largest']:8.3g} um  {100 * energy['median']:8.3g} "
                 f"{_energy_text(energy['largest'])}; above 20 um or 1 % at "
                 f"{row['matters']} of {row['known']}, most at "
-                f"{_pose_text(position['at'])}"
+                f"{pose_text(position['at'])}"
             )
     return "\n".join([*lines, *_platform_lines(costs)])
 
@@ -171,9 +171,9 @@ def _platform_lines(over: CostsOverPoses) -> list[str]:
     for name in list(costs.by_link)[:_NAMED]:
         rows[f"only {name} a beam"] = costs.by_link[name]
     for text, values in rows.items():
-        row = _spread(values, over.reached)
+        row = spread(values, over.reached)
         middle = f"{100 * row['median']:8.3g} " if many else ""
-        place = f" at {_pose_text(row['at'])}" if many else ""
+        place = f" at {pose_text(row['at'])}" if many else ""
         lines.append(f"{text:>30}: {middle}{100 * row['largest']:8.3g} %{place}")
     lines.append(f"{'estimated mesh error':>30}: {100 * costs.mesh_error:8.3g} %")
     free = int(np.isnan(costs.beams).sum())
@@ -186,7 +186,7 @@ def _platform_lines(over: CostsOverPoses) -> list[str]:
     return lines
 
 
-def _pose_text(asked: _Pose | None) -> str:
+def pose_text(asked: _Pose | None) -> str:
     """Return the text of a pose, such as ``tx=0.1, tz=-0.5``; ``-`` for none."""
     if asked is None:
         return "-"

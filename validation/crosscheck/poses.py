@@ -84,6 +84,14 @@ def poses_table(rows: list[dict[str, Any]]) -> dict[str, Any]:
     return {"poses": rows, "passed": passed, "reached": len(reached)}
 
 
+def outcome_text(row: Mapping[str, Any]) -> str:
+    """Return the outcome at one pose of :func:`check_poses` in words."""
+    outcome = _VERDICTS.get(row.get("verdict", ""), "FAILED")
+    if row["passed"] is None:
+        outcome = "not checked"
+    return outcome if row["status"] == OK else f"{outcome} ({row['status']})"
+
+
 def poses_text(rows: list[dict[str, Any]]) -> str:
     """Return a line for each pose, and the verdict."""
     lines = []
@@ -92,11 +100,7 @@ def poses_text(rows: list[dict[str, Any]]) -> str:
         slope = row.get("slope")
         known = slope is not None and np.isfinite(slope)
         measured = f"slope {slope:.4f}, " if known else ""
-        verdict = _VERDICTS.get(row.get("verdict", ""), "FAILED")
-        if row["passed"] is None:
-            verdict = "not checked"
-        status = "" if row["status"] == OK else f" ({row['status']})"
-        lines.append(f"{where}: {measured}{verdict}{status}")
+        lines.append(f"{where}: {measured}{outcome_text(row)}")
     reached = poses_table(rows)["reached"]
     lines.append(
         f"{sum(row['passed'] is True for row in rows)} of {reached} reachable "

@@ -22,12 +22,13 @@ from numpy.typing import ArrayLike, NDArray
 from forcefit.assembly.exact.exact import solve_exact
 from forcefit.assembly.kinematics.posture import Posture
 from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.model.statuses import FAILED, NOT_DECIDED, PASSED
 from forcefit.assembly.platform_stiffness.exact_tangent import exact_tangent
 from forcefit.assembly.platform_stiffness.linear_tangent import (
     without_clearance as classical,
 )
 from forcefit.assembly.platform_stiffness.matrices import PlatformStiffness
-from forcefit.results.display import html_table, numbers, short_repr
+from forcefit.results.display import html_table, numbers, pose_text, short_repr
 from forcefit.stiffness.screws import SCREW, rotation_vector
 from forcefit.validation.crosscheck.link_models import link_models
 from forcefit.validation.multibody.simulation import TIME_LIMIT, without_clearance
@@ -155,6 +156,36 @@ class StiffnessCheck:
             for name, own in self.uncertainties.items() if own <= self.tolerance
         ]  # fmt: skip
 
+    @property
+    def outcome(self) -> str:
+        """``"passed"``, ``"failed"`` or ``"not decided"``."""
+        if self.passed:
+            return PASSED
+        open_questions = self.another_equilibrium or self.mixed or not self._decided
+        return NOT_DECIDED if open_questions else FAILED
+
+    @property
+    def reason(self) -> str:
+        """Reason of the outcome in words."""
+        if self.another_equilibrium:
+            ours, theirs = (
+                f"{numbers(screw)} rad, m ({'' if stable else 'un'}stable)"
+                for screw, stable in (
+                    (self.moved, self.exact.stable),
+                    (self.simulated_moved, self.simulated.stable),
+                )
+            )
+            return (
+                "the two models are at different equilibria: the platform has moved "
+                f"by {ours}, in the simulation by {theirs}"
+            )
+        if self.mixed:
+            return (
+                f"{', '.join(self.mixed)} have both locked and elastic axes and "
+                "deform: their law for finite deformation is not unique"
+            )
+        return f"exact within {self.tolerance:.2g}"
+
     def table(self) -> dict[str, Any]:
         """Return all results as plain values."""
         return {
@@ -182,7 +213,7 @@ class StiffnessCheck:
         """Return the results as text."""
         posture = self.exact.posture
         lines = [
-            f"{posture.robot.name} at {numbers(posture.pose().values())} [m, rad], "
+            f"{posture.robot.name} at {pose_text(posture.pose())}, "
             f"links as {self.links}s",
             f"{'':12s}" + "".join(f"{name:>12s}" for name in SCREW),
         ]
@@ -205,35 +236,13 @@ class StiffnessCheck:
             cells = "".join(f"{value:12.5g}" for value in np.diag(C))
             lines.append(f"{name:12s}{cells}")
         lines += texts
-        if self.another_equilibrium:
-            ours, theirs = (
-                f"{numbers(screw)} rad, m ({'' if stable else 'un'}stable)"
-                for screw, stable in (
-                    (self.moved, self.exact.stable),
-                    (self.simulated_moved, self.simulated.stable),
-                )
-            )
+        words = {PASSED: "passed", FAILED: "FAILED", NOT_DECIDED: "undecided"}
+        lines.append(f"{words[self.outcome]}: {self.reason}")
+        if self.outcome == FAILED and self.links == "beam" and self.bent:
             lines.append(
-                "undecided: the two models are at different equilibria: the "
-                f"platform has moved by {ours}, in the simulation by {theirs}"
+                "with one spring for each link a loaded link bends otherwise than a "
+                'beam: declare more "pieces" of the link in the robot file'
             )
-        elif self.mixed:
-            lines.append(
-                f"undecided: {', '.join(self.mixed)} have both locked and "
-                "elastic axes and deform: their law for finite deformation is "
-                "not unique"
-            )
-        else:
-            outcome = "passed" if self.passed else "FAILED"
-            if not self._decided:
-                outcome = "undecided"
-            lines.append(f"{outcome}: exact within {self.tolerance:.2g}")
-            if outcome == "FAILED" and self.links == "beam" and self.bent:
-                lines.append(
-                    "with one spring for each link a loaded link bends "
-                    'otherwise than a beam: declare more "pieces" of the link '
-                    "in the robot file"
-                )
         return "\n".join(lines)
 
 

@@ -27,7 +27,7 @@ _COLOURS = {"before": RED, "after": BLUE}
 def error_chart(diagnosis: Diagnosis) -> str:
     """Return bars of the errors before and after and of the noise, on held-out rows."""
     charts = []
-    for kind, unit in (("position", "m"), ("rotation", "rad")):
+    for kind, unit in (("rotation", "rad"), ("position", "m")):
         names = ("before", "after", "noise")
         values = {name: getattr(getattr(diagnosis, name), kind) for name in names}
         known = {name: v for name, v in values.items() if np.isfinite(v)}
@@ -152,8 +152,21 @@ def confounding_chart(diagnosis: Diagnosis) -> str:
         if np.any(element.columns):
             columns.setdefault(element.name, element.columns)
     angles = compare_signatures(columns)
+    return imitation_chart(angles.shared, angles.names)
+
+
+def imitation_chart(shared: NDArray, names: tuple[str, ...]) -> str:
+    """Return the chart of the share of each effect that another one can imitate.
+
+    Args:
+        shared: (m, m) share of the row's effect that the column's effect can imitate.
+        names: names of the m effects.
+
+    Returns:
+        HTML.
+    """
     return matrix(
-        angles.shared, angles.names, "share of the row that the column can imitate",
+        shared, names, "share of the row that the column can imitate",
         "1: the column's effect can reproduce every effect of the row's.", around=False,
     )  # fmt: skip
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from forcefit.assembly.model.statuses import AMBIGUOUS, EXPLAINED, LEARNED, NONE_NEEDED
+from forcefit.assembly.model.statuses import AMBIGUOUS, NOT_ENOUGH_ROWS, OUTSIDE_LIBRARY
 from forcefit.inputs.writing import write_text
 from forcefit.page.page import (
     Page,
@@ -28,6 +28,8 @@ _ASSUMED = (
     "An effect that the library lacks is found as a learned function, or as outside "
     "the library; effects that the design cannot distinguish are named together.",
 )
+# verdicts that are not favourable; None if more rows could decide
+_GOOD = {AMBIGUOUS: None, NOT_ENOUGH_ROWS: None, OUTSIDE_LIBRARY: False}
 NOWHERE = Provenance()
 Table = dict[str, Any]
 
@@ -94,7 +96,7 @@ def report_page(
         Page(
             title=f"Diagnosis of {campaign.name}",
             verdict=answer["sentence"],
-            good=diagnosis.verdict in {EXPLAINED, LEARNED, NONE_NEEDED},
+            good=_GOOD.get(diagnosis.verdict, True),
             tiles=_tiles(diagnosis),
             about=f"{len(campaign)} rows, robot {campaign.robot.name}; "
             f"{diagnosis.held.words}.",
@@ -115,7 +117,7 @@ def _tiles(diagnosis: Diagnosis) -> list[Tile]:
     """Return tiles: verdict, errors, most probable effect, next measurement."""
     before, after = diagnosis.before, diagnosis.after
     tiles = [Tile("Verdict", [diagnosis.verdict.replace("_", " ")])]
-    for kind, unit in (("position", "m"), ("rotation", "rad")):
+    for kind, unit in (("rotation", "rad"), ("position", "m")):
         values = [getattr(errors, kind) for errors in (before, after)]
         if all(v == v for v in values):  # NaN if not measured
             tiles.append(Tile(f"Error of {kind}, rms", [

@@ -4,7 +4,7 @@ from typing import Any
 
 from forcefit.assembly.statistics.report import draws_sections
 from forcefit.page.page import Tile, paragraph, section
-from forcefit.page.tables import Value
+from forcefit.page.tables import Value, rotation_and_translation
 from forcefit.validation.study.study import StudyResults
 
 
@@ -45,17 +45,14 @@ def drawn_tiles(found: dict[str, Any] | None, worst: dict[str, Any]) -> list[Til
     note = [
         "Over all parts within the tolerances of the drawing and all clearances, at "
         "this pose",
-        *(["; over the map ", *_pair(over)] if over is not None else []),
+        *(["; over the map ", *_bounds(over)] if over is not None else []),
         f"; {worst['drawn']['assumption']}.",
     ]  # fmt: skip
     if total > 0:
         note.append(f" Largest part of the translation: {name}, {share / total:.0%}.")
-    return [Tile("Certified worst case", _pair(worst["drawn"]["pose"]), note)]
+    return [Tile("Certified worst case", _bounds(worst["drawn"]["pose"]), note)]
 
 
-def _pair(bounds: dict[str, float]) -> list[str | Value]:
-    """Return bounds of a translation and of a rotation."""
-    return [
-        Value(bounds["translation"], "m", 3), " and ",
-        Value(bounds["rotation"], "rad", 3),
-    ]  # fmt: skip
+def _bounds(found: dict[str, float]) -> list[str | Value]:
+    """Return bounds of a rotation and of a translation."""
+    return rotation_and_translation(found["rotation"], found["translation"], 3)

@@ -76,7 +76,12 @@ def _worst_drawn(results: StudyResults) -> dict[str, Any] | None:
 
 
 def verdict(results: StudyResults) -> str:
-    """Return the conclusions of a study in a few sentences.
+    """Return the conclusions of a study in a few sentences: :func:`conclusions`."""
+    return " ".join(conclusions(results))
+
+
+def conclusions(results: StudyResults) -> list[str]:
+    """Return the conclusions of a study, the main one first.
 
     The certified pose error within the clearances is first, with its largest value over
     the map if there is one.  The error at least energy follows.
@@ -85,21 +90,21 @@ def verdict(results: StudyResults) -> str:
         results: results of :func:`forcefit.validation.study.study.run_study`.
 
     Returns:
-        Plain text.
+        Sentences, of which the first is on the assembly.
     """
     solution = results.solution
     if solution["status"] == BEYOND_LIMITS:
-        return f"Beyond the limits of its joints: {solution['reason']}."
+        return [f"Beyond the limits of its joints: {solution['reason']}."]
     if solution["status"] == SINGULAR:
         reason = solution["reason"]
-        return f"{reason[0].upper()}{reason[1:]}. {_checks_text(results)}"
+        return [f"{reason[0].upper()}{reason[1:]}.", _checks_text(results)]
     if solution["status"] != "ok":
-        return f"No answer at this pose: {solution['status']}, {solution['reason']}."
+        return [f"No answer at this pose: {solution['status']}, {solution['reason']}."]
     parts = (
         _assembly_text(results) + ".", _pose_error_text(results), _drawn_text(results),
         _checks_text(results),
     )  # fmt: skip
-    return " ".join(filter(None, parts))
+    return list(filter(None, parts))
 
 
 def by_force(results: StudyResults) -> bool:
@@ -207,8 +212,8 @@ def _bound_text(bounds: dict[str, float]) -> str:
 
 
 def _pose_text(rotation: float, translation: float) -> str:
-    """Return a pose error [rad, m] as text in mm and mrad."""
-    return f"{in_unit(translation, 'mm', 3)} and {in_unit(rotation, 'mrad', 3)}"
+    """Return a pose error [rad, m] as text in mrad and mm."""
+    return f"{in_unit(rotation, 'mrad', 3)} and {in_unit(translation, 'mm', 3)}"
 
 
 def covered(results: StudyResults) -> list[str]:

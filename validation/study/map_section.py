@@ -117,7 +117,7 @@ def maps_section(maps: Any, summary: dict[str, Any]) -> str:
             f"{counts}. Assembles rigidly with compliant joints free at "
             f"{100 * share:.1f} % of the points with a solution."
         ),
-        table(["", "least", "median", "largest", "largest at"], rows, "maps"),
+        table(["quantity", "least", "median", "largest", "largest at"], rows, "maps"),
         _drawn(maps, known[0]) if known else "",
     )
 

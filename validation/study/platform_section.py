@@ -10,8 +10,10 @@ from forcefit.assembly.report.platform_stiffness import (
     share_rows,
 )
 from forcefit.assembly.report.share_pictures import share_chart
+from forcefit.page.page import paragraph, section
 from forcefit.page.tables import table
-from forcefit.stiffness.screws import SCREW
+from forcefit.stiffness.report.link_page import matrix_table
+from forcefit.stiffness.screws import WRENCH
 
 
 def platform_section(stiffness: dict[str, Any]) -> str:
@@ -25,12 +27,6 @@ def platform_section(stiffness: dict[str, Any]) -> str:
         Headings, tables and the chart of the parts' shares.
     """
     K = np.asarray(stiffness["stiffness"])
-    size = np.sqrt(np.abs(np.nan_to_num(np.diag(K))))
-    K = np.where(np.abs(K) < 1e-10 * np.outer(size, size), 0.0, K)
-    rows = [
-        [name, *(f"{v:.5g}" if np.isfinite(v) else "rigid" for v in row)]
-        for name, row in zip(SCREW, K, strict=True)
-    ]
     eigen = ", ".join(f"{one['stiffness']:.4g}" for one in stiffness["eigen"])
     free = len(stiffness["free_motions"])
     shares = list(largest_rows(share_rows(stiffness["shares"])).items())
@@ -38,17 +34,22 @@ def platform_section(stiffness: dict[str, Any]) -> str:
         [name, *(f"{100 * v:.3g}" if np.isfinite(v) else "-" for v in row)]
         for name, row in shares
     ]
-    return (
-        "<h2>Stiffness of the platform K_C</h2><p>K_C of the nominal robot with its "
-        "clearances held at zero, at the platform's origin in base axes [N m/rad, "
-        "N/rad, N m/m, N/m]"
-        + (f"; {free} free motions" if free else "")
-        + ".</p>"
-        + table(["", *SCREW], rows)
-        + f"<p>Eigen-stiffnesses [N/m], angles times "
-        f"{stiffness['characteristic_length']:.4g} m: {eigen}.</p>"
-        "<p>Shares of the parts in the compliance along each axis [%], the largest "
-        "first.</p>"
-        + table(["part", *DIRECTIONS], blame)
-        + share_chart(stiffness["shares"], "The parts of the table.")
+    return section(
+        "Stiffness of the platform K_C",
+        paragraph(
+            "K_C of the nominal robot with its clearances held at zero, at the "
+            "platform's origin in base axes [N m/rad, N/rad, N m/m, N/m]"
+            + (f"; {free} free motions." if free else ".")
+        ),
+        matrix_table(K, WRENCH, "platform stiffness"),
+        paragraph(
+            "Eigen-stiffnesses [N/m], angles times "
+            f"{stiffness['characteristic_length']:.4g} m: {eigen}."
+        ),
+        paragraph(
+            "Shares of the parts in the compliance along each axis [%], the largest "
+            "first."
+        ),
+        table(["part", *DIRECTIONS], blame),
+        share_chart(stiffness["shares"], "The parts of the table."),
     )

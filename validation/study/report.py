@@ -9,16 +9,18 @@ import numpy as np
 from forcefit.assembly.linear.assembled import Assembly, without_rounding
 from forcefit.assembly.linear.zone import ASSEMBLABLE
 from forcefit.assembly.model.contact_closures import loops
+from forcefit.assembly.model.statuses import FAILED, OK, PASSED
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import write_json, write_text
 from forcefit.page.page import Page, Provenance, Tile, command_line, page
-from forcefit.page.tables import Value
+from forcefit.page.tables import Value, rotation_and_translation
 from forcefit.results.display import largest_row
+from forcefit.results.quantities import in_words
 from forcefit.validation.study.drawn_section import drawn_section, drawn_tiles
 from forcefit.validation.study.headline import (
     by_force,
+    conclusions,
     covered,
-    verdict,
     worst_clearance,
 )
 from forcefit.validation.study.map_section import finite, mapped, maps_section
@@ -141,7 +143,7 @@ def report_page(results: StudyResults) -> str:
     return page(
         Page(
             title=study.title,
-            verdict=verdict(results),
+            verdict=_verdict(results),
             good=_good(results),
             tiles=_tiles(results),
             about=about,
@@ -149,15 +151,31 @@ def report_page(results: StudyResults) -> str:
             assumed=[f"{study.errors[0].upper()}{study.errors[1:]}.", *_ASSUMED],
             provenance=Provenance(command, study.files),
             results=results_table(results),
+            details=" ".join(conclusions(results)[1:]),
         )
     )
 
 
+def _verdict(results: StudyResults) -> str:
+    """Return the sentence on the assembly, with the checks that did not pass."""
+    first = conclusions(results)[0].removesuffix(".")
+    missed = [
+        f"{in_words(name)} {outcome}"
+        for name, outcome in results.verdicts.items()
+        if outcome != PASSED
+    ]
+    return f"{'; '.join([first, *missed])}."
+
+
 def _good(results: StudyResults) -> bool | None:
-    """Return whether the result is favourable; None if assembly needs force."""
-    if not results.passed:
+    """Return whether the result is favourable, without force and with all checks.
+
+    None if assembly needs force or a check has no outcome; False without a solution, or
+    if a check failed.
+    """
+    if results.solution["status"] != OK or FAILED in results.verdicts.values():
         return False
-    return None if by_force(results) else True
+    return True if results.passed and not by_force(results) else None
 
 
 def _tiles(results: StudyResults) -> list[Tile]:
@@ -168,12 +186,16 @@ def _tiles(results: StudyResults) -> list[Tile]:
     tiles = []
     if worst["pose"] is not None:
         over = worst["map"]
+        bounds = [
+            rotation_and_translation(one["rotation"], one["translation"], 3)
+            for one in (worst["pose"], over) if one is not None
+        ]  # fmt: skip
         drawn = study_robot.callouts or study_robot.fits
         tiles += drawn_tiles(results.statistics, worst)
         title = "Worst case of given parts" if tiles else "Certified worst case"
-        tiles.append(Tile(title, _bound(worst["pose"]), [
+        tiles.append(Tile(title, bounds[0], [
             "Over all positions within the clearances, at this pose",
-            *(["; over the map ", *_bound(over)] if over is not None else []), ".",
+            *(["; over the map ", *bounds[1]] if over is not None else []), ".",
             " Without the tolerances of the drawing." if drawn else "",
         ]))  # fmt: skip
         tiles += _governing_tiles(results, worst["pose"])
@@ -188,17 +210,17 @@ def _tiles(results: StudyResults) -> list[Tile]:
 
 
 def _force_tile(assembly: Assembly) -> Tile:
-    """Return the tile of the largest force and largest moment through a body."""
+    """Return the tile of the largest moment and largest force through a body."""
     wrenches = without_rounding(assembly.tip_wrenches)
     shown: list[str | Value] = []
     names = []
-    for part, unit in ((slice(3, 6), "N"), (slice(0, 3), "N m")):
+    for part, unit in ((slice(0, 3), "N m"), (slice(3, 6), "N")):
         sizes = np.linalg.norm(wrenches[:, part], axis=1)
         row = largest_row(sizes)
         names.append(assembly.posture.robot.frames[row].name)
         shown += [" and " if shown else "", Value(float(sizes[row]), unit)]
-    return Tile("Force and moment of assembly", shown, [
-        f"Largest values through a body, at  {names[0]} and {names[1]}; energy ",
+    return Tile("Moment and force of assembly", shown, [
+        f"Largest values through a body, at {names[0]} and {names[1]}; energy ",
         Value(assembly.energy, "J"), ".",
     ])  # fmt: skip
 
@@ -234,9 +256,3 @@ def _governing_tiles(results: StudyResults, worst: dict[str, float]) -> list[Til
 def _percent(ratio: float) -> str:
     """Return the change by a factor in per cent."""
     return f"{100 * (ratio - 1):+.0f} %"
-
-
-def _bound(bounds: dict[str, float]) -> list[str | Value]:
-    """Return the text of an upper bound of a pose error."""
-    return [Value(bounds["translation"], "m", 3), " and ",
-            Value(bounds["rotation"], "rad", 3)]  # fmt: skip

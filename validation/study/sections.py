@@ -10,12 +10,14 @@ from forcefit.assembly.linear.reference.pose_error import reachable_screws
 from forcefit.assembly.report.error_body import ErrorBody, error_body
 from forcefit.assembly.report.scene import robot_scene
 from forcefit.assembly.solvers.conic import SolverFailed
-from forcefit.page.charts import GREY, Axis, chart, matrix
+from forcefit.page.charts import matrix
 from forcefit.page.page import paragraph, section
-from forcefit.page.tables import Cell, Column, Value, table
+from forcefit.page.tables import Cell, Column, Value, rotation_and_translation, table
 from forcefit.results.quantities import in_words, unit_of
 from forcefit.stiffness.link import scaled
-from forcefit.stiffness.screws import SCREW
+from forcefit.stiffness.report.link_page import stiffness_unit
+from forcefit.stiffness.screws import SCREW, SCREW_UNITS, WRENCH, WRENCH_UNITS
+from forcefit.validation.crosscheck.report import compared
 from forcefit.validation.crosscheck.verdict import verdict_text
 from forcefit.validation.study.headline import WORST, worst_clearance
 from forcefit.validation.study.study import StudyResults
@@ -25,10 +27,8 @@ _CLEARANCE_OF = {
     "free": "any position; compliant joints also rotate about their axis",
     "budget": "any position and deformation of at most 5 % more than the least energy",
 }
-_POSE = ("rad", "rad", "rad", "m", "m", "m")
-_PARTS = ("translation", "rotation")
-WRENCH = ("N m", "N m", "N m", "N", "N", "N")
-_UNITS = {"tx": "m", "ty": "m", "tz": "m", "rx": "rad", "ry": "rad", "rz": "rad"}
+_PARTS = ("rotation", "translation")
+_UNITS = {"rx": "rad", "ry": "rad", "rz": "rad", "tx": "m", "ty": "m", "tz": "m"}
 
 
 def unchecked_section(results: StudyResults) -> str:
@@ -85,8 +85,8 @@ def governing_section(results: StudyResults) -> str:
     return section(
         "Parts that govern the worst case",
         paragraph(
-            "The certified bound at this pose is ", Value(worst["translation"], "m"),
-            " and ", Value(worst["rotation"], "rad"),
+            "The certified bound at this pose is ",
+            *rotation_and_translation(worst["rotation"], worst["translation"]),
             ". The table gives it with one imperfection removed. Errors may cancel "
             "each other; the bound then rises.",
         ),
@@ -109,10 +109,10 @@ def solution_section(results: StudyResults) -> str:
     solution = results.solution
     pose = [
         text
-        for k, v in solution["pose"].items()
+        for k, unit in _UNITS.items()
         for text in (
-            f"{', ' if k != 'tx' else ''}{k} = ",
-            Value(round(v, 9), _UNITS[k]),
+            f"{', ' if k != 'rx' else ''}{k} = ",
+            Value(round(solution["pose"][k], 9), unit),
         )
     ]
     rows: list[list[Any]] = [[in_words(k), str(v)] if isinstance(v, int) else
@@ -126,7 +126,7 @@ def solution_section(results: StudyResults) -> str:
         rows.append(["energy, eq. (22)", Value(solution["energy"], "J", 9)])
         for k, value in enumerate(solution["platform_screw"]):
             quantity = f"platform error {SCREW[k]}, least energy"
-            rows.append([quantity, Value(value, _POSE[k], 6)])
+            rows.append([quantity, Value(value, SCREW_UNITS[k], 6)])
         for key, value in solution["certificate"].items():
             rows.append([f"certificate: {in_words(key)}", _number(value, unit_of(key))])
         rows += _linearisation_rows(solution["linearisation_error"])
@@ -186,10 +186,9 @@ def _wrenches(results: StudyResults) -> str:
     rows = [
         [name, *wrench] for name, wrench in zip(elastic, wrenches.tolist(), strict=True)
     ]
-    names = ("MX", "MY", "MZ", "FX", "FY", "FZ")
     head: list[str | Column] = [
         "link",
-        *(Column(n, u) for n, u in zip(names, WRENCH, strict=True)),
+        *(Column(n, u) for n, u in zip(WRENCH, WRENCH_UNITS, strict=True)),
     ]
     return paragraph(
         "Wrench that each elastic link transmits, at its tip in its axes:"
@@ -218,7 +217,7 @@ def reference_section(results: StudyResults) -> str:
             "Every screw of every frame is a variable, every constraint an equation of "
             f"the paper; differences must be below {reference['tolerance']:g}."
         ),
-        table(["", "reduced problem", "cvxpy", "relative difference"], rows),
+        table(["quantity", "reduced problem", "cvxpy", "relative difference"], rows),
     )
 
 
@@ -232,7 +231,7 @@ def stiffness_section(results: StudyResults) -> str:
     fea, euler, timoshenko = (compared[k] for k in ("fea", "euler", "timoshenko"))
     rows: list[list[Cell]] = [
         [f"{SCREW[i]}, {SCREW[j]}",
-         *(Value(K[i, j], _stiffness_unit(i, j), 6) for K in (euler, timoshenko, fea)),
+         *(Value(K[i, j], stiffness_unit(i, j), 6) for K in (euler, timoshenko, fea)),
          f"{100 * (fea[i, j] / timoshenko[i, j] - 1):+.2f} %"]
         for i, j in zip(*np.nonzero(np.triu(_significant(euler))), strict=True)
     ]  # fmt: skip
@@ -259,11 +258,6 @@ def stiffness_section(results: StudyResults) -> str:
     )  # fmt: skip
 
 
-def _stiffness_unit(i: int, j: int) -> str:
-    """Return the SI unit of an entry of a stiffness matrix."""
-    return ("N m/rad", "N", "N/m")[int(i > 2) + int(j > 2)]
-
-
 def _significant(K: NDArray) -> NDArray:
     """Return (6, 6) bool: entries above one thousandth of sqrt(K_ii K_jj)."""
     size = np.sqrt(np.diag(K))
@@ -281,41 +275,10 @@ def crosscheck_section(results: StudyResults) -> str:
         title,
         paragraph(
             "The same forced assembly, without clearances, as a geometrically "
-            "nonlinear flexible multibody system (Exudyn). A linearised model must "
-            "differ from it by the square of the errors' size: slope 2. "
-            f"{_slope_text(check.slope)} {verdict_text(check)}."
+            f"nonlinear flexible multibody system (Exudyn): {verdict_text(check)}."
         ),
-        table(check.metric.header(), check.metric.rows(), "cross-check"),
-        _slope_chart(check),
+        *compared(check),
     )
-
-
-def _slope_chart(check: Any) -> str:
-    """Return the chart of differences over the scale, with a line of slope 2."""
-    scales = np.asarray(check.scales)
-    traces: list[dict[str, Any]] = []
-    for name, values in check.metric.differences.items():
-        shown = np.where(values > 0, values, np.nan)
-        traces.append({"type": "scatter", "mode": "markers", "x": scales, "y": shown,
-                       "name": f"{in_words(name)} [{unit_of(name)}]"})  # fmt: skip
-        traces.append({
-            "type": "scatter", "mode": "lines", "x": scales, "name": "slope 2",
-            "y": shown[-1] * (scales / scales[-1]) ** 2, "line": {"color": GREY},
-            "showlegend": len(traces) == 1,
-        })  # fmt: skip
-    log = {"type": "log"}
-    return chart(
-        traces, Axis("scale of the errors", options=log),
-        Axis("simulation minus linear model [rad, m]", options=log),
-        "Difference of the platform's pose, without clearances.",
-    )  # fmt: skip
-
-
-def _slope_text(slope: float) -> str:
-    """Return the measured slope as text, if there is one."""
-    if np.isnan(slope):
-        return "The two models do not differ here, so there is no slope."
-    return f"Measured: {slope:.3f}."
 
 
 def _number(value: float | None, unit: str, digits: int = 6) -> str | Value:

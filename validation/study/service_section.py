@@ -5,10 +5,8 @@ from typing import Any
 import numpy as np
 
 from forcefit.page.page import Tile, paragraph, section
-from forcefit.page.tables import Cell, Value, table
-from forcefit.stiffness.screws import SCREW
-
-_POSE = ("rad", "rad", "rad", "m", "m", "m")
+from forcefit.page.tables import Cell, Value, rotation_and_translation, table
+from forcefit.stiffness.screws import SCREW, SCREW_UNITS
 
 
 def service_section(service: dict[str, Any] | None) -> str:
@@ -44,11 +42,12 @@ def _loaded(service: dict[str, Any]) -> list[str]:
         return [about, paragraph(f"{service['status']}: {service.get('reason', '')}.")]
     solution = service["solution"]
     rows: list[list[Cell]] = [
-        [SCREW[k], Value(solution["platform_screw"][k], _POSE[k], 6),
-         Value(service["deflection"][k], _POSE[k], 6)]
-        for k in range(6)
+        [SCREW[k], Value(solution["platform_screw"][k], unit, 6),
+         Value(service["deflection"][k], unit, 6)]
+        for k, unit in enumerate(SCREW_UNITS)
     ]  # fmt: skip
-    head = ["", "platform error with load and weight", "part due to load and weight"]
+    head = ["component", "platform error with load and weight",
+            "part due to load and weight"]  # fmt: skip
     return [about, table(head, rows, "platform under load")]
 
 
@@ -76,12 +75,9 @@ def service_tile(service: dict[str, Any] | None) -> list[Tile]:
         screw = np.asarray(service["deflection"])
         turn, shift = (float(np.linalg.norm(half)) for half in (screw[:3], screw[3:]))
         note = "The platform's motion at this pose, least-energy solution."
-        motion: list[str | Value] = [
-            Value(shift, "m", 3),
-            " and ",
-            Value(turn, "rad", 3),
-        ]
-        tiles.append(Tile("By load and weight", motion, [note]))
+        tiles.append(
+            Tile("By load and weight", rotation_and_translation(turn, shift, 3), [note])
+        )
     modes = service.get("frequencies", {}).get("modes")
     if modes:
         lowest = Value(modes[0]["frequency"], "Hz", 4)

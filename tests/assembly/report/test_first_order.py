@@ -11,7 +11,7 @@ from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.model.robot import BeamLink
 from forcefit.assembly.report.pose_errors import pose_error_of, pose_error_text
 from forcefit.assembly.report.results import solution_of, solution_text
-from forcefit.validation.study.report import verdict
+from forcefit.validation.study.headline import verdict
 from forcefit.validation.study.study import run_study
 from forcefit.validation.study.study_file import read_study
 from tests.linkages_for_tests import SLIDER_CRANK, slider_crank

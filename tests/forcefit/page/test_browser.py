@@ -15,6 +15,7 @@ import pytest
 from forcefit.validation.study.report import write_study
 from forcefit.validation.study.study import run_study
 from forcefit.validation.study.study_file import read_study
+from tests.axe_for_tests import scheme, violations
 
 pytestmark = [pytest.mark.slow, pytest.mark.exudyn]
 STUDY = """
@@ -192,19 +193,19 @@ def test_click_sorts_a_table_and_the_button_copies_all_digits(tab, results):
     (text,) = wait(tab, "return window.copied.length && window.copied")
     head, *rows = csv.reader(io.StringIO(text))
     assert head[:3] == [
-        "part", "made perfect", "largest platform translation",
+        "part", "made perfect", "largest platform rotation",
     ]  # fmt: skip
-    turns = [float(row[4].removesuffix(" rad")) for row in rows]
-    assert turns == sorted(turns)
+    shifts = [float(row[4].removesuffix(" m")) for row in rows]
+    assert shifts == sorted(shifts)
     bounds = {(one["part"], one["what"]): one for one in results.governing}
     for row in rows:
         one = bounds[row[0], row[1]]
-        assert row[2] == f"{one['translation']!r} m"
-        assert row[4] == f"{one['rotation']!r} rad"
+        assert row[2] == f"{one['rotation']!r} rad"
+        assert row[4] == f"{one['translation']!r} m"
 
 
 def test_unit_switch_changes_to_si_and_back(tab, results):
-    first = "return document.querySelector('.tile .answer span').textContent"
+    first = "return document.querySelectorAll('.tile .answer span')[1].textContent"
     axis = "return document.querySelector('figure.map .plot').layout.xaxis.title.text"
     own = tab.execute_script(first)
     assert (own, tab.execute_script(axis)) == ("0.794 mm", "tx [mm]")
@@ -264,15 +265,14 @@ def test_dark_colour_scheme_has_a_dark_page_with_light_text(tab):
         "document.querySelector('figure.map .xtitle')).fill].map(c =>"
         " c.match(/[0-9]+/g).slice(0, 3).map(Number))"
     )
-    for scheme in ("dark", "light"):
-        tab.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [
-            {"name": "prefers-color-scheme", "value": scheme}]})  # fmt: skip
-        dark = "true" if scheme == "dark" else "false"
+    for name in ("dark", "light"):
+        scheme(tab, name)
+        dark = "true" if name == "dark" else "false"
         wait(tab, "const c = getComputedStyle(document.querySelector("
              "'figure.map .xtitle')).fill.match(/[0-9]+/g).map(Number);"
              f"return (c[0] > 128) === {dark}")  # fmt: skip
         back, ink, axis = (np.mean(c) for c in tab.execute_script(read))
-        assert (back < 64) == (scheme == "dark")
+        assert (back < 64) == (name == "dark")
         assert abs(ink - back) > 128
         assert abs(axis - back) > 128
 
@@ -308,3 +308,11 @@ def test_enter_key_sorts_by_the_focused_column_header(tab):
     assert head.get_attribute("aria-sort") == "ascending"
     head.send_keys(" ")
     assert head.get_attribute("aria-sort") == "descending"
+
+
+@pytest.mark.parametrize("colours", ["dark", "light"])
+def test_study_page_breaks_no_serious_rule_of_accessibility(tab, colours):
+    scheme(tab, colours)
+    wait(tab, "return getComputedStyle(document.documentElement).colorScheme"
+         f" === '{colours}'")  # fmt: skip
+    assert violations(tab) == []

@@ -1,4 +1,4 @@
-"""Pages of other commands in a real browser: they draw, and contain their JSON."""
+"""Pages of all commands but the study in a real browser, opened from disk."""
 
 import json
 from pathlib import Path
@@ -6,50 +6,100 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.axe_for_tests import scheme, violations
 from tests.forcefit.page.test_browser import browser, slide, traces, wait
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.exudyn]
 ROOT = Path(__file__).parents[3]
-ERRORS = ROOT / "examples" / "irsbot2_errors.toml"
+EXAMPLES = ROOT / "examples"
+CAMPAIGN = ROOT / "tests" / "campaigns" / "encoder_offset"
+ERRORS = EXAMPLES / "irsbot2_errors.toml"
+POSE = ("--pose", "tx=0.1,tz=-0.5")
+# figures that each page draws at least
+FIGURES = {
+    "diagnosis": 5, "statistics": 5, "tolerances": 3, "path": 4, "steps": 3,
+    "inspect": 1, "iso": 2, "crosscheck": 1, "crosscheck_grid": 0, "stiffness_check": 0,
+    "validity": 1, "fea": 1, "comparison": 0,
+}  # fmt: skip
 
 
-def imperfect(folder):
-    """The paper's robot with an error in one link, as a file."""
+def imperfect(folder, name, frame):
+    """A robot with an error in one frame, as a file."""
     import forcefit as ff
     from forcefit.assembly.files.robot_file import write_robot
 
-    robot = ff.load_robot("irsbot2")
+    robot = ff.load_robot(name)
     errors = np.zeros((len(robot.frames), 6))
-    errors[robot.index("leg1.link_a")] = [1e-3, 1e-3, 0, 1e-4, 0, 0]
-    write_robot(robot.with_errors(errors), folder / "robot.toml")
-    return folder / "robot.toml"
+    errors[robot.index(frame)] = [1e-3, 1e-3, 0, 1e-4, 0, 0]
+    write_robot(robot.with_errors(errors), folder / f"{name}.toml")
+    return folder / f"{name}.toml"
+
+
+def results(folder):
+    """Two results that differ, as JSON files."""
+    files = [folder / "first.json", folder / "second.json"]
+    for k, file in enumerate(files):
+        file.write_text(json.dumps({"robot": "r", "energy": 1.0 + k}))
+    return files
 
 
 def words_of(kind, folder):
-    """A command that writes a page, and the figures that it draws at least."""
-    if kind == "diagnosis":
-        return ["validation", "diagnose", ROOT / "tests/campaigns/encoder_offset"], 5
-    if kind == "statistics":
-        return ["assembly", "statistics", "irsbot2", "--errors", ERRORS, "--pose",
-                "tx=0.1,tz=-0.5", "--draws", 200], 5  # fmt: skip
-    return ["assembly", "tolerances", imperfect(folder), "--grid",
-            "tx=-0.1:0.1:0.1,tz=-0.5:-0.4:0.1"], 3  # fmt: skip
+    """The command that writes a page."""
+    robot = imperfect(folder, "irsbot2", "leg1.link_a")
+    hexapod = imperfect(folder, "hexapod", "leg2.tip")
+    crosscheck = ["validation", "crosscheck", robot, "--links", "spring"]
+    commands = {
+        "diagnosis": ["validation", "diagnose", CAMPAIGN],
+        "statistics": ["assembly", "statistics", "irsbot2", "--errors", ERRORS, *POSE,
+                       "--draws", 200],
+        "tolerances": ["assembly", "tolerances", robot, "--grid",
+                       "tx=-0.1:0.1:0.1,tz=-0.5:-0.4:0.1"],
+        "path": ["assembly", "path", "hexapod", "--path", EXAMPLES / "hexapod_path.csv",
+                 "--points", 41],
+        "steps": ["assembly", "steps", hexapod, EXAMPLES / "assembly_steps.toml"],
+        "inspect": ["validation", "inspect", CAMPAIGN],
+        "iso": ["validation", "inspect", CAMPAIGN, "--iso"],
+        "crosscheck": [*crosscheck, *POSE],
+        "crosscheck_grid": [*crosscheck, "--grid", "tx=0:0.1:0.1,tz=-0.5"],
+        "stiffness_check": [*crosscheck, *POSE, "--state", "exact"],
+        "validity": ["validation", "validity", robot, "--grid", "tx=0:0.1:0.1,tz=-0.5"],
+        "fea": ["stiffness", "fea", ROOT / "meshes" / "distal_plain.stl", "--base",
+                "z=0", "--tip", "z=0.452", "--young", "6e10", "--poisson", 0.3,
+                "--accuracy", 0.05],
+        "comparison": ["report", "compare", *results(folder)],
+    }  # fmt: skip
+    return commands[kind]
 
 
-@pytest.fixture(params=["diagnosis", "statistics", "tolerances"])
-def opened(request, tmp_path, run):
-    page, written = tmp_path / "page.html", tmp_path / "results.json"
-    words, figures = words_of(request.param, tmp_path)
-    status, _, err = run(*words, "--report", page, "--json", written)
-    assert status == 0, err
+@pytest.fixture(scope="module")
+def chromium():
+    opened = browser()
+    yield opened
+    opened.quit()
+
+
+@pytest.fixture(scope="module")
+def pages():
+    """Pages by their kind, and the JSON of their commands."""
+    return {}
+
+
+@pytest.fixture(params=FIGURES)
+def opened(request, tmp_path_factory, run, chromium, pages):
+    if request.param not in pages:
+        folder = tmp_path_factory.mktemp(request.param)
+        page, written = folder / "page.html", folder / "results.json"
+        words = words_of(request.param, folder)
+        status, _, err = run(*words, "--report", page, "--json", written)
+        assert status == 0, err
+        pages[request.param] = page, written
+    page, written = pages[request.param]
     assert page.stat().st_size < 5_000_000
-    tab = browser()
-    try:
-        tab.get(page.resolve().as_uri())
-        wait(tab, "return document.documentElement.dataset.drawn")
-        yield tab, json.loads(written.read_text()), figures
-    finally:
-        tab.quit()
+    scheme(chromium, "light")
+    chromium.get_log("browser")
+    chromium.get(page.resolve().as_uri())
+    wait(chromium, "return document.documentElement.dataset.drawn")
+    return chromium, json.loads(written.read_text()), FIGURES[request.param]
 
 
 def test_page_draws_all_its_figures_and_contains_its_json(opened):
@@ -74,3 +124,53 @@ def test_page_draws_all_its_figures_and_contains_its_json(opened):
                 points for name, points in traces(tab).items() if "forced" in name
             ]))  # fmt: skip
         assert np.nanmax(np.abs(still[1] - still[0])) > 1.0  # mm
+
+
+def test_page_fits_the_width_of_a_phone_and_of_paper(opened):
+    tab, *_ = opened
+    wait(tab, "return document.querySelectorAll('img.print').length === "
+         "document.querySelectorAll('figure').length")  # fmt: skip
+    before = tab.execute_script("return document.querySelector('.xtitle')?.style.fill")
+    scheme(tab, "dark")  # figures are drawn again
+    wait(tab, "return (document.querySelector('.xtitle')?.style.fill || 0) !== "
+         f"'{before}'")  # fmt: skip
+    for width in ("phone", "paper"):
+        assert beyond(tab, width) == []
+
+
+@pytest.mark.parametrize("colours", ["light", "dark"])
+def test_page_breaks_no_serious_rule_of_accessibility(opened, colours):
+    tab, *_ = opened
+    scheme(tab, colours)
+    wait(tab, "return getComputedStyle(document.documentElement).colorScheme"
+         f" === '{colours}'")  # fmt: skip
+    assert violations(tab) == []
+
+
+def beyond(tab, width):
+    """Pieces of a page beyond the edge of a phone, or of A4 with margins of 15 mm."""
+    pixels = {"phone": 390, "paper": 680}[width]
+    size = {"width": pixels, "height": 844, "deviceScaleFactor": 1,
+            "mobile": width == "phone"}  # fmt: skip
+    media = "print" if width == "paper" else "screen"
+    tab.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": media})
+    tab.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    try:
+        if width == "phone":  # figures are drawn again
+            wait(tab, "return [document.documentElement.scrollWidth, "
+                 "...[...document.querySelectorAll('.main-svg')].map(svg => "
+                 f"svg.clientWidth)].every(width => width <= {pixels})")  # fmt: skip
+            return tab.execute_script(  # drawings that cover the text below them
+                "return [...document.querySelectorAll('figure')].filter(f => "
+                "[...f.querySelectorAll('.main-svg')].some(svg => "
+                "svg.getBoundingClientRect().bottom > "
+                "f.getBoundingClientRect().bottom + 1)).map(f => f.ariaLabel)"
+            )
+        return tab.execute_script(
+            "return [...document.querySelectorAll('table, img.print, p, li, .tile')]"
+            ".filter(e => e.getBoundingClientRect().right > arguments[0])"
+            ".map(e => e.textContent.slice(0, 60))", pixels + 1,
+        )  # fmt: skip
+    finally:
+        tab.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+        tab.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})

@@ -1,6 +1,7 @@
 """Pages: their numbers equal the results, nothing is fetched, names stay names."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -79,6 +80,16 @@ def test_names_on_a_page_are_escaped_in_html_and_data():
     assert seen.figures[1]["traces"][0]["name"] == ODD
     assert "<" not in seen.figures[0]["traces"][0]["y"][0]  # plotly reads tags
     assert results_in(text, "x") == seen.results
+
+
+def test_contents_list_links_to_every_section_of_the_page():
+    text = written(section("First: part", ""), section("2nd part", ""))
+    contents = re.search(r"<nav aria-label=Contents>(.*?)</nav>", text).group(1)
+    links = dict(re.findall(r'<a href="#([^"]+)">([^<]+)</a>', contents))
+    assert list(links.values()) == [
+        "First: part", "2nd part", "Assumptions", "Provenance",
+    ]  # fmt: skip
+    assert [text.count(f'id="{name}"') for name in links] == [1, 1, 1, 1]
 
 
 def test_page_fetches_nothing_and_is_small():

@@ -26,11 +26,13 @@ def test_only_sentences_wrap_in_table_cells():
 
 
 @pytest.mark.parametrize(
-    ("good", "kind"), [(True, "good"), (None, "mixed"), (False, "bad")]
+    ("good", "kind", "word"),
+    [(True, "good", "OK"), (None, "mixed", "Caution"), (False, "bad", "Not OK")],
 )
-def test_verdict_has_the_colour_of_its_outcome(good, kind):
+def test_verdict_has_the_colour_and_the_word_of_its_outcome(good, kind, word):
+    """The colour alone does not tell a reader who does not see it."""
     text = page(Page("t", "v", good, [], "", [], [], Provenance(), {}))
-    assert f"<p class='verdict {kind}'>v</p>" in text
+    assert f"<p class='verdict {kind}'><strong>{word}:</strong> v</p>" in text
 
 
 def test_no_line_breaks_between_a_number_and_its_unit():
@@ -38,7 +40,7 @@ def test_no_line_breaks_between_a_number_and_its_unit():
     verdict = "At most 0.794 mm and 13 mrad, 1.926 J, over 12 poses of 2 modes: 5 %."
     text = page(Page("t", verdict, True, [], "", [], [], Provenance(), {}))
     (shown,) = re.findall(r"<p class='verdict good'>(.*?)</p>", text)
-    assert shown == (
+    assert shown == "<strong>OK:</strong> " + (
         "At most 0.794&nbsp;mm and 13&nbsp;mrad, 1.926&nbsp;J, over 12 poses of "
         "2 modes: 5&nbsp;%."
     )

@@ -46,7 +46,8 @@ def test_display_unit_is_a_multiple_of_the_si_unit(name):
         ("verdict", "explained", "explained"),
         ("names", [], "none"),
         ("names", ["a", "b"], "a, b"),
-        ("pose", {"tx": 0.1, "tz": -0.5}, "[0.1 -0.5] m, rad"),
+        ("pose", {"tx": 0.1, "tz": -0.5}, "[0.1 -0.5] m"),
+        ("pose", {"tx": 0.1, "rz": 0.2}, "[0.2] rad, [0.1] m"),
     ],
 )
 def test_a_value_is_written_in_its_display_unit(name, value, expected):

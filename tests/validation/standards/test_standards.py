@@ -17,6 +17,7 @@ from forcefit.validation.standards.iso9283 import (
     position_repeatability,
 )
 from tests.campaigns_for_tests import write_campaign
+from tests.pages_for_tests import parse, tiles
 
 
 def test_pose_accuracy_and_repeatability_equal_hand_calculation():
@@ -110,6 +111,39 @@ def test_iso_command_reports_the_figures_of_the_standards(run, tmp_path):
     assert axis["reversal"] == pytest.approx(2e-5, rel=1e-9)
     assert axis["repeatability"] == pytest.approx(2e-5 + 4e-6, rel=1e-9)
     assert axis["systematic_deviation"] == pytest.approx(1e-4 + 2e-5, rel=1e-9)
+
+
+def shown(run, folder, registration):
+    """The page of three readings of a pose, of 1, 2 and 3 times 1e-5 m."""
+    rows = [f"a{k},0,0,{k}e-5,0,0,{k},1" for k in (1, 2, 3)]
+    toml = {"registration": f'"{registration}"'}
+    write_campaign(folder / "lab", head=HEAD, rows=rows, toml=toml)
+    page = folder / "iso.html"
+    status, _, err = run(
+        "validation", "inspect", folder / "lab", "--iso", "--report", page
+    )
+    assert status == 0, err
+    return page.read_text(encoding="utf-8")
+
+
+def test_iso_report_shows_accuracy_and_repeatability_of_the_poses(run, tmp_path):
+    """AP is 2e-5 m; the distances are 1, 0 and 1e-5 m: RP 2/3 + 3 sqrt(1/3)."""
+    text = shown(run, tmp_path, "known")
+    (row,) = parse(text).table("pose", "cycles")[1:]
+    assert row[1].value == 3
+    assert row[-3].value == pytest.approx(2e-5)
+    assert row[-2].value == pytest.approx((2 / 3 + 3 * np.sqrt(1 / 3)) * 1e-5)
+    assert tiles(text)["Pose accuracy AP, worst"] == ("20 µm", "at a1, 3 cycles.")
+
+
+@pytest.mark.parametrize("registration", ["known", "unknown"])
+def test_iso_report_has_a_reservation_for_few_cycles(run, tmp_path, registration):
+    """ISO 9283 requires 30 cycles."""
+    text = shown(run, tmp_path, registration)
+    assert "<p class='verdict mixed'>" in text
+    assert "a pose has 3 cycles, ISO 9283 requires 30" in text
+    included = "AP includes the unknown position of the measuring device" in text
+    assert included == (registration == "unknown")
 
 
 def test_iso_command_refuses_a_campaign_without_repeats(run, tmp_path):

@@ -61,7 +61,7 @@ def test_study_importance_names_the_callouts_with_the_shares_by_hand(results):
 
 def test_study_page_has_the_numbers_of_its_results(results):
     found, page, table = results
-    rows = {row[0].text: row for row in page.table("", "attained")[1:]}
+    rows = {row[0].text: row for row in page.table("error", "attained")[1:]}
     worst = table["statistics"]["worst_case"]
     for key in ("rotation", "translation"):
         assert rows[key][1].value == worst[key]["attained"]

@@ -42,7 +42,7 @@ def test_deflection_of_parallel_springs_is_the_load_over_their_sum(tmp_path):
     assert results.passed
     rows = {
         row[0].text: row
-        for row in page.table("", "platform error with load and weight")[1:]
+        for row in page.table("component", "platform error with load and weight")[1:]
     }
     assert rows["TX"][2].value == pytest.approx(1e-4)
     assert rows["TX"][1].value == pytest.approx(1e-4 + 2e-4 * 3 / 4)
@@ -101,7 +101,7 @@ def test_service_maps_on_the_page_equal_those_in_the_file(five_bar):
         np.testing.assert_array_equal(layers["stiffness.FX"], along)
         shift = np.linalg.norm(data["deflection"].values[..., 3:], axis=-1)
         np.testing.assert_allclose(layers["deflection_shift"], shift, rtol=1e-12)
-    rows = {row[0].text: row for row in page.table("", "least")[1:]}
+    rows = {row[0].text: row for row in page.table("quantity", "least")[1:]}
     row = rows["stiffness along FX, the other axes free"]
     assert [row[1].value, row[3].value] == [along.min(), along.max()]
     assert results_table(results)["maps"]["stiffness.FX"][2] == along.max()
@@ -133,7 +133,7 @@ def test_grid_of_three_axes_is_drawn_at_its_largest_error(tmp_path):
     error = results.maps["translation_error"].sel(bound="upper")
     at = np.unravel_index(int(np.nanargmax(error.values)), error.shape)
     place = {d: float(error[d][i]) for d, i in zip(error.dims, at, strict=True)}
-    (row, *_) = page.table("", "least")[1:]
+    (row, *_) = page.table("quantity", "least")[1:]
     assert row[4].text == ", ".join(f"{d} = {v:.6g} m" for d, v in place.items())
     (drawn,) = (one for one in page.figures if "layers" in one)
     values = np.array(drawn["layers"][0]["values"], float)

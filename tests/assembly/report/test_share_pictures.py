@@ -1,0 +1,32 @@
+"""Charts of shares: the sum of the parts that are not shown is grey."""
+
+import numpy as np
+import pytest
+
+from forcefit.assembly.report.platform_stiffness import DIRECTIONS
+from forcefit.assembly.report.share_pictures import plot_shares, share_chart
+from forcefit.page.charts import GREY
+from tests.pages_for_tests import parse
+
+
+def shares(parts):
+    """Equal shares of the links in the compliance along every axis."""
+    one = {f"part{k}": 1.0 / parts for k in range(parts)}
+    return {name: {"links": dict(one), "joints": {}} for name in DIRECTIONS}
+
+
+@pytest.mark.parametrize(("parts", "others"), [(5, 0), (20, 8)])
+def test_sum_of_the_other_parts_is_grey_and_the_shares_add_up(parts, others):
+    (spec,) = parse(share_chart(shares(parts), "")).figures
+    heights = {t["name"]: t["y"] for t in spec["traces"]}
+    np.testing.assert_allclose(sum(np.array(v) for v in heights.values()), 1.0)
+    grey = [t for t in spec["traces"] if t["marker"]["color"] == GREY]
+    assert [t["name"] for t in grey] == ([f"{others} others"] if others else [])
+    assert all(one["y"] == pytest.approx([others / parts] * 6) for one in grey)
+
+
+def test_plot_has_the_sum_of_the_other_parts_in_grey():
+    figure = plot_shares({"robot": "r", "shares": shares(20)})
+    bars = {c.get_label(): c.patches[0] for c in figure.axes[0].containers}
+    spread = {name: np.ptp(p.get_facecolor()[:3]) for name, p in bars.items()}
+    assert [name for name, size in spread.items() if size < 0.1] == ["8 others"]
