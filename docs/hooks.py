@@ -125,6 +125,12 @@ def on_page_content(html: str, **_: Any) -> str:
     return _ROLE.sub("", html)
 
 
+def on_post_page(output: str, **_: Any) -> str:
+    """A name of the search for screen readers, which the theme lacks."""
+    search = 'data-md-component="search" role="dialog"'
+    return output.replace(search, f'{search} aria-label="Search"')
+
+
 @event_priority(-100)  # after the search plugin, which writes the index
 def on_post_build(config: Any, **_: Any) -> None:
     """The index of the search as a script, which pages of a folder may load."""
