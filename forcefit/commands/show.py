@@ -156,8 +156,10 @@ def _write_scene(
 ) -> None:
     """Write the scene that reports and notebooks show, as a page of its own."""
     from forcefit.assembly.report.show import show
+    from forcefit.page.picture import Picture
 
     shown = show(assembly, errors=error_body, assumption=assumption, interactive=True)
+    assert isinstance(shown, Picture)  # because it is interactive
     write_text(shown.html, figure)
 
 
