@@ -46,7 +46,7 @@ $(EMPTY): pyproject.toml
 
 # C++ is compiled when the package is installed
 $(READY): $(EMPTY) $(CPP)
-	$(BIN)/python -m pip install --quiet -e ".[all,dev]"
+	$(BIN)/python -m pip install --quiet -e ".[all,mkl,dev]"
 	@touch $@
 
 clean:

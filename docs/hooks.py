@@ -1,4 +1,4 @@
-r"""Changes of the site to pages: mathematics, tables of the code's numbers, roles.
+r"""Changes of the site to pages: mathematics, scenes, tables of numbers, roles.
 
 Mathematics is written as on GitHub: a block of ``math``, or $`x`$ within a line.  It
 becomes MathML when the site is built, which browsers of 2023 and newer show without a
@@ -6,13 +6,17 @@ script or a network.  ``\tag{22}`` at the end of a block is the paper's number.
 """
 
 import re
+import shlex
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from latex2mathml.converter import convert
 from markdown import Markdown
 from markdown.extensions import Extension
 from markdown.inlinepatterns import InlineProcessor
+from mkdocs.plugins import event_priority
 from mkdocs.structure.files import File
 
 # a docstring's ":func:`name`", once its name is code
@@ -25,6 +29,9 @@ _NUMBER = re.compile(
 _NUMBERS = "<!-- numbers of the code -->"
 _CHANGES = "<!-- CHANGELOG.md -->"
 _ROOT = Path(__file__).parents[1]
+
+# a command that writes a scene
+_COMMAND = re.compile(r"^forcefit assembly show .*(?:\\\n.*)*\.html$", re.M)
 
 # number of an equation, at the end of a block
 _TAG = re.compile(r"\\tag\{([^}]+)\}\s*$")
@@ -39,11 +46,35 @@ def on_config(config: Any, **_: Any) -> Any:
 
 
 def on_files(files: Any, config: Any, **_: Any) -> Any:
-    """The notebooks of the examples, to download."""
+    """The notebooks of the examples, to download, and the scenes of the gallery."""
     for path in sorted((_ROOT / "examples" / "notebooks").glob("*.ipynb")):
         name = f"notebooks/{path.name}"
         files.append(File.generated(config, name, abs_src_path=str(path)))
+    gallery = (_ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    for name, content in _scenes(gallery).items():
+        files.append(File.generated(config, f"scenes/{name}", content=content))
     return files
+
+
+def _scenes(gallery: str) -> dict[str, str]:
+    """The scenes to which the gallery links, made by the commands that it shows."""
+    wanted = re.findall(r"\]\(scenes/([\w.]+)\)", gallery)
+    commands = {c.split()[-1]: c for c in _COMMAND.findall(gallery)}
+    with TemporaryDirectory() as folder:
+        return {name: _made(commands[name], Path(folder) / name) for name in wanted}
+
+
+def _made(command: str, path: Path) -> str:
+    """What a command of forcefit writes as its last word, with another path."""
+    from typer.main import get_command
+
+    from forcefit.commands.app import app
+
+    words = shlex.split(command.replace("\\\n", " "))[1:-1]
+    words = [str(_ROOT / w) if w.startswith("examples/") else w for w in words]
+    with redirect_stdout(None), redirect_stderr(None):
+        get_command(app)([*words, str(path)], standalone_mode=False)
+    return path.read_text(encoding="utf-8")
 
 
 def equation(source: str, *_: Any, **__: Any) -> str:
@@ -92,3 +123,17 @@ def _numbers() -> str:
 def on_page_content(html: str, **_: Any) -> str:
     """Names in docstrings without the role that stands before them."""
     return _ROLE.sub("", html)
+
+
+def on_post_page(output: str, **_: Any) -> str:
+    """A name of the search for screen readers, which the theme lacks."""
+    search = 'data-md-component="search" role="dialog"'
+    return output.replace(search, f'{search} aria-label="Search"')
+
+
+@event_priority(-100)  # after the search plugin, which writes the index
+def on_post_build(config: Any, **_: Any) -> None:
+    """The index of the search as a script, which pages of a folder may load."""
+    folder = Path(config.site_dir) / "search"
+    index = (folder / "search_index.json").read_text(encoding="utf-8")
+    (folder / "search_index.js").write_text(f"var __index = {index}", encoding="utf-8")

@@ -9,11 +9,13 @@ import sys
 
 import pytest
 
+from forcefit.assembly.robots import BUILT_IN
 from tests.axe_for_tests import scheme, violations
-from tests.forcefit.page.test_browser import browser
+from tests.forcefit.page.test_browser import browser, wait
 from tests.test_tutorials import DOCS, ROOT, blocks
 
 LAST = 27  # number of the paper's last equation
+SLOW = "Multiple readback operations using getImageData"
 
 
 def test_theory_page_has_each_equation_of_the_paper_once():
@@ -67,12 +69,59 @@ def pages_of(site):
 @pytest.mark.slow
 def test_every_page_opens_from_its_folder_without_an_error(site):
     pages = pages_of(site)
-    assert len(pages) == len(list(DOCS.rglob("*.md")))
+    scenes = [path for path in pages if path.parent.name == "scenes"]
+    assert len(pages) - len(scenes) == len(list(DOCS.rglob("*.md")))
     tab = browser()
     try:
         for path in pages:
             tab.get(path.as_uri())
-            assert tab.get_log("browser") == [], path.name
+            # plotly.js measures its texts in a way that Chromium calls slow
+            log = [m for m in tab.get_log("browser") if SLOW not in m["message"]]
+            assert log == [], path.name
+    finally:
+        tab.quit()
+
+
+@pytest.mark.slow
+def test_gallery_has_a_scene_of_each_robot_that_the_browser_draws(site):
+    """The built-in robots and the drawn examples; the frame out of view is removed."""
+    drawn = {path.stem for path in (ROOT / "examples" / "drawn").glob("*.toml")}
+    expected = {*BUILT_IN} | {f"drawn_{n}" if n in BUILT_IN else n for n in drawn}
+    assert {path.stem for path in (site / "scenes").iterdir()} == expected
+    tab = browser()
+    try:
+        tab.get((site / "gallery.html").as_uri())
+        for name in ("hexapod", "delta"):
+            show = "document.querySelector('[data-scene$=\"/%s.html\"]')%s"
+            tab.execute_script(show % (name, ".scrollIntoView()"))
+            wait(tab, "return " + show % (name, "?.firstChild"))
+            frame = tab.execute_script("return " + show % (name, ".firstChild"))
+            tab.switch_to.frame(frame)
+            wait(tab, "return document.documentElement.dataset.drawn")
+            assert tab.execute_script("return document.querySelector('canvas') && 1")
+            tab.switch_to.default_content()
+        frames = "return document.querySelectorAll('.scene-room iframe').length"
+        assert tab.execute_script(frames) <= 3
+    finally:
+        tab.quit()
+
+
+@pytest.mark.slow
+def test_search_finds_a_page_from_a_folder(site):
+    """The page of the built-in robots names Kutzbach."""
+    assert "Kutzbach" in (DOCS / "robots.md").read_text("utf-8")
+    tab = browser()
+    try:
+        tab.get((site / "index.html").as_uri())
+        field = "document.querySelector('.md-search__input')"
+        tab.execute_script(f"{field}.focus()")
+        tab.execute_script(
+            f"{field}.value = 'Kutzbach'; {field}.dispatchEvent(new Event('keyup'))"
+        )
+        links = "[...document.querySelectorAll('.md-search-result__item > a')]"
+        wait(tab, f"return {links}.length")
+        found = tab.execute_script(f"return {links}.map(a => a.pathname)")
+        assert any(path.endswith("/robots.html") for path in found)
     finally:
         tab.quit()
 

@@ -64,9 +64,9 @@ def follow(page, folder):
     return ran, compared
 
 
-def test_tutorials_folder_has_the_five_known_tutorials():
-    known = ["assembly_order", "cad_link", "own_robot", "tolerances", "tracker"]
-    assert known == TUTORIALS
+def test_tutorials_folder_has_the_six_known_tutorials():
+    known = ["assembly_order", "cad_link", "first_tasks", "own_robot", "tolerances"]
+    assert [*known, "tracker"] == TUTORIALS
 
 
 @pytest.mark.slow

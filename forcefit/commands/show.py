@@ -22,7 +22,14 @@ from forcefit.commands.options import (
 from forcefit.inputs.animation import ANIMATION, save_animation
 from forcefit.inputs.errors import BadInput, checked, nearest
 from forcefit.inputs.packages import need
-from forcefit.inputs.writing import PIXELS, check_writable, save_pixels, write_json
+from forcefit.inputs.writing import (
+    PAGE,
+    PIXELS,
+    check_writable,
+    save_pixels,
+    write_json,
+    write_text,
+)
 
 
 def show(
@@ -31,8 +38,8 @@ def show(
         Path | None,
         typer.Option(
             "--figure",
-            help="Picture to write: PNG, JPEG, BMP or TIFF, with --closing GIF; "
-            "without it and --json a window opens.",
+            help="Picture to write: PNG, JPEG, BMP or TIFF, with --closing GIF; or "
+            "HTML, a scene to turn in a browser. Without it and --json a window opens.",
         ),
     ] = None,
     closing: Annotated[
@@ -85,8 +92,9 @@ def show(
     from forcefit.assembly.solvers.conic import SolverFailed
 
     drawn = figure is not None or json is None
+    scene = figure is not None and not closing and _is_page(figure)
     if figure is not None:
-        check_writable(figure, ANIMATION if closing else PIXELS)
+        check_writable(figure, ANIMATION if closing else PAGE if scene else PIXELS)
     elif closing:
         raise BadInput("--closing: found no --figure, expected --figure FILE.gif")
     if closing and error_body is not None:
@@ -99,6 +107,11 @@ def show(
         if value is not None and value not in valid:
             raise BadInput(f'{option}: found "{value[:60]}"{nearest(value, valid)}')
     if exaggeration is not None:
+        if scene:
+            raise BadInput(
+                "--exaggeration: found it together with an HTML figure, whose slider "
+                "sets the factor; expected a picture"
+            )
         checked("--exaggeration", exaggeration, "1", above=0)
     wrench = parse_load(load)
     loaded = bool(drive_force) or (wrench is not None and any(wrench))
@@ -110,7 +123,7 @@ def show(
     assumption = assumption or ("frozen" if loaded else "budget")
     posture = posture_of(robot, pose, joint, rest, mismatch, drive_force=drive_force)
     results = shown_of(posture)
-    if drawn:
+    if drawn and not scene:
         need("pyvista")
     write_json(results, json)
     if json != "-":
@@ -124,11 +137,30 @@ def show(
         assembly = solve_assembly(posture, wrench)
         if closing and figure is not None:
             save_animation(closing_pictures(assembly, exaggeration), figure)
+        elif figure is not None and scene:
+            _write_scene(assembly, figure, error_body, assumption)
         else:
             _draw(assembly, figure, exaggeration, error_body, assumption)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         print(f"{failure_status(error)}: {error}")
         raise typer.Exit(1) from None
+
+
+def _is_page(path: Path) -> bool:
+    """Return whether a path ends as an HTML page."""
+    return path.suffix.lower() in PAGE.endings
+
+
+def _write_scene(
+    assembly: Any, figure: Path, error_body: str | None, assumption: str
+) -> None:
+    """Write the scene that reports and notebooks show, as a page of its own."""
+    from forcefit.assembly.report.show import show
+    from forcefit.page.picture import Picture
+
+    shown = show(assembly, errors=error_body, assumption=assumption, interactive=True)
+    assert isinstance(shown, Picture)  # because it is interactive
+    write_text(shown.html, figure)
 
 
 def _draw(

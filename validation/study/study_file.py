@@ -165,6 +165,10 @@ def _files(path: Path, root: Table, meshes: dict[str, MeshLink]) -> tuple[Path, 
 
 def _robot(root: Table, folder: Path, links: bool) -> Robot:
     """Return the robot, built in or from a file, with closures that hold."""
+    if not root.has("robot") and (root.has("frame") or root.has("body")):
+        line = f'robot = "{Path(root.file).name}"'
+        expected = f"a study file, in the simplest case with the one line {line}"
+        raise root.bad("", f"found a robot file, expected {expected}")
     name = root.text("robot", expected="a built-in robot or a robot file")
     if name in BUILT_IN:
         return _closed(root, name, links)

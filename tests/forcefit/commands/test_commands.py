@@ -18,6 +18,7 @@ import xarray
 import forcefit
 from forcefit.assembly.files.robot_file import write_robot
 from forcefit.commands import app as command
+from tests.pages_for_tests import parse
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
 
 ROOT = Path(__file__).parents[3]
@@ -183,6 +184,36 @@ def test_show_writes_a_figure(run, robot_file, tmp_path):
     )
     assert status == 0
     assert (tmp_path / "robot.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_show_writes_the_scene_of_a_loaded_bar_as_a_page(run, write_file, tmp_path):
+    """w(L) = F L^3 / (3 E I) + F L / (k G A), k of a round bar by Cowper (1966)."""
+    bar = write_file("""
+name = "bar"
+platform = "tip"
+[[frame]]
+name = "tip"
+parent = "base"
+translation = [0.4, 0, 0]
+link = { beam = { radius = 0.01 }, young = 2e11, poisson = 0.3 }
+""")
+    page = tmp_path / "bar.html"
+    status, _, err = run("assembly", "show", bar, "--load", "fz=-50", "--figure", page)
+    assert status == 0, err
+    (spec,) = parse(page.read_text("utf-8")).figures
+    bending = 0.4**3 / (3 * 2e11 * np.pi * 0.01**4 / 4)
+    shear = 0.4 / (6 * 1.3 / 8.8 * 2e11 / 2.6 * np.pi * 0.01**2)
+    expected = -50.0 * (bending + shear)
+    (tip,) = (body for body in spec["bodies"] if body["name"] == "tip")
+    np.testing.assert_allclose(tip["moved"][-1], [0, 0, expected], atol=1e-12)
+
+
+def test_show_refuses_an_exaggeration_of_a_page_with_a_slider(run, tmp_path):
+    page = tmp_path / "robot.html"
+    words = ["hexapod", "--exaggeration", 5, "--figure", page]
+    status, _, err = run("assembly", "show", *words)
+    assert (status, page.exists()) == (2, False)
+    assert "--exaggeration: found it together with an HTML figure" in err
 
 
 @pytest.mark.parametrize(

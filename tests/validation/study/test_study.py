@@ -314,6 +314,19 @@ def test_study_reports_a_manipulator_that_cannot_be_assembled(tmp_path):
     )
 
 
+def test_robot_file_in_place_of_a_study_names_the_line_that_makes_one(tmp_path):
+    path = tmp_path / "arm.toml"
+    robot = BUILT_IN["five_bar"]()
+    write_robot(robot, path)
+    with pytest.raises(
+        BadInput, match="found a robot file, expected a study file"
+    ) as e:
+        read_study(path)
+    line = str(e.value).rpartition("with the one line ")[2]
+    (tmp_path / "study.toml").write_text(line)
+    assert read_study(tmp_path / "study.toml").robot == robot
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
