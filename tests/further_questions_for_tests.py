@@ -5,7 +5,6 @@ leave free."""
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,8 +29,6 @@ from forcefit.stiffness.surface.patches import triangles_on
 from forcefit.stiffness.surface.surface import check_surface
 from tests.built_in_robots_for_tests import LOAD, WORKSPACE
 from tests.solids_for_tests import cylinder
-
-TESTS = Path(__file__).parent
 
 
 def refined(nudge: float) -> Any:

@@ -192,10 +192,3 @@ for words in {words.split(";")}:
 """
     unwanted = HEAVY - {"clarabel"} | {*left_out}
     assert sorted(unwanted & in_memory(code, ROOT)) == []
-
-
-def test_heavy_import_is_detected(tmp_path):
-    (tmp_path / "feather.py").write_text("import json\n")
-    (tmp_path / "anvil.py").write_text("import matplotlib\n")
-    assert loaded("feather", tmp_path) == []
-    assert loaded("anvil", tmp_path) == ["matplotlib"]

@@ -1,23 +1,19 @@
 """Helical joints: a screw and its nut."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from forcefit.assembly.exact.exact import solve_exact
 from forcefit.assembly.files.robot_file import read_robot
 from forcefit.assembly.kinematics.mobility import mobility
-from forcefit.assembly.kinematics.posture import home_posture, place_robot, together
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.kinematics.verdict import limits_passed
 from forcefit.assembly.linear.energy import solve_assembly
 from forcefit.assembly.linear.pose_error import bound_pose_error
 from forcefit.assembly.linear.reference.as_printed import energy_as_printed
 from forcefit.assembly.measurement.conditions import as_declared
-from forcefit.assembly.measurement.exact_rows import solve_rows
-from forcefit.assembly.measurement.predict import assemble_row, predict
+from forcefit.assembly.measurement.predict import predict
 from forcefit.assembly.model.error_distributions import tolerance_sources
-from forcefit.assembly.platform_stiffness.deflection import deflection_curve
 from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from forcefit.assembly.platform_stiffness.vibration import natural_modes
 from forcefit.assembly.statistics.experiment import Experiment
@@ -44,17 +40,6 @@ def test_screw_lift_has_one_freedom_and_three_redundant_constraints(read):
     found = mobility(home_posture(read()))
     assert (found.freedoms, found.platform_freedoms) == (1, 1)
     assert (found.freedoms_drives_locked, found.redundant_constraints) == (0, 3)
-
-
-@pytest.mark.parametrize("factor", [1e-6, 1e3])
-def test_mobility_of_the_lift_does_not_depend_on_its_size(factor, read):
-    robot = read()
-    frames = tuple(
-        replace(f, translation=factor * f.translation, pitch=factor * f.pitch)
-        for f in robot.frames
-    )
-    found = mobility(home_posture(replace(robot, frames=frames)))
-    assert (found.freedoms, found.redundant_constraints) == (1, 3)
 
 
 def test_turn_of_the_screw_moves_the_table_by_the_pitch(read):
@@ -103,14 +88,6 @@ def test_frequency_of_the_table_is_that_of_its_mass_on_the_screw(read):
     found = natural_modes(home_posture(read()))
     expected = np.sqrt(200 / LEAD**2 / 8) / (2 * np.pi)
     assert found.frequencies == pytest.approx([expected], rel=1e-9)
-
-
-@pytest.mark.parametrize("state", ["contact", "exact"])
-def test_deflection_of_the_table_grows_by_the_compliance_of_the_screw(state, read):
-    at, loads = home_posture(read()), np.arange(0.0, -501.0, -250.0)
-    curve = deflection_curve(at, 5, loads, state=state)
-    np.testing.assert_allclose(curve.deflection, loads * LEAD**2 / 200, rtol=1e-9)
-    np.testing.assert_allclose(curve.stiffness, 200 / LEAD**2, rtol=1e-6)
 
 
 def test_rotation_error_of_the_screw_lowers_the_table_by_its_lead(read):
@@ -164,14 +141,6 @@ def test_uniform_positions_of_a_nut_fill_its_axial_clearance(read):
     assert sizes.mean() == pytest.approx(0.5, abs=1 / 23)
 
 
-def test_driven_nut_is_elastic_along_its_thread(read):
-    """C = s s^T / k of the unit screw s = [0 0 1 0 0 h]."""
-    text = NUT[: NUT.index("clearance")] + "actuated = true\ndrive_stiffness = 50\n"
-    C = platform_stiffness(home_posture(read(text))).compliance
-    s = np.array([0, 0, 1, 0, 0, 0.004 / (2 * np.pi)])
-    assert np.abs(C - np.outer(s, s) / 50).max() < 1e-14
-
-
 SPRUNG = LIFT.replace("pitch =", (
     "clearance = { radial = 1e-5, axial = 2e-5, tilt = 1e-4 }\n"
     "joint_stiffness = [2e4, 2e4, 0, 1e8, 1e8, 5e7]\npitch ="
@@ -191,26 +160,6 @@ def test_compiled_reference_and_printed_energies_of_a_loaded_lift_agree(seed, re
     assert energy == pytest.approx(expected.energy, rel=1e-5)
     np.testing.assert_allclose(screw, found.platform_screw, rtol=0, atol=1e-9)
     assert expected.energy > 1e-3
-
-
-@pytest.mark.parametrize("pitch", ["5 mm", "9 mm"])
-def test_exact_rows_of_a_measured_lift_equal_single_exact_solutions(pitch, read):
-    """A chord iteration, and Newton's method of the other engine."""
-    text = SPRUNG.replace("clearance =", "# ").replace("5 mm", pitch)
-    robot, rng = read(text), np.random.default_rng(4)
-    robot = robot.with_errors(rng.normal(size=(len(robot.frames), 6)) * 1e-4)
-    postures = [place_robot(robot, pose={"tz": z}) for z in (0.4, 0.42)]
-    here = as_declared(
-        together(postures), rng.normal(size=(2, 6)) * 50,
-        mismatch=[p.mismatch for p in postures], point=np.zeros(3),
-        gravity=[0, 0, -9.81],
-    )  # fmt: skip
-    here = replace(here, exact=True)
-    screws, found = solve_rows(here, np.zeros((2, 0)))
-    assert found.all()
-    for row in range(2):
-        alone = assemble_row(here, row).platform_screw
-        np.testing.assert_allclose(screws[row], alone, rtol=0, atol=2e-11)
 
 
 def test_readings_of_lifts_that_differ_in_pitch_are_those_of_their_own(read):

@@ -204,16 +204,6 @@ def test_a_cross_adds_the_clearances_of_its_two_bearings(axis2, one_joint):
         assert found == pytest.approx(expected, rel=1e-7)
 
 
-def test_bearings_of_a_cross_may_have_different_bores(one_joint):
-    """The sum of both support functions."""
-    pair = '[{ radial = 1e-5, length = 0.03 }, { radial = 2e-5, length = "50 mm" }]'
-    keys = "axis = [1, 0, 0]\naxis2 = [0, 1, 0]"
-    posture = one_joint("universal", pair, keys=keys)
-    normal, about = heights(posture, [[0, 0, 0, 0, 0, 1], [0, 0, 1, 0, 0, 0]])
-    assert normal == pytest.approx(3e-5, rel=1e-7)
-    assert about == pytest.approx(2 * (1e-5 / 0.03 + 2e-5 / 0.05), rel=1e-7)
-
-
 def test_a_ball_joint_reaches_its_gap_and_turns_freely(one_joint, rng):
     posture = one_joint("spherical", 'ball = "10 um"', keys="")
     assert reach(posture) == pytest.approx(C, abs=1e-9)

@@ -234,17 +234,3 @@ def test_crosses_with_an_axis_along_their_leg_let_it_turn_at_home():
     assert mobility(home).freedoms_drives_locked == 6
     moved = gough("universal", [0.02, 0.01, 0.0], turn(0.06) @ turn(0.05, X), True)
     assert counts(home_posture(moved)) == (6, 6, 0, 0, 0)
-
-
-def test_a_redundant_drive_is_a_redundant_constraint():
-    """Two drives hold the one freedom of a parallelogram: one of them too many."""
-    robot = mechanism(
-        "coupler", [0.5, 0.3, 0],
-        joint("revolute", "base", "crank", [0, 0, 0], driven=True),
-        joint("revolute", "crank", "coupler", [0, 0.3, 0]),
-        joint("revolute", "coupler", "rocker", [0.5, 0.3, 0]),
-        joint("revolute", "base", "rocker", [0.5, 0, 0], driven=True),
-    )  # fmt: skip
-    found = mobility(home_posture(robot))
-    assert (found.drives, found.freedoms, found.overconstraint) == (2, 1, 3)
-    assert (found.freedoms_drives_locked, found.redundant_constraints) == (0, 4)

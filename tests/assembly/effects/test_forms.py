@@ -51,13 +51,6 @@ def test_spline_of_two_variables_is_the_product_of_two_splines():
     assert set(shape_names(FORMS["spline"], 2)) == set(ends)
 
 
-def test_spline_of_two_knots_is_linear_and_constant_beyond_them():
-    x = np.array([-1.0, 0.0, 0.25, 1.0, 3.0])
-    hats = natural_spline(np.array([0.0, 1.0]), x)
-    right = np.clip(x, 0.0, 1.0)
-    np.testing.assert_allclose(hats, np.column_stack([1 - right, right]), atol=1e-15)
-
-
 def test_spline_roughness_equals_the_integral_of_squared_curvature():
     values = np.array([1.0, -2.0, 0.5, 3.0, 2.5, 0.0])
     spline = CubicSpline(np.arange(6), values, bc_type="natural")
@@ -97,12 +90,6 @@ def test_knee_changes_its_slope_at_the_given_load():
     assert found @ [2.0, 0.5] == pytest.approx([-7, -6, -2, 0, 4, 8])
     jump = FORMS["knee"].basis(["size"], [load], {"at": 0.5})
     assert 0.1 * jump[:, 0] == pytest.approx([-0.1, -0.1, -0.1, 0, 0.1, 0.1])
-
-
-def test_reversal_waves_repeat_after_each_screw_lead():
-    side, x = np.array([1.0, -1.0, 1.0]), np.array([0.0, 0.0025, 0.0125])
-    found = FORMS["reversal_waves"].basis(["1.sine"], [side, x], {"period": 0.01})
-    assert found[:, 0] == pytest.approx([0, -1, 1])
 
 
 def test_scaled_waves_are_waves_times_the_second_variable():

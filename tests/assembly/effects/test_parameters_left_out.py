@@ -7,18 +7,13 @@ import numpy as np
 import pytest
 
 from forcefit.assembly.effects import LIBRARY, apply_effects
-from forcefit.assembly.effects.base_compliance import (
-    FOUNDATION,
-    on_foundation,
-    with_foundation,
-)
+from forcefit.assembly.effects.base_compliance import FOUNDATION, on_foundation
 from forcefit.assembly.effects.functions import covariates_of
 from forcefit.assembly.effects.robot_effects import check_covariates
 from forcefit.assembly.kinematics.posture import place_robot
 from forcefit.assembly.measurement.conditions import as_declared
 from forcefit.assembly.model.function import Function
 from forcefit.assembly.model.robot import Clearance, Frame
-from forcefit.assembly.robots import load_robot
 from forcefit.inputs.errors import BadInput
 from tests.assembly.effects.test_effects import K, L, arm, change, here, standing
 
@@ -62,14 +57,6 @@ def test_encoder_sine_and_cosine_become_amplitude_and_phase():
         assert wave == pytest.approx(s * sin(q) + c * cos(q), rel=1e-12)
 
 
-def test_encoder_eccentricity_without_a_phase_is_zero_at_zero_angle():
-    for q in (0.0, 0.9):
-        seen = change(
-            here(arm(), q=q), "encoder_eccentricity", {"drive.amplitude": 1e-5}
-        )
-        assert seen[2] == pytest.approx(1e-5 * sin(q), rel=1e-9, abs=1e-18)
-
-
 def test_friction_is_zero_without_an_approach_direction():
     values = {"drive": 2.0}
     for approach, part in ((0.0, 0.0), (0.5, -0.5)):
@@ -87,14 +74,6 @@ def test_robot_with_two_base_frames_gets_a_foundation_frame():
     ]
     assert [f.parent for f in found.frames] == ["base", FOUNDATION, "foot", "drive",
                                                FOUNDATION]  # fmt: skip
-
-
-def test_second_foundation_gets_a_different_name():
-    once = with_foundation(load_robot("arm6"), {})
-    twice = with_foundation(once, {"stiffness.tz": 1e6})
-    assert [f.name for f in twice.frames[:2]] == [FOUNDATION + "_", FOUNDATION]
-    assert np.diag(twice.frames[0].joint_stiffness)[5] == 1e6
-    assert np.isinf(np.diag(twice.frames[0].joint_stiffness)[:5]).all()
 
 
 def test_joint_clearance_effect_adds_to_the_declared_clearance():

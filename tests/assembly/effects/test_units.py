@@ -1,4 +1,4 @@
-"""Units of the parameters of effects and functions, and where effects act."""
+"""Units of the parameters of effects and functions."""
 
 import pytest
 
@@ -141,24 +141,3 @@ def test_fitted_compliance_becomes_a_stiffness_and_zero_is_left_out(
     expected = {after.format("rx"): 5e5, after.format("tz"): 1e8}
     public = LIBRARY[effect].public(load_robot("arm6"), values)
     assert public == pytest.approx(expected)
-
-
-def test_effects_name_the_frames_on_which_they_can_act():
-    """All drives, revolute drives only, or beams; one beam has a body of its own."""
-    beam = arm().frames[1].link
-    robot = Robot("both", "tip", (
-        Frame("turn", joint="revolute", actuated=True), Frame("bar", "turn",
-              [0.2, 0, 0], link=beam),
-        Frame("slide", "bar", joint="prismatic", actuated=True),
-        Frame("pin", "slide", joint="revolute"), Frame("tip", "pin"),
-    ))  # fmt: skip
-    drives, turning, beams = ("turn", "slide"), ("turn",), ("bar",)
-    frames = {name: effect.frames for name, effect in LIBRARY.items() if effect.frames}
-    assert {name: where(robot) for name, where in frames.items()} == {
-        "thermal_expansion": beams, "delayed_expansion": beams,
-        "body_mass": beams, "drive_compliance": drives,
-        "encoder_offset": drives, "encoder_eccentricity": turning,
-        "link_length": beams, "modulus_scale": beams,
-        "joint_clearance": (*drives, "pin"), "friction_hysteresis": (),
-        "contact_stiffening": drives,
-    }  # fmt: skip

@@ -34,15 +34,6 @@ def test_function_of_the_base_moment_turns_the_drive(place):
     assert found == pytest.approx(turned(turn, 0.5), rel=1e-4, abs=1e-9)
 
 
-def test_function_uses_the_named_component_of_the_wrench():
-    """The force F along y at the tip is Fy in the drive, its moment F L about z."""
-    turns = {"fy": F, "mz": F * L, "fx": 0.0, "fz": 0.0, "mx": 0.0, "my": 0.0}
-    for component, wrench in turns.items():
-        law = at_drive({"1": 1e-6}, variables=(f"wrench.drive.{component}",))
-        expected = turned(1e-6 * wrench, 0.0)
-        assert seen(loaded(0.0), law)[0] == pytest.approx(expected, rel=1e-4, abs=1e-9)
-
-
 def test_compliance_linear_in_the_moment_turns_by_its_closed_form():
     """The turn is (c + d M) M."""
     soft = at_drive(
@@ -52,18 +43,6 @@ def test_compliance_linear_in_the_moment_turns_by_its_closed_form():
     found = seen(loaded(0.3), soft)[0]
     turn = (1e-5 + 2e-7 * M) * M
     assert found == pytest.approx(turned(turn, 0.3), rel=1e-3, abs=1e-8)
-
-
-def test_session_functions_deform_only_rows_of_their_session():
-    rows = campaign_of(np.zeros(3), session=np.array(["a", "b", "a"]))
-    rows = replace(rows, load=np.tile([0, 0, 0, 0, F, 0], (3, 1)))
-    for kind, parameters, variables in (
-        ("compliance", {"0": 1e-5}, ("time",)),
-        ("screw", {"1": 1e-5}, ("wrench.drive.mz",)),
-    ):
-        own = at_drive(parameters, variables=variables, kind=kind, session="a")
-        turn = 1e-5 * F * L
-        assert seen(rows, own)[:, 2] == pytest.approx([turn, 0, turn], rel=1e-6)
 
 
 def test_reversal_of_a_wrench_scales_with_the_absolute_moment():

@@ -8,14 +8,13 @@ from scipy.optimize import brentq
 
 from forcefit.assembly.exact.dead_load import (
     dead_loads,
-    dead_loads_of_rows,
     work_gradient,
     wrenches_on_frames,
 )
 from forcefit.assembly.exact.exact import solve_exact
 from forcefit.assembly.exact.finite_robot import FiniteRobot
 from forcefit.assembly.exact.placement import place
-from forcefit.assembly.kinematics.posture import home_posture, place_robot, together
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.linear.closure import virtual_joints
 from forcefit.assembly.linear.energy import solve_assembly
 from forcefit.assembly.model.links import link_compliance
@@ -70,17 +69,6 @@ def test_arm_with_a_mass_rests_at_its_moment_balance(stiffness):
     expected = stiffness * angle**2 / 2 + weight * fall
     assert answer.potential == pytest.approx(expected, rel=1e-12)
     assert answer.joint_wrenches[0, 2] == pytest.approx(stiffness * angle, rel=1e-9)
-
-
-def test_beam_weight_acts_at_the_middle_of_the_beam():
-    """k a + W L/2 cos a = 0 for a beam that hardly bends."""
-    beam = BeamLink({"radius": 0.02}, 1e16, 0.3, density=8000.0)
-    posture = on_a_hinge(5.0, Frame("tip", "hinge", [0.6, 0, 0], link=beam))
-    weight = 8000.0 * np.pi * 0.02**2 * 0.6 * G
-    angle = brentq(lambda a: 5.0 * a + weight * 0.3 * np.cos(a), -2.0, 0.0)
-    answer = solve_exact(posture, gravity=[0, -G, 0])
-    assert abs(angle) > 1.0
-    assert answer.joint_screws[0, 2] == pytest.approx(angle, abs=1e-8)
 
 
 def test_weight_of_a_displaced_beam_acts_at_the_displaced_middle():
@@ -141,18 +129,6 @@ def test_base_reactions_balance_the_whole_weight():
             balance += w
     assert np.abs(answer.linear.platform_screw).max() > 1e-6
     assert balance == pytest.approx(total, rel=1e-8, abs=1e-8 * np.abs(total).max())
-
-
-def test_linear_model_error_falls_with_the_square_of_the_weight():
-    """Linear minus exact falls with the square of the weight and the errors."""
-    robot = heavy(irsbot2_with(NUMBERS["cases"][0]), np.random.default_rng(1))
-    tight = (replace(frame, clearance=None) for frame in robot.frames)
-    robot, off = replace(robot, frames=tuple(tight)), []
-    for s in (0.02, 0.01):
-        small = place_robot(robot.with_errors(s * robot.errors), pose={"tz": -0.5})
-        exact = solve_exact(small, gravity=[0, 0, -s * G])
-        off.append(np.abs(exact.linearisation_error.translation).max())
-    assert off[0] / off[1] == pytest.approx(4.0, rel=0.05)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 5])
@@ -240,26 +216,3 @@ def test_frame_wrench_is_the_sum_of_all_loads_beyond_the_frame():
         scale = np.abs(own).sum()
         assert joint[i] == pytest.approx(held, abs=1e-12 * scale), frame.name
         assert body[i] == pytest.approx(held + own[i], abs=1e-12 * scale)
-
-
-@pytest.mark.parametrize("point", [(0.0, 0.0, 0.0), (0.1, -0.2, 0.05)])
-def test_loads_of_many_rows_equal_those_of_each_row(point):
-    """Each row has its own errors, load and gravity."""
-    rng = np.random.default_rng(3)
-    robot = heavy(random_robot(rng, legs=2), rng)
-    rows = 3
-    errors = 1e-2 * rng.normal(size=(rows, len(robot.frames), 6))
-    load, gravity = rng.normal(size=(rows, 6)), 9.8 * rng.normal(size=(rows, 3))
-    postures = [home_posture(robot.with_errors(one)) for one in errors]
-    many = together(postures)
-    found = dead_loads_of_rows(many, errors, load, gravity, np.array(point))
-    for k, posture in enumerate(postures):
-        one = dead_loads(posture, load[k], gravity=gravity[k], point=point)
-        for name in ("load", "bodies", "carried"):
-            expected = getattr(one, name)
-            size = np.abs(expected).max()
-            assert getattr(found, name)[k] == pytest.approx(expected, abs=1e-12 * size)
-    assert np.abs(found.carried).max() > 0
-    still = dead_loads_of_rows(many, errors, load, 0 * gravity, np.zeros(3))
-    assert np.array_equal(still.load, load)
-    assert not still.beyond_platform

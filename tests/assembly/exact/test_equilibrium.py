@@ -17,7 +17,7 @@ from forcefit.assembly.exact.placement import place
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.linear.closure import virtual_joints
 from forcefit.assembly.model.robot import Clearance, Frame, Robot
-from tests.assembly.exact.test_exact import only, pendulum, two_bars
+from tests.assembly.exact.test_exact import two_bars
 
 C = 2e-3  # [m] of clearances
 
@@ -46,38 +46,6 @@ def two_slides(link=None):
     )))  # fmt: skip
 
 
-@pytest.mark.parametrize("share", [0.0, 0.5, 0.9, 1.0, 2.0])
-def test_imbalance_of_a_spring_is_its_relative_unbalanced_moment(share):
-    """|y - w| of |y - w| + w for a moment w = m / sqrt(k) of the scaled unknown y."""
-    k, m = 10.0, 3.0
-    y = share * m / np.sqrt(k)
-    local = at(pendulum(k, 0.5), [y], [0, 0, m, 0, 0, 0])
-    expected = abs(share - 1) / (abs(share - 1) + 1)
-    assert imbalance(local) == pytest.approx(expected, abs=1e-12)
-
-
-@pytest.mark.parametrize(("size", "small"), [(1.0, 0.0), (1e-10, 1e-9)])
-def test_imbalance_of_two_closed_springs_is_their_mean_unbalanced_force(size, small):
-    """Springs of 1 N/m, stretched by 3 and -1 m: the closure carries 2 N, 1 N remains.
-
-    The imbalance is relative to both forces and to the force of 1e-9 m.
-    """
-    spring = only(3, 1.0)
-    posture = home_posture(Robot("pair", "one", (
-        Frame("a", joint_stiffness=spring), Frame("one", "a"),
-        Frame("b", joint_stiffness=spring), Frame("two", "b"),
-    ), (("one", "two"),)))  # fmt: skip
-    model = FiniteRobot(posture, virtual_joints(posture.robot))
-    there = place(model, size * np.array([3.0, -1.0]))
-    local = expand(there, dead_loads(posture), np.zeros(6))
-    assert np.linalg.norm(local.multipliers) == pytest.approx(2 * size, rel=1e-6, abs=0)
-    expected = size / (2 * size + small + size)
-    assert imbalance(local) == pytest.approx(expected, rel=1e-6)
-    # in balance where they pull alike
-    there = place(model, size * np.array([2.0, -2.0]))
-    assert imbalance(expand(there, dead_loads(posture), np.zeros(6))) < 1e-9
-
-
 @pytest.mark.parametrize(
     ("at_share", "force", "expected"),
     [
@@ -94,24 +62,6 @@ def test_imbalance_of_a_clearance_is_the_force_that_no_bound_carries(
 ):
     local = at(pin(axial=C), [at_share], [0, 0, 0, 0, 0, force])
     assert imbalance(local) == pytest.approx(expected, rel=1e-6, abs=1e-12)
-
-
-@pytest.mark.parametrize("F", [1.0, 300.0])
-def test_pressed_pin_has_the_curvature_of_a_pendulum_of_clearance_length(F):
-    """-F c cos a: F c^2 / c per squared length along the rim, and nothing normal."""
-    local = at(pin(radial=C), [0.6, 0.8], [0, 0, 0, 0.6 * F, 0.8 * F, 0])
-    active, force = active_clearances(local)
-    assert active.tolist() == [True]
-    assert force == pytest.approx([F * C], rel=1e-12)
-    D, H = tangent_space(local)
-    assert D.shape == (2, 1)
-    assert D[:, 0] @ [0.6, 0.8] == pytest.approx(0.0, abs=1e-12)
-    assert H[0, 0] / (D[:, 0] @ D[:, 0]) == pytest.approx(F * C, rel=1e-12)
-    assert least_curvature(local) == pytest.approx(F / C, rel=1e-12)
-    # pulled off the rim it is free, and falls
-    away = at(pin(radial=C), [0.6, 0.8], [0, 0, 0, -0.6 * F, -0.8 * F, 0])
-    assert active_clearances(away)[0].tolist() == [False]
-    assert active_clearances(away)[1].tolist() == [0.0]
 
 
 def test_fully_pressed_clearances_leave_no_tangent_space():

@@ -16,7 +16,6 @@ from forcefit.assembly.kinematics.se3 import (
     second_form,
 )
 from forcefit.assembly.linear.closure import virtual_joints
-from forcefit.assembly.linear.energy import solve_assembly
 from tests.robots_for_tests import random_robot
 
 
@@ -80,20 +79,6 @@ def test_second_form_equals_differences_of_the_exponential(rng, size):
 
 
 # Closures of a robot
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_closure_rows_without_motion_equal_the_linear_rows(seed):
-    rng = np.random.default_rng(seed)
-    robot = random_robot(rng, legs=3)
-    posture = home_posture(robot.with_errors(0 * robot.errors))
-    lin = solve_assembly(posture).linearisation
-    model = FiniteRobot(posture, virtual_joints(posture.robot))
-    here = place(model, np.zeros(len(model.frame)))
-    columns = np.hstack([model.joints.elastic, model.joints.cones, model.joints.free])
-    assert here.largest_gap < 1e-15
-    assert np.abs(here.rows - lin.rows @ columns).max() < 1e-14
-    assert np.abs(here.platform_rows - lin.platform @ columns).max() < 1e-14
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -8,8 +8,6 @@ import pytest
 from forcefit.assembly.exact.exact import solve_exact
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.linear.energy import solve_assembly
-from forcefit.assembly.linear.pose_error import bound_pose_error
-from forcefit.assembly.linear.zone import zone_margin
 from forcefit.assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from forcefit.stiffness.screws import (
     rotation_matrix,
@@ -115,32 +113,6 @@ def test_solution_does_not_depend_on_the_root_of_the_tree(seed):
             back = screw_map(this.T[:3, 3], this.T[:3, :3])
             assert back.T @ there == pytest.approx(-here, rel=1e-4, abs=1e-4 * np.abs(
                 here).max())  # fmt: skip
-
-
-@pytest.mark.parametrize("compliant", ["rigid", "free"])
-@pytest.mark.parametrize("seed", range(6))
-def test_margins_do_not_depend_on_the_root(seed, compliant):
-    legs, _ = random_legs(np.random.default_rng(seed))
-    margins = [
-        zone_margin(home_posture(robot_of(these)), compliant).margin
-        for these in (legs, from_the_platform(legs))
-    ]
-    if margins[0] is None:
-        assert margins[1] is None
-    else:
-        assert margins[1] == pytest.approx(margins[0], rel=1e-7)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_rotation_errors_do_not_depend_on_the_root(seed):
-    legs, _ = random_legs(np.random.default_rng(seed))
-    brackets = []
-    for these in (legs, from_the_platform(legs)):
-        answer = solve_assembly(home_posture(robot_of(these)))
-        brackets.append(bound_pose_error(answer, "budget").rotation_error)
-    (low, high), (other_low, other_high) = brackets
-    assert low <= other_high + 1e-8
-    assert other_low <= high + 1e-8
 
 
 @pytest.mark.parametrize("seed", range(3))

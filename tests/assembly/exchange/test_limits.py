@@ -115,18 +115,6 @@ def test_posture_beyond_a_limit_of_a_universal_joint_is_reported(tmp_path):
         )
 
 
-def test_mjcf_ranges_of_several_joints_of_a_body_become_limits(tmp_path):
-    """A cylindrical joint: a slide and a hinge along one axis."""
-    text = (
-        '<mujoco><compiler angle="radian"/><worldbody><body name="b">'
-        '<joint name="along" type="slide" range="-0.2 0.1"/>'
-        '<joint name="about" type="hinge" range="-1 2"/>'
-        '<inertial mass="1" pos="0 0 0"/></body></worldbody></mujoco>'
-    )
-    found = limits(tmp_path, "c.xml", text)
-    assert found == {"along": (-0.2, 0.1), "about": (-1.0, 2.0)}
-
-
 @pytest.mark.parametrize("ending", ["urdf", "xml"])
 def test_limits_are_equal_after_conversion_and_back(tmp_path, ending):
     robot = load_robot("orthoglide")

@@ -225,14 +225,6 @@ def test_contacts_of_a_joint_do_not_move_its_feature(tmp_path):
 FIT = FRAMES.replace('name = "b"', 'name = "b"\nclearance = { fit = "12 H7/g6" }')
 
 
-def test_fit_is_kept_when_a_robot_is_written(tmp_path):
-    robot = read(tmp_path, FIT)
-    write_robot(robot, tmp_path / "again.toml")
-    again = read_robot(tmp_path / "again.toml")
-    assert dict(again.fits) == {"b": "12 H7/g6"}
-    assert again.frame("b").clearance == robot.frame("b").clearance
-
-
 def test_fit_of_a_drawn_joint_is_that_of_its_frame(tmp_path, without_circle):
     joint = 'name = "foot"\ntype = "revolute"'
     text = without_circle.replace(joint, joint + '\nclearance = { fit = "12 H7/g6" }')

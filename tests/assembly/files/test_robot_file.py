@@ -136,14 +136,6 @@ def test_relative_paths_start_from_the_robot_file(write_file, tmp_path):
         assert read_robot(file).frame("coupler").link == LibraryLink(expected, "k")
 
 
-def test_robot_written_to_another_folder_refers_to_the_same_mesh(write_file, tmp_path):
-    robot = read_robot(write_file(FOUR_BAR.replace(BEAM, mesh())))
-    (tmp_path / "out").mkdir()
-    write_robot(robot, tmp_path / "out" / "b.toml")
-    again = read_robot(tmp_path / "out" / "b.toml").frame("coupler").link.surface
-    assert again.resolve() == (tmp_path / "x.stl").resolve()
-
-
 def test_relative_path_is_written_relative_to_the_new_file(
     write_file, tmp_path, monkeypatch
 ):

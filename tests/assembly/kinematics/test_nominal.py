@@ -10,12 +10,11 @@ from scipy.spatial.transform import Rotation
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput
-from forcefit.stiffness.screws import rotation_matrix, rotation_vector, transform
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector
 from tests.linkages_for_tests import (
     CRANK,
     GROUND,
     driven,
-    five_bar,
     four_bar,
     four_bar_angles,
     frame,
@@ -44,16 +43,6 @@ def test_rough_home_coordinates_are_corrected_to_close():
     np.testing.assert_allclose(
         posture.platform[:2, 3], four_bar_angles(0.5)[2], rtol=0, atol=EXACT
     )
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_frame_order_does_not_change_the_posture(seed):
-    mixed = np.random.default_rng(seed).permutation(6)
-    here = place_robot(four_bar(order=mixed), joints={"crank": 2.0})
-    there = place_robot(four_bar(), joints={"crank": 2.0})
-    np.testing.assert_allclose(here.platform, there.platform, rtol=0, atol=EXACT)
-    parents = here.robot.parents
-    assert all(parents < np.arange(6))
 
 
 def test_message_states_where_a_limited_crank_stops():
@@ -98,20 +87,6 @@ def test_arm_reaches_a_pose_in_the_elbow_mode_of_home(x):
     far = (x**2 + y**2 - 0.5**2 - 0.4**2) / (2 * 0.5 * 0.4)
     np.testing.assert_allclose(posture.coordinates[1], math.acos(far), atol=EXACT)
     np.testing.assert_allclose(posture.platform[:2, 3], [x, y], rtol=0, atol=EXACT)
-
-
-def test_pose_out_of_reach_is_refused_with_the_missing_distance():
-    """The arm reaches 0.9 m, and 1.2 m is requested; home is straight ahead on x."""
-    start = math.acos((0.5**2 + 0.6**2 - 0.4**2) / (2 * 0.5 * 0.6))
-    bend = -math.acos((0.6**2 - 0.5**2 - 0.4**2) / (2 * 0.5 * 0.4))
-    robot = arm(angles=(start, bend))
-    with pytest.raises(BadInput, match="arm: pose tx=1.2, ty=0 cannot") as caught:
-        place_robot(robot, pose={"tx": 1.2, "ty": 0.0})
-    text = str(caught.value)
-    short = float(text.split(" m short")[0].split(", ")[-1])
-    # the track halves its step until 1e-5 of its length, 0.6 m, is left
-    assert short == pytest.approx(0.3, abs=1e-4)
-    assert "expected a configuration in which every closure holds" in text
 
 
 def test_missing_angle_equals_that_between_the_two_rotations():
@@ -171,36 +146,6 @@ def test_spherical_wrist_reaches_the_requested_rotation_vector():
     assert rotation_vector(one.platform[:3, :3])[1] == pytest.approx(0.9, abs=EXACT)
 
 
-def test_target_half_a_turn_away_is_reached():
-    """All components are given; the rotation vector changes its sign at half a turn."""
-    robot = Robot("disc", "hand", (frame("q", **driven(0.1)), frame("hand", "q")))
-    posture = place_robot(robot, pose={"rx": 0.0, "ry": 0.0, "rz": math.pi})
-    assert abs(posture.coordinates[0]) == pytest.approx(math.pi, abs=EXACT)
-
-
-def test_serial_arm_pose_is_the_product_of_its_transforms():
-    """T = prod(fixed_i motion_i), multiplied here by hand."""
-    robot = Robot("chain", "tool", (
-        frame("a", at=(0.1, 0.2, 0.3), turn=(0.4, -0.2, 0.1), **driven(0.5)),
-        frame("b", "a", (0.3, 0, 0.1), (0, 1.2, 0), joint="prismatic", actuated=True,
-              position=0.15),
-        frame("c", "b", (0, 0.2, 0), (1.0, 0.3, 0.2), **free(-0.7)),
-        frame("tool", "c", (0, 0, 0.4), (0, 0, 0.9)),
-    ))  # fmt: skip
-    joints = {"a": 0.8, "b": -0.05}
-    slide = transform([0, 0, -0.05], np.eye(3))
-    T = np.eye(4)
-    turns = {"a": 0.8, "c": -0.7}
-    for f in robot.frames:
-        T = T @ transform(f.translation, rotation_matrix(f.rotation))
-        if f.name in turns:
-            T = T @ transform(np.zeros(3), rotation_matrix([0, 0, turns[f.name]]))
-        elif f.name == "b":
-            T = T @ slide
-    posture = place_robot(robot, joints=joints)
-    np.testing.assert_allclose(posture.platform, T, rtol=0, atol=1e-14)
-
-
 def test_slider_crank_position_equals_its_closed_form():
     """Passive prismatic joint: x = r cos q + sqrt(l^2 - r^2 sin^2 q)."""
     half = math.pi / 2
@@ -218,26 +163,6 @@ def test_slider_crank_position_equals_its_closed_form():
     np.testing.assert_allclose(posture.platform[:3, 3], [x, 0, 0], atol=EXACT)
     slide = posture.coordinates[robot.index("slide")]
     assert slide == pytest.approx(x, abs=EXACT)
-
-
-@pytest.mark.parametrize("x", [-0.2, 0.05, 0.25])
-def test_five_bar_drives_equal_the_inverse_kinematics(x):
-    """Both legs by the law of cosines; the platform's rotation is unspecified."""
-    y = 0.45
-    robot = five_bar()
-    posture = place_robot(robot, pose={"tx": x, "ty": y})
-    for side, name in ((1, "right"), (-1, "left")):
-        far = math.hypot(x - side * 0.1, y)
-        aim = math.atan2(y, x - side * 0.1)
-        inner = (far**2 + 0.35**2 - 0.4**2) / (2 * far * 0.35)
-        q = posture.coordinates[robot.index(f"{name}.drive")]
-        assert q == pytest.approx(aim - side * math.acos(inner), abs=EXACT)
-    back = {f"{n}.drive": posture.coordinates[robot.index(f"{n}.drive")]
-            for n in ("right", "left")}  # fmt: skip
-    again = place_robot(robot, joints=back)
-    np.testing.assert_allclose(
-        again.platform[:3, 3], posture.platform[:3, 3], rtol=0, atol=EXACT
-    )
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from forcefit.assembly.kinematics.nominal import size_of
 from forcefit.assembly.kinematics.posture import (
     home_posture,
     joint_target,
@@ -15,7 +14,7 @@ from forcefit.assembly.kinematics.posture import (
 from forcefit.assembly.model.robot import Frame, Robot
 from forcefit.assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
-from tests.linkages_for_tests import GROUND, four_bar, four_bar_angles
+from tests.linkages_for_tests import four_bar, four_bar_angles
 
 
 def turned(*angles):
@@ -78,12 +77,6 @@ def test_coordinates_above_1e6_are_refused():
         BadInput, match=r"joint crank: found -2e\+06, .* at most 1e\+06"
     ):
         place_robot(four_bar(), joints={"crank": -2e6})
-
-
-def test_reference_length_is_that_of_the_longest_body():
-    assert size_of(four_bar()) == pytest.approx(GROUND)
-    assert size_of(load_robot("irsbot2")) > 0
-    assert size_of(Robot("point", "a", (Frame("a"),))) == 1.0
 
 
 def test_posture_reports_its_largest_closure_gap():

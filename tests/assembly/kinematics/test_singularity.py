@@ -74,27 +74,6 @@ def test_five_bar_distances_equal_the_closed_form_jacobian(five_bar):
         assert found.condition[i] == pytest.approx(tangents[0] / tangents[-1])
 
 
-def test_five_bar_distal_arms_in_line_are_a_parallel_singularity():
-    """det A = d_1 x d_2 = 0 where the elbows are 2 * 90 mm apart, the tip between them.
-
-    With equal drive angles either side of 90 degrees the elbows are 120 + 180 cos(t) mm
-    apart, t the left angle to the outside: cos(t) = 1/3 makes it 180 mm.
-    """
-    robot = load_robot("five_bar")
-    distances = []
-    for short in (0.1, 0.03, 0.01):
-        t = math.acos(1 / 3) + short
-        found = at(robot, joints={"left.drive": math.pi - t, "right.drive": t})
-        distances.append(found.parallel[0])
-        assert found.serial[0] > 0.01
-    # near it, the distance goes with the square root of the elbows' distance to it
-    slope = np.log(distances[0] / distances[2]) / np.log(10)
-    assert slope == pytest.approx(0.5, abs=0.1)
-    (name,) = found.names(robot, near=0.2)
-    assert name.startswith("parallel: ")
-    assert name.endswith(", platform TY")
-
-
 def test_arms_in_line_are_a_serial_singularity_with_the_drive_named():
     """B_11 = d.(k x a) = 0 where the left arms are one line, 180 mm long.
 

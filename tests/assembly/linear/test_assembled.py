@@ -9,7 +9,6 @@ from forcefit.assembly.kinematics.posture import home_posture, together
 from forcefit.assembly.linear.energy import solve_assembly, together_at
 from forcefit.assembly.model.clearance import CONES, clearance_bounds
 from forcefit.assembly.model.links import joint_compliances, link_compliances
-from forcefit.assembly.model.robot import Frame
 from tests.robots_for_tests import coaxial_beams, random_robot
 
 
@@ -67,30 +66,6 @@ def test_any_wrenches_give_a_lower_bound_of_the_energy(rng):
         assert bounded.bound <= best.potential + 1e-9 * scale
         by_hand = bound_by_hand(other)
         assert other.bound == pytest.approx(by_hand, rel=1e-9, abs=1e-9 * scale)
-
-
-def test_uncertainty_is_the_gap_with_every_term_at_its_worst_sign(rng):
-    """Potential minus bound: 2 |slip q| and |multiplier residual|."""
-    for _, other in solvable(rng):
-        slip = other.joints.free.T @ other.joint_wrenches.ravel() * other.motions
-        left = other.multipliers * (other.linearisation.rows @ other.screws.ravel())
-        # signs at which they are largest
-        gap = other.potential - other.bound
-        worst = gap + np.sum(np.abs(slip) + slip) + np.sum(np.abs(left) - left)
-        vars(other)["rounding"] = 0.0
-        sizes = np.abs(other.clearances)
-        assert sizes.max(initial=0.0) < 5.0
-        assert other.uncertainty == pytest.approx(worst, rel=1e-8)
-
-
-def test_largest_force_is_named_by_the_first_of_equal_bodies():
-    """Bodies in series carry equal forces up to rounding; the idle body none."""
-    robot = coaxial_beams([0, 0, 0, 1e-4, 2e-5, 3e-5])
-    idle = replace(
-        robot, frames=(Frame("idle", translation=[0.1, 0, 0]), *robot.frames)
-    )
-    figures = solve_assembly(home_posture(idle))._figures()
-    assert figures["largest force"].endswith(" N, in one")
 
 
 def test_combined_points_keep_their_own_certificates():

@@ -63,19 +63,6 @@ def test_a_ball_reaches_its_radius_in_every_direction(method, width):
         assert high - low < width
 
 
-def test_balls_in_series_are_a_ball_of_the_summed_radius():
-    larger = Clearance(ball=3 * C)
-    frames = (
-        Frame("a", rotation=[0.3, 0.2, 0.1], clearance=Clearance(ball=C)),
-        Frame("b", "a", [0.1, 0.2, 0.3], [1.0, 2.0, 0.5], clearance=larger),
-        Frame("tip", "b", [0.3, 0, 0]),
-    )
-    answer = solve_assembly(home_posture(Robot("two", "tip", frames)))
-    found = bound_pose_error(answer, tolerance_translation=1e-10)
-    assert not found.one_by_one
-    assert found.translation_error == pytest.approx(4 * C, rel=1e-5)
-
-
 @pytest.mark.parametrize("gap", [0.5 * C, 1.7 * C, 40 * C])
 def test_energy_beyond_a_ball_is_that_of_its_distance(gap):
     """Equal springs of 1e6 N/m each, in series, over the gap less the radius."""

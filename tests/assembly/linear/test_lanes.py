@@ -9,7 +9,6 @@ from forcefit.assembly.kinematics.posture import home_posture, together
 from forcefit.assembly.linear import zone
 from forcefit.assembly.linear.closure import linearise, virtual_joints
 from forcefit.assembly.linear.energy import solve_assembly
-from forcefit.assembly.linear.robot_structure import structure_of
 from forcefit.assembly.linear.zone import zone_margin
 from forcefit.assembly.robots import BUILT_IN
 from tests.robots_for_tests import (
@@ -45,36 +44,6 @@ def test_energy_of_a_point_is_independent_of_its_neighbours(grid, rng, load):
         other = solve_assembly(at[rows], wrenches[rows], errors=errors[rows])
         for name in ROWS:
             assert np.array_equal(row(other, name), row(whole, name)[rows]), name
-
-
-@pytest.mark.parametrize("loaded", [False, True])
-@pytest.mark.parametrize("seed", range(4))
-def test_solutions_at_motion_limits_do_not_depend_on_other_points(seed, loaded):
-    """Some draws reach a limit: in another order, alone, and as single postures."""
-    rng = np.random.default_rng(seed)
-    home = home_posture(with_bounded_motion(random_robot(rng, joints=4), rng))
-    load = rng.normal(size=6) if loaded else None
-    errors = 1e-4 * rng.normal(size=(11, len(home.robot.frames), 6))
-    errors[::3] *= 1e-2
-    whole = solve_assembly(home, load, errors=errors)
-    assert set(whole.method) == {"compiled"}
-    held = whole.held[0].tolist()
-    assert held
-    order = rng.permutation(len(errors))
-    other = solve_assembly(home, load, errors=errors[order])
-    for name in ROWS:
-        np.testing.assert_array_equal(row(whole, name)[order], row(other, name))
-    for i, one in enumerate(errors):
-        alone = solve_assembly(home, load, errors=one[None])
-        posture = replace(home, robot=home.robot.with_errors(one))
-        single = solve_assembly(posture, load)
-        for name in ROWS:
-            np.testing.assert_array_equal(row(whole, name)[i], row(alone, name)[0])
-        assert single.method == "compiled"
-        assert (i in held) == bool(single.joints.bounded_motion)
-        assert np.array_equal(single.clearances, whole[i].clearances)
-        for name in ("energy", "platform_screw", "multipliers"):
-            assert np.array_equal(getattr(single, name), getattr(whole, name)[i])
 
 
 @pytest.mark.parametrize("loaded", [False, True])
@@ -130,18 +99,6 @@ def test_margin_of_a_point_is_independent_of_its_neighbours(grid, rng, compliant
             assert np.array_equal(getattr(other, name), getattr(whole, name)[order])
 
 
-@pytest.mark.parametrize("compliant", ["rigid", "free"])
-@pytest.mark.parametrize("kappa", [0.05, 0.2, 1.0])
-def test_margins_are_proportional_to_the_errors_and_certified(grid, compliant, kappa):
-    """All clearances scale with the margin."""
-    robot, postures = grid
-    lanes = zone_margin(postures, compliant, kappa * robot.errors)
-    whole = zone_margin(postures, compliant)
-    assert set(lanes.method) == {"compiled"}
-    assert lanes.margin == pytest.approx(kappa * whole.margin, rel=2e-8)
-    assert np.all(lanes.bound >= lanes.margin * (1 - 1e-8))
-
-
 @pytest.mark.parametrize("each", [True, False])
 def test_uncertified_margins_are_solved_by_the_reference_method(
     grid, each, monkeypatch
@@ -182,21 +139,3 @@ def test_draws_at_one_posture_are_bit_identical_to_separate_points(
         assert np.array_equal(row(draws, name), row(points, name)), name
         for i, one in enumerate(alone):
             assert np.array_equal(row(one, name)[0], row(draws, name)[i]), name
-
-
-def test_forces_on_clearances_prove_the_margin(grid, rng):
-    """Their norms over all cones sum to 1, and only the errors do work on them."""
-    robot, postures = grid
-    joints, structure = structure_of(robot, springs=False, own_axes_free=True)
-    errors = robot.errors * rng.uniform(-1, 1, (9, *robot.errors.shape))
-    found = zone_margin(postures[3], "free", errors=errors)
-    sizes = np.add.reduceat(found.forces**2, structure.starts[:-1], axis=1)
-    assert np.sqrt(sizes).sum(axis=1) == pytest.approx(1.0, rel=1e-12)
-    # multipliers of the closures with these forces and none on free motions
-    A = linearise(postures[3]).rows
-    columns = A @ np.hstack([joints.cones, joints.free])
-    asked = np.pad(found.forces, ((0, 0), (0, joints.free.shape[1])))
-    q, _, _, _ = np.linalg.lstsq(columns.T, asked.T, rcond=1e-10)
-    assert np.abs(columns.T @ q - asked.T).max() < 1e-8 * np.abs(found.forces).max()
-    work = np.einsum("mk,mi,ki->k", -q, A, errors.reshape(9, -1))
-    assert work == pytest.approx(found.bound, rel=1e-7)

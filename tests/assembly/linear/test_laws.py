@@ -18,7 +18,6 @@ from forcefit.stiffness.screws import rotation_matrix, rotation_vector, transfor
 from tests.robots_for_tests import in_millimetres, planar_four_bar, random_robot
 
 REFUSALS = (CannotAssemble, FreeMotion, SolverFailed)
-ROD = BeamLink({"radius": 0.01}, 70e9, 0.33)
 
 
 @pytest.mark.parametrize("seed", range(8))

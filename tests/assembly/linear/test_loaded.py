@@ -16,12 +16,10 @@ from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.assembly.solvers.method import METHODS
 from tests.robots_for_tests import (
     NUMBERS,
-    ROWS,
     coaxial_beams,
     irsbot2_with,
     proved,
     random_robot,
-    row,
 )
 
 LOAD = np.array([1.0, 2.0, 3.0, 30.0, 10.0, -100.0])
@@ -177,25 +175,6 @@ def test_random_robots_equal_the_reference_method_or_its_refusal(loaded):
     assert solved
 
 
-def test_zero_load_is_bit_identical_to_no_load(grid):
-    """Zero loads alone, or together with points that are loaded."""
-    robot, postures = grid
-    plain = solve_assembly(postures)
-    zero = solve_assembly(postures, np.zeros(6), gravity=(0, 0, 0))
-    assert not zero.loaded.any()
-    for name in ROWS:
-        assert np.array_equal(row(zero, name), row(plain, name)), name
-    one = solve_assembly(postures[0], np.zeros(6))
-    assert one.energy == plain.energy[0]
-    assert np.array_equal(one.platform_screw, plain.platform_screw[0])
-    every = np.arange(len(postures))[:, None] % 3 == 0
-    mixed = solve_assembly(postures, LOAD * every)
-    assert np.array_equal(mixed.loaded, every[:, 0])
-    for name in ROWS:
-        rows, expected = row(mixed, name), row(plain, name)
-        assert np.array_equal(rows[~every[:, 0]], expected[~every[:, 0]]), name
-
-
 @pytest.mark.parametrize("method", METHODS)
 def test_load_moves_a_pin_to_its_limit_or_has_no_equilibrium(method):
     """An open chain: a pin limited to 1e-3 rad, or without limit, turned about z."""
@@ -207,15 +186,3 @@ def test_load_moves_a_pin_to_its_limit_or_has_no_equilibrium(method):
         assert found.status.tolist() == [status]
         if status == "ok":
             assert found.platform_screw[0, 2] == pytest.approx(1e-3, rel=1e-6)
-
-
-def test_moment_on_a_free_hinge_has_no_equilibrium_and_a_force_has():
-    """A moment turns the hinge without end; a force through its axis does not."""
-    link = MatrixLink(1e6 * np.eye(6))
-    frames = (Frame("hinge", joint="revolute"), Frame("tip", "hinge", link=link))
-    posture = home_posture(Robot("r", "tip", frames))
-    turned = solve_assembly([posture], [0, 0, 1.0, 0, 0, 0])
-    pulled = compiled(posture, [0, 0, 0, 10.0, 0, 0])
-    assert list(turned.method).count("reference") == 1
-    assert turned.status[0] == "no equilibrium"
-    assert pulled.platform_screw[0, 3] == pytest.approx(1e-5, rel=1e-12)

@@ -247,14 +247,3 @@ def test_pose_error_brackets_overlap_the_published_brackets(
             assert bracket[1] - bracket[0] <= 1e-6
             assert bracket[0] <= high + 1e-7
             assert bracket[1] >= low - 1e-7
-
-
-def test_pose_error_by_clearances_alone_is_symmetric_in_x():
-    both = []
-    for x in (-0.25, 0.25):
-        answer = solve_assembly(place_robot(irsbot2(), pose={"tx": x, "tz": -0.4}))
-        both.append(bound_pose_error(answer, "frozen"))
-    for name in ("rotation_error", "translation_error"):
-        left, right = (getattr(b, name) for b in both)
-        assert left[0] <= right[1]
-        assert right[0] <= left[1]

@@ -33,18 +33,6 @@ def rigid_pins(gaps):
     return home_posture(robot), errors
 
 
-def test_displacements_by_load_and_gravity_add_up_for_each_posture(rng):
-    """Without clearance displacements are linear in the loads of each posture."""
-    home = home_posture(coaxial_beams(np.zeros(6), (K, 3 * K)))
-    load, gravity = rng.normal(size=(4, 6)), rng.normal(size=(4, 3))
-    both = solve_assembly([home] * 4, load, gravity=gravity)
-    apart = (
-        solve_assembly([home] * 4, load), solve_assembly([home] * 4, gravity=gravity)
-    )  # fmt: skip
-    whole = sum(one.platform_screw for one in apart)
-    assert both.platform_screw == pytest.approx(whole, rel=1e-12, abs=1e-20)
-
-
 def test_points_are_selected_by_mask_slice_and_repeated_indices():
     """The energy is K (gap - 1e-4)^2 / 2 beyond the clearance, by hand."""
     gaps = np.array([0.5e-4, 2e-4, 3e-4, 1.5e-4])

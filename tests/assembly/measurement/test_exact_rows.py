@@ -17,7 +17,6 @@ from forcefit.assembly.measurement.predict import assemble_row, predict
 from forcefit.assembly.measurement.settled_clearance import without_joint_clearances
 from forcefit.assembly.model.robot import Frame, Robot
 from forcefit.assembly.robots import load_robot
-from tests.robots_for_tests import in_millimetres, random_robot
 
 ROBOTS = {"five_bar": 0.3, "3rrr": 0.2, "hexapod": 0.02, "arm6": 0.4}
 
@@ -113,21 +112,3 @@ def test_rows_that_do_not_converge_are_left_to_the_exact_solver():
     assert not found.any()
     angle = predict(here).deviation[0, 2]
     assert angle == pytest.approx(brentq(lambda x: x - 3 * np.cos(x), 0, 2), rel=1e-9)
-
-
-@pytest.mark.parametrize("seed", [0, 3, 5, 7])
-def test_exact_rows_do_not_depend_on_the_unit_of_length(seed, rng):
-    """Rotations are equal and translations scale; neither is refused."""
-    robot = random_robot(np.random.default_rng(seed), 2, link_share=1.0)
-    tight = tuple(replace(f, clearance=None) for f in robot.frames)
-    robot = replace(robot, frames=tight).with_errors(1e-2 * robot.errors)
-    load = rng.uniform(-1, 1, (1, 6)) * 0.1
-    found = []
-    for s in (1.0, 1e3, 1e-3):
-        postures = together([home_posture(in_millimetres(robot, s))])
-        here = as_declared(postures, load * np.repeat([s, 1.0], 3))
-        screws, converged = solve_rows(replace(here, exact=True), np.zeros((1, 0)))
-        assert converged.all()
-        found.append(screws / np.repeat([1.0, s], 3))
-    for other in found[1:]:
-        assert other == pytest.approx(found[0], rel=1e-6, abs=1e-10)

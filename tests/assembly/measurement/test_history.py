@@ -85,21 +85,3 @@ def test_direction_is_that_of_the_last_step_of_the_session(rng):
         expected = directions_by_hand(values, session, approach)
         assert history.direction("u").tolist() == expected
         assert history.direction("approach").tolist() == approach.tolist()
-
-
-def test_lag_does_not_change_within_zero_time():
-    """A row at time 0 has no lag yet; two rows at the same time have the same state."""
-    given = {"time": np.array([0.0, 2.0, 2.0]), "u": np.array([3.0, 3.0, 7.0])}
-    history, _ = in_order(given, None)
-    held = history.lagged("u", 4.0, held=True)
-    settled = 3.0 * (1 - np.exp(-0.5))
-    assert held == pytest.approx([0.0, settled, settled])
-
-
-def test_slip_of_vanishing_depth_equals_the_direction():
-    values = np.array([0.0, 1.0, 3.0, 9.0, 8.0, 5.0, 6.0])
-    sides = np.full(7, -1.0)
-    history, _ = in_order(
-        {"time": np.arange(7.0), "u": values, "approach": sides}, None
-    )
-    assert history.slip("u", 1e-6) == pytest.approx(history.direction("u"))

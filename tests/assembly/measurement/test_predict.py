@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from forcefit.assembly.effects import apply_effects
 from forcefit.assembly.kinematics.posture import (
     home_posture,
     place_many_joints,
@@ -153,21 +152,6 @@ def test_row_that_cannot_close_has_no_prediction_and_centred_clearance():
     assert not np.delete(rest[0], wrist, axis=0).any()
     held = predict(replace(here, rest=rest).take([0]))
     assert held.deviation[0] == pytest.approx(seen.deviation[0], abs=1e-9)
-
-
-def test_load_takes_up_open_chain_clearance_also_with_finite_motions():
-    """By the radius along the force; without a load the clearance is undetermined."""
-    c = 1e-4
-    rigid = Frame("drive", joint="revolute", actuated=True)
-    here = rows(Robot("rigid", "tip", (rigid, arm().frames[1])), 5.0)
-    loose = apply_effects(here, {"joint_clearance": {"drive.radial": c}})
-    for exact in (False, True):
-        seen = predict(replace(loose, exact=exact))
-        expected = np.tile([0, 0, 0, 0, c, 0], (4, 1))
-        assert seen.deviation == pytest.approx(expected, abs=1e-9)
-        assert not seen.undetermined.any()
-    free = replace(loose, load=0 * loose.load)
-    assert predict(free).undetermined.all()
 
 
 @pytest.mark.parametrize("exact", [False, True])

@@ -53,21 +53,6 @@ def test_each_variable_name_gives_the_value_of_the_row(rows):
         np.testing.assert_allclose(variable(here, name), values, atol=1e-12)
 
 
-def test_history_of_a_campaign_orders_rows_by_session_and_time(rows):
-    """Session b is first in the table; selected rows keep the same history."""
-    whole = with_history(rows[0])
-    history, row = past(whole, ["q.turn"])
-    assert row.tolist() == [1, 3, 0, 2]
-    assert history.first.tolist() == [True, False, True, False]
-    names = ["q.turn", "q.slide", "load.my", "load.force", "position.z", "time",
-             "approach", "cov.temperature", "cov.time", "cov.dust"]  # fmt: skip
-    for name in names:
-        np.testing.assert_array_equal(history.values[name][row], variable(whole, name))
-    same, some = past(whole.take([2, 0]), [])
-    assert same is history
-    assert some.tolist() == [0, 1]
-
-
 @pytest.mark.parametrize("missing", ["history", "row", "both"])
 def test_rows_without_history_are_first_rows_of_their_own_sessions(rows, missing):
     here = with_history(rows[0])

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from forcefit.assembly.kinematics.posture import home_posture
-from forcefit.assembly.linear.reference.reduction import FreeMotion
 from forcefit.assembly.model.robot import Frame, Robot
 from forcefit.assembly.platform_stiffness.arc_length import follow_load
 from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
@@ -69,10 +68,3 @@ def test_spinning_rods_cause_no_events_on_the_path():
     assert curve.stiffness[0] == pytest.approx(classical, rel=1e-8)
     assert not curve.events
     assert abs(curve.loads[-1]) >= 500.0
-
-
-def test_load_along_a_free_motion_is_refused():
-    slide = Frame("slide", joint="prismatic")
-    robot = Robot("slide", "tip", (slide, Frame("tip", "slide")))
-    with pytest.raises(FreeMotion, match="it moves slide tz"):
-        follow_load(home_posture(robot), 5, 0.0, -10.0)

@@ -12,17 +12,6 @@ from forcefit.assembly.robots import load_robot
 from forcefit.inputs.errors import BadInput
 
 
-def test_load_without_resistance_is_refused_with_its_free_motion():
-    """The slide's z axis is along x, so the platform moves along x."""
-    spring = Frame("spring", rotation=[0, np.pi / 2, 0], joint="prismatic",
-                   link=MatrixLink(np.eye(6)))  # fmt: skip
-    posture = home_posture(Robot("slide", "tip", (spring, Frame("tip", "spring"))))
-    named = r"it moves spring tz; the platform moves along \[0 0 0 1 0 0\] \[rad, m\]"
-    for state in ("contact", "exact"):
-        with pytest.raises(FreeMotion, match=named):
-            platform_stiffness(posture, state, load=[0, 0, 0, 5.0, 1.0, 0])
-
-
 def test_free_motion_of_another_body_is_refused_with_a_fixed_platform():
     """A wheel turns freely, driven by a couple on its rim."""
     frames = (

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from forcefit.assembly.kinematics.posture import home_posture, place_many, together
-from forcefit.assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from forcefit.assembly.platform_stiffness.linear_tangent import without_clearance
 from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from forcefit.assembly.robots import BUILT_IN, load_robot
+from forcefit.assembly.robots import load_robot
 from forcefit.assembly.solvers.method import METHODS
 from tests.robots_for_tests import coaxial_beams, random_robot
 
@@ -38,14 +38,6 @@ def assert_same(many, row, one):
             assert shares[part][row] == pytest.approx(share, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", BUILT_IN)
-def test_stiffness_of_many_postures_equals_that_of_one_at_home(name):
-    posture = home_posture(load_robot(name))
-    many = platform_stiffness([posture])
-    assert set(many.method) == {"compiled"}
-    assert_same(many, 0, without_clearance(posture))
-
-
 def test_stiffness_does_not_depend_on_other_postures(rng):
     """Bit-identical: alone, or in another order."""
     robot = load_robot("irsbot2")
@@ -66,23 +58,6 @@ def test_stiffness_of_random_robots_equals_that_of_one_posture(seed):
     posture = home_posture(random_robot(rng, legs=int(rng.integers(1, 4))))
     many = platform_stiffness([posture])
     assert_same(many, 0, without_clearance(posture))
-
-
-def test_free_motion_has_nan_compliance_and_zero_stiffness():
-    frames = (
-        Frame("slide", joint="prismatic", link=MatrixLink(UNIT)),
-        Frame("tip", "slide"),
-    )
-    posture = home_posture(Robot("slider", "tip", frames))
-    many = platform_stiffness([posture])
-    free = np.isnan(many.compliance[0])
-    assert free[5].all()
-    np.testing.assert_allclose(many.compliance[0, :5, :5], np.eye(5))
-    np.testing.assert_allclose(many.eigen_stiffnesses[0], [0, 1, 1, 1, 1, 1])
-    assert [many.along(axis)[0] for axis in UNIT] == [1, 1, 1, 1, 1, 0]
-    assert many.apart[0].free_text == (
-        "the platform moves freely along [0 0 0 0 0 1] [rad, m]"
-    )
 
 
 def test_spring_along_x_has_infinite_stiffness_across_it():

@@ -16,7 +16,6 @@ from forcefit.assembly.platform_stiffness.active_set import contacts
 from forcefit.assembly.platform_stiffness.matrices import Part
 from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from forcefit.assembly.robots import load_robot
-from forcefit.assembly.robots.hexapod import HexapodParameters, hexapod, points
 from forcefit.stiffness.screws import screw_map
 from tests.assembly.exact.test_exact import only
 from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot
@@ -71,23 +70,6 @@ def test_serial_chain_compliance_is_the_sum_of_its_moved_parts():
     tangent = platform_stiffness(serial(*frames))
     assert_same_matrix(tangent.compliance, expected, 1e-12)
     assert_same_matrix(tangent.stiffness, np.linalg.inv(expected), 1e-9)
-
-
-@pytest.mark.parametrize("pose", [{}, {"tx": 0.03, "tz": 0.5, "ry": 0.2}])
-def test_gough_platform_stiffness_is_the_sum_over_its_struts(pose):
-    """K = sum of k w w', w the unit wrench along a strut (Merlet 2006, 4.2)."""
-    P = HexapodParameters()
-    posture = place_robot(hexapod(), pose) if pose else home_posture(hexapod())
-    base, platform = points()
-    ends = posture.platform[:3, 3] + platform @ posture.platform[:3, :3].T
-    K = np.zeros((6, 6))
-    area = np.pi * (P.radius**2 - P.inner_radius**2)
-    tube = P.young * area / np.linalg.norm(base - platform - [0, 0, P.height], axis=1)
-    for a, b, k_tube in zip(base, ends, tube, strict=True):
-        along = (b - a) / np.linalg.norm(b - a)
-        line = np.concatenate([np.cross(b - posture.platform[:3, 3], along), along])
-        K += np.outer(line, line) / (1 / P.drive + 1 / k_tube)
-    assert_same_matrix(platform_stiffness(posture).stiffness, K, 1e-9)
 
 
 @pytest.mark.parametrize("name", ["3rrr", "delta"])
@@ -231,26 +213,6 @@ def test_compliance_shares_sum_to_one_and_a_single_link_has_all():
     beam = Frame("beam", translation=[1, 0, 0], link=MatrixLink(UNIT))
     alone = platform_stiffness(serial(beam))
     assert alone.shares(UNIT[4]) == {Part("beam", "link"): pytest.approx(1.0)}
-
-
-def test_compliance_slope_by_the_modulus_is_minus_the_link_share():
-    """dC = -C_i dE/E (Castigliano): differences of Young's modulus."""
-    robot = load_robot("orthoglide")
-    posture = place_robot(robot, {"tx": 0.03, "ty": -0.02})
-    part, by = platform_stiffness(posture).contributions(), 1e-4
-    name = next(p.frame for p in part if p.kind == "link")
-    scaled = []
-    for factor in (1 + by, 1 - by):
-        link = robot.frame(name).link
-        other = robot.with_links({name: replace(link, young=factor * link.young)})
-        at_point = place_robot(other, {"tx": 0.03, "ty": -0.02})
-        scaled.append(platform_stiffness(at_point).compliance)
-    slope = (scaled[0] - scaled[1]) / (2 * by)
-    size = np.sqrt(np.diag(platform_stiffness(posture).compliance))
-    size = np.outer(size, size)
-    np.testing.assert_allclose(
-        slope / size, -part[Part(name, "link")] / size, atol=1e-7
-    )
 
 
 def test_free_motion_is_reported_with_nan_compliance():

@@ -102,23 +102,6 @@ def test_free_motion_has_zero_frequency():
     np.testing.assert_array_equal(modes.frequencies, [0.0])
 
 
-def test_four_times_the_mass_halves_the_frequencies():
-    robot = load_robot("delta")
-    frames = tuple(
-        replace(
-            f, mass=4 * f.mass,
-            link=replace(f.link, density=4 * f.link.density)
-            if isinstance(f.link, BeamLink) and f.link.density else f.link,
-        )
-        for f in robot.frames
-    )  # fmt: skip
-    light = natural_modes(home_posture(robot)).frequencies
-    heavy = natural_modes(home_posture(replace(robot, frames=frames))).frequencies
-    np.testing.assert_allclose(heavy, light / 2, rtol=1e-9)
-    # three equal legs: modes across come in pairs
-    np.testing.assert_allclose(light[0], light[1], rtol=1e-6)
-
-
 def test_vibration_ignores_clearances_and_refuses_a_robot_without_mass():
     posture = cantilever(1)
     (tip,) = posture.robot.frames

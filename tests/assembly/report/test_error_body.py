@@ -10,7 +10,7 @@ from forcefit.assembly.linear.energy import solve_assembly
 from forcefit.assembly.linear.pose_error import bound_pose_error
 from forcefit.assembly.linear.reference.pose_error import reachable_screws
 from forcefit.assembly.model.robot import Clearance, Frame, Robot
-from forcefit.assembly.report.error_body import ErrorBody, error_body, even_directions
+from forcefit.assembly.report.error_body import ErrorBody, error_body
 from forcefit.assembly.report.plot import plot_assembly
 from forcefit.assembly.robots.irsbot2 import irsbot2
 
@@ -63,13 +63,6 @@ def test_free_platform_or_unknown_part_has_no_error_body():
         error_body(reach_of(Clearance(radial=1e-5)), "both")
 
 
-def test_even_directions_are_unit_vectors_in_all_octants():
-    directions = even_directions(200)
-    assert np.allclose(np.linalg.norm(directions, axis=1), 1, rtol=0, atol=1e-14)
-    octants = (directions > 0) @ [1, 2, 4]
-    assert np.bincount(octants).min() >= 20
-
-
 def test_slack_is_the_largest_support_height_beyond_the_points():
     """Four of the corners of a cube: the other corners are 2 / sqrt 3 beyond them."""
     corners = np.array(list(product([-1.0, 1.0], repeat=3)))
@@ -92,15 +85,3 @@ def test_picture_shows_the_error_body_and_states_its_size():
     assert said.startswith("gold: possible translation errors (frozen), up to 0.38")
     gold = (pixels[..., 0] > 150) & (pixels[..., 1] > 110) & (pixels[..., 2] < 110)
     assert gold.sum() > 500
-
-
-@pytest.mark.parametrize("count", [50, 200, 1000])
-def test_even_directions_are_evenly_spaced_on_the_sphere(count):
-    """Each is in the middle of a slice of equal area; the least distance is near that
-    of the densest packing, sqrt(8 pi / (sqrt(3) n))."""
-    directions = even_directions(count)
-    middles = np.linspace(1, -1, 2 * count + 1)[1::2]
-    np.testing.assert_allclose(directions[:, 2], middles, atol=1e-12)
-    apart = np.linalg.norm(directions[:, None] - directions, axis=2)
-    nearest = (apart + 9 * np.eye(count)).min()
-    assert nearest > 0.78 * np.sqrt(8 * np.pi / (np.sqrt(3) * count))

@@ -11,14 +11,12 @@ from forcefit.assembly.kinematics.mobility import mobility
 from forcefit.assembly.kinematics.posture import Posture, home_posture, place_robot
 from forcefit.assembly.kinematics.pure_motions import pure_motions
 from forcefit.assembly.report.mobility import mobility_lines, mobility_of
-from forcefit.assembly.robots import load_robot
 from tests.assembly.drawing import test_mobility_of_mechanisms as mechanisms
 from tests.assembly.drawing.test_mobility_of_mechanisms import (
     MECHANISMS,
     X,
     Y,
     Z,
-    gough,
     joint,
     mechanism,
     three_upu,
@@ -61,13 +59,6 @@ def test_coupler_of_a_four_bar_turns_about_the_crossing_of_its_arms():
     np.testing.assert_allclose(turn["direction"], Z, atol=1e-12)
 
 
-def test_tricept_turns_about_the_joint_of_its_central_leg():
-    found = mobility_of(home_posture(load_robot(DRAWN / "tricept.toml")))
-    assert found["words"].startswith(
-        "3 freedoms: translates along z and turns about x, y through (0, 0, "
-    )
-
-
 def test_redundant_drive_is_reported():
     robot = mechanism(
         "coupler", [0.5, 0.3, 0],
@@ -87,14 +78,6 @@ def test_seoul_robot_has_fewer_freedoms_near_its_singular_home():
     assert (found["freedoms"], found["singular"]) == (5, True)
     assert (found["finite_freedoms"], found["near"]["freedoms"]) == (3, 3)
     assert "near it 3 freedoms" in mobility_lines(found)["singular posture"]
-
-
-def test_crosses_along_their_legs_turn_at_home_only():
-    """9 freedoms, 3 over-constraints, 6 with drives locked; near home 6, 0, 0."""
-    found = mobility_of(home_posture(gough("universal", axis_along=True)))
-    names = ("freedoms", "overconstraint", "freedoms_drives_locked")
-    assert [found[name] for name in names] == [9, 3, 6]
-    assert [found["near"][name] for name in names] == [6, 0, 0]
 
 
 def test_three_parallel_axes_in_a_plane_move_at_first_order_only():

@@ -1,18 +1,15 @@
-"""Results printed by solve: certified sizes, without rounding, stable order."""
+"""Results printed by solve: certified sizes, and gravity without masses."""
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from forcefit.assembly.kinematics.posture import home_posture
-from forcefit.assembly.linear.assembled import without_rounding
 from forcefit.assembly.linear.load import massless
 from forcefit.assembly.model.robot import Clearance, Frame, MeshLink, Robot
 from forcefit.assembly.report.pose_errors import pose_error_of
 from forcefit.assembly.report.results import solution_of, solution_text
 from forcefit.assembly.robots import load_robot
-from forcefit.results.display import largest_row
 
 
 def test_largest_error_of_solve_equals_the_certified_pose_error():
@@ -27,18 +24,6 @@ def test_largest_error_of_solve_equals_the_certified_pose_error():
     certified = pose_error_of(posture, ["frozen"])["error"]["frozen"]["translation"]
     assert results["worst_error"]["translation"] == certified["upper"]
     assert "assumption frozen of (27)" in solution_text(results)
-
-
-def test_wrench_components_at_rounding_level_are_shown_as_zero():
-    wrenches = np.array([[1e-13, 7.0, 0, 1.5e-14, 2e-8, 1e3], [0, 0, 5e-6, 0, 0, 0]])
-    shown = without_rounding(wrenches)
-    assert shown.tolist() == [[0, 7.0, 0, 0, 0, 1e3], [0, 0, 5e-6, 0, 0, 0]]
-    assert without_rounding(np.full((2, 6), 1e-14)).any() == np.False_
-
-
-@pytest.mark.parametrize("noise", [1e-15, -1e-15])
-def test_first_of_numbers_equal_up_to_rounding_is_the_largest(noise):
-    assert largest_row([0.5, 1.0, 1.0 + noise, 0.2]) == 1
 
 
 def test_gravity_without_mass_is_reported_to_have_no_effect():

@@ -15,11 +15,8 @@ from forcefit.assembly.robots.delta import DeltaParameters, drive_angle
 from forcefit.assembly.robots.hexapod import HexapodParameters
 from forcefit.inputs.table import BadInput
 from tests.built_in_robots_for_tests import (
-    LOAD,
-    drive_jacobian,
     farthest_corner,
     joints_of,
-    only_drives_give,
     platform_compliance,
     random_pose,
 )
@@ -66,18 +63,6 @@ def test_hexapod_stiffness_is_the_sum_over_its_struts(rng):
         found = platform_compliance(posture)
         size = np.sqrt(np.diag(expected))
         assert np.abs((found - expected) / np.outer(size, size)).max() < 1e-9
-
-
-def test_hexapod_struts_carry_axial_forces_only(rng):
-    """Between a universal and a ball joint, for any load."""
-    posture = place_robot(BUILT_IN["hexapod"](), pose=random_pose("hexapod", rng))
-    w, _ = strut_lines(posture)
-    forces = np.linalg.solve(w.T, LOAD)
-    answer = solve_assembly(posture, LOAD)
-    for k, force in enumerate(forces, 1):
-        found = answer.wrenches[posture.robot.index(f"leg{k}.strut")]
-        expected = [0, 0, 0, 0, 0, force]
-        assert np.abs(found - expected).max() < 1e-9 * np.abs(forces).max()
 
 
 def assert_pose_error_is_of_64_corners(posture, lines, joints):
@@ -207,17 +192,3 @@ def test_orthoglide_legs_keep_their_length(rng):
         left = (p - slides) ** 2 + p @ p - p**2 - 0.310**2
         assert np.abs(left).max() < 1e-12
         assert np.abs(posture.platform[:3, :3] - np.eye(3)).max() < 1e-11
-
-
-def test_orthoglide_jacobian_is_the_identity_at_the_isotropic_point():
-    """Chablat, Wenger (2003)."""
-    J = drive_jacobian(home_posture(BUILT_IN["orthoglide"]()))
-    assert np.abs(J[3:] - np.eye(3)).max() < 1e-7
-    assert np.abs(J[:3]).max() < 1e-7
-
-
-def test_orthoglide_compliance_is_that_of_its_drives_at_the_isotropic_point():
-    posture = home_posture(only_drives_give(BUILT_IN["orthoglide"]()))
-    found = platform_compliance(posture) * 5e7
-    assert np.abs(found[3:, 3:] - np.eye(3)).max() < 1e-9
-    assert np.abs(found[:3]).max() < 1e-9

@@ -114,17 +114,6 @@ def body_of(rng, group, rows=0, size=1.0):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("part", [0, 3])
-def test_farthest_point_of_a_single_point_is_that_point(part):
-    centre = np.array([1.0, 2.0, 2.0, 2.0, 3.0, 6.0])
-    one = ReachableSet(
-        centre, np.zeros((6, 0)), np.zeros((0, 0)), np.zeros(0), np.zeros(0, np.int64)
-    )
-    bounds, screw, _ = one.farthest(part, 1e-3)
-    assert bounds == ((3.0, 3.0) if part == 0 else (7.0, 7.0))
-    assert np.array_equal(screw, centre)
-
-
 def test_farthest_point_of_a_ball_or_interval_equals_its_closed_form():
     """|c + r v| with |v| <= 1 is |c| + r; of a ball of three and one more column."""
     centre = np.array([0.0, 0.0, 0.0, 3e-3, 0.0, 4e-3])

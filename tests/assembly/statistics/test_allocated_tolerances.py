@@ -54,43 +54,6 @@ def test_tolerance_class_has_the_unit_of_its_first_error():
         assert allocation_of(some)["tolerances"][1]["at_loosest"] == loosest
 
 
-def test_allocation_text_states_tolerances_price_and_proofs():
-    """Lengths in mm, angles in mrad; missing proofs and checks are omitted."""
-    plain = allocation_of(allocation())
-    assert allocation_text(plain).splitlines() == [
-        "  length: +-1.25 mm (98%)",
-        "  angle: +-99.9 mrad (the loosest allowed)",
-        "in brackets: the share of the price",
-        "price 20, 25 with those of the convex programme scaled alike: 20.0% less",
-    ]
-    whole = allocation(
-        price_bound=19.5, worst={"energy": (1.5, 1.75)}, proven_scale=0.75,
-        verification=CHECK, tolerances=np.array([1e-3, 2e-2]),
-    )  # fmt: skip
-    assert allocation_text(allocation_of(whole)).splitlines() == [
-        "  length: +-1 mm (92%)",
-        "  angle: +-20 mrad (8%)",
-        "in brackets: the share of the price",
-        "price 20, no tolerances cost less than 19.5",
-        "worst energy: 1.5 found, at most 1.75 proven, limit 2",
-        "proven when scaled by 0.7500",
-        "500 new draws at all postures: yield 0.9900 (0.9760 to 0.9967), required 0.9: "
-        "shown (test 2 of at most 4, each at 98.75%: 95% for all)",
-    ]
-
-
-def test_allocation_text_states_that_the_worst_wrench_is_not_proven():
-    found = allocation(limits={"force": 40.0}, worst={"force": (39.0, NAN)})
-    text = allocation_text(allocation_of(found))
-    assert "worst force: 39 found, nothing proven, limit 40" in text.splitlines()
-
-
-def test_allocation_text_states_undecided_draws():
-    undecided = {"yield": CHECK["yield"] | {"undecided": 3}}
-    text = allocation_text(allocation_of(allocation(verification=CHECK | undecided)))
-    assert text.endswith("95% for all, 3 draws undecided)")
-
-
 def test_allocation_states_the_clearance_model_only_for_pose_error_limits():
     for limits, play in (({"rotation": 1e-3}, "worst"), ({"energy": 1.0}, None)):
         plain = allocation_of(allocation(limits=limits))
@@ -99,22 +62,6 @@ def test_allocation_states_the_clearance_model_only_for_pose_error_limits():
         assert (said in allocation_text(plain).splitlines()) == (play is not None)
         attributes = allocation(limits=limits).to_xarray().attrs
         assert attributes["clearance"] == (play or "")
-
-
-@pytest.mark.parametrize(
-    ("cost", "alike", "said"),
-    [
-        ("reciprocal", 25.0, ", 25 with those of the convex programme scaled alike: "
-                             "20.0% less"),
-        ("logarithm", 25.0, ", 25 with those of the convex programme scaled alike"),
-        ("reciprocal", 20.0, ""),
-        ("reciprocal", 19.0, ""),
-    ],
-)  # fmt: skip
-def test_price_is_compared_with_that_of_uniform_scaling(cost, alike, said):
-    """A logarithmic price has no natural zero, so no relative saving is stated."""
-    found = allocation_of(allocation(cost=cost, price_uniformly_scaled=alike))
-    assert allocation_text(found).splitlines()[-1] == f"price 20{said}"
 
 
 def test_allocation_data_set_contains_tolerances_and_provenance():

@@ -49,7 +49,7 @@ def test_uniform_model_is_uniform_over_the_limited_motion(joint, key, component)
     assert stats.kstest(part, "uniform").pvalue > 1e-3
 
 
-@pytest.mark.parametrize("error", [0.0, 1.5e-4, 2.4e-4])
+@pytest.mark.parametrize("error", [0.0, 2.4e-4])
 @pytest.mark.parametrize("steel", [0.0, 1e9])
 def test_two_hinges_on_one_axis_turn_within_both_motion_limits(error, steel):
     """|angle| <= a, |angle - error| <= b: an interval, whose ends are the contacts."""

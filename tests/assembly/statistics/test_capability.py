@@ -58,13 +58,6 @@ def test_parts_per_million_have_the_worked_intervals():
     assert proportion(0, 10**6, 0.9)["upper"] * 1e6 == pytest.approx(3.0, abs=0.01)
 
 
-def test_cpk_by_quantiles_is_the_index_of_a_normal_distribution():
-    values = np.random.default_rng(1).normal(size=200_000)
-    value, lower, upper = quantile_cpk(values, 4.0)
-    assert value == pytest.approx(4 / 3, rel=0.02)
-    assert lower < 4 / 3 < upper
-
-
 def test_cpk_by_quantiles_of_a_disc_is_that_of_its_radius():
     """Rayleigh: median s sqrt(2 ln 2), 99.865 % quantile s sqrt(-2 ln 0.00135)."""
     x = np.random.default_rng(2).normal(size=(400_000, 2))

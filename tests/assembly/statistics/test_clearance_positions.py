@@ -1,7 +1,5 @@
 """Uniform and contact clearance positions, against known volumes and rejection."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy import stats
@@ -20,7 +18,6 @@ from forcefit.assembly.statistics.clearance_positions import (
     position_clearances,
 )
 from forcefit.assembly.statistics.linear_response import linear_response
-from tests.robots_for_tests import in_millimetres
 
 
 def generators(count, seed=3):
@@ -198,19 +195,3 @@ def test_unknown_clearance_position_is_refused(drawn, play):
     with pytest.raises(ValueError, match=f"clearance is '{play}'") as error:
         position_clearances(one, found, play, generators(DRAWN))
     assert str(error.value).endswith("expected one of ('uniform', 'contact', 'least')")
-
-
-def test_contact_positions_do_not_depend_on_the_unit_of_length():
-    """The same random forces in metres and in millimetres."""
-    robot = load_robot("3rrr")
-    frames = (replace(f, link=None, joint_stiffness=None) for f in robot.frames)
-    robot, screws = replace(robot, frames=tuple(frames)), []
-    for one in (robot, in_millimetres(robot)):
-        prepared = linear_response(home_posture(one))
-        found = prepared.solve(np.zeros((5, len(one.frames), 6)))
-        moved, _ = position_clearances(prepared, found, "contact", generators(5))
-        screws.append(moved)
-    here, there = screws
-    assert np.abs(here).max(axis=1).min() > 1e-6
-    assert there[:, :3] == pytest.approx(here[:, :3], rel=1e-6, abs=1e-12)
-    assert there[:, 3:] == pytest.approx(1e3 * here[:, 3:], rel=1e-6, abs=1e-9)

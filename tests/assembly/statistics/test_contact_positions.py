@@ -33,33 +33,6 @@ def test_farthest_positions_in_discs_and_intervals_equal_closed_forms(size, rng)
     np.testing.assert_allclose(found, expected, atol=1e-4)
 
 
-def test_farthest_positions_keep_the_equations_of_their_start():
-    """u0 - u1 stays 0.5: the first ends at 1, and hence the second at 0.5."""
-    row = np.array([[1.0, -1.0, 0.0]]) / np.sqrt(2)
-    start = np.array([[0.25, -0.25, 0.3], [0.25, -0.25, 0.3]])
-    found = moved([[1, 1, 0.5], [-1, -2, -0.5]], [0, 1, 2, 3], row, positions=start)
-    np.testing.assert_allclose(found, [[1, 0.5, 1], [-0.5, -1, -1]], atol=1e-5)
-
-
-def test_loaded_clearances_do_not_move():
-    """Their direction has no influence, and they do not enter the equations."""
-    start = np.array([[0.6, 0.8, 0.1, -0.2]])
-    row = np.array([[0.0, 0.0, 1.0, 1.0]]) / np.sqrt(2)
-    found = moved(
-        [[5.0, -5.0, 1.0, 0.0]], [0, 2, 3, 4], row, [False, False, True, True], start
-    )
-    np.testing.assert_allclose(found, [[0.6, 0.8, 0.9, -1.0]], atol=1e-5)
-
-
-def test_positions_without_a_direction_do_not_move():
-    start = np.array([[0.3, -0.4], [0.3, -0.4]])
-    found = moved([[0.0, 0.0], [0.0, 2.0]], [0, 1, 2], positions=start)
-    np.testing.assert_array_equal(found[0], [0.3, -0.4])
-    np.testing.assert_allclose(found[1, 1], 1.0, atol=1e-5)
-    still = moved([[0.0, 2.0]], [0, 1, 2], free=[True, False], positions=start[:1])
-    np.testing.assert_array_equal(still, start[:1])
-
-
 @pytest.mark.parametrize("length", [0.05, 0.4, 5.0])
 def test_contact_length_weighs_moments_against_forces(length):
     """A pin with tilt t, and the platform on an arm L along x across its axis z.

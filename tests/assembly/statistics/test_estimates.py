@@ -14,19 +14,6 @@ from forcefit.assembly.statistics.estimates import (
 )
 
 
-def test_upper_bound_of_zero_successes_equals_clopper_and_pearson():
-    """1 - (alpha / 2)^(1/n), Clopper and Pearson (1934)."""
-    found = proportion(0, 300)
-    assert found["probability"] == found["lower"] == 0.0
-    assert found["upper"] == pytest.approx(1 - 0.025 ** (1 / 300), rel=1e-12)
-
-
-def test_quantile_of_a_small_sample_has_an_infinite_upper_bound():
-    found = quantile(np.arange(10.0), 0.99)
-    assert found["upper"] == np.inf
-    assert np.isfinite(found["lower"])
-
-
 def test_mean_and_interval_of_three_numbers_equal_hand_calculation():
     """1, 2, 4: 7/3, deviation sqrt(7/3), Student's t of two degrees 4.302653."""
     answer = mean([1.0, 2.0, 4.0])
@@ -35,21 +22,6 @@ def test_mean_and_interval_of_three_numbers_equal_hand_calculation():
     half = 4.302653 * (7 / 9) ** 0.5
     assert answer["upper"] == pytest.approx(7 / 3 + half, rel=1e-6)
     assert answer["lower"] == pytest.approx(7 / 3 - half, rel=1e-6)
-
-
-@pytest.mark.parametrize("values", [[3.0, 3.0], [0.0, 0.0, 0.0], [-2.0] * 5])
-def test_mode_of_equal_numbers_is_that_number(values):
-    assert set(most_probable(values).values()) == {values[0]}
-
-
-def test_mode_scales_and_shifts_with_its_sample(rng):
-    x = rng.gamma(3.0, size=400)
-    one, other = most_probable(x), most_probable(5.0 - 1e-9 * x)
-    assert other["value"] == pytest.approx(5.0 - 1e-9 * one["value"], abs=1e-11)
-    big = most_probable(1e6 * x, positive=True)
-    small = most_probable(x, positive=True)
-    for name in ("value", "lower", "upper"):
-        assert big[name] == pytest.approx(1e6 * small[name], rel=1e-9)
 
 
 @pytest.mark.parametrize("level", [0.9, 0.95])
@@ -108,17 +80,3 @@ def test_mode_equals_the_maximum_of_silverman_kernels(positive, seed):
     assert most_probable(x, positive=positive)["value"] == pytest.approx(
         mode, abs=0.06 * width
     )
-
-
-def test_mode_interval_grows_with_its_confidence_level(rng):
-    """From the same resampled modes: half of them, or 19 of 20; a seed repeats them."""
-    x = rng.gamma(3.0, size=300)
-    half, most = (most_probable(x, level) for level in (0.5, 0.95))
-    assert most["lower"] < half["lower"] < half["upper"] < most["upper"]
-    assert half["value"] == most["value"]
-    assert most_probable(x, 0.5) == half
-    other = most_probable(x, 0.5, seed=2)
-    assert other["value"] == half["value"]
-    assert other["lower"] != half["lower"]
-    # resamples of 300 of a gamma law of deviation sqrt(3)
-    assert 0.05 < most["upper"] - most["lower"] < 2.0

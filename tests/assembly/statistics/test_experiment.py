@@ -11,7 +11,7 @@ from forcefit.assembly.model.error_distributions import tolerance_sources
 from forcefit.assembly.model.link_stress import peak_stresses
 from forcefit.assembly.model.robot import Clearance
 from forcefit.assembly.robots import load_robot
-from forcefit.assembly.statistics.experiment import Experiment, precision_for
+from forcefit.assembly.statistics.experiment import Experiment
 from forcefit.assembly.statistics.monte_carlo import run_draws
 from forcefit.assembly.statistics.summary import summarise, summary_text
 from forcefit.inputs.table import BadInput
@@ -92,47 +92,6 @@ def test_draws_that_cannot_be_assembled_have_a_status_and_nan_results():
     assert "margin" not in rows.dtype.names
 
 
-def test_later_draws_equal_those_of_a_longer_run():
-    experiment = springs(clearance="contact", seed=4)
-    whole, later = experiment.solve(0, 9), experiment.solve(5, 4)
-    assert len(later) == 4
-    for name in ("energy", "force", "translation", "platform_screw"):
-        np.testing.assert_allclose(later[name], whole[name][5:], rtol=1e-9, atol=1e-15)
-    assert np.ptp(whole["translation"]) > 1e-6
-
-
-@pytest.mark.parametrize("model", ["least", "uniform", "contact"])
-def test_pose_errors_are_norms_of_the_rotation_and_translation(model):
-    rows = tip(clearance=model).solve(0, 6)
-    screws = rows["platform_screw"]
-    for part, name in ((slice(0, 3), "rotation"), (slice(3, 6), "translation")):
-        size = np.sqrt((screws[:, part] ** 2).sum(axis=1))
-        np.testing.assert_allclose(rows[name], size, rtol=1e-12)
-        assert size.min() > 0.0
-    assert ("clearance_mixed" in rows.dtype.names) == (model == "uniform")
-    if model == "uniform":
-        assert rows["clearance_mixed"].all()
-    assert "translation_lower" not in rows.dtype.names
-
-
-def test_worst_pose_error_bounds_have_the_requested_precision():
-    """For an error e about x and clearance: rotation |e|, and hypot(e_xy + p, e_z)."""
-    experiment = tip(precision=(1e-8, 1e-7))
-    values = experiment.sources.draw(0, 30, seed=2)
-    rows = experiment.evaluate(values, range(30))
-    truth = {
-        "rotation": np.abs(values[:, 0]),
-        "translation": np.hypot(np.hypot(*values[:, 1:3].T) + PLAY, values[:, 3]),
-    }
-    for (name, size), width in zip(truth.items(), (1e-8, 1e-7), strict=True):
-        lower, upper = rows[f"{name}_lower"], rows[name]
-        assert (lower <= size * (1 + 1e-12)).all()
-        assert (size <= upper * (1 + 1e-12)).all()
-        assert (upper - lower).max() <= 1.001 * width
-    # beside them the screw is that of the solution, which leaves the clearance alone
-    np.testing.assert_allclose(rows["platform_screw"][:, 3:], values[:, 1:], atol=1e-12)
-
-
 def test_drawn_stress_equals_single_solutions_and_can_be_left_out(rng):
     posture = place_robot(load_robot("irsbot2"), {"tx": 0.1, "tz": -0.5})
     robot = posture.robot
@@ -167,11 +126,6 @@ def test_limits_on_quantities_that_are_not_computed_are_refused():
         with pytest.raises(BadInput) as error:
             bare.check_limits(["energy", limit])
         assert str(error.value) == message
-
-
-def test_precision_is_a_thousandth_of_a_tight_limit():
-    found = precision_for({"rotation": 2e-5, "translation": 1e-4})
-    assert found == pytest.approx((2e-8, 1e-7))
 
 
 @pytest.mark.parametrize("contact_length", [None, 0.25])

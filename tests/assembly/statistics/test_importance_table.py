@@ -1,7 +1,5 @@
 """The importance table of a linear platform whose indices are known."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -109,20 +107,6 @@ def test_draws_without_a_solution_are_reported_with_the_reason():
         assert np.isnan(parts).all()
 
 
-def test_importance_covers_margins_if_computed_and_stress_only_with_sections():
-    with_margins = replace(arm(clearance="least"), margins=True)
-    design = importance_design(with_margins, ImportanceOptions(8, "source"))
-    rows = importance_rows(with_margins, design, 0, len(design))
-    data = importance_dataset(with_margins, design, rows, 0.5)
-    assert list(data["quantity"].values) == [
-        "energy", "margin_free", "rotation", "translation", "force",
-    ]  # fmt: skip
-    assert data["first_index"].dims == ("quantity", "group", "estimate")
-    assert list(data["estimate"].values) == ["value", "lower", "upper"]
-    assert data["failed_share"].shape == (5, 3)
-    assert data.attrs["importance_draws"] == 8
-
-
 def told(units, left_out=0.0, rank=(1, 1)):
     """The table's lines for a group of each unit, the first of the largest part."""
     count = len(units)
@@ -176,27 +160,3 @@ def test_importance_table_reports_left_out_draws_and_further_groups():
         "group14",
     ]
     assert "more" not in told(["m"] * 15)[-1]
-
-
-def test_importance_table_reports_errors_that_share_a_rank():
-    lines = told(["m", "m"], rank=(1, 2))
-    assert [line.split()[-1] for line in lines[-3:-1]] == ["1-2", "1-2"]
-    assert lines[-1].endswith("are not distinguished by these draws")
-    assert "distinguished" not in told(["m", "m"])[-1]
-
-
-def test_largest_errors_of_equal_legs_are_named_together():
-    index = {f"leg{i}.hinge.RX": np.array([0.3, 0.2, 0.4]) for i in (1, 2, 3)}
-    index["leg1.tip.TX"] = np.array([0.1, 0.05, 0.15])
-    ranks = dict.fromkeys(list(index)[:3], (1, 3)) | {"leg1.tip.TX": (4, 4)}
-    platform = {
-        name: {"error_unit": "rad", "translation_part": 1e-6, "rotation_part": 1e-3,
-               "translation_gain": 0.4, "rotation_gain": 1.0}
-        for name in index
-    }  # fmt: skip
-    one = {"total_index": index, "largest_share_left_out": 0.0, "rank": ranks}
-    text = importance_text({
-        "base_draws": 64, "clearance": "least", "platform": platform,
-        "quantities": {"translation": one},
-    })  # fmt: skip
-    assert text.splitlines()[-1] == "largest: hinge.RX of all legs"

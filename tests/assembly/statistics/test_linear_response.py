@@ -46,22 +46,6 @@ def test_draws_equal_single_solutions(name, scale, load, gravity):
             assert off <= limit * np.abs(answer.wrenches).max()
 
 
-def test_drawn_screws_without_clearance_equal_single_solutions(rng):
-    """Without clearances the solution is unique and linear: only rounding differs."""
-    robot = load_robot("irsbot2")
-    robot = replace(
-        robot, frames=tuple(replace(f, clearance=None) for f in robot.frames)
-    )
-    posture = place_robot(robot)
-    errors = drawn_errors(robot)
-    found = linear_response(posture).solve(errors)
-    for i, own in enumerate(errors):
-        answer = solve_assembly(replace(posture, robot=robot.with_errors(own)))
-        scale = np.abs(answer.platform_screw).max()
-        off = np.abs(found.platform_screw[i] - answer.platform_screw).max()
-        assert off <= 1e-9 * scale
-
-
 @pytest.mark.parametrize(
     ("seed", "load"), [*((k, None) for k in range(20)), *((k, LOAD) for k in range(6))]
 )
@@ -97,21 +81,3 @@ def test_errors_of_a_wrong_shape_are_refused():
         linear_response(posture).solve(np.zeros((3, 7, 6)))
     with pytest.raises(ValueError, match="all finite"):
         prepare_margins(posture).solve(np.full((1, 8, 6), np.nan))
-
-
-def test_drawn_wrenches_at_motion_limits_equal_single_solutions():
-    """Robots whose passive joints have clearance."""
-    seen = 0
-    for seed in (1, 4, 16, 24):
-        robot = random_robot(np.random.default_rng(seed))
-        posture = place_robot(robot)
-        one = linear_response(posture)
-        found = one.solve(robot.errors[None])
-        assert set(found.method) == {"compiled"}
-        answer = solve_assembly(posture)
-        wrenches = found.wrenches[0]
-        seen += int(np.abs(wrenches).max() > 0)
-        np.testing.assert_allclose(
-            wrenches, answer.wrenches, atol=1e-9 * np.abs(answer.wrenches).max()
-        )
-    assert seen == 4

@@ -1,6 +1,5 @@
-"""Blocks of a run, its identity and its data set: an arm that follows its errors."""
+"""Blocks of a run and its identity: an arm that follows its errors."""
 
-from contextlib import ExitStack
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +11,6 @@ from forcefit.assembly.statistics import monte_carlo
 from forcefit.assembly.statistics.experiment import Experiment
 from forcefit.assembly.statistics.importance_table import ImportanceOptions
 from forcefit.assembly.statistics.monte_carlo import provenance, run_draws
-from forcefit.assembly.sweeps.sweep import journal_path
 from forcefit.inputs.table import BadInput
 from tests import tolerances_for_tests
 
@@ -40,17 +38,6 @@ def test_block_size_and_workers_do_not_change_the_draws(arm, monkeypatch, worker
     assert data.attrs["importance_draws"] == 4
 
 
-@pytest.mark.parametrize("held", [None, ExitStack()])
-def test_held_journal_is_kept_until_it_is_closed(arm, tmp_path, held):
-    path = tmp_path / "draws.nc"
-    run_draws(arm, 3, path, held=held)
-    assert path.exists()
-    assert journal_path(path).exists() == (held is not None)
-    if held is not None:
-        held.close()
-        assert not journal_path(path).exists()
-
-
 def test_killed_run_resumes_with_another_confidence_level(arm, tmp_path):
     """The same rows are solved; a different number of rows is refused."""
 
@@ -69,38 +56,6 @@ def test_killed_run_resumes_with_another_confidence_level(arm, tmp_path):
         progress=lambda done, total: seen.append((done, total)),
     )  # fmt: skip
     assert seen == [(3, 23), (23, 23)]
-
-
-def test_data_set_of_draws_records_units_meanings_and_inputs(arm):
-    """Long names depend on the clearance model; attributes hold every input."""
-    asked = replace(
-        arm, clearance="worst", margins=True, seed=9, precision=(1e-6, np.inf)
-    )
-    data = run_draws(asked, 3)
-    units = {name: data[name].attrs["units"] for name in data.data_vars}
-    assert units["energy"] == "J"
-    assert units["translation_lower"] == "m"
-    assert units["status"] == units["margin"] == "1"
-    meaning = data["translation"].attrs["long_name"]
-    assert meaning.startswith(
-        "upper bound of the magnitude of the platform's translation"
-    )
-    assert meaning.endswith("all positions in the clearances, eq. (27)")
-    screw = data["platform_screw"]
-    assert screw.dims == ("draw", "screw")
-    assert list(screw["screw"].values) == ["RX", "RY", "RZ", "TX", "TY", "TZ"]
-    assert "one of many possible ones" in screw.attrs["long_name"]
-    attributes = data.attrs
-    assert (attributes["robot"], attributes["seed"]) == ("arm", 9)
-    assert (attributes["margins"], attributes["stress"]) == (1, 1)
-    assert attributes["precision"] == "1e-06 inf"
-    assert attributes["load"] == attributes["gravity"] == ""
-    assert attributes["pose.tx"] == pytest.approx(0.4)
-    assert "stiffness" not in attributes
-    least = run_draws(arm, 3)["translation"].attrs["long_name"]
-    assert least.startswith(
-        "magnitude of the platform's translation error; positions of"
-    )
 
 
 @pytest.mark.parametrize(

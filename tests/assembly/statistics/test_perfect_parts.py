@@ -10,7 +10,7 @@ from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.model.error_distributions import tolerance_sources
 from forcefit.assembly.robots import load_robot
 from forcefit.assembly.statistics.experiment import Experiment
-from forcefit.assembly.statistics.perfect_parts import limits_broken, perfect_parts
+from forcefit.assembly.statistics.perfect_parts import perfect_parts
 from tests.pages_for_tests import tiles
 from tests.tolerances_for_tests import ARM, arm
 
@@ -61,15 +61,6 @@ def test_clearance_shares_of_a_closed_loop_sum_to_the_largest_error(name):
     for key in ("rotation", "translation"):
         total = sum(parts[key]["clearances"].values())
         assert total == pytest.approx(parts[key]["reached"], rel=5e-3)
-
-
-def test_only_limits_below_the_clearances_are_reported_as_broken():
-    parts = perfect_parts(experiment(arm(radial=RADIAL, tilt=TILT)))
-    largest = np.hypot(RADIAL, ARM * TILT)
-    assert not limits_broken(parts, {"translation": 1.01 * largest, "energy": 1.0})
-    broken = limits_broken(parts, {"translation": 0.9 * largest, "rotation": 1.0})
-    assert list(broken) == ["translation"]
-    assert broken["translation"]["limit"] == 0.9 * largest
 
 
 def test_perfect_parts_include_the_displacement_by_the_load():

@@ -12,21 +12,6 @@ from forcefit.assembly.statistics.posture_margins import prepare_margins
 from tests.robots_for_tests import random_robot
 from tests.tolerances_for_tests import drawn_errors
 
-ROBOTS = ["irsbot2", "five_bar", "3rrr", "orthoglide", "hexapod"]
-
-
-@pytest.mark.parametrize("name", ROBOTS)
-@pytest.mark.parametrize("compliant", ["rigid", "free"])
-def test_margins_of_draws_equal_single_solutions(name, compliant):
-    robot = load_robot(name)
-    posture = place_robot(robot)
-    errors = drawn_errors(robot)
-    found = prepare_margins(posture, compliant).solve(errors)
-    for i, own in enumerate(errors):
-        zone = zone_margin(replace(posture, robot=robot.with_errors(own)), compliant)
-        assert found.margin[i] == pytest.approx(zone.margin, rel=2e-8, abs=1e-12)
-        assert found.bound[i] <= found.margin[i]
-
 
 def test_margins_are_proportional_to_the_errors_and_convex():
     """Euler: slope . errors is the margin; the margin of a mean is at most the mean."""

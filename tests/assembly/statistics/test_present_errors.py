@@ -13,7 +13,6 @@ from forcefit.assembly.statistics.tolerances import (
     identity_of,
     left_out_text,
     present_errors,
-    present_text,
 )
 from forcefit.inputs.table import BadInput
 from tests.robots_for_tests import coaxial_beams
@@ -61,28 +60,6 @@ def test_present_errors_rank_the_shares_of_the_largest_margin():
     np.testing.assert_allclose(margin_slopes, signs / PLAY, rtol=1e-6)
     energy_slopes = [one["energy_slope"] for one in slopes]
     np.testing.assert_allclose(energy_slopes, signs * K * 2.5 * PLAY / 2, rtol=1e-6)
-
-
-def test_present_errors_text_states_the_five_largest_errors_and_the_posture():
-    slopes = [
-        {"error": f"e{k}", "value": 1e-4 * (k + 1), "share_of_margin": 0.5 / (k + 1)}
-        for k in range(7)
-    ]
-    results = {
-        "postures": 8, "assemblable_share": 0.375, "largest_margin": 1.23456,
-        "factor_on_errors": 0.81, "slopes": slopes,
-        "at": {"tx": 0.25, "tz": -0.5, "ry": 1e-12, "rz": 2e-9},
-    }  # fmt: skip
-    lines = present_text(results).splitlines()
-    assert lines[:3] == [
-        "8 postures, 37.5% assemble; largest margin 1.235 at tx = 0.25, tz = -0.5, "
-        "rz = 2e-09",
-        "everywhere with all errors times 0.81",
-        "  e0 = 0.0001 makes 50.0% of that margin",
-    ]
-    assert [line.split()[0] for line in lines[2:]] == ["e0", "e1", "e2", "e3", "e4"]
-    home = present_text(results | {"at": {"tx": 0.0, "ty": -1e-10}}).splitlines()[0]
-    assert home.endswith("largest margin 1.235 at the origin")
 
 
 def test_present_errors_within_clearance_have_zero_energy_and_rigid_parts_nan():

@@ -48,14 +48,6 @@ def test_scaling_approaches_a_jump_from_the_admissible_side(start, within, beyon
         assert 3.0 * (1 - precision) <= found <= 3.0
 
 
-def test_scaling_meets_a_limit_that_is_zero_below_a_threshold():
-    """Energy beyond a clearance of 1: (t - 1)^2 = 4 at 3, zero below 1."""
-    for start in (1e-3, 0.5, 1.5, 40.0):
-        known = Known(lambda size: np.maximum(size - 1.0, 0.0) ** 2 / 4)
-        (found,) = scale_uniformly(known, ONE, np.array([start]))
-        assert found == pytest.approx(3.0, rel=1e-4)
-
-
 def test_scaling_keeps_proportions_within_the_bounds_of_the_plan():
     """Samples (1, 1) of tolerances 1 to 4; tolerances at their loosest stay there."""
     known = Known(lambda size: size / 6.0, least=0.5, most=8.0, tolerances=3)

@@ -122,38 +122,6 @@ def test_small_stiffness_is_not_reported_as_a_free_motion():
     assert about_z["quantiles"]["0.5"]["value"] == pytest.approx(0.02)
 
 
-@pytest.mark.parametrize(("held", "described"), [(0, False), (1, False), (2, True)])
-def test_stiffness_mean_needs_two_draws_that_resist(held, described):
-    stiffnesses = np.zeros((4, 6))
-    stiffnesses[:held] = np.array([[2.0], [4.0]])[:held]
-    said = stiffness_report(stiffnesses, np.full((4, 6, 6), np.nan), "contact", 0.95)
-    one = said["axes"]["fx"]
-    assert one["free"]["probability"] == (4 - held) / 4
-    assert ("mean" in one) == ("quantiles" in one) == described
-    if described:
-        assert one["mean"]["value"] == pytest.approx(3.0)
-    text = stiffness_spread_text(said).splitlines()[4]
-    assert text.startswith(
-        "  fx: median 3 N/m, 90 %" if described else "  fx: no resistance"
-    )
-    assert text.endswith(f"; free in {(4 - held) / 4:g}")
-    assert said["axes"]["my"]["unit"] == "N m/rad"
-
-
-def test_free_motions_equal_to_two_decimals_are_counted_together():
-    """At most five are listed, in the order of their number of draws."""
-    motions = np.full((9, 6, 6), np.nan)
-    motions[:, 0] = np.eye(6)[5]
-    motions[:4, 0, :2] = [[-1e-3, 0], [1e-3, -2e-3], [-0.0, 0], [0, 4e-3]]
-    motions[4:7, 0, 0] = 0.5
-    motions[0, 1:6] = [np.arange(6) + k for k in range(5)]
-    free = stiffness_report(np.zeros((9, 6)), motions, "contact", 0.95)["free_motions"]
-    assert [one["draws"] for one in free] == [6, 3, 1, 1, 1]
-    np.testing.assert_array_equal(free[0]["screw"], np.eye(6)[5])
-    assert not np.signbit(free[0]["screw"]).any()
-    np.testing.assert_array_equal(free[1]["screw"], [0.5, 0, 0, 0, 0, 1])
-
-
 def test_stiffness_of_a_platform_that_does_not_yield_is_reported_as_rigid():
     """Along fx all draws are rigid, along fy one of four; without draws, no shares."""
     stiffnesses = np.full((4, 6), 2.0)

@@ -61,24 +61,6 @@ def test_summary_counts_assembled_draws_with_unmixed_clearances():
     assert "clearance_not_mixed" not in summarise(draws(energy=[1.0]))
 
 
-def test_limit_is_met_up_to_equality_and_never_without_a_solution():
-    """Energies 1 to 4 and one without a solution, limit 2; one force is too large."""
-    data = draws(energy=[1.0, 2, 3, 4, NAN], force=[9.0, 5, 5, 9, NAN],
-                 status=[0, 0, 0, 0, 1])  # fmt: skip
-    said = summarise(data, {"energy": 2.0, "force": 8.0}, level=0.9)
-    over = said["exceeds"]
-    assert (over["energy"]["probability"], over["energy"]["undecided"]) == (3 / 5, 0)
-    assert (over["energy"]["limit"], over["energy"]["unit"]) == (2.0, "J")
-    assert over["force"]["probability"] == 3 / 5
-    assert said["within_limits"]["probability"] == 1 / 5
-    assert said["within_limits"]["undecided"] == 0
-    low, high = stats.binomtest(1, 5).proportion_ci(0.9)
-    assert said["within_limits"]["lower"] == pytest.approx(low)
-    assert said["within_limits"]["upper"] == pytest.approx(high)
-    assert "clearance" not in said["within_limits"] | over["energy"]
-    assert "within_limits" not in summarise(data)
-
-
 def test_draw_with_bounds_that_enclose_a_limit_is_undecided():
     """Bounds 0 to 2, 1 to 3, 2 to 3 and 3 to 4 of the translation, limit 2."""
     data = draws("worst", translation=[2.0, 3, 3, 4, NAN], status=[0, 0, 0, 0, 1],
@@ -121,38 +103,6 @@ def test_quantity_is_described_by_draws_with_finite_values():
     assert set(one["quantiles"]) == {"0.05", "0.5", "0.95", "0.99"}
 
 
-@pytest.mark.parametrize(("known", "described"), [(0, False), (1, False), (2, True)])
-def test_mean_and_mean_screw_need_two_assembled_draws(known, described):
-    status = [0] * known + [1] * (5 - known)
-    screws = np.arange(30.0).reshape(5, 6)
-    said = summarise(draws(energy=[1.0, 3, 5, 7, 9], status=status, screws=screws))
-    assert ("mean" in said["quantities"]["energy"]) == described
-    assert ("platform_screw" in said) == described
-    if described:
-        screw = said["platform_screw"]
-        assert screw["draws"] == 2
-        np.testing.assert_allclose(screw["mean"], np.arange(6.0) + 3)
-        # (x, x + 6) of every component: variance 18, all alike
-        np.testing.assert_allclose(screw["covariance"], np.full((6, 6), 18.0))
-        assert len(screw["most_probable"]) == 6
-
-
-def test_screws_of_the_worst_model_are_those_of_least_clearances():
-    for play, named in (("worst", "least"), ("contact", "contact")):
-        assert (
-            summarise(draws(play, energy=[1.0, 2]))["platform_screw"]["clearance"]
-            == named
-        )
-
-
-def test_unknown_screws_are_left_out_of_the_mean():
-    screws = np.ones((4, 6))
-    screws[2:] = [[3.0] * 6, [1.0] * 5 + [NAN]]
-    found = summarise(draws(energy=[1.0] * 4, screws=screws))["platform_screw"]
-    assert found["draws"] == 3
-    np.testing.assert_allclose(found["mean"], 5 / 3)
-
-
 @pytest.mark.parametrize(("zeros", "mode"), [(50, 7.0), (51, 0.0)])
 def test_zero_is_the_mode_if_more_than_half_are_zero(zeros, mode):
     """The other values are about 7; 1e-19 of the largest is rounding, 1e-17 is not."""
@@ -180,48 +130,6 @@ def test_margins_include_draws_that_do_not_assemble():
     assert "margin of all 5 draws: median 2 (" in text
     energy = summarise(draws(energy=[1.0, 2]))["quantities"]["energy"]
     assert "all_draws" not in energy
-
-
-def test_summary_describes_only_quantities_of_draws():
-    """Bounds, gaps, screws, missing links and quantities of the run are omitted."""
-    data = draws("worst", translation=[1.0, 2], translation_lower=[0.5, 1.5],
-                 stress=np.zeros((2, 0)))  # fmt: skip
-    data["force"] = ("group", [1.0, 2.0, 3.0])
-    assert list(summarise(data)["quantities"]) == ["translation"]
-
-
-def test_summary_text_states_quantities_units_and_intervals():
-    """A pure number has no unit; a pose error is given with its clearance model."""
-    one = {"value": 1.0, "lower": 0.5, "upper": 2.0}
-    described = {
-        "unit": "m", "clearance": "worst", "mean": one,
-        "most_probable": one | {"value": 1.25},
-        "quantiles": {"0.5": one, "0.95": one | {"value": 3.0, "upper": 4.0}},
-    }  # fmt: skip
-    share = {"probability": 0.25, "lower": 0.1234567, "upper": 0.5}
-    lines = summary_text({
-        "draws": 40, "assembled": 30, "confidence": 0.9, "clearance": "worst",
-        "clearance_means": "anywhere", "assembles": {"forced": share},
-        "exceeds": {"margin": share | {"limit": 1.5, "unit": "1", "undecided": 0}},
-        "within_limits": share | {"undecided": 7, "clearance": "worst"},
-        "quantities": {
-            "translation": described, "force": {"unit": "N"},
-            "margin": described | {"unit": "1", "all_draws": described},
-        },
-    }).splitlines()  # fmt: skip
-    shown = "0.25 (0.12346 to 0.5)"
-    quantiles = "median 1 (0.5 to 2), 95 % below 3 (0.5 to 4)"
-    assert lines == [
-        "40 draws; in brackets 90% intervals",
-        "pose errors: clearance worst: anywhere",
-        f"assembles, by force if necessary: {shown}",
-        f"margin above 1.5: {shown}",
-        f"yield [clearance worst], all limits met: {shown}, 7 draws undecided",
-        "of the 30 of 40 draws that assemble:",
-        f"  translation [clearance worst]: most probable 1.25 m, {quantiles}",
-        f"  margin [clearance worst]: most probable 1.25, {quantiles}",
-        f"margin of all 40 draws: {quantiles}",
-    ]
 
 
 @pytest.mark.parametrize("key", ["force", "stress"])

@@ -76,16 +76,6 @@ def test_advice_omits_tolerances_at_their_loosest():
     assert tiles(none)["Tolerance to tighten"][0] == "nothing"
 
 
-def test_report_bars_start_at_zero_on_a_linear_axis():
-    """25.66 and 26.72 urad are drawn in the ratio 1 to 1.04."""
-    figures = parse(shown([2.566e-5, 2.672e-5], [1.0, 1.0])).figures
-    assert len(figures) == 2
-    for figure in figures:
-        (trace,) = figure["traces"]
-        assert trace["type"] == "bar"
-        assert '"log"' not in json.dumps(figure)
-
-
 def test_report_without_a_proof_states_so_and_has_no_empty_table():
     page = shown([1e-3, 1e-4], [1.0, 1.0])
     assert "not proved" in page

@@ -1,19 +1,15 @@
-"""The worst clearance: closed forms, other models, slopes against differences."""
-
-from dataclasses import replace
+"""The worst clearance: closed forms and other models."""
 
 import numpy as np
 import pytest
 
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.model.error_distributions import tolerance_sources
-from forcefit.assembly.model.robot import Clearance
 from forcefit.assembly.robots import load_robot
 from forcefit.assembly.statistics.clearance_positions import CLEARANCE_MODELS
 from forcefit.assembly.statistics.experiment import Experiment, precision_for
 from forcefit.assembly.statistics.linear_response import linear_response
 from forcefit.assembly.statistics.monte_carlo import run_draws
-from forcefit.assembly.statistics.responses import respond
 from forcefit.assembly.statistics.summary import summarise, summary_text
 from forcefit.assembly.statistics.worst_clearance import bound_worst_errors
 from tests.tolerances_for_tests import ARM, arm
@@ -53,25 +49,6 @@ def test_screws_of_the_worst_clearance_attain_its_bounds(rng):
     turned, moved = screws[:2, 0, :3], screws[:2, 1, 3:]
     np.testing.assert_allclose(np.linalg.norm(turned, axis=1), TILT, rtol=1e-4)
     np.testing.assert_allclose(np.linalg.norm(moved, axis=1), size, rtol=1e-4)
-
-
-@pytest.mark.parametrize("part", [0, 1])
-def test_part_without_requested_precision_is_bounded_by_the_solution(part):
-    """Its bounds enclose the true value, at any width."""
-    posture = home_posture(arm(radial=RADIAL, tilt=TILT))
-    prepared, errors = linear_response(posture), np.zeros((4, 2, 6))
-    errors[:, 1] = np.linspace(1e-4, 4e-4, 4)[:, None] * [1, 0, 0, 1, 0, 0]
-    draws = prepared.solve(errors)
-    precision = [1e-8, 1e-8]
-    precision[part] = np.inf
-    bounds, _ = bound_worst_errors(draws, tuple(precision))
-    both, _ = bound_worst_errors(draws, (1e-8, 1e-8))
-    np.testing.assert_allclose(bounds[:, 1 - part], both[:, 1 - part], atol=2e-8)
-    screws = draws.platform_screw[:, 3 * part : 3 * part + 3]
-    least = np.linalg.norm(screws, axis=1)
-    assert (bounds[:, part, 0] >= least * (1 - 1e-12)).all()
-    assert (bounds[:, part, 0] <= both[:, part, 1]).all()
-    assert (bounds[:, part, 1] >= both[:, part, 0]).all()
 
 
 @pytest.mark.parametrize(
@@ -121,60 +98,6 @@ def test_worst_clearance_adds_nothing_if_a_load_takes_up_all_clearance():
     rest = np.linalg.norm(values + [RADIAL, 0, 0], axis=1)
     np.testing.assert_allclose(rows["translation"], rest, atol=1e-9)
     np.testing.assert_allclose(rows["translation_lower"], rest, atol=1e-9)
-
-
-@pytest.mark.parametrize("key", ["rotation", "translation"])
-@pytest.mark.parametrize("share", [0.05, 0.2, 0.6])
-def test_slopes_of_the_largest_pose_error_equal_central_differences(key, share, rng):
-    """Steps in random directions, inside the zone and outside it.
-
-    Where the farthest point jumps to another corner there is a kink: 3 of 4 steps
-    must agree, all within a tenth.
-    """
-    experiment = papers(share)
-    sources, ready = experiment.sources, experiment.energies
-    values = rng.uniform(-1, 1, size=(1, len(sources))) * sources.scale
-    slopes = respond(ready, sources, values, key)[1][0]
-    assert slopes.any()
-    off = []
-    for _ in range(4):
-        step = 1e-3 * rng.normal(size=len(sources)) * sources.scale
-        above, below = (
-            respond(ready, sources, values + s, key)[0][0] for s in (step, -step)
-        )
-        scale = float(np.linalg.norm(slopes * step))
-        off.append(abs((above - below) / 2 - slopes @ step) / scale)
-    assert np.sort(off)[2] < 0.02
-    assert max(off) < 0.1
-
-
-def test_worst_pose_error_grows_with_the_clearances():
-    """Sets of clearances without energy are nested; brackets are 1e-6 wide."""
-    robot, before = load_robot("irsbot2"), None
-    sources = tolerance_sources(robot, [1e-4] * 3 + [5e-6] * 3)
-    values = sources.draw(0, 40, seed=3)
-    for factor in (1.0, 1.1, 1.5):
-        looser = replace(robot, frames=tuple(
-            replace(f, clearance=None if f.clearance is None else Clearance(**{
-                k: factor * getattr(f.clearance, k) for k in ("radial", "axial", "tilt")
-            }, spin=f.clearance.spin))
-            for f in robot.frames
-        ))  # fmt: skip
-        posture, own = place_robot(looser, pose=POSE), replace_robot(sources, looser)
-        experiment = Experiment(posture, own, margins=False)
-        rows = experiment.evaluate(values, range(40))
-        assert rows["energy"].max() < 1e-20
-        if before is not None:
-            for name in ("rotation", "translation"):
-                assert (rows[name] >= before[f"{name}_lower"]).all()
-                assert np.median(rows[name] / before[name]) > 1.05
-        before = rows
-
-
-def replace_robot(sources, robot):
-    arrays = ("frame", "component", "kind", "centre", "scale", "least", "limit",
-              "signed")  # fmt: skip
-    return type(sources)(robot, *(getattr(sources, a) for a in arrays))
 
 
 def test_unknown_clearance_model_is_refused():

@@ -180,21 +180,6 @@ def test_energy_over_the_stroke_is_that_of_the_stand_bolted_at_one_pose(
         assert solve_assembly(posture).energy == pytest.approx(expected, abs=2e-6)
 
 
-def test_bolting_multiplies_the_energy_over_the_stroke(tmp_path):
-    """Loose, the slots give way at every pose; bolted they do at one of them."""
-    loose = load_robot(four_bar(tmp_path))
-    energies = {}
-    for name in ("loose", 0.4, 1.2, 2.0):
-        key = at_angle(name) if name != "loose" else ""
-        robot = loose if not key else load_robot(four_bar(tmp_path, key))
-        energies[name] = max(
-            solve_assembly(place_robot(robot, joints={"crank": a})).energy
-            for a in ANGLES
-        )
-    assert energies["loose"] < 1e-6
-    assert min(energies[a] for a in (0.4, 1.2, 2.0)) > 0.02
-
-
 def test_statistics_bolt_every_drawn_machine_with_its_own_errors(tmp_path):
     robot = load_robot(four_bar(tmp_path, at_angle(0.4)))
     sources = tolerance_sources(robot, np.array([1e-3] * 3 + [1e-4] * 3), ("pin2",))
@@ -207,17 +192,6 @@ def test_statistics_bolt_every_drawn_machine_with_its_own_errors(tmp_path):
         alone = solve_assembly(replace(posture, robot=machine)).energy
         assert row["energy"] == pytest.approx(alone, rel=1e-6, abs=1e-12)
         assert np.any(machine.frame("stand").locked_at.screw)
-
-
-def test_sweep_has_the_energies_of_the_bolted_robot(tmp_path):
-    path = four_bar(tmp_path, at_angle(1.2))
-    robot = load_robot(path)
-    data = sweep(path, grid="q.crank=0.4:2.0:0.4", assumption="none")
-    expected = [
-        solve_assembly(place_robot(robot, joints={"crank": a})).energy for a in ANGLES
-    ]
-    energies = np.asarray(data["energy"]).ravel()
-    assert energies == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
 def test_sweep_bolts_every_draw_with_its_own_errors(tmp_path):
@@ -237,19 +211,6 @@ def test_sweep_bolts_every_draw_with_its_own_errors(tmp_path):
         ]
         energies = np.asarray(data["energy"].isel(draw=i)).ravel()
         assert energies == pytest.approx(alone, rel=1e-6, abs=1e-12)
-
-
-def test_sweep_bolts_every_design(tmp_path):
-    path = four_bar(tmp_path, at_angle(0.4))
-    data = sweep(
-        path, grid="q.crank=2.0", assumption="none",
-        vary=["pin2.link.beam.radius=0.01,0.02"],
-    )  # fmt: skip
-    energies = np.asarray(data["energy"]).ravel()
-    robot = load_robot(path)
-    own = solve_assembly(place_robot(robot, joints={"crank": 2.0})).energy
-    assert energies[1] == pytest.approx(own, rel=1e-9)
-    assert 0 < energies[0] < energies[1]
 
 
 def test_robot_with_a_bolted_joint_is_written_as_it_was_read(tmp_path):

@@ -62,19 +62,6 @@ def test_disc_of_an_open_slot_is_filled_evenly():
     assert not screws[:, :3].any()
 
 
-def test_platform_between_two_pins_is_left_anywhere_that_both_allow():
-    """0 +- 20 um and 30 +- 20 um: the platform is uniform in [10, 20] um."""
-    frames = [Frame("guide", "base", joint="prismatic"), Frame("platform", "guide")]
-    for name, error in (("left", 0.0), ("right", 30e-6)):
-        axial = {"axial": 20e-6}
-        frames += pin(name, axial, [0, 0, 0, 0, 0, error], **UNIFORM)
-    closures = (("platform", "left.end"), ("platform", "right.end"))
-    screws = bolted(Robot("pins", "platform", tuple(frames), closures))
-    left, right = screws[:, 2, 5], screws[:, 4, 5]
-    assert left - right == pytest.approx(np.full(COUNT, 30e-6), rel=1e-9)
-    assert stats.kstest(left / 10e-6 - 1, "uniform").pvalue > 1e-3
-
-
 def test_two_round_pins_leave_the_platform_anywhere_in_the_lens(rng):
     """Uniform in the lens of two discs, drawn here by rejection."""
     robot = platform_of_two_pins({"radial": 1e-4}, 1e-4)

@@ -101,17 +101,6 @@ def test_each_pinned_leg_needs_the_closing_force_of_the_springs_so_far():
     assert last.work == pytest.approx(2.133333e-3, rel=1e-6)
 
 
-def test_pinned_while_clamped_then_released_leaves_the_same_state():
-    clamp = Fix("clamp", "platform", {"TZ": 10e-6})
-    joins = tuple(join_leg(i) for i in (1, 2, 3))
-    results = assemble_in_steps(
-        Plan((clamp, *joins, Release("free", ("clamp",)))), three_legs()
-    )
-    assert results[3].platform_screw[0, 5] == pytest.approx(10e-6)
-    assert results[4].platform_screw[0, 5] == pytest.approx(140 / 6 * 1e-6)
-    assert results[4].energy == pytest.approx(2.966667e-3, rel=1e-6)
-
-
 @pytest.mark.parametrize(
     ("last", "x", "energy"),
     [(1, 22.0e-6, 2.94e-3), (2, 45.0e-6, 0.15e-3), (3, -10e-6 / 3, 0.8333333e-3)],
@@ -159,20 +148,6 @@ def test_slot_before_the_pin_differs_where_the_pin_moves_the_slot(
     assert slope == pytest.approx(turn)
     assert result.energy == pytest.approx(energy, rel=1e-6)
     assert result.platform_screw[0, 5] == pytest.approx(z)
-
-
-def test_slot_where_the_pin_does_not_move_it_ends_alike_in_both_orders():
-    """A pin at 0.1 m on legs at 0 and 0.4 m does not lift the platform at 0.6 m."""
-    posture = planar_platform([0.0, 0.4, 0.1, 0.6], [0, 0, 40e-6, 0])
-    ends = []
-    for order in ((3, 4), (4, 3)):
-        steps = tuple(
-            Join(f"{i}", (f"seat{i}", f"end{i}"), locked=Z if i == 4 else ())
-            for i in (1, 2, *order)
-        )
-        ends.append(assemble_in_steps(Plan(steps), posture)[-1])
-    assert ends[0].platform_screw == pytest.approx(ends[1].platform_screw, abs=1e-16)
-    assert ends[0].energy == pytest.approx(ends[1].energy)
 
 
 def test_portal_welded_to_a_bent_base_keeps_its_share_of_the_rotation():
@@ -256,20 +231,6 @@ def test_slot_bolted_after_one_pin_costs_what_its_place_in_the_clearance_says(
     last = assemble_in_steps(Plan(steps), posture)[-1]
     assert abs(last.wrenches["join 3"][0, 5]) == pytest.approx(force, abs=1e-3)
     assert last.energy == pytest.approx(force**2 / 4e6, abs=1e-7)
-
-
-def test_a_load_seats_the_clearance_in_which_the_slot_is_bolted():
-    """A weight presses the platform to -20 um of pin 1: pin 2 then needs 60 N."""
-    posture = legs_with_pins((0.0, 30e-6, 0.0), (20e-6, 20e-6, None))
-    down = np.array([0, 0, 0, 0, 0, -5.0])
-    steps = (
-        join_leg(1), Preload("weight", "platform", down), join_leg(3, locked=Z),
-        Release("no weight", ("weight",)), join_leg(2),
-    )  # fmt: skip
-    results = assemble_in_steps(Plan(steps), posture)
-    assert results[2].platform_screw[0, 5] == pytest.approx(-20e-6, rel=1e-6)
-    force = abs(results[-1].wrenches["join 3"][0, 5])
-    assert force == pytest.approx(60.0, rel=1e-6)
 
 
 def test_a_joint_with_clearance_that_is_bolted_keeps_its_place():
@@ -391,20 +352,6 @@ def test_seventh_leg_cut_to_the_measured_length_is_free_of_force():
     assert results[-1].platform_screw[0] == pytest.approx(J @ LENGTHS, rel=1e-6)
 
 
-def test_many_machines_have_the_results_of_each_alone(rng):
-    errors = rng.normal(size=(4, 5, 6)) * [0, 0, 0, 0, 0, 3e-5]
-    posture = three_legs()
-    plan = Plan((join_leg(1), join_leg(3), join_leg(2, locked=Z)))
-    many = assemble_in_steps(plan, posture, errors)
-    for i, own in enumerate(errors):
-        alone = assemble_in_steps(plan, posture, own[None])
-        for one, several in zip(alone, many, strict=True):
-            assert one.energy == pytest.approx(several.energy[i], rel=1e-9, abs=1e-18)
-            assert one.closing_force == pytest.approx(
-                several.closing_force[i], rel=1e-9, abs=1e-9
-            )
-
-
 @pytest.mark.parametrize(
     ("steps", "text"),
     [
@@ -421,19 +368,6 @@ def test_a_plan_that_does_not_fit_is_refused_in_one_line(steps, text):
         assemble_in_steps(Plan(steps), three_legs())
     assert text in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_release_before_welding_leaves_no_force_in_the_portal():
-    bent = {"TX": 0.0, "TZ": 0.0, "RY": 1e-3}
-    every = ("RX", "RY", "RZ", "TX", "TY", "TZ")
-    steps = (
-        Fix("clamp 1", "foot1", bent), Fix("clamp 2", "foot2", {"RY": -1e-3}),
-        Release("free", ("clamp 1", "clamp 2")),
-        Join("weld", ("corner", "top2"), locked=every),
-    )  # fmt: skip
-    results = assemble_in_steps(Plan(steps), portal())
-    assert results[-1].energy == pytest.approx(0.0, abs=1e-15)
-    assert results[2].lost == pytest.approx(results[1].energy, rel=1e-9)
 
 
 def test_influence_coefficients_give_the_spring_back_of_clamped_parts():

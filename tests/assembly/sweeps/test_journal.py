@@ -210,13 +210,6 @@ def test_designs_with_different_numbers_have_different_hashes(tmp_path):
     assert question_hash(design) == question_hash(moved) != question_hash(other)
 
 
-def test_block_order_does_not_change_the_file(whole, tmp_path):
-    sweep, expected, _ = whole
-    path = tmp_path / "map.nc"
-    run_sweep(sweep, path, solve=lambda s, b: solve_here(s, [2, 0, 3, 1]))
-    assert path.read_bytes() == expected
-
-
 @pytest.mark.parametrize(
     ("other", "message"),
     [

@@ -134,24 +134,6 @@ def test_list_and_grid_of_the_same_postures_give_equal_energies(robot, tmp_path)
     assert len(figure_of(found).axes) == 6
 
 
-def test_grid_of_joint_coordinates_equals_the_grid_of_their_poses():
-    robot = load_robot("five_bar")
-    posture = place_robot(robot, pose={"tx": 0.03, "ty": 0.13})
-    drives = {
-        f"q.{side}.drive": np.array([posture.coordinates[robot.index(f"{side}.drive")]])
-        for side in ("left", "right")
-    }
-    errors = np.zeros((9, 6))
-    errors[robot.index("left.elbow"), 3] = 1e-5
-    robot = robot.with_errors(errors)
-    found = sweep_poses(robot, drives)
-    expected = sweep_poses(robot, parse_grid("tx=0.03,ty=0.13"))
-    assert found.energy.values.ravel() == pytest.approx(
-        expected.energy.values.ravel(), rel=1e-6
-    )
-    assert found["q.left.drive"].attrs["units"] == "rad"
-
-
 def test_design_that_cannot_close_has_the_status_invalid_robot():
     path = "leg1.elbow_a.translation.y"
     y = float(load_robot("irsbot2").frame("leg1.elbow_a").translation[1])

@@ -41,19 +41,6 @@ def test_swept_stiffness_equals_that_of_single_postures():
     assert "softest eigen-stiffness [N/um]" in titles
 
 
-def test_stiffness_increases_with_the_swept_link_radius():
-    """The bending stiffness of a round bar is proportional to radius^4."""
-    data = sweep(
-        "irsbot2",
-        grid="tx=0,tz=-0.5",
-        vary=["link_a.link.beam.radius=0.03,0.04,0.05"],
-        assumption="none",
-        state="nominal",
-    )
-    stiffness = data.stiffness.sel(wrench_component="FY").values.ravel()
-    assert (np.diff(stiffness) > 0).all()
-
-
 LOAD = (0.0, 0.0, 0.0, 0.0, 0.0, -300.0)
 
 

@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import typer
-import xarray
 
 import forcefit
 from forcefit.assembly.files.robot_file import write_robot
@@ -103,40 +102,6 @@ def test_error_writes_the_public_keys(run, robot_file, tmp_path):
         assert bracket["upper"] >= point[key][0] - 1e-9
         assert len(bracket["platform_screw"]) == 6
     assert found["budget"]["rotation"]["lower"] >= found["frozen"]["rotation"]["lower"]
-
-
-def test_sweep_writes_netcdf_and_a_figure(run, robot_file, tmp_path):
-    out_file, figure = tmp_path / "out.nc", tmp_path / "map.png"
-    status, out, _ = run("assembly", "sweep", robot_file, "--grid",
-                         "tx=0:0.1:0.1,tz=-0.5:-0.4:0.1", "-o", out_file,
-                         "--figure", figure)  # fmt: skip
-    assert (status, out.strip()) == (0, "ok: 4")
-    with xarray.open_dataset(out_file) as data:
-        sizes = {"tx": 2, "tz": 2, "screw": 6, "bound": 2, "kind": 3, "joint": 24}
-        assert dict(data.sizes) == sizes
-    assert figure.read_bytes().startswith(b"\x89PNG")
-
-
-def test_solve_reports_both_margins(run, robot_file):
-    status, out, _ = run("assembly", "solve", robot_file, "--pose", "tx=0.4,tz=-0.45",
-                         "--quantities", "margin", "--json", "-")  # fmt: skip
-    zone = json.loads(out)["zone"]
-    point = NUMBERS["cases"][0]["points"][3]
-    assert status == 0
-    assert zone["margin"] == pytest.approx(point["t_compliant_rigid"])
-    assert zone["margin_free"] == pytest.approx(point["t_compliant_free"])
-    assert (zone["assemblable"], zone["assemblable_free"]) == (False, True)
-
-
-def test_exact_solution_reports_the_error_of_the_linear_model(run, robot_file):
-    status, out, _ = run("assembly", "solve", robot_file, "--pose", "tx=0,tz=-0.5",
-                         "--state", "exact", "--json", "-")  # fmt: skip
-    found = json.loads(out)
-    assert status == 0
-    assert found["certificate"]["closure_residual"] < 1e-11
-    gap = np.subtract(found["linear"]["platform_screw"], found["platform_screw"])
-    assert np.allclose(found["linearisation_error"]["rotation"], gap[:3])
-    assert 1e-6 < np.linalg.norm(gap[3:]) < 2e-4  # tens of micrometres at full errors
 
 
 COLUMN = """name = "column"

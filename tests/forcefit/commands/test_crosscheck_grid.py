@@ -20,23 +20,6 @@ pytestmark = pytest.mark.exudyn
 AXES = {"tx": [-0.7, 0.0, 0.2], "tz": [-0.45]}
 
 
-def test_every_reachable_pose_is_checked_and_others_are_out_of_reach():
-    robot, seen = irsbot2_with(NUMBERS["cases"][0]), []
-    rows = check_poses(
-        robot,
-        AXES,
-        lambda p: crosscheck(p, (1.0, 0.5)),
-        lambda *step: seen.append(step),
-    )
-    assert [row["status"] for row in rows] == ["out of reach", "ok", "ok"]
-    assert [row["passed"] for row in rows] == [None, True, True]
-    assert rows[1]["asked"] == {"tx": 0.0, "tz": -0.45}
-    assert all(abs(row["slope"] - 2) < 0.1 for row in rows[1:])
-    assert poses_table(rows)["passed"]
-    assert poses_text(rows).splitlines()[-1] == "2 of 2 reachable poses passed"
-    assert seen == [(1, 3), (2, 3), (3, 3)]
-
-
 def test_pose_beyond_the_limits_of_a_joint_is_not_checked():
     """The slides of an orthoglide move with its platform along each axis."""
     robot = load_robot("orthoglide")

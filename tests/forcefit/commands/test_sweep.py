@@ -212,22 +212,6 @@ def test_sweep_of_listed_poses_and_designs_draws_a_map(run, tmp_path):
     assert (tmp_path / "x.svg").read_bytes().startswith(b"<?xml")
 
 
-def test_ask_sweep_takes_paths_as_text_or_as_paths(tmp_path):
-    from forcefit.assembly.files.robot_file import write_robot
-    from forcefit.assembly.robots import load_robot
-    from forcefit.assembly.sweeps.request import SweepOptions, ask_sweep
-
-    (tmp_path / "errors.toml").write_text(ERRORS)
-    (tmp_path / "poses.csv").write_text("pose.tx,pose.ty\n0,0.13\n")
-    write_robot(load_robot("five_bar"), tmp_path / "robot.toml")
-    files = {"poses": tmp_path / "poses.csv", "errors": tmp_path / "errors.toml"}
-    one = ask_sweep(tmp_path / "robot.toml", SweepOptions(**files, draws=2))
-    text = {name: str(path) for name, path in files.items()}
-    other = ask_sweep(str(tmp_path / "robot.toml"), SweepOptions(**text, draws=2))
-    assert one.identity == other.identity
-    assert one.command == other.command
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [

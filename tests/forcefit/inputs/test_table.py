@@ -8,13 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from forcefit.inputs.errors import checked, one_line
-from forcefit.inputs.number_arrays import find_fault, number_array
+from forcefit.inputs.number_arrays import find_fault
 from forcefit.inputs.table import (
     BadInput,
     Table,
     describe,
     nearest,
-    quoted,
     read_text,
     read_toml,
 )
@@ -78,10 +77,6 @@ def test_value_is_described_as_written_in_the_file(value, text):
     assert describe(value) == text
 
 
-def test_integer_too_long_to_print_is_described_by_its_bits():
-    assert describe(16**5000) == "an integer of 20001 bits"
-
-
 def test_description_of_any_value_is_short():
     deep = []
     for _ in range(100_000):
@@ -91,29 +86,6 @@ def test_description_of_any_value_is_short():
         assert len(describe(value)) <= 60
     while deep:  # taken apart by hand: Python would recurse
         deep = deep[0]
-
-
-def test_quoted_name_is_cut_to_62_characters():
-    assert quoted("a b") == '"a b"'
-    assert len(quoted("x" * 10**6)) <= 62
-
-
-@pytest.mark.parametrize(("value", "expected"), [
-    ([1, 2.5], [1.0, 2.5]), ([[1, 2], [3, 4]], [[1, 2], [3, 4]]), ([], []),
-    ([math.inf], [math.inf]), ([int(1.7976931348623157e308)], [1.7976931348623157e308]),
-])  # fmt: skip
-def test_number_array_converts_lists_of_numbers(value, expected):
-    np.testing.assert_array_equal(number_array(value), expected)
-    assert number_array(value).dtype == float
-
-
-@pytest.mark.parametrize(
-    "value",
-    [1.0, "12", None, {"a": 1}, [True], ["1"], [[1], [1, 2]], [[1], 2], [1, [2]],
-     [[1], ["a"]], [2**1024], [-(10**400)]],
-)  # fmt: skip
-def test_number_array_of_ragged_or_non_numeric_lists_is_none(value):
-    assert number_array(value) is None
 
 
 @pytest.mark.parametrize(("value", "shape", "text"), [
@@ -129,10 +101,6 @@ def test_fault_in_an_array_is_reported_with_its_position(value, shape, text):
     assert find_fault(value, shape) == text
 
 
-def test_infinite_number_is_accepted_on_request():
-    assert find_fault([1, math.inf, "a"], (3,), infinite=True) == "'a' as number 3"
-
-
 @pytest.mark.parametrize(
     ("value", "text"),
     [
@@ -145,16 +113,6 @@ def test_number_out_of_range_is_refused(value, text):
     found = message(table(a=value).number, "a", "m", above=0.0, below=2.0)
     assert found.startswith(f"f.toml: place.a: {text}")
     assert found.endswith("expected a finite number > 0 and < 2 [m]")
-
-
-def test_message_for_a_number_states_only_the_limits_it_has():
-    assert message(table().number, "a", "rad") == (
-        "f.toml: place.a: missing; expected a finite number [rad]"
-    )
-    found = message(table(a=-2e6).number, "a", "m", largest=1e6)
-    assert found.endswith(
-        "found -2000000.0, expected a number of size at most 1e+06 [m]"
-    )
 
 
 def test_absent_keys_have_their_defaults():
@@ -206,13 +164,6 @@ def test_misspelt_key_is_reported_as_missing_and_as_unknown():
     assert message(wrong.finish) == (
         'f.toml: place: unknown key "raduis"; did you mean "radius"?'
     )
-
-
-def test_message_of_an_inner_table_states_its_path():
-    root = Table({"a": [{"b": {"c": 1}}]}, "f.toml", "")
-    inner = root.tables("a")[0].table("b")
-    assert message(inner.text, "c") == "f.toml: a[1].b.c: found 1, expected a string"
-    root.finish()
 
 
 def test_text_is_read_with_a_byte_order_mark_and_any_line_ends(tmp_path):

@@ -18,7 +18,6 @@ from forcefit.assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import (
     JSON,
-    PICTURE,
     PIXELS,
     ROBOT,
     check_writable,
@@ -147,18 +146,6 @@ def test_picture_of_every_ending_is_written_and_replaced(tmp_path, ending):
         shown = np.asarray(Image.open(path).convert("RGB"))
         assert shown.shape == (5, 7, 3)
         assert (abs(shown.astype(int) - shade) <= 2).all()  # JPEG rounds
-
-
-@pytest.mark.parametrize("ending", PICTURE.endings)
-def test_figure_of_every_ending_is_written_and_replaced(tmp_path, ending):
-    path = tmp_path / f"figure{ending}"
-    path.write_bytes(WRITTEN[ending])
-    save_figure(a_figure(), path)
-    first = path.read_bytes()
-    assert first.startswith(WRITTEN[ending])
-    assert len(first) > 1000
-    save_figure(a_figure(title="replaced"), path)
-    assert path.read_bytes() not in {first, WRITTEN[ending]}
 
 
 def fail_in(path):

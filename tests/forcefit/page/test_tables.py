@@ -2,11 +2,9 @@
 
 import re
 
-import pytest
-
 from forcefit.page.comparison import compare, comparison_page
 from forcefit.page.page import Page, Provenance, page
-from forcefit.page.tables import Column, Value, table
+from forcefit.page.tables import Column, table
 
 
 def test_table_headers_can_have_the_keyboard_focus():
@@ -14,15 +12,6 @@ def test_table_headers_can_have_the_keyboard_focus():
     heads = re.findall(r"<th( [^>]*)>", text)
     assert len(heads) == 2
     assert all("tabindex=0" in head and "scope=col" in head for head in heads)
-
-
-def test_only_sentences_wrap_in_table_cells():
-    sentence = "any position; compliant joints also turn about their axis"
-    text = table(["", "", ""], [["leg1.loop2_platform", Value(1.0, "m"), sentence]])
-    cells = re.findall(r"<td([^>]*)>([^<]*)", text)
-    assert ["long" in attributes for attributes, _ in cells] == [
-        False, False, True
-    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(

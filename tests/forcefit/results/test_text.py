@@ -2,16 +2,13 @@
 
 import math
 
-import numpy as np
 import pytest
 
-from forcefit.results.display import listing
 from forcefit.results.quantities import LABELS, QUANTITIES, number
 from forcefit.results.text import (
     in_unit,
     lines_of,
     readings_text,
-    table_lines,
     value_text,
 )
 from forcefit.results.units import FACTORS
@@ -72,18 +69,6 @@ def test_result_lines_follow_the_given_names_and_omit_absent_ones():
     assert lines_of(failed, "status reason") == {
         "status": "free motion", "reason": "it turns"
     }  # fmt: skip
-
-
-def test_lists_and_tables_are_aligned():
-    assert listing("arm", {"a": "1", "bcd": "2"}, ["light"]).split("\n") == [
-        "arm", "  a    1", "  bcd  2", "note: light",
-    ]  # fmt: skip
-    head, *rows = table_lines(
-        ("frame", "MX [N m]", "note"), {"long name": (-0.0, "x"), "b": (np.nan, "y")}
-    )
-    assert [len(row) for row in rows] == [len(head)] * 2
-    assert rows[0].split() == ["long", "name", "0", "x"]
-    assert rows[1].split() == ["b", "-", "y"]
 
 
 def test_labels_of_dimensions_equal_those_of_screws_and_wrenches():

@@ -10,10 +10,6 @@ from forcefit.stiffness.mesh.edge_grading import layered
 from tests.solids_for_tests import box_solid
 
 
-def test_material_without_a_density_has_density_zero():
-    assert Material(2.1e11, 0.3).density == 0.0
-
-
 @pytest.mark.parametrize("density", [-1e-9, np.inf, np.nan])
 def test_wrong_density_is_refused(density):
     with pytest.raises(BadInput, match="density"):

@@ -182,9 +182,3 @@ def test_refining_inverted_elements_more_than_halves_the_volume_error(counts, in
         for s in (solid, refine_inverted(solid, 3))
     ]
     assert error[1] < error[0] / 2
-
-
-def test_elements_that_are_not_inverted_are_kept():
-    for solid in (shell((2, 2, 2), 0.6, 1.0), bar_solid(2, 4, 0.04, 0.2)):
-        assert not curved_elements(solid, 3).inverted.any()
-        assert refine_inverted(solid, 3) is solid

@@ -1,15 +1,11 @@
-"""Layers along singular edges: found, conforming, nested, of the same volume."""
-
-from math import prod
+"""Layers along singular edges: found, conforming, of the same volume."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from forcefit.stiffness.fem.condensation import KINDS, condense
 from forcefit.stiffness.fem.elements import integration, isoparametric, triangle_areas
-from forcefit.stiffness.link import scaled
 from forcefit.stiffness.mesh.edge_grading import (
     layered,
     singular_edges,
@@ -17,14 +13,12 @@ from forcefit.stiffness.mesh.edge_grading import (
 )
 from forcefit.stiffness.mesh.lagrange import FACES
 from forcefit.stiffness.mesh.refine import edges_of
-from forcefit.stiffness.mesh.solid import Solid, boundary_faces
+from forcefit.stiffness.mesh.solid import Solid
 from forcefit.stiffness.surface.primitives import Plane
 from tests.solids_for_tests import (
     Z,
     box_solid,
-    constants,
     masked_solid,
-    outward,
     with_plane_sides,
 )
 
@@ -59,6 +53,31 @@ def test_the_singular_edges_of_an_l_are_its_clamped_outlines_and_the_inner_edge(
     inner = (np.abs(middle[:, :2] - 0.1) < 1e-9).all(axis=1)
     assert (clamped.sum(), inner.sum()) == (8 * len(heights), 3)
     assert edges == {tuple(edge) for edge in ends[clamped | inner]}
+
+
+def bent_plate(angle, unit, way):
+    """A plate of 2 by 1 by 1, bent along the middle by an angle toward y or away."""
+    solid = box_solid((2, 1, 2), (2.0, 1.0, 1.0))
+    x, y, z = solid.points.T
+    points = np.column_stack([x, y + way * np.tan(angle) * np.maximum(x - 1, 0), z])
+    return with_plane_sides(
+        Solid(unit * points, solid.cells, solid.faces, solid.patch,
+              (solid.shapes[0], Plane(unit * Z, Z), None))
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("way", [1, -1])
+def test_inner_edge_of_more_than_35_degrees_is_singular(unit, way):
+    """An edge is an inner one on the side toward which the plate is bent,
+    else an outer one."""
+    for degrees, edges in ((34.0, 0), (36.0, 2), (60.0, 2)):
+        solid = bent_plate(np.radians(degrees), unit, way)
+        found = singular_edges(solid, ())
+        assert len(found) == edges
+        places = solid.points[found] / unit
+        np.testing.assert_allclose(places[..., 0], 1.0)
+        np.testing.assert_allclose(places[..., 1], 1.0 if way > 0 else 0.0, atol=1e-12)
 
 
 def touched(solid, held):
@@ -124,96 +143,3 @@ def test_layers_of_any_union_of_boxes_conform_and_keep_the_volume(kept, held):
     share = sum(kept) / len(kept)
     assert solid.volumes().sum() == pytest.approx(share * SIZE.prod(), rel=1e-12)
     check_layers(solid, held)
-
-
-# --- nested spaces -------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_richer_finite_element_space_lowers_the_stiffness(kind):
-    """On a box the geometry is exact.
-
-    Quadratic fields are a subset of cubic ones, and fields of whole elements of those
-    of their parts; K falls in every direction.
-    """
-    held = (0, 1)
-    solid = split_joining_edges(box_solid((2, 2, 3), (0.05, 0.08, 0.2)), held)
-    parts = layered(solid, held)
-    centers = np.array([[0.025, 0.04, 0], [0.025, 0.04, 0.2]])
-
-    def stiffness(order, parts):
-        mesh = isoparametric(solid, order, parts)
-        return condense(mesh, *constants(mesh), centers, kind).stiffness
-
-    K = {
-        (p, cut): stiffness(p, parts if cut else None) for p in (2, 3) for cut in (0, 1)
-    }
-    order = [(2, 0), (3, 0), (3, 1)], [(2, 0), (2, 1), (3, 1)]
-    for sequence in order:
-        for poor, rich in zip(sequence, sequence[1:], strict=False):
-            values = np.linalg.eigvalsh(scaled(K[poor] - K[rich], K[poor]))
-            assert values[0] > -1e-9
-            assert values[5] > 1e-5 or kind != "rigid"
-
-
-def test_mesh_without_singular_edges_is_not_split():
-    solid = box_solid((2, 2, 3), (0.05, 0.08, 0.2))
-    assert len(singular_edges(solid, ())) == 0
-    assert split_joining_edges(solid, ()).cells.shape == solid.cells.shape
-    mesh = isoparametric(solid, 3, layered(solid, ()))
-    assert len(mesh.nodes) == prod(3 * n + 1 for n in (2, 2, 3))
-
-
-def bent_plate(angle, unit, way):
-    """A plate of 2 by 1 by 1, bent along the middle by an angle toward y or away."""
-    solid = box_solid((2, 1, 2), (2.0, 1.0, 1.0))
-    x, y, z = solid.points.T
-    points = np.column_stack([x, y + way * np.tan(angle) * np.maximum(x - 1, 0), z])
-    return with_plane_sides(
-        Solid(unit * points, solid.cells, solid.faces, solid.patch,
-              (solid.shapes[0], Plane(unit * Z, Z), None))
-    )  # fmt: skip
-
-
-@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
-@pytest.mark.parametrize("way", [1, -1])
-def test_inner_edge_of_more_than_35_degrees_is_singular(unit, way):
-    """An edge is an inner one on the side toward which the plate is bent,
-    else an outer one."""
-    for degrees, edges in ((34.0, 0), (36.0, 2), (60.0, 2)):
-        solid = bent_plate(np.radians(degrees), unit, way)
-        found = singular_edges(solid, ())
-        assert len(found) == edges
-        places = solid.points[found] / unit
-        np.testing.assert_allclose(places[..., 0], 1.0)
-        np.testing.assert_allclose(places[..., 1], 1.0 if way > 0 else 0.0, atol=1e-12)
-
-
-def pyramid(base, triangles):
-    """A pyramid of height 5 whose base is patch 0, on triangles of its corners."""
-    points = np.array([*[[x, y, 0.0] for x, y in base], [0.0, 0.0, 5.0]])
-    apex = len(base)
-    cells = outward(points, np.array([[*corners, apex] for corners in triangles]))
-    faces = boundary_faces(cells)
-    low = (faces < apex).all(axis=1)
-    patch = np.where(low, 0, np.arange(len(faces)) + 1)
-    return Solid(points, cells, faces, patch, (None,) * (len(faces) + 1))
-
-
-@pytest.mark.parametrize(
-    ("base", "triangles"),
-    [
-        # the only edge that joins two singular ones is the shortest of all
-        ([(-0.1, 0), (0.1, 0), (0, 1), (0, -1)], [(0, 1, 2), (0, 1, 3)]),
-        # or the longest
-        ([(-3, 0), (3, 0), (0, 1), (0, -1)], [(0, 1, 2), (0, 1, 3)]),
-        # a face between singular edges alone
-        ([(-1, -1), (1, -1), (0, 1)], [(0, 1, 2)]),
-    ],
-)
-def test_a_clamped_base_is_split_until_no_edge_joins_two_of_its_sides(base, triangles):
-    whole = pyramid(base, triangles)
-    solid = split_joining_edges(whole, (0,))
-    check_chordless(solid, (0,))
-    assert solid.volumes().sum() == pytest.approx(whole.volumes().sum(), rel=1e-12)
-    assert len(solid.cells) > len(whole.cells)

@@ -132,17 +132,6 @@ def test_mesh_with_a_missing_column_is_refused(tmp_path, monkeypatch):
         mesh_solid(surface, *FACES, cache=tmp_path)
 
 
-@pytest.mark.parametrize(
-    ("name", "ways_through", "shells"),
-    [("distal_plain", 0, 1), ("tube", 1, 1), ("delta_forearm", 0, 2)],
-)
-def test_eulers_characteristic_counts_shells_and_holes(name, ways_through, shells):
-    """Two for each shell, also the forearm's cavity, minus two for each hole."""
-    surface = read_surface(Path(__file__).parents[3] / "meshes" / f"{name}.stl")
-    characteristic = euler_characteristic(surface.triangles)
-    assert characteristic == 2 * shells - 2 * ways_through
-
-
 @pytest.mark.parametrize("name", ["distal_plain", "delta_forearm", "l_bracket"])
 def test_coarser_surface_has_fewer_triangles_and_the_same_volume(name):
     """The coarse surface is near the part, has as many holes, and its volume to 1 %.

@@ -1,4 +1,4 @@
-"""Lifted facets: weights of corners, unit normals, fourth-order accuracy, any unit."""
+"""Lifted facets: weights of corners, unit normals, fourth-order accuracy."""
 
 import numpy as np
 import pytest
@@ -29,26 +29,6 @@ def test_lifted_facets_deviate_by_the_fourth_power_of_the_angle(radius):
         np.testing.assert_allclose(distances / radius, lift, atol=a**4)
         np.testing.assert_allclose(np.linalg.norm(gradients, axis=1), 1, rtol=1e-12)
         np.testing.assert_allclose(gradients[:, :2], points[:, :2], atol=a**2)
-
-
-@pytest.mark.parametrize("unit", [1e-6, 1e6])
-def test_lifted_facets_do_not_depend_on_the_unit(unit):
-    """The triangles are unequal, so that angles at corners weigh the normals."""
-    rng = np.random.default_rng(2)
-    x, y = (v.ravel() for v in np.meshgrid([0, 0.1, 0.5, 1.2], [0, 0.7, 0.8]))
-    points = np.column_stack([x, y, 0.1 * rng.normal(size=12)])
-    low = np.array([0, 1, 2, 4, 5, 6])
-    triangles = np.concatenate([
-        np.column_stack([low, low + 1, low + 5]),
-        np.column_stack([low, low + 5, low + 4]),
-    ])
-    one, other = Facets(points, triangles), Facets(unit * points, triangles)
-    np.testing.assert_allclose(one.normals, other.normals, atol=1e-12)
-    np.testing.assert_allclose(np.linalg.norm(one.normals, axis=1), 1, rtol=1e-12)
-    somewhere = rng.uniform([0, 0, -0.1], [1.2, 0.8, 0.1], (20, 3))
-    expected, actual = one.signed(somewhere), other.signed(unit * somewhere)
-    np.testing.assert_allclose(actual[0] / unit, expected[0], atol=1e-5)
-    np.testing.assert_allclose(actual[1], expected[1], atol=1e-4)
 
 
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])

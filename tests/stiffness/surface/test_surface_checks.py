@@ -9,7 +9,6 @@ from forcefit.inputs.table import BadInput
 from forcefit.stiffness.surface import surface as surface_module
 from forcefit.stiffness.surface.surface import (
     Surface,
-    area_vectors,
     check_surface,
     directed_edges,
     read_surface,
@@ -18,17 +17,6 @@ from tests.solids_for_tests import CUBE, CUBE_TRIANGLES, cylinder
 
 TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 CORNERS = 0.1 * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-
-
-def test_area_vector_of_a_triangle_is_its_area_along_its_normal():
-    """Legs 3 and 4 in the plane z = 7: 6 upward; in reverse order, downward."""
-    points = np.array([[1.0, 2, 7], [4, 2, 7], [1, 6, 7]])
-    triangles = np.array([[0, 1, 2], [1, 2, 0], [2, 1, 0]])
-    expected = [[0, 0, 6], [0, 0, 6], [0, 0, -6]]
-    np.testing.assert_allclose(area_vectors(points, triangles), expected, rtol=1e-14)
-    surface = Surface(points, triangles, "legs")
-    assert surface.area == pytest.approx(18)
-    assert surface.diagonal == pytest.approx(5)
 
 
 def test_surface_digest_depends_on_the_geometry_only():

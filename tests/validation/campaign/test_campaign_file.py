@@ -9,7 +9,6 @@ import pytest
 
 from forcefit.assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
-from forcefit.validation.campaign.campaign import number_rows
 from forcefit.validation.campaign.campaign_file import read_campaign
 from tests.campaigns_for_tests import ARM, HEAD, NOISE, ROWS, write_campaign
 
@@ -61,11 +60,6 @@ def test_take_keeps_the_requested_order_and_the_configuration_numbers(tmp_path):
     assert campaign.take(campaign.configuration == 0).ids == ("m1", "m3", "m4")
     assert campaign.take(slice(0, 2)).ids == ("m1", "m2")
     assert len(campaign.take([])) == 0
-
-
-def test_number_rows_counts_by_first_occurrence():
-    numbers = number_rows([2.0, 1.0, 2.0 + 1e-12, -0.0, 0.0], [math.nan] * 5)
-    np.testing.assert_array_equal(numbers, [0, 1, 0, 2, 2])
 
 
 def test_commanded_poses_give_the_commanded_joints(tmp_path):

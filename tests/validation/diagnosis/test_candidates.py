@@ -46,16 +46,6 @@ def one_at(components, shape=LINE):
     return Candidate((part,), "screw", shape)
 
 
-def test_basis_is_orthonormal_and_keeps_zero_columns(sensitivities):
-    s, q = sensitivities
-    columns, mixed = s.basis(("q.one",), LINE)
-    np.testing.assert_allclose(columns.T @ columns / 12, np.eye(2), atol=1e-12)
-    np.testing.assert_allclose(np.array([q**0, q]).T @ mixed, columns, atol=1e-12)
-    columns, mixed = s.basis(("q.two",), CandidateShape("powers", ("1",)))
-    assert not columns.any()
-    assert mixed.tolist() == [[1.0]]
-
-
 @pytest.mark.parametrize("units", [1.0, 1e-12])
 def test_function_parameters_are_named_by_component(sensitivities, units):
     """T x and its standard deviations, for units of any size."""

@@ -56,17 +56,6 @@ def test_drive_that_turns_against_its_load_gets_no_compliance():
     assert first(machine(gives_way(30.0, 2e5), SOFTER, start=1e-6))
 
 
-def test_two_equivalent_effects_are_both_unsupported():
-    """At a constant temperature expansion and length are equivalent."""
-    heat = {"temperature": np.full(8, 5.0)}
-    plain = bar(link=BEAM, **heat)
-    campaign = bar(link=BEAM, measured=fit_of(plain, 1e-3), **heat)
-    both = machine(campaign, LONGER, WARMER)
-    assert not any(supported(both, one) for one in both.unknowns.effects)
-    for one in (LONGER, WARMER):
-        assert first(machine(campaign, one))
-
-
 def test_effect_at_its_bound_is_not_supported():
     """The bound is 5e-4 per kelvin, which no material has."""
     heat = {"temperature": np.full(8, 5.0)}

@@ -49,12 +49,3 @@ def test_load_gain_is_tested_in_recorded_directions_only():
         [("offset.mz",), ("offset.fy",)],
     ]  # fmt: skip
     assert named(conditions_of(bar(link=BEAM)))["load_gain"] == [[("factor",)]]
-
-
-def test_weight_and_base_compliance_are_tested_together_and_by_component():
-    found = named(conditions_of(bar(link=BEAM)))
-    axes = [("g.x",), ("g.y",), ("g.z",)]
-    assert found["self_weight"] == [axes, *([axis] for axis in axes)]
-    base = [(f"compliance.{axis}",) for axis in ("rx", "ry", "rz", "tx", "ty", "tz")]
-    assert found["base_compliance"] == [base, *([one] for one in base)]
-    assert found["geometric_stiffening"] == [[]]

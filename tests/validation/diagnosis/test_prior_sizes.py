@@ -30,21 +30,6 @@ def test_best_prior_sizes_maximise_the_density():
     assert [found.of_group[g] for g in (0, 1)] == pytest.approx(expected, rel=0.05)
 
 
-def test_given_prior_size_is_kept_without_penalty():
-    X, group, z = _case()
-    given, inf = np.full(12, 2.0), np.full(12, np.inf)
-    found = best_sizes(Grouped(X.T @ X, X.T @ z, z @ z, 60, group, given, inf))
-    assert (found.std == 2.0).all()
-    assert found.cost == 0.0
-
-
-def test_prior_sizes_do_not_exceed_their_bound():
-    X, group, z = _case()
-    nan, most = np.full(12, np.nan), np.full(12, 3.0)
-    found = best_sizes(Grouped(X.T @ X, X.T @ z, z @ z, 60, group, nan, most))
-    assert found.std.max() <= 3.0
-
-
 def test_penalty_of_a_prior_size_is_laplaces_approximation():
     # ln of the average over a range R of ln t of exp(-gamma u^2) about its maximum
     for gamma in (1.0, 6.0):

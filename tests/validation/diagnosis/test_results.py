@@ -9,7 +9,6 @@ import pytest
 from forcefit.validation.diagnosis import results as module
 from forcefit.validation.diagnosis.fit import MachineFit
 from forcefit.validation.diagnosis.nuisance import GEOMETRY, SPRINGS
-from forcefit.validation.diagnosis.sequence import Errors, Step
 from forcefit.validation.diagnosis.unknowns import Acting, Small, Unknowns
 from tests.bar_for_tests import LONGER, TURNED, bar
 
@@ -87,14 +86,3 @@ def test_nuisance_parameters_are_listed_by_frame_and_individually():
     assert told["scale"] == {"rotation": 1e-7, "translation": 1e-9}
     assert told["identifiable"] == pytest.approx(0.96)
     assert module.small(one, "nothing") is None
-
-
-def test_step_errors_are_in_metres_or_in_radians_without_positions():
-    errors = Errors(1e-5, 2e-6, 3.0), Errors(float("nan"), 4e-6, 5.0)
-    one = SimpleNamespace(
-        sequence=[Step(f"step {k}", k, e) for k, e in enumerate(errors)]
-    )
-    first, other = module.steps(one)
-    assert (first["kept_aside_rms"], first["unit"]) == (1e-5, "m")
-    assert (other["kept_aside_rms"], other["unit"]) == (4e-6, "rad")
-    assert (first["kept_aside_rotation"], other["kept_aside_sigma"]) == (2e-6, 5.0)

@@ -123,37 +123,6 @@ def test_held_out_readings_change_only_the_stated_errors(found, change):
         assert not again.claimed
 
 
-def test_folds_are_fitted_without_their_held_out_readings(monkeypatch):
-    """Held-out readings are NaN in each fold; the last fit uses all rows."""
-    given, looked = [], []
-
-    class Enough(Exception):
-        pass
-
-    def set_up(campaign, conditions):
-        looked.append(len(campaign))
-        return ()
-
-    def watched(campaign, fitted, *args, **options):
-        given.append((campaign.cells.any(axis=1), fitted))
-        if len(given) < 6:
-            return None, None
-        raise Enough
-
-    monkeypatch.setattr(module, "trace", watched)
-    monkeypatch.setattr(module, "setup_blunders", set_up)
-    campaign = read(commanded(arm(), 20))
-    with pytest.raises(Enough):
-        diagnose(campaign)
-    *folds, (every, _) = given
-    assert every.all()
-    assert looked == [int(seen.sum()) for seen, _ in given]
-    held = [~seen for seen, _ in folds]
-    assert np.array_equal(np.sum(held, axis=0), np.ones(20))
-    for seen, fitted in folds:
-        assert np.array_equal(seen, fitted)
-
-
 def test_saved_robot_keeps_the_measured_point(found, saved):
     """Predictions at another point report the point of identification."""
     point = tuple(found.campaign.reference_point.tolist())

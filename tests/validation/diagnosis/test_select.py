@@ -5,10 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from forcefit.validation.diagnosis.elements import Dense
-from forcefit.validation.diagnosis.search import Search
 from forcefit.validation.diagnosis.select import select
-from forcefit.validation.diagnosis.weighted_readings import WeightedReadings
 from tests.bar_for_tests import BEAM, LENGTH, along, bar, columns_of
 
 ROWS = 40
@@ -81,22 +78,6 @@ def test_search_excludes_outliers(columns):
     selected = found(columns, readings)
     assert selected.hypotheses == selected.functions == ()
     assert (selected.weights < 0.5).sum() == 3
-
-
-def test_joint_scores_of_functions_equal_single_scores(columns):
-    rng = np.random.default_rng(4)
-    z = 5 * rng.normal(size=6 * ROWS)
-    every = np.ones(len(z), dtype=bool)
-    search = Search(WeightedReadings(columns, z, every, np.ones(len(z))))
-    looked = search.scores.look(
-        search.empty[-1], columns.functions.first_look(), most=30
-    )
-    made = [columns.functions.element(f.candidate, 0.0) for f in looked]
-    dense = Dense(made, search.readings.cells, search.readings.whiten)
-    alone = dense.gains(search.empty[-1].marginal)
-    together = np.array([f.score - f.log_prior for f in looked])
-    assert len(looked) > 50
-    assert together == pytest.approx(alone, rel=1e-6)
 
 
 def test_places_visible_only_by_rounding_are_excluded():

@@ -1,22 +1,12 @@
-"""Learned functions and verdicts as readable text."""
+"""Learned functions and tallies as readable text."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 from forcefit.assembly.model.function import Function
-from forcefit.validation.diagnosis import sentence as module
 from forcefit.validation.diagnosis.calibration import Calibration
-from forcefit.validation.diagnosis.holdout import HeldOut
-from forcefit.validation.diagnosis.lack_of_fit import Trend
-from forcefit.validation.diagnosis.sentence import (
-    calibration_text,
-    formula,
-    open_text,
-    sentence,
-)
+from forcefit.validation.diagnosis.sentence import calibration_text, formula
 
 
 def test_formula_of_a_product_names_both_variables():
@@ -68,42 +58,3 @@ def test_formula_of_a_compliance_states_the_factor_of_the_wrench():
     )  # fmt: skip
     expected = "rz = 0.002 drive; tx = 0.003 drive (times the wrench there)"
     assert formula(function) == expected
-
-
-SAID = [
-    ({"verdict": "none_needed"}, "distinguish the residual from noise (7.00 sigma"),
-    ({"verdict": "explained"}, "lacks a and b and springs; on held-out rows the"),
-    ({"verdict": "learned"}, "lacks a and b and t0 and t1 and t2 and t3 (with"),
-    ({"verdict": "ambiguous"}, "these effects: a or nothing or a + b or c; on held"),
-    ({"verdict": "outside_library"}, "sigma, which varies with x0, x1, x2; on held"),
-    ({"verdict": "outside_library", "trends": ()}, "rows, 2.50 sigma; on held"),
-    ({"verdict": "not_enough_rows"}, "distinguish a cause from chance; on held"),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("changes", "expected"), SAID)
-def test_verdict_sentence_states_the_supporting_findings(
-    monkeypatch, changes, expected
-):
-    """At most six names, four sets and three trends."""
-    monkeypatch.setattr(module, "titles", lambda one: [f"t{k}" for k in range(6)])
-    sets = ("a",), (), ("a", "b"), ("c",), ("d",)
-    one = SimpleNamespace(**{
-        "before": SimpleNamespace(normalised=7.0),
-        "noise": SimpleNamespace(normalised=1.0),
-        "after": SimpleNamespace(normalised=1.5), "lack": SimpleNamespace(rms=2.5),
-        "claimed": ("a", "b"), "alternatives": tuple((names, 0.2) for names in sets),
-        "fit": SimpleNamespace(
-            unknowns=SimpleNamespace(small=(SimpleNamespace(name="springs"),))
-        ),
-        "held": HeldOut("split", (np.array([False, True]),), ""), "uncertainty": 0.25,
-        "setup": (),
-        "trends": tuple(Trend(f"x{k}", 0.1, 0.0) for k in range(5)),
-    } | changes)  # fmt: skip
-    assert expected in sentence(one)
-    one.held = HeldOut("none", (np.ones(2, bool),), "")
-    assert "on the fitted rows (too few to hold any out)" in sentence(one)
-
-
-def test_text_states_the_number_of_rows_with_a_free_motion():
-    assert "undetermined in 2 of 3 rows" in open_text(np.array([True, False, True]))

@@ -1,4 +1,4 @@
-"""Conditions of a campaign and tangents of its effects, on a bar by hand."""
+"""Conditions of a campaign and its residual, on a bar by hand."""
 
 from dataclasses import replace
 
@@ -13,11 +13,10 @@ from forcefit.validation.diagnosis.hypotheses import Hypothesis
 from forcefit.validation.diagnosis.signatures import (
     Tangents,
     conditions_of,
-    loaded_components,
     whiten,
 )
 from forcefit.validation.diagnosis.trace import FINITE
-from tests.bar_for_tests import BEAM, LONGER, bar, fit_of
+from tests.bar_for_tests import bar, fit_of
 from tests.planar_arm_for_tests import SIGMA
 
 
@@ -49,12 +48,6 @@ def test_function_of_a_covariate_requires_its_column(name, given):
             conditions_of(campaign)
 
 
-def test_loaded_components_are_those_that_act_in_any_row():
-    loads = np.zeros((8, 6))
-    loads[3, 4], loads[:, 2] = -2.0, 1.0
-    assert loaded_components(replace(bar(), loads=loads)) == ["mz", "fy"]
-
-
 def test_residual_is_reading_minus_declared_prediction():
     """A bar declared 0.1 mm longer, read 0.3 mm longer; some cells not measured."""
     plain = bar()
@@ -80,19 +73,3 @@ def test_visible_effect_without_unknowns_becomes_an_offset():
     exact = predict(replace(tangents.derivatives.conditions, exact=True)).deviation
     assert found.offset == pytest.approx(whiten(campaign, exact) - tangents.declared)
     assert found.columns.shape == (48, 0)
-
-
-@pytest.mark.parametrize("x", [0.0, 3e-4, -2e-3])
-def test_tangent_of_a_length_is_the_same_at_any_value(x):
-    """1 / sigma along the bar, also about zero and together with another effect."""
-    campaign = bar(link=BEAM)
-    tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))
-    expected = whiten(campaign, fit_of(campaign, 1.0))
-    beside = {"encoder_offset": {"drive": 1e-9}}
-    for found in (
-        tangents.at_start(LONGER),
-        tangents.about(LONGER, np.array([x]), {}),
-        tangents.about(LONGER, np.array([x]), beside),
-    ):
-        assert found.columns[:, 0] == pytest.approx(expected, abs=1e-6 * expected.max())
-        assert found.offset == pytest.approx(np.zeros(len(expected)), abs=1e-6)

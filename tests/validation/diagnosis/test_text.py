@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from forcefit.validation.diagnosis import text as module
-from forcefit.validation.diagnosis.diagnosis import Diagnosis
 from forcefit.validation.diagnosis.next_measurement import load_text
 
 NONE = float("nan")
@@ -81,15 +80,6 @@ def test_diagnosis_text_omits_absent_sections(shown):
     ]
 
 
-def test_model_sequence_of_one_step_has_no_reduction(shown):
-    """Where only rotations were read, the rms is one of angles."""
-    declared = step("declared", 0, 2e-6, 7.0, "rad")
-    assert [line.split() for line in shown(**{"ladder": [declared]})[-2:]] == [
-        ["model", "unknowns", "rad", "sigma", "reduction"],
-        ["declared", "0", "2e-06", "7"],
-    ]
-
-
 def test_errors_with_outliers_are_printed_only_for_held_out_outliers(shown):
     """An outlier among the fitted rows is named all the same."""
     fitted = shown(outliers=["m1"])
@@ -99,31 +89,6 @@ def test_errors_with_outliers_are_printed_only_for_held_out_outliers(shown):
     assert "left out as outliers: m1, m3" in aside
     (more,) = [line for line in aside if line.startswith("with outliers")]
     assert more.split() == ["with", "outliers", "8", "2.25", "1.2"]
-
-
-def test_components_without_readings_are_listed_as_not_measured(shown):
-    """They are not printed as 0 +- 0."""
-    missing = ["rx", "ry", "rz", "ty"]
-    assert "not measured: rx, ry, rz, ty" in shown(not_measured=missing)
-    assert not any("not measured" in line for line in shown())
-
-
-def test_text_states_the_measurement_that_would_decide(shown):
-    assert "measurement that would decide: 16 configurations" in shown(
-        needed="16 configurations"
-    )
-
-
-def test_noise_is_printed_only_if_large_or_correlated_in_time(shown):
-    assert not any("scatter" in line or "correlated" in line for line in shown())
-    large = {"findings": ["the residual is large"], "normalised": 1.0}
-    assert "the residual is large" in shown(noise_scale=large)
-    (line,) = [
-        line
-        for line in shown(noise_in_time={"share": 0.35, "constant": 60.0})
-        if "correlated" in line
-    ]
-    assert "35 % of its variance over 60 s" in line
 
 
 def test_text_ends_with_residual_trends_and_the_next_measurement(shown):
@@ -167,20 +132,3 @@ def test_text_lists_effects_and_functions_with_their_values(shown):
         "without the function 5",
         "  2 other places fit equally well",
     ]
-
-
-def test_summary_of_a_diagnosis_names_the_three_most_likely_effects():
-    rows = type("Rows", (), {"name": "arm", "__len__": lambda self: 4})()
-    error = SimpleNamespace(normalised=1.0)
-    one = SimpleNamespace(
-        campaign=rows, verdict="ambiguous", claimed=(), outliers=np.zeros(4, bool),
-        probability={"a": 0.2, "b": 0.9, "c": 0.3, "d": 0.1},
-        before=error, after=error, noise=error,
-    )  # fmt: skip
-    figures = Diagnosis._figures(one)
-    assert figures["likeliest"] == "b 0.900, c 0.300, a 0.200"
-    assert figures["claimed"] == "none"
-    assert figures["campaign"] == "arm, 4 rows"
-    one.probability, one.claimed = {}, ("b", "c")
-    figures = Diagnosis._figures(one)
-    assert (figures["likeliest"], figures["claimed"]) == ("none", "b, c")

@@ -110,14 +110,6 @@ def test_probability_of_every_trend_equals_an_f_test(varied, monkeypatch):
     assert shares == sorted(shares, reverse=True)
 
 
-def test_at_most_six_trends_are_listed(varied, rng):
-    noise = rng.normal(size=(ROWS, 6))
-    lines = {f"c{k}": varied.covariates["humidity"] for k in range(9)}
-    many = replace(varied, covariates=lines)
-    rest = (noise + 5 * lines["c0"][:, None]) * varied.sigma
-    assert len(trends(many, conditions_of(many), rest)) == 6
-
-
 def test_quadratic_trend_is_found_far_from_zero(rng):
     """Temperatures between 1e6 and 1e6 + 1, and times within half a second."""
     x = rng.uniform(0, 1, 40)

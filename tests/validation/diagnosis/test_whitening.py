@@ -39,14 +39,6 @@ def test_cells_are_independent_after_whitening(k):
     assert whiten.inverse(whiten(values)) == pytest.approx(values, rel=1e-10)
 
 
-def test_whitening_with_common_noise_of_zero_scales_only():
-    root = np.random.default_rng(0).uniform(0.2, 2, 11)
-    whiten = whitening(root, np.zeros((11, 6)), VISIT)
-    values = np.arange(22.0).reshape(11, 2)
-    assert np.array_equal(whiten(values), values * root[:, None])
-    assert whiten.log_det == 0.0
-
-
 def two_points(rows=40):
     """The bar with two points of its tip measured together; rows in random order."""
     plain = bar(rows=rows)
@@ -86,12 +78,6 @@ def _reading(campaign):
         screw = np.tile(1e-6 * np.eye(6)[k], (len(campaign), 1))
         columns.append((read(conditions, screw) - read(conditions, -screw)) / 2e-6)
     return np.stack(columns, axis=2)
-
-
-def test_single_point_per_row_has_no_common_noise():
-    campaign = bar()
-    assert platform_motions(campaign, np.zeros((8, 6, 6))) is None
-    assert np.array_equal(size_of_noise(campaign), campaign.sigma)
 
 
 def test_whitened_residual_of_common_noise_is_independent_with_unit_variance():

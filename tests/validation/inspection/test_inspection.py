@@ -7,7 +7,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from forcefit.validation.campaign.campaign_file import read_campaign
-from forcefit.validation.inspection.counts import correlation
 from forcefit.validation.inspection.design_remarks import remarks_on
 from forcefit.validation.inspection.design_signatures import design_signatures
 from forcefit.validation.inspection.inspection import inspect_campaign
@@ -180,12 +179,6 @@ def test_correlated_covariates_are_remarked(rng):
     assert any(
         "time and temperature vary together (correlation +1.00)" in t for t in found
     )
-
-
-def test_correlation_equals_that_of_numpy(rng):
-    x, y = rng.normal(size=(2, 30))
-    assert correlation(x, y) == pytest.approx(np.corrcoef(x, y)[0, 1], rel=1e-12)
-    assert correlation(x, np.ones(30)) == 0.0
 
 
 def test_constant_temperature_does_not_separate_expansion_from_length(tmp_path, rng):
