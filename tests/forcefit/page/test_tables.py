@@ -2,6 +2,8 @@
 
 import re
 
+import pytest
+
 from forcefit.page.comparison import compare, comparison_page
 from forcefit.page.page import Page, Provenance, page
 from forcefit.page.tables import Column, table
