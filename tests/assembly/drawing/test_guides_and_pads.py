@@ -24,6 +24,7 @@ from forcefit.assembly.linear.energy import solve_assembly
 from forcefit.assembly.linear.pose_error import bound_pose_error
 from forcefit.assembly.linear.reference.pose_error import reachable_screws
 from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.model.joint_names import joint_of
 from forcefit.assembly.statistics.clearance_positions import position_clearances
 from forcefit.assembly.statistics.linear_response import linear_response
 from forcefit.validation.crosscheck.crosscheck import crosscheck
@@ -327,3 +328,13 @@ def test_a_guide_is_the_same_in_a_file_of_either_format(version, drawn, tmp_path
     one, other = (zone_margin(own).margin for own in (posture, again))
     assert other == pytest.approx(one, rel=1e-9)
     assert mobility(again).overconstraint == mobility(posture).overconstraint == 5
+
+
+@pytest.mark.parametrize(("kind", "clearance"), [("prismatic", GUIDE), ("planar", PAD)])
+@pytest.mark.parametrize("reverse", [False, True])
+def test_every_frame_of_a_contact_belongs_to_the_drawn_joint(
+    drawn, kind, clearance, reverse
+):
+    robot = one_joint(drawn, kind, clearance, reverse).robot
+    names = {joint_of(robot, row) for row in range(len(robot.frames))}
+    assert names == {"j", "table"}
