@@ -105,7 +105,7 @@ class _JointsKey:
 
 
 def _parts(robot: Robot) -> tuple:
-    """Return the data that determine the virtual joints; links are not copied."""
+    """Return the data for the cache key; links are compared by identity."""
     return tuple(
         (
             f.parent, f.joint, f.pitch, f.actuated, f.clearance, id(f.link),
