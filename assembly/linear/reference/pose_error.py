@@ -165,7 +165,7 @@ class ReachableSet:
         return Support(max(height, float(direction @ screw)), screw, reduced)
 
     def _screw_near(self, v: NDArray) -> NDArray:
-        """Return the (6,) [rad, m] screw of a nearby v that satisfies rows and cones."""
+        """Return the (6,) [rad, m] screw of a nearby v within all rows and cones."""
         # rows are satisfied to rounding, cones to 5e-9 of their size
         start, group = self.start, self.group
         step = v - start
