@@ -1,8 +1,8 @@
-"""Effects that a declared model may lack, each in a separate file.
+"""Effects that a declared model may lack, each in a separate module.
 
-Begin at ``effect.py``, which defines an effect.  Effects are applied in the order of
-:data:`LIBRARY`.  Friction acts on a joint's spring, so drive compliance comes before
-it; the foundation adds a frame, so it comes last.
+Start with ``effect.py``, which defines an effect.  Effects are applied in the order of
+:data:`LIBRARY`.  Friction acts on the spring of a joint, so drive compliance precedes
+it.  The foundation adds a frame, so it is the last effect.
 """
 
 from collections.abc import Mapping

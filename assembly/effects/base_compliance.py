@@ -24,7 +24,8 @@ def on_foundation(conditions: Conditions) -> Conditions:
         conditions: R rows.
 
     Returns:
-        The conditions; the new frame is the first one, unless there was such a frame.
+        The conditions; the new frame is the first frame.  If the robot already has such
+        a frame, the conditions are unchanged.
     """
     feet = [f for f in conditions.robot.frames if f.parent == BASE]
     foot = feet[0]
@@ -73,7 +74,7 @@ def with_foundation(robot: Robot, values: Values) -> Robot:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Return stiffnesses from compliances; those below 0 mean a stiffer foundation."""
+    """Return stiffnesses from compliances; negative ones mean a stiffer foundation."""
     return {
         f"stiffness.{name.removeprefix('compliance.')}": 1 / c
         for name, c in values.items()

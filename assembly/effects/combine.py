@@ -1,7 +1,7 @@
-"""Combination of a declared effect with the difference that a diagnosis found.
+"""Combination of a declared effect with a difference that a diagnosis identified.
 
-Effects act in sequence: first the declared one, then the one that a diagnosis found.
-Both together are a single effect with other parameters: offsets and compliances are
+Effects act in sequence: first the declared one, then the identified one.  Both together
+are equivalent to a single effect with other parameters: offsets and compliances are
 added, factors multiplied, eccentricities added as vectors, rotations of frames
 composed.
 """
@@ -19,14 +19,15 @@ Effects = Mapping[str, Values]
 
 
 def combined(declared: Effects, found: Effects) -> dict[str, dict[str, float]]:
-    """Return the effects of a robot's file combined with effects found in addition.
+    """Return the effects of a robot's file combined with additional effects.
 
     Args:
         declared: for each effect of the file its parameters by public name.
-        found: the same for effects that act after the declared ones.
+        found: for each additional effect, which acts after the declared one, its
+            parameters by public name.
 
     Returns:
-        Parameters of every effect that is equivalent to both in sequence.
+        Parameters of the single effects that are equivalent to both in sequence.
 
     Raises:
         ValueError: no single effect is equivalent, as for two contact laws in one
@@ -48,7 +49,7 @@ def _sum(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _in_series(declared: Values, found: Values) -> dict[str, float]:
-    """Return the stiffnesses of springs in series; an absent one is rigid."""
+    """Return the stiffnesses of springs in series; a missing spring is rigid."""
     both = {k: 1 / v for k, v in declared.items()}
     for k, v in found.items():
         both[k] = both.get(k, 0.0) + 1 / v
@@ -112,7 +113,7 @@ def _contact(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _delayed(declared: Values, found: Values) -> dict[str, float]:
-    """Return the expansions, which must differ in body or have one time constant."""
+    """Return the expansions; for one body, the time constants must be equal."""
     both = _sum(declared, found)
     for key in set(declared) & set(found):
         if key.endswith(".time_constant"):

@@ -1,7 +1,7 @@
 """Forms of a function of one or two variables.
 
-A form is linear in most of its coefficients: each of them multiplies one column, so
-that a fit finds them all together.  The other parameters, its *shapes* (a time
+A form is linear in most of its coefficients: each coefficient multiplies one column, so
+a fit determines all of them together.  The other parameters, called *shapes* (a time
 constant, a period), change the columns nonlinearly.
 
 ========== ============================== =====================================
@@ -79,7 +79,7 @@ class Form:
     least: int = 1
 
     def is_column(self, name: str, variables: int) -> bool:
-        """Return whether a name is a column of the form with so many variables."""
+        """Return whether a name is a column of the form for a number of variables."""
         head, word = name, ""
         if self.words != ("",):
             head, _, word = name.rpartition(".")

@@ -1,9 +1,9 @@
 """Formulas written by users: a small grammar, evaluated without executing code.
 
-It has numbers, names, ``+ - * / **``, brackets, ``pi`` and the functions below.  Units
-are checked: the terms of a sum must have equal units, and the argument of a function
-must be a pure number (rad counts as one).  The units of the parameters follow from
-this.
+The grammar allows numbers, names, ``+ - * / **``, brackets, ``pi`` and the functions
+below.  Units are checked: the terms of a sum must have equal units, and the argument of
+a function must be a pure number (rad counts as a pure number).  The units of the
+parameters follow from these conditions.
 
 Sources:
     Kennedy, Relational Parametricity and Units of Measure, POPL 1997 (units of

@@ -1,9 +1,9 @@
-"""A frame of a manipulator: one body and the joint at its far end.
+"""A frame of a manipulator: one body and the joint at the body's far end.
 
-The body reaches from the parent to the frame (``docs/robot_files.md``).  Small screws
-act at the frame in the paper's order, in its axes: geometric error, link deformation,
-joint clearance, joint deformation; then the joint's own motion about or along its z
-carries the children.
+The body connects the parent to the frame (``docs/robot_files.md``).  Small screws act
+at the frame, in its axes and in the paper's order: geometric error, link deformation,
+joint clearance, joint deformation.  The motion of the joint about or along its z axis
+follows and moves the child frames.
 """
 
 import math
@@ -41,16 +41,16 @@ FORCE_CONTROL = (
 class Clearance:
     """Bounds of a joint's clearance, the paper's c-bar of eqs. (1)-(5).
 
-    ``None`` means "not given": no clearance, except along the free motion of a passive
-    joint, where it means unbounded.
+    ``None`` means that a bound is not given: there is no clearance in this direction,
+    except along the free motion of a passive joint, which is then unbounded.
 
     Attributes:
         radial: [m] radius of the disc for (TX, TY), eq. (2).
         axial: [m] bound of abs(TZ), eq. (3).
         tilt: [rad] radius of the disc for (RX, RY), eq. (4).
         spin: [rad] bound of abs(RZ), eq. (5).
-        ball: [m] radius of the ball for (TX, TY, TZ), in place of ``radial`` and
-            ``axial``: a ball in its socket.
+        ball: [m] radius of the ball for (TX, TY, TZ), which replaces ``radial`` and
+            ``axial`` for a ball joint.
     """
 
     radial: float | None = None
@@ -70,16 +70,19 @@ LEFT = ("least", "uniform")  # rules for the position in which a joint is bolted
 
 @dataclass(frozen=True, eq=False)
 class LockedAt:
-    """A fixed joint with clearance that is bolted at one pose and rigid afterwards.
+    """Fixed joint with clearance that is bolted at one pose and rigid afterwards.
 
     Attributes:
-        clearance: before it is bolted.
+        clearance: clearance before the joint is bolted.
         pose: components ``tx .. rz`` [m, rad] of the platform at that pose.
-        joints: or coordinates [rad or m] of drives; home if both are empty.
-        left: where the fitter leaves drawn machines: ``"least"``, the least sum of
-            squares among the positions of least energy, or ``"uniform"``, any of them.
-        screw: (6,) [rad, m] clearance that is locked in; it is part of the geometric
-            error.  Computed by :func:`forcefit.assembly.steps.bolted.bolt_joints`.
+        joints: coordinates [rad or m] of drives instead of a pose; the home pose is
+            used if both are empty.
+        left: position at which joints of drawn machines are bolted: ``"least"`` for the
+            least sum of squares among the positions of least energy, ``"uniform"`` for
+            a random position among them.
+        screw: (6,) [rad, m] clearance that remains after bolting and is part of the
+            geometric error.  It is computed by
+            :func:`forcefit.assembly.steps.bolted.bolt_joints`.
     """
 
     clearance: Clearance
@@ -102,33 +105,36 @@ class Frame(EqualData):
     """One body and the joint at its far end; see the head of this module.
 
     Attributes:
-        name: unique; dots group by leg.
+        name: unique name; dots group frames by leg.
         parent: name of the parent frame, or ``"base"``.
         translation: (3,) [m] origin seen from the parent's frame after its joint.
-        rotation: (3,) [rad] rotation vector of the axes, seen from there too.
-        joint: ``"fixed"``, ``"revolute"`` or ``"prismatic"``, about or along own z, or
-            ``"helical"``, both together; its coordinate is the angle.
-        actuated: whether the joint is locked at a command; otherwise its motion is
-            free.
+        rotation: (3,) [rad] rotation vector of the axes seen from the same frame.
+        joint: ``"fixed"``, ``"revolute"`` about z, ``"prismatic"`` along z, or
+            ``"helical"`` about and along z; the coordinate of a helical joint is its
+            angle.
+        actuated: whether a drive fixes the joint at a command; otherwise it moves
+            freely.
         position: [rad or m] joint coordinate in the home pose.
-        limits: [rad or m] least and largest coordinate that may be commanded, or None.
+        limits: [rad or m] least and largest permitted coordinate, or None.
         geometric_error: (6,) [rad, m] delta l.
         tolerance: (6,) [rad, m] standard deviations of delta l about the given value, 0
-            where it is exact; None if unknown.
+            for exact components; None if unknown.
         clearance: clearance of the joint; None if it has none.
-        locked_at: where the joint is bolted, with its clearance before; None if it is
-            not.
-        joint_stiffness: (6, 6) K_B with ``inf`` on the diagonal where rigid, or None;
-            0 along a passive joint's own motion (its row and column) leaves it free.
-        drive_force: [N m or N] with which a drive pushes a passive joint along its
-            motion, independent of its coordinate; positive where the coordinate grows.
-        link: elasticity of the body, None if rigid.
-        mass: [kg] of the body in addition to its link's own.
-        centre_of_mass: (3,) [m] of that mass, in the frame's axes.
-        inertia: (3, 3) [kg m^2] of that mass about its centre, in the frame's axes;
-            symmetric, its principal moments those of a body.
-        pitch: [m] translation of a helical joint in a turn, positive for a right-hand
-            thread; 0 of other joints.
+        locked_at: pose at which the joint is bolted, with its clearance before bolting;
+            None if the joint is not bolted.
+        joint_stiffness: (6, 6) K_B with ``inf`` on the diagonal for rigid directions,
+            or None; zeros in the row and column of a passive joint's motion leave the
+            motion free.
+        drive_force: [N m or N] force of a drive on a passive joint along its motion,
+            which does not depend on its coordinate; positive in the direction of
+            increasing coordinate.
+        link: elasticity of the body; None if rigid.
+        mass: [kg] mass of the body in addition to the mass of its link.
+        centre_of_mass: (3,) [m] centre of that mass, in the frame's axes.
+        inertia: (3, 3) [kg m^2] moments of inertia of that mass about its centre, in
+            the frame's axes; symmetric and physically possible.
+        pitch: [m] translation of a helical joint per turn, positive for a right-hand
+            thread; 0 for other joints.
     """
 
     name: str
@@ -189,18 +195,18 @@ class Frame(EqualData):
             fault = inertia_fault(self.inertia)
             if fault:
                 raise BadInput(f"frame {quoted(self.name)}.inertia: {fault}")
-            # files have the upper triangle
+            # files contain only the upper triangle
             J = locked((self.inertia + self.inertia.T) / 2, (3, 3), "inertia")
             object.__setattr__(self, "inertia", J)
 
     @cached_property
     def _hash(self) -> int:
-        # what differs in random errors and identified geometries
+        # these numbers differ between random errors and identified geometries
         numbers = self.translation.tobytes() + self.geometric_error.tobytes()
         return hash((self.name, numbers))
 
     def _figures(self) -> Figures:
-        """Return the fields in short; the rarest only where they are not zero."""
+        """Return the fields in short form; rarely used ones only if not zero."""
         shown = {f.name: brief(getattr(self, f.name)) for f in fields(self)[1:]}
         for name in ("drive_force", "pitch"):
             if not getattr(self, name):
@@ -212,7 +218,7 @@ class Frame(EqualData):
 
     @property
     def passive(self) -> bool:
-        """Whether the joint is passive: mobile but not driven."""
+        """Whether the joint moves and is not driven."""
         return self.joint != "fixed" and not self.actuated
 
     @property
@@ -222,7 +228,7 @@ class Frame(EqualData):
 
     @property
     def resistance(self) -> NDArray | None:
-        """(6, 6) joint's K_B, None if rigid; free along a passive joint's motion."""
+        """(6, 6) K_B of the joint, zero along a passive motion; None if rigid."""
         if self.joint_stiffness is not None or not self.passive:
             return self.joint_stiffness
         K = np.full(6, np.inf)
@@ -231,32 +237,32 @@ class Frame(EqualData):
 
     @property
     def lead(self) -> float:
-        """[m/rad] translation of a helical joint per angle, 0 of others."""
+        """[m/rad] translation of a helical joint per angle, 0 for other joints."""
         return self.pitch / (2 * math.pi)
 
     @property
     def turns(self) -> bool:
-        """Whether the coordinate is an angle: of a revolute or helical joint."""
+        """Whether the coordinate is an angle: for revolute and helical joints."""
         return self.joint in {"revolute", "helical"}
 
     @property
     def own_axis(self) -> int:
-        """Index of the joint's own component of a screw: RZ, or TZ if prismatic.
+        """Index of the component of a screw that is the joint's motion: RZ or TZ.
 
-        RZ of a helical joint is its whole motion, the translation included
-        (:func:`forcefit.assembly.model.links.motion_map`).
+        TZ applies to prismatic joints.  RZ of a helical joint is its whole motion,
+        including the translation (:func:`forcefit.assembly.model.links.motion_map`).
         """
         return 5 if self.joint == "prismatic" else 2
 
     @property
     def own_stiffness(self) -> float | None:
-        """[N m/rad or N/m] K_B along the joint's motion, None without K_B."""
+        """[N m/rad or N/m] K_B along the joint's motion; None without K_B."""
         K = self.joint_stiffness
         return None if K is None else float(K[self.own_axis, self.own_axis])
 
     @property
     def springs(self) -> NDArray | None:
-        """(6, 6) K_B of the springs: ``inf`` also along a free motion."""
+        """(6, 6) K_B of the springs, with ``inf`` along a free motion."""
         K = self.joint_stiffness
         if K is None or self.compliant or not self.passive:
             return K
@@ -280,9 +286,9 @@ def locked(value: ArrayLike, shape: tuple[int, ...], whose: str) -> NDArray:
     """Return a read-only copy of an array.
 
     Args:
-        value: the array, or a list that makes one.
+        value: the array, or a list of numbers.
         shape: the required shape.
-        whose: beginning of the message.
+        whose: name of the array, with which the error message begins.
 
     Returns:
         The array of floats.
@@ -300,7 +306,7 @@ def locked(value: ArrayLike, shape: tuple[int, ...], whose: str) -> NDArray:
 
 
 def between_origins(frame: Frame) -> NDArray:
-    """Return (3,) [m] vector from the parent's origin to the frame's, in its axes."""
+    """Return the (3,) [m] vector from parent's to frame's origin, in frame axes."""
     return np.asarray(rotation_matrix(frame.rotation).T @ frame.translation)
 
 
@@ -308,7 +314,7 @@ def beam_axis(frame: Frame) -> tuple[float, NDArray]:
     """Return the length and direction of a frame's beam.
 
     Args:
-        frame: one with a :class:`BeamLink`.
+        frame: frame whose link is a :class:`BeamLink`.
 
     Returns:
         [m] length, and (3,) unit vector from base to tip in the frame's axes.
@@ -321,7 +327,7 @@ def beam_axis(frame: Frame) -> tuple[float, NDArray]:
     if frame.link.length is not None and frame.link.axis is not None:
         axis = np.array(frame.link.axis)
         return frame.link.length, axis / np.linalg.norm(axis)
-    # a revolute parent rotates the beam about its start, which changes neither
+    # a revolute parent rotates the beam about its start: length and direction remain
     along = between_origins(frame)
     length = math.sqrt(along @ along)
     if length == 0.0:

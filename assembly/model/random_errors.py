@@ -1,4 +1,4 @@
-"""Geometric errors drawn at random as in the paper's section IV, with a seed."""
+"""Random geometric errors as in the paper's section IV, from a seed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,13 +16,13 @@ class ErrorDraw:
     """Parameters of a draw of geometric errors delta l.
 
     Attributes:
-        frames: names of the frames that get an error, in the order of drawing.
+        frames: names of the frames with an error, in the order of drawing.
         least: (6,) [rad, m] smallest size of each component.
-        most: (6,) [rad, m] largest size.
+        most: (6,) [rad, m] largest size of each component.
         seed: seed of the random numbers.
-        signs: ``"literal"``, all positive as the paper's interval reads, or
-            ``"signed"``, the same sizes with random signs.  The paper does not state
-            which; the median energy differs five-fold.
+        signs: ``"literal"`` for positive errors, as the paper's interval is printed, or
+            ``"signed"`` for the same sizes with random signs.  The paper does not state
+            which is meant; the median energies differ by a factor of five.
     """
 
     frames: tuple[str, ...]
@@ -35,19 +35,19 @@ class ErrorDraw:
 def draw_errors(robot: Robot, draw: ErrorDraw) -> NDArray:
     """Return the errors of one draw.
 
-    Sizes are uniform between ``least`` and ``most``, frame by frame.  The signs come
-    from the same generator afterwards, so both conventions have equal sizes.
+    Sizes are uniform between ``least`` and ``most``, frame by frame.  The signs are
+    drawn afterwards from the same generator, so both conventions have equal sizes.
 
     Args:
         robot: robot of n frames.
         draw: frames, sizes, seed and signs.
 
     Returns:
-        (n, 6) [rad, m]; zero for frames without a drawn error.
+        (n, 6) [rad, m] errors; zero for frames without a drawn error.
 
     Raises:
-        BadInput: a frame is not the robot's.
-        ValueError: ``signs`` is neither of the two.
+        BadInput: a frame does not exist in the robot.
+        ValueError: ``signs`` is unknown.
     """
     if draw.signs not in SIGNS:
         raise ValueError(f"signs is {draw.signs!r}, expected one of {SIGNS}")
@@ -62,7 +62,7 @@ def draw_errors(robot: Robot, draw: ErrorDraw) -> NDArray:
 
 
 def frames_named(robot: Robot, names: Sequence[str]) -> tuple[str, ...]:
-    """Return frames by full name, or by the part after a leg's dot in every leg.
+    """Return frames by full name, or by the part after the dot in every leg.
 
     Args:
         robot: any robot.
@@ -78,5 +78,5 @@ def frames_named(robot: Robot, names: Sequence[str]) -> tuple[str, ...]:
     chosen = set()
     for name in names:
         fits = {k for k in known if k == name or k.split(".", 1)[-1] == name}
-        chosen |= fits or {known[robot.index(name)]}  # index() names the nearest
+        chosen |= fits or {known[robot.index(name)]}  # index() suggests a similar name
     return tuple(k for k in known if k in chosen)

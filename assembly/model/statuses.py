@@ -1,6 +1,6 @@
 """Statuses of points and verdicts of comparisons, with their meanings.
 
-A status says whether a point has a result; a verdict says how good a result is.
+A status states whether a point has a result.  A verdict rates a result.
 """
 
 OK = "ok"

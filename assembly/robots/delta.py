@@ -91,7 +91,7 @@ def drive_angle(
         position: (3,) [m] position of the platform.
 
     Returns:
-        [rad] the drive's coordinate.
+        [rad] coordinate of the drive.
 
     Raises:
         BadInput: the leg does not reach the position.
