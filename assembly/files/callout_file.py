@@ -1,7 +1,7 @@
 """Tolerances of features in robot files: ``[[tolerance]]``.
 
-In a file of frames a feature is a frame, in a file of bodies a joint of the body; see
-``docs/drawing_tolerances.md``.
+In a file of frames, a feature is a frame.  In a file of bodies, a feature is a joint of
+the body.  See ``docs/drawing_tolerances.md``.
 """
 
 from collections.abc import Callable, Iterator
@@ -33,14 +33,14 @@ Vector = tuple[float, float, float]
 _Z = (0.0, 0.0, 1.0)
 _ORIGIN = (0.0, 0.0, 0.0)
 _LARGEST_CP = 5.0
-_ACROSS = 1e-3  # largest cosine of two directions at right angles
+_ACROSS = 1e-3  # largest cosine of two perpendicular directions
 _NOT_ACROSS = "found one that is not at right angles to the axis, expected 90 deg"
-_SIZES = {"axis": 1, "plane": 2, "point": 0}  # numbers of "extent"
+_SIZES = {"axis": 1, "plane": 2, "point": 0}  # count of numbers in "extent"
 _EXTENTS = {
     "axis": 'the length of the bore, such as "20 mm"',
     "plane": 'two sizes of the face, such as ["40 mm", "30 mm"]',
 }
-# words that a shape cannot have
+# keys that a shape cannot have
 _EXCLUDED = {
     "axis": ("profile",),
     "plane": ("coaxiality",),
@@ -52,14 +52,14 @@ def read_frame_callouts(root: Table, frames: list[str]) -> tuple[Callout, ...]:
     """Return the callouts of a file of frames.
 
     Args:
-        root: its root table.
+        root: root table of the file.
         frames: names of the frames.
 
     Returns:
-        In the order of the file; whether they fit the geometry is not checked.
+        Callouts in the order of the file, not checked against the geometry.
 
     Raises:
-        BadInput: a rule of the format is broken.
+        BadInput: the file violates a rule of the format.
     """
     found = []
     for table in root.tables("tolerance"):
@@ -80,18 +80,19 @@ def read_frame_callouts(root: Table, frames: list[str]) -> tuple[Callout, ...]:
 def read_drawn_callouts(
     copied: Copy, bodies: list[DrawnBody], joints: list[DrawnJoint]
 ) -> Iterator[DrawnCallout]:
-    """Return the callouts of the bodies of a copy, and of the base.
+    """Yield the callouts of the bodies in a copy of a leg, and of the base.
 
     Args:
-        copied: a copy of a leg, or the robot's own bodies.
-        bodies: of the whole robot.
-        joints: of the whole robot.
+        copied: a copy of a leg, or the bodies that belong to no leg.
+        bodies: bodies of the whole robot.
+        joints: joints of the whole robot.
 
     Yields:
-        Callouts whose features and datums are joints, directions in base axes at home.
+        Callouts whose features and datums are joints; directions are in base axes in
+        the home pose.
 
     Raises:
-        BadInput: a rule of the format is broken.
+        BadInput: the file violates a rule of the format.
     """
     owners = [(copied.prefix + t.content["name"], t)
               for t in copied.table.tables("body")]  # fmt: skip
@@ -105,7 +106,7 @@ def read_drawn_callouts(
 def _drawn(
     table: Table, copied: Copy, body: str, joints: list[DrawnJoint]
 ) -> DrawnCallout:
-    """The callouts of one joint of a body."""
+    """Return the callouts of one joint of a body."""
     here = {j.name: j for j in joints if body in (j.first, j.second)}
     short = body.removeprefix(copied.prefix)
 
@@ -140,7 +141,7 @@ def _drawn(
 def _check_direction(
     table: Table, direction: Vector, feature: DrawnJoint, body: str
 ) -> None:
-    """Refuse a direction, base axes, that is not across the axis of a bore."""
+    """Raise BadInput if a direction is not perpendicular to the axis of a bore."""
     if feature.kind == "planar":
         fault = "found one of a face, whose sizes are along the joint's x and y"
         raise table.bad("direction", f"{fault}; expected none")
@@ -151,7 +152,7 @@ def _check_direction(
 
 
 def _datum_list(table: Table) -> list:
-    """The datums as written: at least one, at most three."""
+    """Return the datums as written: at least one, at most three."""
     value = table.require("datums", "names of features, A first")
     if not isinstance(value, list) or not 1 <= len(value) <= 3:
         fault = f"found {describe(value)}, expected a list of one to three names"
@@ -160,7 +161,7 @@ def _datum_list(table: Table) -> list:
 
 
 def _datum(table: Table, value: Any, frames: list[str]) -> Datum:
-    """A datum: the name of a frame, or a table with shape and axis."""
+    """Return a datum from the name of a frame, or from a table with shape and axis."""
     if isinstance(value, dict):
         inner = Table(value, table.file, f"{table.place}.datums")
         name = inner.text("frame", expected="the name of a frame")
@@ -177,7 +178,7 @@ def _datum(table: Table, value: Any, frames: list[str]) -> Datum:
 
 
 def _check_known(table: Table, key: str, name: str, frames: list[str]) -> None:
-    """Refuse a name that is not that of a frame."""
+    """Raise BadInput if a name is not the name of a frame."""
     if name not in frames:
         fault = f"found {quoted(name)}, expected the name of a frame"
         raise table.bad(key, fault + nearest(name, frames))
@@ -187,7 +188,7 @@ def _callout(
     table: Table, name: str, feature: str, datums: tuple[Datum, ...], shape: str,
     after: bool, axis: Vector | None,
 ) -> Callout:  # fmt: skip
-    """The keys that both formats have."""
+    """Return a callout from the keys that both formats have."""
     if len(set(datums)) < len(datums):
         names = [datum.frame for datum in datums]
         raise table.bad("datums", f"found {names}, expected each datum once")
@@ -218,7 +219,7 @@ def _callout(
 
 
 def _widths(table: Table, shape: str) -> tuple[dict[str, float], str]:
-    """The widths of the zones, and the hole whose position is at maximum material."""
+    """Return the widths of the zones, and the hole with maximum material condition."""
     widths: dict[str, float] = {}
     used = False
     hole = table.text("hole", "") if table.has("hole") else ""
@@ -244,7 +245,7 @@ def _widths(table: Table, shape: str) -> tuple[dict[str, float], str]:
 
 
 def _check_widths(table: Table, widths: dict[str, float]) -> None:
-    """Refuse an orientation zone that is not smaller than the location's."""
+    """Raise BadInput if an orientation zone is not smaller than the location zone."""
     located = [widths[w] for w in LOCATIONS if w in widths]
     for word in ORIENTATIONS:
         if word in widths and located and not widths[word] < min(located):
@@ -254,7 +255,7 @@ def _check_widths(table: Table, widths: dict[str, float]) -> None:
 
 
 def _extent(table: Table, shape: str, widths: dict[str, float]) -> tuple[float, ...]:
-    """[m] the length of a bore, or the sizes of a face."""
+    """Return the length [m] of a bore, or the side lengths [m] of a face."""
     count = _SIZES[shape]
     if not table.has("extent"):
         if widths and count:
@@ -273,7 +274,7 @@ def _extent(table: Table, shape: str, widths: dict[str, float]) -> tuple[float, 
 
 
 def _across(table: Table, axis: Vector | None) -> Vector | None:
-    """Unit vector in which the zones are, at right angles to a known axis."""
+    """Return the unit vector of the zones' direction, perpendicular to a known axis."""
     direction = _direction(table, "direction")
     if direction is not None and axis is not None:
         if abs(float(np.dot(direction, axis))) > _ACROSS:
@@ -282,14 +283,14 @@ def _across(table: Table, axis: Vector | None) -> Vector | None:
 
 
 def _point(table: Table) -> Vector:
-    """[m] the middle of a feature in its frame's axes."""
+    """Return the middle of a feature [m] in its frame's axes."""
     default = np.zeros(3)
     x, y, z = table.array("at", (3,), "m", default, largest=LARGEST_LENGTH).tolist()
     return x, y, z
 
 
 def _direction(table: Table, key: str) -> Vector | None:
-    """A unit vector, None if absent."""
+    """Return a unit vector; None if the key is absent."""
     if not table.has(key):
         return None
     vector = table.array(key, (3,), "direction", largest=LARGEST_LENGTH)
@@ -301,7 +302,7 @@ def _direction(table: Table, key: str) -> Vector | None:
 
 
 def _parsed(table: Table, key: str, parse: Callable[[Any], Parsed]) -> Parsed:
-    """The value of a key by a function that refuses what it is not."""
+    """Return the value of a key, parsed by a function that raises for wrong values."""
     try:
         return parse(table.content[key])
     except BadInput as error:
@@ -347,7 +348,7 @@ def callout_table(callout: Callout) -> dict[str, Any]:
 
 
 def _datum_value(datum: Datum) -> str | dict[str, Any]:
-    """A datum as it is written."""
+    """Return a datum as written in a file."""
     if datum == Datum(datum.frame):
         return datum.frame
     table = {"frame": datum.frame, "shape": datum.shape, "axis": list(datum.axis)}

@@ -1,4 +1,4 @@
-"""Links of bodies in files of ``format = 2``: units, and beams along a curve."""
+"""Links of bodies in files of ``format = 2``: lengths with units, and curved beams."""
 
 from dataclasses import dataclass
 from typing import Any, NoReturn
@@ -18,32 +18,33 @@ _LENGTHS = ("radius", "inner_radius", "width", "height", "length", "wall", "web"
             "flange")  # fmt: skip
 _CURVE = ("curve", "young", "poisson", "density", "theory")
 _KINDS = ("beam", "curve", "stiffness", "mesh", "library")
-_GAP = 1e-6  # [1] of the beam's reach by which it may miss the joint at its end
+_GAP = 1e-6  # [-] accepted distance from the end joint, relative to the beam's reach
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A beam along a curve, by its table.
+    """Table of a beam along a curve.
 
     Attributes:
-        table: of the link; its keys are checked when the joints' points are known.
+        table: table of the link; its keys are checked when the joints' points are
+            known.
     """
 
     table: Table
 
 
 def read_drawn_link(body: Table) -> Link | Curve | None:
-    """The link of a body.
+    """Return the link of a body.
 
     Args:
-        body: its table, whose texts with units become numbers.
+        body: table of the body; texts with units in it are replaced by numbers.
 
     Returns:
-        The link as a robot file has it, directions in base axes at home; a curve, or
-        None for a rigid body.
+        The link, with directions in base axes in the home pose; a curve; or None for a
+        rigid body.
 
     Raises:
-        BadInput: a rule of the format is broken.
+        BadInput: the table violates a rule of the format.
     """
     link = body.content.get("link")
     if isinstance(link, dict) and not set(_KINDS) & set(link):
@@ -61,7 +62,7 @@ def read_drawn_link(body: Table) -> Link | Curve | None:
 
 
 def _refuse_no_kind(link: Table) -> NoReturn:
-    """Reject a link without its kind, which may be misspelt."""
+    """Raise BadInput for a link without a known kind, which can be misspelt."""
     unknown = [key for key in link.content if key not in (*_CURVE, "pieces", "up")]
     if unknown:
         hint = nearest(unknown[0], _KINDS)
@@ -71,7 +72,7 @@ def _refuse_no_kind(link: Table) -> NoReturn:
 
 
 def _plain_lengths(content: dict[str, Any], body: Table, place: str) -> None:
-    """Lengths of a section as numbers."""
+    """Replace texts with units in a section by numbers."""
     inner = Table(content, body.file, f"{body.place}.{place}")
     for key in _LENGTHS:
         without_units(inner, key, "length")
@@ -80,19 +81,20 @@ def _plain_lengths(content: dict[str, Any], body: Table, place: str) -> None:
 def curve_link(
     curve: Curve, start: NDArray, tip: NDArray
 ) -> tuple[MatrixLink, float, NDArray, NDArray]:
-    """Return stiffness and mass of a beam along a curve between two joints.
+    """Return the stiffness and mass of a beam along a curve between two joints.
 
     Args:
-        curve: as read.
-        start: (3,) [m] point of the joint at which it begins, axes of the file.
-        tip: (4, 4) point and axes of the joint at its end, axes of the file.
+        curve: curve as read.
+        start: (3,) [m] point of the joint at the beam's start, axes of the file.
+        tip: (4, 4) point and axes of the joint at the beam's end, axes of the file.
 
     Returns:
-        The stiffness at the tip in its axes, [kg], (3,) [m] centre of the beam and its
-        (3, 3) [kg m^2] about the centre; no mass without a density.
+        The stiffness at the tip in the tip's axes; the mass [kg]; the centre (3,) [m];
+        and the moments of inertia (3, 3) [kg m^2] about the centre.  The mass is zero
+        without a density.
 
     Raises:
-        BadInput: a piece or a material is not proper, or the curve ends elsewhere.
+        BadInput: a piece or a material is invalid, or the curve ends at another point.
     """
     table = curve.table
     young = table.number("young", "Pa", above=0.0, largest=LARGEST)

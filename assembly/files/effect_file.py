@@ -20,15 +20,15 @@ def with_effects(robot: Robot, tables: Sequence[Table]) -> Robot:
     """Return a robot with the effects of its file.
 
     Args:
-        robot: robot of the same file, without them.
-        tables: every ``[[effect]]``.
+        robot: robot of the same file, without effects.
+        tables: every ``[[effect]]`` table.
 
     Returns:
-        The robot.
+        The robot with effects.
 
     Raises:
-        BadInput: an unknown effect or parameter, an effect given twice or at a frame
-            where it cannot act, or a value that is not a finite number.
+        BadInput: an effect or parameter is unknown, an effect is given twice or at a
+            frame where it cannot act, or a value is not a finite number.
     """
     everywhere: dict[str, Values] = {}
     sessions: dict[str, dict[str, Values]] = {}
@@ -86,7 +86,7 @@ def effect_tables(robot: Robot) -> list[dict[str, Any]]:
         robot: any robot.
 
     Returns:
-        One table each; :func:`with_effects` reads them back to the same effects.
+        One table per effect, from which :func:`with_effects` reads the same effects.
     """
 
     def listed(
@@ -104,11 +104,11 @@ def effect_tables(robot: Robot) -> list[dict[str, Any]]:
 
 
 def parameter_names(robot: Robot, effect: str) -> tuple[str, ...]:
-    """Return the public names of all parameters that an effect may have on a robot.
+    """Return the public names of all parameters that an effect can have on a robot.
 
     Args:
         robot: any robot.
-        effect: a name of the library.
+        effect: name of an effect in the library.
 
     Returns:
         Names such as ``"leg1.drive"`` or ``"g.z"``.

@@ -1,4 +1,4 @@
-"""``[[effect]]`` named ``function`` of a robot file, read and written."""
+"""Reading and writing of an ``[[effect]]`` named ``function`` in a robot file."""
 
 import math
 from collections.abc import Mapping
@@ -38,15 +38,15 @@ def read_function(table: Table, robot: Robot) -> Function:
     """Return one general effect.
 
     Args:
-        table: an ``[[effect]]`` whose name is ``function``.
+        table: an ``[[effect]]`` table whose name is ``function``.
         robot: robot of the same file.
 
     Returns:
         The function, completely checked.
 
     Raises:
-        BadInput: an unknown place, component, variable, form or parameter, a missing
-            one, or a formula that is invalid or has inconsistent units.
+        BadInput: a place, component, variable, form or parameter is unknown or missing,
+            or a formula is invalid or has inconsistent units.
     """
     label = table.text("label", "", longest=200)
     if label:
@@ -89,7 +89,7 @@ def read_function(table: Table, robot: Robot) -> Function:
 
 
 def _words(table: Table, key: str, most: int) -> tuple[str, ...]:
-    """Return distinct names, at least one."""
+    """Return one or more distinct names."""
     value = table.require(key, f"1 to {most} names")
     if isinstance(value, list) and all(isinstance(v, str) for v in value):
         if 1 <= len(value) <= most and len(set(value)) == len(value):
@@ -108,7 +108,7 @@ def _numbers(
 
 
 def _check_variable(table: Table, name: str, robot: Robot) -> None:
-    """Reject a variable that conditions do not have."""
+    """Raise BadInput for a variable that measurements do not have."""
     kind, _, rest = name.partition(".")
     frames = [frame.name for frame in robot.frames]
     if kind == "q":
@@ -131,7 +131,7 @@ def _check_variable(table: Table, name: str, robot: Robot) -> None:
 
 
 def _check_parameters(table: Table, function: Function, robot: Robot) -> None:
-    """Reject parameters that the form does not have, and missing ones."""
+    """Raise BadInput for unknown and for missing parameters of a form."""
     for name in function.std:
         if name not in function.parameters:
             hint = nearest(name, function.parameters)
@@ -239,8 +239,7 @@ def function_table(function: Function) -> dict[str, Any]:
         function: function of a robot.
 
     Returns:
-        Keys and plain values; :func:`read_function` reads them back to the same
-        function.
+        Keys and plain values, from which :func:`read_function` reads the same function.
     """
     table: dict[str, Any] = {"name": FUNCTION}
     if function.label:

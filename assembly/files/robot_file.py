@@ -1,4 +1,4 @@
-"""Robot files read and written (``docs/robot_files.md``), with all rules checked."""
+"""Reading and writing of robot files (``docs/robot_files.md``), with all checks."""
 
 import math
 from collections.abc import Callable
@@ -57,7 +57,7 @@ from forcefit.stiffness.screws import rotation_matrix, rotation_vector
 
 Closing = Callable[[Robot], Robot]
 _LONGEST_NAME = 200  # largest number of characters
-MOST_FRAMES = 2000  # most frames of a robot; more closures would take minutes
+MOST_FRAMES = 2000  # largest number of frames; more closures would require minutes
 
 
 def read_robot(path: Path | str, close: Closing | None = None) -> Robot:
@@ -65,8 +65,8 @@ def read_robot(path: Path | str, close: Closing | None = None) -> Robot:
 
     Args:
         path: a ``.toml`` file in the public format.
-        close: function that makes the closures of the declared robot hold; none if
-            absent.
+        close: function that makes the closures of the declared robot hold; None to
+            leave them unchanged.
 
     Returns:
         The robot; its nominal closures hold in its home pose.  Meshes and libraries of
@@ -74,7 +74,7 @@ def read_robot(path: Path | str, close: Closing | None = None) -> Robot:
         :func:`forcefit.assembly.files.solved_links.solve_links`.
 
     Raises:
-        BadInput: the file breaks a rule of the format, or a closure does not hold.
+        BadInput: the file violates a rule of the format, or a closure does not hold.
     """
     return robot_of(read_toml(Path(path)), Path(path).stem, close)
 
@@ -91,13 +91,13 @@ def robot_of(root: Table, name: str, close: Closing | None = None) -> Robot:
         The robot; its nominal closures hold in its home pose.
 
     Raises:
-        BadInput: the table breaks a rule of the format, or a closure does not hold.
+        BadInput: the table violates a rule of the format, or a closure does not hold.
     """
     robot = declared_robot(root, name)
     try:
         robot = robot if close is None else close(robot)
         home = home_posture(robot)
-        place_callouts(home)  # whether they fit the geometry
+        place_callouts(home)  # check that callouts fit the geometry
         return with_spans(robot, home.coordinates)
     except BadInput as error:
         raise BadInput(f"{root.file}: {error}") from None
@@ -107,14 +107,14 @@ def declared_robot(root: Table, name: str) -> Robot:
     """Return the robot of a root table as written, without a check of its closures.
 
     Args:
-        root: root of a robot file.
+        root: root table of a robot file.
         name: name of the robot if the table has none.
 
     Returns:
-        The robot; lengths of its beams may still be unknown.
+        The robot; lengths of its beams can still be unknown.
 
     Raises:
-        BadInput: the table breaks a rule of the format.
+        BadInput: the table violates a rule of the format.
     """
     name = root.text("name", name, longest=_LONGEST_NAME)
     description = root.get("description", "")
@@ -194,7 +194,7 @@ def _learned_range(root: Table) -> dict[str, tuple[float, float]]:
 
 
 def _reference_point(root: Table) -> tuple[float, float, float] | None:
-    """Return the point at which the robot was identified, None if not given."""
+    """Return the point at which the robot was identified; None if not given."""
     if not root.has("reference_point"):
         return None
     x, y, z = root.array("reference_point", (3,), "m", largest=LARGEST_LENGTH).tolist()
@@ -203,7 +203,7 @@ def _reference_point(root: Table) -> tuple[float, float, float] | None:
 
 def _diagnosis(root: Table) -> dict[str, Any]:
     """Return the file's record of its diagnosis, with an absolute path."""
-    # texts, numbers and lists are kept unchanged
+    # texts, numbers and lists are stored unchanged
     content: dict[str, Any] = {}
     if root.has("diagnosis"):
         table = root.table("diagnosis")
@@ -233,7 +233,7 @@ def _is_record(value: object) -> bool:
 
 def _remarks(tables: list[Table]) -> tuple[str, ...]:
     """Return a remark on frames with ``dh`` but without ``alpha``."""
-    # the other three are often zero; a forgotten alpha changes the machine
+    # the other parameters are often zero; a forgotten alpha changes the machine
     dh = {table.content["name"]: table.content.get("dh") for table in tables}
     without_alpha = [
         quoted(name) for name, given in dh.items() if given and "alpha" not in given
@@ -244,7 +244,7 @@ def _remarks(tables: list[Table]) -> tuple[str, ...]:
 
 
 def _fitted_ends(tables: list[Table]) -> dict[str, FittedEnd]:
-    """Return the fitted ends by frame; the same parts must have the same fit."""
+    """Return the fitted ends by frame; equal parts must have equal fits."""
     ends: dict[str, FittedEnd] = {}
     fits: dict[str, str] = {}
     for table in tables:
@@ -261,7 +261,7 @@ def _fitted_ends(tables: list[Table]) -> dict[str, FittedEnd]:
 
 
 def _fit_remarks(robot: Robot) -> tuple[str, ...]:
-    """Return a remark on the fits, of which one clearance is used."""
+    """Return a remark on the fits, whose mean clearance is used."""
     texts = []
     ends = robot.fitted_ends
     by_parts = {
@@ -326,7 +326,7 @@ def _frame(table: Table) -> Frame:
 
 
 def _numbers(table: Table, key: str, count: int, unit: str) -> NDArray:
-    """Return the lengths or angles, zero where absent."""
+    """Return the lengths or angles of a key; zeros if absent."""
     zero = np.zeros(count)
     return table.array(key, (count,), unit, zero, largest=LARGEST_LENGTH)
 
@@ -340,7 +340,7 @@ def _drive_force(table: Table, passive: bool) -> float:
 
 
 def _limits(table: Table) -> tuple[float, float] | None:
-    """Return least and largest coordinate of a command, None if not given."""
+    """Return the least and largest coordinate of a command; None if not given."""
     if not table.has("limits"):
         return None
     least, most = table.array("limits", (2,), "rad or m", largest=LARGEST_LENGTH)
@@ -351,7 +351,7 @@ def _limits(table: Table) -> tuple[float, float] | None:
 
 
 def _tolerance(table: Table) -> NDArray | None:
-    """Return standard deviations of the geometric error, None if not given."""
+    """Return the standard deviations of the geometric error; None if not given."""
     if not table.has("tolerance"):
         return None
     sigma = table.array("tolerance", (6,), "rad, m", largest=LARGEST_LENGTH)
@@ -362,7 +362,7 @@ def _tolerance(table: Table) -> NDArray | None:
 
 
 def _placement(table: Table) -> tuple[NDArray, NDArray]:
-    """Return the translation and rotation vector, given as such or by ``dh``."""
+    """Return translation and rotation vector, from their keys or from ``dh``."""
     given = [key for key in ("translation", "rotation") if table.has(key)]
     if not table.has("dh"):
         return (
@@ -401,7 +401,7 @@ def _closure(table: Table, names: list[str]) -> tuple[str, str]:
 
 
 def _check_known(table: Table, key: str, name: str, names: list[str]) -> None:
-    """Reject a name that is not that of a frame."""
+    """Raise BadInput if a name is not the name of a frame."""
     if name == BASE:
         message = 'found "base"; expected a frame (add a fixed one whose parent is it)'
         raise table.bad(key, message)
@@ -412,7 +412,7 @@ def _check_known(table: Table, key: str, name: str, names: list[str]) -> None:
 
 
 def _check_meeting_frames(robot: Robot) -> None:
-    """Check that a frame where chains meet has no joint of its own."""
+    """Check that a frame at which chains meet has a rigid joint."""
     meeting = {"platform": [robot.platform]}
     for number, pair in enumerate(robot.closures, 1):
         meeting[f"closure[{number}].frames"] = list(pair)
@@ -430,16 +430,16 @@ def _check_meeting_frames(robot: Robot) -> None:
 
 
 def write_robot(robot: Robot, path: Path | str) -> None:
-    """Write a robot file that :func:`read_robot` reads back to the same robot.
+    """Write a robot file from which :func:`read_robot` reads the same robot.
 
     Args:
-        robot: to be written.
+        robot: the robot.
         path: path of the new file; relative paths of meshes and libraries are written
             relative to its folder.
 
     Raises:
-        BadInput: the file cannot be written, or one is there that this did not write:
-            it may hold comments.
+        BadInput: the file cannot be written, or a file exists that was not written by
+            this function and can contain comments.
     """
     check_writable(path, ROBOT)
     table = robot_table(robot, Path(path).parent)
@@ -460,7 +460,7 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
         folder: folder of the file to be written, to which paths are made relative.
 
     Returns:
-        Plain values; :func:`robot_of` reads them back to the same robot.
+        Plain values, from which :func:`robot_of` reads the same robot.
     """
     table = root_table(robot, folder)
     table["frame"] = [frame_table(frame, folder) for frame in robot.frames]
@@ -477,7 +477,7 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
 
 
 def _write_fit(clearance: dict[str, Any], robot: Robot, name: str) -> None:
-    """Replace the mean of a frame's fit by the fit."""
+    """Replace the mean clearance of a frame's fit by the fit."""
     end = robot.fitted_ends.get(name)
     del clearance["radial" if end is None else "tilt"]
     clearance["fit"] = robot.fits[name]
@@ -512,7 +512,7 @@ def root_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
 
 
 def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
-    """Return the content of ``[[frame]]``, defaults left out.
+    """Return the content of ``[[frame]]`` without default values.
 
     Args:
         frame: frame of a robot.

@@ -69,7 +69,7 @@ def read_steps(path: Path | str, robot: Robot) -> Plan:
         The plan.
 
     Raises:
-        BadInput: the file breaks a rule, or does not fit the robot.
+        BadInput: the file violates a rule, or does not fit the robot.
     """
     root = read_toml(path)
     tables = root.tables("step")
@@ -86,7 +86,7 @@ def read_steps(path: Path | str, robot: Robot) -> Plan:
 
 
 def _named(steps: list[Step], tables: list[Table]) -> tuple[Step, ...]:
-    """Return the steps; names that are not given are numbered where they repeat."""
+    """Return the steps; default names that repeat are numbered."""
     count: dict[str, int] = {}
     named = []
     for step, table in zip(steps, tables, strict=True):
@@ -111,14 +111,14 @@ def _step(table: Table, robot: Robot) -> Step:
 
 
 def _name(table: Table, kind: str) -> str:
-    """Return the name of a step; by default its kind and what it acts on."""
+    """Return the name of a step; by default its kind and the parts it acts on."""
     value = table.content[kind]
     parts = value if isinstance(value, list) else [value]
     return table.text("name", f"{kind} {' - '.join(map(str, parts))}", longest=400)
 
 
 def _fix(table: Table, name: str, robot: Robot) -> Fix:
-    """Return a fixture; where nothing is given it holds the nominal position."""
+    """Return a fixture, by default at the nominal position."""
     position = _values(table, "at", "rad or m")
     if position is None:
         position = dict.fromkeys(SCREW, 0.0)
@@ -126,7 +126,7 @@ def _fix(table: Table, name: str, robot: Robot) -> Fix:
 
 
 def _clamp(table: Table, name: str, robot: Robot) -> Step:
-    """Return a clamp: where the frame lies, at a position, or with a force."""
+    """Return a clamp at the frame's current pose, at a position, or with a force."""
     frame = _frame(table, "clamp", robot)
     if not table.has("load"):
         position = _values(table, "at", "rad or m")
@@ -150,7 +150,7 @@ def _held(table: Table, fix: Fix) -> Fix:
 
 
 def _join(table: Table, name: str, robot: Robot) -> Join:
-    """Return a closure that is closed, or a joint that is bolted."""
+    """Return a step that closes a closure or bolts a joint."""
     part = _part(table, "join", robot)
     locked: tuple[str, ...] = ()
     if isinstance(table.content.get("locked"), bool):
@@ -171,12 +171,12 @@ def _join(table: Table, name: str, robot: Robot) -> Join:
 
 
 def _preload(table: Table, name: str, robot: Robot) -> Preload:
-    """Return a load that stays until it is released."""
+    """Return a load that acts until it is released."""
     return Preload(name, _frame(table, "preload", robot), _wrench(table))
 
 
 def _release(table: Table, name: str, robot: Robot) -> Release:
-    """Return the steps whose holds end."""
+    """Return a step that ends fixtures, clamps or loads of earlier steps."""
     value = table.require("release", "the name of an earlier step, or a list of them")
     names = value if isinstance(value, list) else [value]
     if not names or not all(isinstance(n, str) for n in names):
@@ -186,13 +186,13 @@ def _release(table: Table, name: str, robot: Robot) -> Release:
 
 
 def _measure(table: Table, name: str, robot: Robot) -> Measure:
-    """Return a reading."""
+    """Return a measurement step."""
     part = _part(table, "measure", robot)
     return Measure(name, part, _names(table, "components", SCREW))
 
 
 def _adjust(table: Table, name: str, robot: Robot) -> Adjust:
-    """Return an adjustment, and the reading that it makes least."""
+    """Return an adjustment, with the reading that it minimises."""
     components = _names(table, "components")
     reading = _part(table, "reading", robot)
     of: tuple[str, ...] = SCREW
@@ -218,7 +218,7 @@ _READERS: dict[str, Callable[[Table, str, Robot], Step]] = {
 
 
 def _frame(table: Table, key: str, robot: Robot) -> str:
-    """Return the name of a frame."""
+    """Return the name of a frame after a check that the robot has this frame."""
     name = table.text(key, expected="the name of a frame")
     names = [frame.name for frame in robot.frames]
     if name not in names:
@@ -228,7 +228,7 @@ def _frame(table: Table, key: str, robot: Robot) -> str:
 
 
 def _part(table: Table, key: str, robot: Robot) -> tuple[str, str] | str:
-    """Return a frame, or the closure of two frames in either order."""
+    """Return a frame, or the closure between two frames given in either order."""
     value = table.require(key, "a frame, or the two frames of a closure")
     if isinstance(value, str):
         return _frame(table, key, robot)
@@ -244,7 +244,7 @@ def _part(table: Table, key: str, robot: Robot) -> tuple[str, str] | str:
 def _names(
     table: Table, key: str, default: tuple[str, ...] | None = None
 ) -> tuple[str, ...]:
-    """Return components of a screw."""
+    """Return the names of components of a screw."""
     if default is not None and not table.has(key):
         return default
     expected = f"a list of {', '.join(_COMPONENTS)}"
@@ -256,7 +256,7 @@ def _names(
 
 
 def _values(table: Table, key: str, unit: str) -> dict[str, float] | None:
-    """Return numbers by component of a screw; None if absent."""
+    """Return numbers by component of a screw; None if the key is absent."""
     if not table.has(key):
         return None
     inner, values = table.table(key), {}

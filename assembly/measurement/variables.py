@@ -1,6 +1,7 @@
 """Variables of effects, by public name: ``q.drive``, ``load.fz``, ``time`` ..
 
-Wrenches (``wrench.drive.mz``) are not included, because only the equilibrium has them.
+Wrenches (``wrench.drive.mz``) are not included, because they are known only after the
+equilibrium has been computed.
 """
 
 from collections.abc import Iterable
