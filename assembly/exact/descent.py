@@ -260,7 +260,7 @@ def advance(
             damping = max(8.0 * damping, _FIRST_DAMPING * least)
     raise NotConverged(
         problem_name(start, local.loads),
-        "no step lowers the energy; the closures are open by "
+        "no step decreases the energy; the closures are open by "
         f"{start.largest_gap:.2g} rad or m",
     )
 

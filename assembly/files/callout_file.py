@@ -34,7 +34,7 @@ _Z = (0.0, 0.0, 1.0)
 _ORIGIN = (0.0, 0.0, 0.0)
 _LARGEST_CP = 5.0
 _ACROSS = 1e-3  # largest cosine of two perpendicular directions
-_NOT_ACROSS = "found one that is not at right angles to the axis, expected 90 deg"
+_NOT_ACROSS = "found a direction that is not perpendicular to the axis, expected 90 deg"
 _SIZES = {"axis": 1, "plane": 2, "point": 0}  # count of numbers in "extent"
 _EXTENTS = {
     "axis": 'the length of the bore, such as "20 mm"',
@@ -143,7 +143,7 @@ def _check_direction(
 ) -> None:
     """Raise BadInput if a direction is not perpendicular to the axis of a bore."""
     if feature.kind == "planar":
-        fault = "found one of a face, whose sizes are along the joint's x and y"
+        fault = "found a direction for a face; its sides are along the joint's x and y"
         raise table.bad("direction", f"{fault}; expected none")
     second = feature.kind == "universal" and body == feature.second
     axis = feature.axis2 if second else feature.axis
@@ -197,11 +197,11 @@ def _callout(
     across = _across(table, axis)
     if across is not None and (shape == "point" or not widths):
         fault = "a point" if shape == "point" else "a feature without a zone"
-        raise table.bad("direction", f"found one of {fault}, expected none")
+        raise table.bad("direction", f"found a direction for {fault}, expected none")
     distribution = table.choice("distribution", DISTRIBUTIONS, "uniform")
     if table.has("cp") and distribution == "uniform":
         expected = 'expected distribution = "normal" or "truncated" with it'
-        raise table.bad("cp", f"found one of a uniform distribution, {expected}")
+        raise table.bad("cp", f"found a cp for a uniform distribution, {expected}")
     length = general = None
     if table.has("length"):
         length = _parsed(table, "length", parse_length)
@@ -230,16 +230,16 @@ def _widths(table: Table, shape: str) -> tuple[dict[str, float], str]:
             continue
         if word in _EXCLUDED[shape]:
             article = "an" if shape == "axis" else "a"
-            fault = f"found one of a feature that is {article} {shape}"
+            fault = f"found for a feature that is {article} {shape}"
             raise table.bad(word, f"{fault}, expected none")
         widths[word], at_most = _parsed(table, word, parse_width)
         if at_most and (word != "position" or shape != "axis" or not hole):
-            fault = 'found (M), expected it with the position of a bore and "hole"'
+            fault = 'found (M), expected only for the position of a bore with "hole"'
             raise table.bad(word, f'{fault}, such as hole = "12 H7"')
         used = used or at_most
     if hole and not used:
-        expected = 'expected one with it, such as position = "0.05 mm (M)"'
-        raise table.bad("hole", f"found one without (M), {expected}")
+        expected = 'expected a position with (M), such as position = "0.05 mm (M)"'
+        raise table.bad("hole", f"found a hole without (M), {expected}")
     _check_widths(table, widths)
     return widths, hole
 

@@ -99,7 +99,7 @@ def _copies(root: Table) -> Iterator[Copy]:
             name = leg.text("name", longest=LONGEST_NAME)
             leg.place = f"leg {quoted(name)}"
             if name in names:
-                raise leg.bad("name", "found it twice, expected different names")
+                raise leg.bad("name", "found a name twice, expected different names")
             names.append(name)
             yield from _repeated(leg, name)
 
@@ -162,7 +162,8 @@ def _between(
             raise table.bad("between", fault)
         found.append(full)
     if found[0] == found[1]:
-        raise table.bad("between", f"found {quoted(value[0])} twice, expected two")
+        fault = f"found {quoted(value[0])} twice, expected two bodies"
+        raise table.bad("between", fault)
     return found
 
 

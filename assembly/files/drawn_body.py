@@ -42,7 +42,7 @@ def read_bodies(copied: Copy) -> Iterator[DrawnBody]:
         table.place = place_of(copied.table, "body", name)
         if name == BASE:
             raise table.bad(
-                "name", f'found "{BASE}", which stands still; expected another'
+                "name", f'found "{BASE}", which is fixed; expected another name'
             )
         without_units(table, "centre", "length")
         link = read_drawn_link(table)
@@ -57,7 +57,7 @@ def read_bodies(copied: Copy) -> Iterator[DrawnBody]:
         )
         for key in ("from", "to"):
             if table.has(key) and link is None:
-                raise table.bad(key, 'found one without "link", expected both')
+                raise table.bad(key, 'found a joint without "link", expected both')
         table.tables("tolerance")  # read when all joints are known
         table.finish()
         yield turned_body(body, copied.T)

@@ -79,7 +79,7 @@ def _in_bearings(table: Table, kind: str, bounds: Clearance) -> _Clearance:
     first, second = sorted(_bearing(table, k, one) for k, one in enumerate(value, 1))
     (z1, gap1, fit1, part1), (z2, gap2, fit2, part2) = first, second
     if z2 - z1 <= _LEAST_LENGTH:
-        fault = f"found both at z = {z1:g} m"
+        fault = f"found both bearings at z = {z1:g} m"
         raise table.bad("bearings", f"{fault}, expected a distance between them")
     contacts = bearings((z1, gap1), (z2, gap2))
     return _of_shaft(bounds), fitted(contacts, (fit1, fit2), (part1, part2), z2 - z1)
@@ -153,7 +153,7 @@ _CONTACTS = {
 def _refuse_type(table: Table, key: str, kind: str, of_kind: str) -> None:
     """Raise BadInput for contacts of another type of joint."""
     if kind != of_kind:
-        fault = f"found one on a {kind} joint, expected none"
+        fault = f"found on a {kind} joint, expected none"
         raise table.bad(key, f"{fault}; only a {of_kind} joint has a {key}")
 
 

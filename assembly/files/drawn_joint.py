@@ -56,10 +56,10 @@ def read_drawn_joint(table: Table, name: str, first: str, second: str) -> DrawnJ
     if not one and (actuated or given):
         key = "actuated" if actuated else given[0]
         names = " | ".join(f'"{name}"' for name in ONE_FREEDOM)
-        fault = f"found one on a {kind} joint, expected {names}"
+        fault = f"found on a {kind} joint, expected {names}"
         raise table.bad(key, fault)
     if "drive_stiffness" in given and not actuated:
-        raise table.bad("drive_stiffness", "found one without actuated = true")
+        raise table.bad("drive_stiffness", "found a stiffness without actuated = true")
     joint = DrawnJoint(
         name, kind, first, second,
         at=table.array("at", (3,), "m", largest=LARGEST_LENGTH),
@@ -82,7 +82,9 @@ def _axes(table: Table, kind: str) -> tuple[NDArray, NDArray, NDArray]:
         across = perpendicular(axis)
         return axis, across, across
     if np.linalg.norm(np.cross(axis, axis2)) < _PARALLEL:
-        raise table.bad("axis2", 'found it parallel to "axis", expected an angle')
+        raise table.bad(
+            "axis2", 'found a direction parallel to "axis", expected another'
+        )
     return axis, perpendicular(axis, axis2), axis2
 
 
@@ -104,7 +106,7 @@ def _limits(table: Table, unit: str) -> tuple[float, float] | None:
         return None
     least, most = table.array("limits", (2,), unit, largest=LARGEST_LENGTH)
     if not least < most:
-        fault = f"found [{least:g}, {most:g}], expected the smaller one first"
+        fault = f"found [{least:g}, {most:g}], expected the smaller number first"
         raise table.bad("limits", fault)
     return float(least), float(most)
 
@@ -166,7 +168,7 @@ def _tolerance(table: Table) -> NDArray | None:
         return None
     sigma = table.array("tolerance", (6,), "rad, m", largest=LARGEST_LENGTH)
     if sigma.min() < 0:
-        fault = f"found {sigma.min():g} in it, expected 6 numbers >= 0 [rad, m]"
+        fault = f"found the number {sigma.min():g}, expected 6 numbers >= 0 [rad, m]"
         raise table.bad("tolerance", fault)
     return sigma
 

@@ -57,7 +57,7 @@ def read_drawn_link(body: Table) -> Link | Curve | None:
     for key in table.content:
         if key not in _CURVE:
             names = " | ".join(f'"{name}"' for name in _CURVE[1:])
-            raise table.bad(key, f'found it with "curve", expected only {names}')
+            raise table.bad(key, f'found together with "curve", expected only {names}')
     return Curve(table)
 
 
@@ -68,7 +68,7 @@ def _refuse_no_kind(link: Table) -> NoReturn:
         hint = nearest(unknown[0], _KINDS)
         raise link.bad("", f"unknown key {quoted(unknown[0])}{hint}")
     names = " | ".join(map(quoted, _KINDS))
-    raise link.bad("", f"found none of them, expected exactly one of {names}")
+    raise link.bad("", f"found no kind of link, expected exactly one of {names}")
 
 
 def _plain_lengths(content: dict[str, Any], body: Table, place: str) -> None:
@@ -113,8 +113,8 @@ def curve_link(
     pieces = read_pieces(tables, start, poisson)
     gap = float(np.linalg.norm(pieces[-1].place(1.0) - tip[:3, 3]))
     if gap > _GAP * float(np.linalg.norm(tip[:3, 3] - start)):
-        fault = f"found that it ends {gap:.3g} m from the joint at its end"
-        raise table.bad("curve", f"{fault}, expected it there")
+        fault = f"found the end of the curve {gap:.3g} m from the joint there"
+        raise table.bad("curve", f"{fault}, expected 0 m")
     try:
         C = curve_compliance(pieces, young, poisson, theory=theory)
     except BadInput as error:

@@ -47,7 +47,7 @@ def with_effects(robot: Robot, tables: Sequence[Table]) -> Robot:
             )
         effects = everywhere if session is None else sessions.setdefault(session, {})
         if name in effects:
-            raise table.bad("name", "found twice; expected one [[effect]] of each name")
+            raise table.bad("name", "found twice; expected one [[effect]] per name")
         effects[name] = _parameters(table, robot, name)
     return replace(
         robot, effects=everywhere, session_effects=sessions, functions=tuple(functions)
@@ -63,14 +63,16 @@ def _parameters(table: Table, robot: Robot, effect: str) -> Values:
     for key in given:
         if key not in allowed:
             hint = nearest(key, allowed)
-            message = f"found {quoted(key)}, which is no parameter of {effect} here"
+            message = f"found {quoted(key)}, which is not a parameter of {effect}"
             raise table.bad("parameters", f"{message}{hint}")
     # time constants must be given and positive
     times = {key for key in allowed if LIBRARY[effect].unit(robot, key) == "s"}
     for key in sorted(times - set(given)):
         owner = key.rpartition(".")[0]
         if not owner or any(k == owner or k.startswith(f"{owner}.") for k in given):
-            raise table.bad("parameters", f"found no {quoted(key)}; expected it, in s")
+            raise table.bad(
+                "parameters", f"{quoted(key)} is missing; expected a time in s"
+            )
     if inner is None:
         return {}
     return {

@@ -64,7 +64,7 @@ def read_function(table: Table, robot: Robot) -> Function:
         valid = components_of(where)
         if name not in valid:
             hint = nearest(name, valid)
-            raise table.bad("components", f"found {quoted(name)} there{hint}")
+            raise table.bad("components", f"found {quoted(name)}{hint}")
     variables = _words(table, "variables", 2)
     for name in variables:
         _check_variable(table, name, robot)
@@ -135,7 +135,9 @@ def _check_parameters(table: Table, function: Function, robot: Robot) -> None:
     for name in function.std:
         if name not in function.parameters:
             hint = nearest(name, function.parameters)
-            raise table.bad("std", f"found {quoted(name)}, which is no parameter{hint}")
+            raise table.bad(
+                "std", f"found {quoted(name)}, which is not a parameter{hint}"
+            )
     if function.form == FORMULA:
         _check_formula(table, function, robot)
         return
@@ -149,7 +151,7 @@ def _check_parameters(table: Table, function: Function, robot: Robot) -> None:
     first = function.variables[0]
     if form.remembers and first.startswith("wrench."):
         message = (
-            f"found {quoted(first)}, expected a variable that is no wrench, "
+            f"found {quoted(first)}, expected a variable other than a wrench, "
             f"because {form.name} depends on its history"
         )
         raise table.bad("variables", f"{message}; expected no wrench")
@@ -158,11 +160,13 @@ def _check_parameters(table: Table, function: Function, robot: Robot) -> None:
         own = parameters_of(function, component)
         for name in own:
             if name not in shapes and not form.is_column(name, count):
-                message = f"found {quoted(name)}, which is no parameter of {form.name}"
+                message = (
+                    f"found {quoted(name)}, which is not a parameter of {form.name}"
+                )
                 raise table.bad("parameters", f"{message}; expected {_example(form)}")
         for name, needed in shapes.items():
             if needed and name not in own:
-                message = f"{quoted(name)} is missing; {form.name} needs it"
+                message = f"{quoted(name)} is missing; {form.name} requires it"
                 raise table.bad("parameters", message)
             if name.partition(".")[0] in _POSITIVE and own.get(name, 1.0) <= 0:
                 message = f"{quoted(name)}: found {own[name]:g}, expected > 0"
@@ -175,7 +179,7 @@ def _check_parameters(table: Table, function: Function, robot: Robot) -> None:
     unturned = any(whole_unit(variable_unit(robot, name)) != "rad" for name in waving)
     if unturned and "period" not in function.parameters:
         message = (
-            '"period" is missing; expected it, because the variable is no angle in rad'
+            '"period" is missing; expected because the variable is not an angle in rad'
         )
         raise table.bad("parameters", message)
 

@@ -39,7 +39,7 @@ def read_pitch(table: Table, joint: str) -> float:
     if joint != "helical":
         if table.has("pitch"):
             expected = "expected none, or a helical joint"
-            raise table.bad("pitch", f"found one on a {joint} joint, {expected}")
+            raise table.bad("pitch", f"found a pitch on a {joint} joint, {expected}")
         return 0.0
     pitch = table.number("pitch", "m per turn", largest=_LARGEST_PITCH)
     if abs(pitch) < _LEAST_PITCH:
@@ -95,7 +95,7 @@ def read_bounds(table: Table, joint: str) -> Clearance:
         if table.has(key)
     }
     if joint == "helical" and "spin" in bounds:
-        raise table.bad("spin", f"found one on a helical joint, {NO_SPIN}")
+        raise table.bad("spin", f"found a bound on a helical joint, {NO_SPIN}")
     for key, bound in bounds.items():
         if 0.0 < bound < _LEAST_CLEARANCE:
             expected = f"expected 0 or at least {_LEAST_CLEARANCE:g}"
@@ -142,7 +142,7 @@ def _fitted_end(inner: Table) -> FittedEnd | None:
         if not inner.has(key):
             raise inner.bad(key, f'{fault}; expected one with "length"')
     if inner.has("tilt"):
-        fault = 'found it together with "length", from which it follows'
+        fault = 'found together with "length", which determines the tilt'
         raise inner.bad("tilt", f"{fault}; expected one of them")
     length = inner.number("length", "m", above=_LEAST_LENGTH, largest=LARGEST_LENGTH)
     return FittedEnd(length, inner.text("parts"))
@@ -158,7 +158,7 @@ def fit_of(inner: Table) -> Fit | None:
     if not inner.has("fit"):
         return None
     if inner.has("radial"):
-        raise inner.bad("radial", 'found it together with "fit", expected one of them')
+        raise inner.bad("radial", 'found together with "fit", expected one of them')
     text = inner.text("fit", expected='a fit such as "12 H7/g6"')
     try:
         return clearance_fit(text)
@@ -198,7 +198,9 @@ def read_joint_stiffness(table: Table, free: int | None = None) -> NDArray | Non
         if free is not None and checked[free] == 0.0:
             checked[free] = 1.0
         if checked.min() <= 0:
-            raise table.bad(key, f"found {checked.min():g} in it, expected {expected}")
+            raise table.bad(
+                key, f"found the number {checked.min():g}, expected {expected}"
+            )
         K = np.diag(K)
     rigid = np.isposinf(np.diag(K))
     if free is not None and rigid[free]:
@@ -214,7 +216,7 @@ def read_joint_stiffness(table: Table, free: int | None = None) -> NDArray | Non
         raise table.bad(
             key,
             f"found {K[i, j]:g} at [{i + 1}, {j + 1}]; expected inf only on the "
-            "diagonal, the rest of its row and column zero",
+            "diagonal, with zeros elsewhere in its row and column",
         )
     K[soft] = definite(table, key, K[soft])
     return K
@@ -263,13 +265,13 @@ def definite(table: Table, key: str, K: NDArray) -> NDArray:
         raise table.bad(
             key,
             f"not symmetric: found [{a + 1}, {b + 1}] = {K[a, b]:.6e} but "
-            f"[{b + 1}, {a + 1}] = {K[b, a]:.6e}, expected them equal",
+            f"[{b + 1}, {a + 1}] = {K[b, a]:.6e}, expected equal numbers",
         )
     least = np.linalg.eigvalsh((unit + unit.T) / 2).min()
     if least <= 1e-13:
         raise table.bad(
             key,
-            f"not positive definite: found {least:.1e} as smallest eigenvalue once "
+            f"not positive definite: found {least:.1e} as smallest eigenvalue when "
             "scaled to a unit diagonal, expected > 0",
         )
     return np.where(K == K.T, K, K / 2 + K.T / 2)

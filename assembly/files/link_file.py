@@ -55,7 +55,7 @@ def read_link(frame: Table) -> Link | None:
     if not kinds and not set(link.content) <= {*_MATERIAL, "up", "pieces"}:
         link.finish()  # reports a misspelt kind with a suggestion
     if len(kinds) != 1:
-        given = " and ".join(map(quoted, kinds)) or "none of them"
+        given = " and ".join(map(quoted, kinds)) or "no kind of link"
         names = " | ".join(map(quoted, _KINDS))
         raise link.bad("", f"found {given}, expected exactly one of {names}")
     result: Link

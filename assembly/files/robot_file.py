@@ -157,7 +157,9 @@ def _framed(root: Table, name: str, description: str) -> Robot:
     root.finish()
     if not 0 < len(tables[0]) <= MOST_FRAMES:
         fault = f"found {len(tables[0])}" if tables[0] else "missing"
-        raise root.bad("frame", f"{fault}; expected 1 to {MOST_FRAMES} [[frame]]")
+        raise root.bad(
+            "frame", f"{fault}; expected 1 to {MOST_FRAMES} tables [[frame]]"
+        )
     frames = tuple(_frame(table) for table in tables[0])
     names = [frame.name for frame in frames]
     closures = tuple(_closure(table, names) for table in tables[1])
@@ -186,7 +188,7 @@ def _learned_range(root: Table) -> dict[str, tuple[float, float]]:
     for name in table.content:
         least, most = table.array(name, (2,), "its unit")
         if least > most:
-            fault = f"found [{least:g}, {most:g}], expected the smaller one first"
+            fault = f"found [{least:g}, {most:g}], expected the smaller number first"
             raise table.bad(name, fault)
         ranges[name] = (float(least), float(most))
     table.finish()
@@ -253,7 +255,7 @@ def _fitted_ends(tables: list[Table]) -> dict[str, FittedEnd]:
         parts = name if end is None else end.parts
         if fit and fits.setdefault(parts, fit) != fit:
             found = f"found {quoted(fit)} of the parts {quoted(parts)}"
-            expected = f"expected {quoted(fits[parts])}, as before"
+            expected = f"expected {quoted(fits[parts])} as for an earlier frame"
             raise table.table("clearance").bad("fit", f"{found}, {expected}")
         if end is not None:
             ends[name] = end
@@ -334,7 +336,7 @@ def _numbers(table: Table, key: str, count: int, unit: str) -> NDArray:
 def _drive_force(table: Table, passive: bool) -> float:
     """Return the force of a drive on a passive joint, 0 if not given."""
     if table.has("drive_force") and not passive:
-        fault = f"found one on a joint that is not passive; {FORCE_CONTROL}"
+        fault = f"found a force on a joint that is not passive; {FORCE_CONTROL}"
         raise table.bad("drive_force", fault)
     return table.number("drive_force", "N m or N", 0.0, largest=LARGEST)
 
@@ -345,7 +347,7 @@ def _limits(table: Table) -> tuple[float, float] | None:
         return None
     least, most = table.array("limits", (2,), "rad or m", largest=LARGEST_LENGTH)
     if not least < most:
-        message = f"found [{least:g}, {most:g}], expected the smaller one first"
+        message = f"found [{least:g}, {most:g}], expected the smaller number first"
         raise table.bad("limits", message)
     return float(least), float(most)
 
@@ -356,7 +358,7 @@ def _tolerance(table: Table) -> NDArray | None:
         return None
     sigma = table.array("tolerance", (6,), "rad, m", largest=LARGEST_LENGTH)
     if sigma.min() < 0:
-        message = f"found {sigma.min():g} in it, expected 6 numbers >= 0 [rad, m]"
+        message = f"found the number {sigma.min():g}, expected 6 numbers >= 0 [rad, m]"
         raise table.bad("tolerance", message)
     return sigma
 

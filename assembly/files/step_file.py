@@ -76,7 +76,7 @@ def read_steps(path: Path | str, robot: Robot) -> Plan:
     root.finish()
     if not 0 < len(tables) <= _MOST_STEPS:
         fault = f"found {len(tables)}" if tables else "missing"
-        raise root.bad("step", f"{fault}; expected 1 to {_MOST_STEPS} [[step]]")
+        raise root.bad("step", f"{fault}; expected 1 to {_MOST_STEPS} tables [[step]]")
     plan = Plan(_named([_step(table, robot) for table in tables], tables))
     try:
         check_plan(plan, robot)
@@ -144,7 +144,7 @@ def _held(table: Table, fix: Fix) -> Fix:
             fault = f"found {value:g}, expected a number > 0, at most {LARGEST:g}"
             raise table.bad(f"stiffness.{component.lower()}", fault)
         if fix.position is not None and component not in fix.position:
-            fault = 'found a component that "at" leaves free, expected one it holds'
+            fault = 'found a component that "at" leaves free, expected a fixed one'
             raise table.bad(f"stiffness.{component.lower()}", fault)
     return replace(fix, stiffness=stiffness)
 
@@ -163,7 +163,7 @@ def _join(table: Table, name: str, robot: Robot) -> Join:
     leave_open = table.boolean("leave_open", False)
     if isinstance(part, str) and (locked or limit < inf or leave_open):
         key = "locked" if locked else "force_limit" if limit < inf else "leave_open"
-        fault = "found with a joint, which is bolted as it lies; expected a closure"
+        fault = "found for a joint, which is bolted in its position; expected a closure"
         raise table.bad(key, fault)
     if leave_open and limit == inf:
         raise table.bad("leave_open", 'found without "force_limit", expected both')
@@ -276,7 +276,7 @@ def _wrench(table: Table) -> np.ndarray:
     """Return the (6,) [N m, N] wrench of ``load``."""
     inner = table.table("load") if table.has("load") else None
     if inner is None:
-        raise table.bad("load", "missing; expected such as { fz = -50 }")
+        raise table.bad("load", "missing; expected a table such as { fz = -50 }")
     values = [inner.number(name, "N m or N", 0.0, largest=LARGEST) for name in _LOADS]
     inner.finish()
     if not any(values):

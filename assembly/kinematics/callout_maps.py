@@ -98,7 +98,7 @@ def place_callouts(home: Posture) -> tuple[PlacedCallout, ...]:
         twice = next(
             c for k, c in enumerate(callouts) if sides[c.feature, c.after] != k
         )
-        fault = "found the feature twice, expected one [[tolerance]] with all"
+        fault = "found the feature twice, expected one [[tolerance]] per feature"
         raise BadInput(_fault(twice, fault))
     datums = [_datum_sides(bodies, c, sides) for c in callouts]
     zones = [_zone(bodies, c, d[0], callouts, sides)
@@ -126,7 +126,7 @@ def _check_names(names: list[str], callouts: tuple[Callout, ...]) -> None:
     """Raise BadInput if two features would have the same name in tables."""
     for k, name in enumerate(names):
         if name in names[:k]:
-            fault = f"found {quoted(name)} twice, expected another name of the feature"
+            fault = f"found {quoted(name)} twice, expected a different name per feature"
             raise BadInput(_fault(callouts[k], fault))
 
 
@@ -190,7 +190,7 @@ def _order(
         return list(TopologicalSorter(needs).static_order())
     except CycleError as error:
         names = " -> ".join(quoted(callouts[k].name) for k in error.args[1])
-        fault = f"found circular datums: {names}, expected an order"
+        fault = f"found datums that depend on each other: {names}; expected none"
         raise BadInput(_fault(callouts[error.args[1][0]], fault)) from None
 
 

@@ -170,7 +170,7 @@ def preloaded(robot: Robot, joints: Mapping[str, float] | None = None) -> Robot:
         if abs(value) > _OPEN and (own is None or np.isinf(own)):
             raise BadInput(
                 f"--mismatch spring: drive {frame.name}: found a rigid drive "
-                f"whose coordinate is {value:.3g} rad or m off; expected a "
+                f"whose coordinate must change by {value:.3g} rad or m; expected a "
                 "joint_stiffness about its own axis"
             )
         frames.append(replace(frame, geometric_error=error))

@@ -257,7 +257,9 @@ def read_sources(
     for (i, c, *_), table in rows:
         if (i, c) in seen:
             name = f"{robot.frames[i].name}.{SCREW[c]}"
-            raise table.bad("", f"found {quoted(name)} again, first in {seen[i, c]}")
+            raise table.bad(
+                "", f"found {quoted(name)} a second time, first in {seen[i, c]}"
+            )
         seen[i, c] = table.place
     columns = zip(*(row for row, _ in rows), strict=True)
     return ErrorSources(

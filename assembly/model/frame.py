@@ -24,12 +24,12 @@ from forcefit.stiffness.screws import rotation_matrix
 JOINTS = ("fixed", "revolute", "prismatic", "helical")
 BASE = "base"
 LOCKED = (
-    "found inf along the own motion of a passive joint, which would lock it; expected "
+    "found inf along the motion of a passive joint, which would lock it; expected "
     '0 (free, as a bearing), a number > 0 (a spring), or joint = "fixed"'
 )
-SLIDING_BALL = "found one on a joint that slides, expected radial"
+SLIDING_BALL = "found a bound on a sliding joint, expected radial"
 ONE_OF_BALL = 'found together with "ball", expected one of them'
-NO_SPIN = "expected none: its motion along the thread has no clearance bound"
+NO_SPIN = "expected none: the motion along the thread has no clearance"
 
 FORCE_CONTROL = (
     'expected a joint = "revolute" | "prismatic" | "helical" that is not actuated: a '
@@ -168,7 +168,7 @@ class Frame(EqualData):
         if self.locked_at is not None and (self.joint != "fixed" or self.clearance):
             raise BadInput(
                 f"frame {quoted(self.name)}.locked_at: found a joint that moves or has "
-                'a clearance besides; expected joint = "fixed"'
+                'another clearance; expected joint = "fixed"'
             )
         if (self.joint == "helical") != (self.pitch != 0.0):
             raise BadInput(
@@ -178,7 +178,7 @@ class Frame(EqualData):
             )
         if self.pitch and self.clearance and self.clearance.spin is not None:
             place = f"frame {quoted(self.name)}.clearance.spin"
-            raise BadInput(f"{place}: found one on a helical joint, {NO_SPIN}")
+            raise BadInput(f"{place}: found a bound on a helical joint, {NO_SPIN}")
         ball = self.clearance is not None and self.clearance.ball is not None
         if ball and self.joint in {"prismatic", "helical"}:
             raise BadInput(f"frame {quoted(self.name)}.clearance.ball: {SLIDING_BALL}")
@@ -331,5 +331,5 @@ def beam_axis(frame: Frame) -> tuple[float, NDArray]:
     along = between_origins(frame)
     length = math.sqrt(along @ along)
     if length == 0.0:
-        raise ValueError(f"frame '{frame.name}': a beam of no length")
+        raise ValueError(f"frame '{frame.name}': the beam has length 0")
     return length, along / length

@@ -38,7 +38,7 @@ def given_load(load: Load, whose: str = "load") -> NDArray:
         shape = np.broadcast_shapes(*(values.shape for values in given.values()))
     except ValueError:
         counts = ", ".join(f"{name} {values.size}" for name, values in given.items())
-        expected = "expected one number or as many for each"
+        expected = "expected one number per component, or equally many"
         raise BadInput(f"{whose}: found {counts} numbers, {expected}") from None
     wrench = np.zeros((*shape, 6))
     for name, values in given.items():

@@ -41,8 +41,8 @@ def refuse_unsolved(frame: Frame) -> NoReturn:
     """Raise BadInput for a link that was not solved when the robot was loaded."""
     kind = "library" if isinstance(frame.link, LibraryLink) else "mesh"
     raise BadInput(
-        f"frame {quoted(frame.name)}.link.{kind}: found no stiffness, expected a robot "
-        "of load_robot, or of forcefit.assembly.files.solved_links.solve_links"
+        f"frame {quoted(frame.name)}.link.{kind}: found no stiffness; expected a robot "
+        "returned by load_robot or forcefit.assembly.files.solved_links.solve_links"
     )
 
 

@@ -362,7 +362,7 @@ def _direction(direction: ArrayLike) -> NDArray:
     """Return the (6,) direction scaled to unit size."""
     d = numbers_of("direction", direction, 6, "N m, N")
     if not d.any():
-        raise BadInput("direction: found 0 in all, expected 6 numbers, not all 0")
+        raise BadInput("direction: found only zeros, expected 6 numbers, not all 0")
     return d / np.linalg.norm(d)
 
 

@@ -105,7 +105,7 @@ def drive_angle(
     rod = math.sqrt(max(0.0, P.rod**2 - float(position @ across) ** 2))
     if not abs(P.arm - rod) <= reach <= P.arm + rod:
         raise BadInput(
-            f"delta: a leg needs a reach of {reach:.6g} m, its arm and rods give "
+            f"delta: a leg requires a reach of {reach:.6g} m, its arm and rods reach "
             f"{abs(P.arm - rod):.6g} to {P.arm + rod:.6g} m"
         )
     cosine = (reach**2 + P.arm**2 - rod**2) / (2 * reach * P.arm)

@@ -142,8 +142,8 @@ def drive_angle(parameters: IRSBot2Parameters, x: float, z: float) -> float:
     cosine = (n**2 + P.L1**2 - L2**2) / (2 * n * P.L1)
     if not -1.0 <= cosine <= 1.0:
         raise BadInput(
-            f"irsbot2: pose x = {x:g}, z = {z:g} m needs a reach of {n:.6g} m, "
-            f"the links give {abs(P.L1 - L2):.6g} to {P.L1 + L2:.6g} m"
+            f"irsbot2: pose x = {x:g}, z = {z:g} m requires a reach of {n:.6g} m, "
+            f"the links reach {abs(P.L1 - L2):.6g} to {P.L1 + L2:.6g} m"
         )
     return math.atan2(along[1], along[0]) + math.acos(cosine)
 

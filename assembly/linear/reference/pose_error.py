@@ -240,7 +240,7 @@ def reachable_screws(
     if assumption not in ASSUMPTIONS:
         raise ValueError(f"assumption is {assumption!r}, expected one of {ASSUMPTIONS}")
     if assumption == "budget" and (assembly.frame_loads or energy_budget < 0):
-        raise ValueError("the budget assumption needs no load and a budget >= 0")
+        raise ValueError("the budget assumption requires no load and a budget >= 0")
     free = assumption == "free"
     loaded = assembly
     if free:
