@@ -44,7 +44,7 @@ def combined(declared: Effects, found: Effects) -> dict[str, dict[str, float]]:
 
 
 def _sum(declared: Values, found: Values) -> dict[str, float]:
-    """Return the sums of parameters."""
+    """Return the sum of declared and found value of each parameter."""
     return dict(declared) | {k: declared.get(k, 0.0) + v for k, v in found.items()}
 
 
@@ -57,12 +57,12 @@ def _in_series(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _product(declared: Values, found: Values) -> dict[str, float]:
-    """Return the products of factors."""
+    """Return the product of declared and found factor of each parameter."""
     return dict(declared) | {k: declared.get(k, 1.0) * v for k, v in found.items()}
 
 
 def _load(declared: Values, found: Values) -> dict[str, float]:
-    """Return the gains of the load: the found gain multiplies the declared result."""
+    """Return the load gains: the found gain acts on the result of the declared gain."""
     factor = found.get("factor", 1.0)
     offsets = {k: factor * v for k, v in declared.items() if k != "factor"}
     more = {k: v for k, v in found.items() if k != "factor"}
@@ -94,7 +94,7 @@ def _registration(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _drift(declared: Values, found: Values) -> dict[str, float]:
-    """Return the sums of amplitudes with one time constant."""
+    """Return the summed amplitudes, with the common time constant."""
     constant = declared["time_constant"]
     if not math.isclose(found["time_constant"], constant, rel_tol=1e-9):
         raise ValueError(

@@ -170,7 +170,7 @@ def roughness(count: int) -> NDArray:
 
 
 def _remembered(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Return columns from the lagged variable and from the decaying initial state."""
+    """Return columns of the lagged variable and of the decaying initial state."""
     return np.column_stack([inputs[name == "start"] for name in names])
 
 
@@ -181,7 +181,7 @@ def _step(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
 
 
 def _reversal(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Return columns of a direction, times powers of a second input if present."""
+    """Return columns of a direction, multiplied by powers of a second input if any."""
     size = inputs[1] if len(inputs) > 1 else np.ones_like(inputs[0])
     return _stacked([inputs[0] * size ** int(name) for name in names], inputs)
 
@@ -197,7 +197,7 @@ def _reversal_waves(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDA
 
 
 def _slip(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Return the state of the slipping element, from -1 to 1."""
+    """Return the position of the slipping friction element, from -1 to 1."""
     return _stacked([inputs[0]] * len(names), inputs)
 
 

@@ -162,7 +162,7 @@ class _Units:
     known: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def of(self, node: ast.AST) -> dict[str, float]:
-        """Return the unit of a part of a formula; refuse conflicts within the part."""
+        """Return the unit of a part of a formula; raise BadInput for a conflict."""
         match node:
             case ast.Name(id=name) if name in self.variables:
                 return dict(self.variables[name])
@@ -195,7 +195,7 @@ class _Units:
         return {}
 
     def reduced(self, unit: Mapping[str, float]) -> dict[str, float]:
-        """Return a unit with the known units of parameters inserted."""
+        """Return a unit in which the known units of parameters are substituted."""
         reduction: dict[str, float] = {}
         for name, k in unit.items():
             reduction = _added(reduction, self.known.get(name, {name: 1.0}), k)
@@ -204,7 +204,7 @@ class _Units:
     def equal(
         self, one: Mapping[str, float], other: Mapping[str, float], where: str
     ) -> None:
-        """Equate two units, and store the consequence for a parameter."""
+        """Equate two units, and store the resulting unit of a parameter."""
         left = self.reduced(_added(one, other, -1.0))
         free = next((name for name in left if name.startswith("?")), None)
         if free is not None:
@@ -218,7 +218,7 @@ class _Units:
             )
 
     def of_parameters(self, names: list[str]) -> dict[str, Unit]:
-        """Return the units of parameters; an undetermined one is a pure number."""
+        """Return the units of parameters; undetermined ones are pure numbers."""
         reduced = {name: self.reduced({f"?{name}": 1.0}) for name in names}
         return {
             name: {k: v for k, v in unit.items() if not k.startswith("?")}
@@ -236,7 +236,7 @@ def _number(node: ast.AST) -> float | None:
 def _added(
     one: Mapping[str, float], other: Mapping[str, float], factor: float
 ) -> dict[str, float]:
-    """Return the exponents of the product of one unit and a power of another."""
+    """Return the exponents of one unit times a power of another."""
     names = dict.fromkeys([*one, *other])
     return {name: one.get(name, 0.0) + factor * other.get(name, 0.0) for name in names}
 

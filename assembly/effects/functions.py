@@ -223,7 +223,7 @@ def apply_functions(
 
 
 def in_session(conditions: Conditions, session: str | None) -> NDArray:
-    """Return (R,) bool: rows of a session; all rows for None."""
+    """Return (R,) bool, True for rows of a session; for None, True for all rows."""
     if session is None:
         return np.ones(len(conditions), dtype=bool)
     if conditions.session is None:
@@ -234,7 +234,7 @@ def in_session(conditions: Conditions, session: str | None) -> NDArray:
 def _with_function(
     conditions: Conditions, function: Function, inputs: NDArray, acts: NDArray
 ) -> Conditions:
-    """Return conditions with one more function, in the rows where the function acts."""
+    """Return conditions with one more function, which acts in the given rows."""
     where = function.where
     named = [name.split(".")[1] for name in function.variables if "wrench" in name]
     if BASE in (where, *named):
@@ -273,7 +273,7 @@ def _yielding(
     inputs: NDArray,
     acts: NDArray,
 ) -> Conditions:
-    """Return conditions in which a place is compliant under its wrench."""
+    """Return conditions with a compliant place that depends on the wrench there."""
     slots: dict[int, int] = {}  # column of the inputs, by the index of the wrench
     through: list[tuple[str, int]] = []
     for k, name in enumerate(function.variables):

@@ -29,7 +29,7 @@ def beams(robot: Robot) -> tuple[str, ...]:
 
 
 def bodies(robot: Robot) -> tuple[str, ...]:
-    """Return the frames whose bodies have a length: beams and bodies of two origins."""
+    """Return the frames whose bodies have a length: beams, or two distinct origins."""
     return tuple(
         f.name
         for f in robot.frames
@@ -38,7 +38,7 @@ def bodies(robot: Robot) -> tuple[str, ...]:
 
 
 def growing(robot: Robot) -> tuple[str, ...]:
-    """Return the frames whose length can differ: beams; all bodies without beams."""
+    """Return the frames whose length can differ: beams, or all bodies if no beams."""
     return beams(robot) or bodies(robot)
 
 

@@ -17,7 +17,7 @@ from forcefit.assembly.model.function import Function
 from forcefit.assembly.model.robot import Robot
 
 _COVARIATES: dict[str, Unit] = {"temperature": {"K": 1}, "time": {"s": 1}}
-_ANGLE: Unit = {}  # rad counts as a number
+_ANGLE: Unit = {}  # rad counts as a pure number
 
 
 def variable_unit(robot: Robot, name: str) -> Unit:

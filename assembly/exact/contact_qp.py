@@ -41,7 +41,7 @@ _STILL = 1e-6
 # relative to the largest multiplier: a cone with a smaller negative multiplier stays
 # active
 _ZERO_MULTIPLIER = 1e-11
-_LONGEST = 0.3  # [-] longest step along a boundary, because it is curved
+_LONGEST = 0.3  # [-] longest step along a boundary, which is curved
 _SHIFTS = (
     0.0,
     1e-9,
@@ -92,7 +92,7 @@ class ClearanceProblem:
 
 
 def cone_multipliers(u: NDArray, gradient: NDArray, group: NDArray) -> NDArray:
-    """Return the (cones,) [J] multipliers of the cones from the energy's gradient."""
+    """Return the (cones,) [J] cone multipliers, computed from the energy's gradient."""
     force = -np.bincount(group, weights=gradient * u)
     at_boundary = cone_sizes(u, group) >= 1.0 - AT_BOUNDARY
     return np.where(at_boundary, np.maximum(force, 0.0), 0.0)
@@ -144,7 +144,7 @@ def _convex(p: ClearanceProblem, method: Method) -> tuple[NDArray, NDArray] | No
 def _conic(
     p: ClearanceProblem, S: NDArray, s: NDArray, method: Method
 ) -> tuple[NDArray, NDArray] | None:
-    """Return the conic solver's step; S is changed to have positive curvatures."""
+    """Return the step by the conic solver, for S without negative curvatures."""
     values, vectors = np.linalg.eigh(S)
     floor = _LEAST_CURVATURE * max(float(np.abs(values).max(initial=0.0)), 1e-150)
     G = np.sqrt(np.maximum(values, floor))[:, None] * vectors.T
@@ -155,7 +155,7 @@ def _conic(
 
 
 def _newton(p: ClearanceProblem) -> tuple[NDArray, NDArray] | None:
-    """Return the step of Newton's method on the active boundaries; None if it fails."""
+    """Return the step by Newton's method on the active boundaries; None if it fails."""
     force, rigid = p.multipliers
     u, active = p.start, force > 0.0
     for _ in range(_STEPS):

@@ -208,7 +208,7 @@ def curvature_of(place: Placement, multipliers: NDArray, loads: DeadLoads) -> ND
         return H
     wrenches, M = _on_unknowns(place, loads)
     turn, shift = place.moves[:3].T, place.moves[3:].T
-    # exp(A) exp(B) moves a point x, to second order in both, by a x (b x x + v_b)
+    # the term of exp(A) exp(B) with A and B moves a point x by a x (b x x + v_b)
     spread = np.trace(M, axis1=1, axis2=2)[:, None, None] * np.eye(3)
     later = np.einsum("nij,nj->ni", M - spread, turn)
     later -= np.cross(wrenches[:, 3:], shift)

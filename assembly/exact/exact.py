@@ -83,7 +83,7 @@ _STEPS = 160  # largest number of steps; usually 3 to 5, 80 for metres of travel
 # relative energy that can still be gained: below it, Newton's method is tried
 _NEAR = 1e-2
 _DECREMENT = 1e-14  # relative energy that can still be gained at the last step
-# number of steps after which a balanced state is accepted although clearances move
+# number of steps after which a state in equilibrium is accepted with moving clearances
 _RESTLESS = 100
 _STILL = 1e-9  # [rad, reference lengths] size of a last step without damping
 _STATIONARY = 1e-7  # largest relative imbalance of a solution; 1e-12 is usual
@@ -192,7 +192,7 @@ class ExactAssembly:
 
     @cached_property
     def energy(self) -> float:
-        """[J] elastic energy; 0 if the residual of the closures can cause it."""
+        """[J] elastic energy; 0 if the closure residual alone could cause it."""
         energy, residual = energy_of(self.placement), self.closure_residual()
         differs = differs_from_zero(energy, 0.0, self.multipliers, residual)
         return energy if differs else 0.0
@@ -288,7 +288,7 @@ class ExactAssembly:
 
     @cached_property
     def linearisation_error(self) -> LinearisationError:
-        """Linear minus exact platform screw and energy."""
+        """Difference of platform screw and energy: linear minus exact result."""
         screw = self.linear.platform_screw - self.platform_screw
         energy = self.linear.energy - self.energy
         # inside an assembly zone both energies are zero except for rounding errors
@@ -443,7 +443,7 @@ def _first_guess(model: FiniteRobot, linear: Assembly) -> NDArray:
 
 
 def _energy_scale(at: Placement, linear: Assembly, loads: DeadLoads) -> float:
-    """Return the [J] scale of the energies of the problem."""
+    """Return a typical energy [J] of the problem, as a scale for tolerances."""
     return max(
         energy_of(at), abs(work_of(at, loads)), 1e-3 * linear.energy_without_clearance
     )

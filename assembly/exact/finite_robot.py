@@ -90,7 +90,7 @@ class FiniteRobot:
 
     @cached_property
     def units(self) -> NDArray:
-        """(N,) scale of the unknowns: 1 for springs; free motions have size 1."""
+        """(N,) scale of the unknowns: 1 for springs; free motions become unit screws."""
         units = np.ones(len(self.frame))
         units[self.bounded.stop :] /= np.linalg.norm(
             self.columns[self.bounded.stop :] * self.scale, axis=1
@@ -161,7 +161,7 @@ class FiniteRobot:
 
     @cached_property
     def comes_before(self) -> NDArray:
-        """(N, N) 1 if the first unknown moves the second, 1/2 within one motion."""
+        """(N, N) 1 if the first unknown moves the second, 1/2 if they are one motion."""
         above = self.posture.robot.on_path[self.frame][:, self.frame].T
         return above * (1.0 - np.sign(self._order[:, None] - self._order)) / 2
 

@@ -119,7 +119,7 @@ class Placement:
 
     @cached_property
     def _open(self) -> NDArray:
-        """(K, 4, 4) errors of the closures as motions, at the platform's origin."""
+        """(K, 4, 4) residual motion of each closure, at the platform's origin."""
         first, second = self.transforms[self.model.closed_frames.T]
         G = first @ self.model.nominal_closures @ inverse(second)
         origin = self.model.posture.platform[:3, 3]
@@ -239,7 +239,7 @@ class Placement:
         return np.concatenate([moment + np.cross(arm, load[3:]), load[3:]])
 
     def _load_curvature(self, load: NDArray) -> NDArray:
-        """Return the load's curvature without the brackets of its wrench."""
+        """Return the load's curvature without the bracket terms of its wrench."""
         W, turn = self._at_origin, self.platform_screw[:3]
         order = self.model._order
         V = self.moves * self.model.on_platform

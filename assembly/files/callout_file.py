@@ -307,7 +307,7 @@ def _parsed(table: Table, key: str, parse: Callable[[Any], Parsed]) -> Parsed:
         return parse(table.content[key])
     except BadInput as error:
         raise table.bad(key, str(error)) from None
-    except TypeError:  # a text was expected
+    except TypeError:  # the parser expected a text
         fault = f"found {describe(table.content[key])}, expected a text"
         raise table.bad(key, fault) from None
 

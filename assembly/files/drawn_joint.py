@@ -73,7 +73,7 @@ def read_drawn_joint(table: Table, name: str, first: str, second: str) -> DrawnJ
 
 
 def _axes(table: Table, kind: str) -> tuple[NDArray, NDArray, NDArray]:
-    """Return unit vectors of the axis, of a perpendicular x, and of the second axis."""
+    """Return three unit vectors: the axis, a perpendicular x axis, the second axis."""
     needs = kind not in {"fixed", "spherical"}
     axis = _direction(table, "axis", needs)
     axis = np.array([0.0, 0.0, 1.0]) if axis is None else axis
@@ -112,7 +112,7 @@ def _limits(table: Table, unit: str) -> tuple[float, float] | None:
 
 
 def _numbers(table: Table, kind: str, actuated: bool) -> tuple[JointNumbers, ...]:
-    """Return error, clearance and stiffness, of a universal joint for each bearing."""
+    """Return error, clearance and stiffness; for a universal joint one per bearing."""
     if kind != "universal":
         return (_one(table, kind, actuated),)
     for key in ("clearance", "geometric_error", "tolerance"):
@@ -126,7 +126,7 @@ def _numbers(table: Table, kind: str, actuated: bool) -> tuple[JointNumbers, ...
 
 
 def _refuse_count(table: Table, key: str) -> None:
-    """Raise BadInput for a list whose length is not the number of bearings, two."""
+    """Raise BadInput for a list that has not one value for each of two bearings."""
     value = table.content.get(key)
     parts = dict if key == "clearance" else list
     if not isinstance(value, list) or not all(isinstance(v, parts) for v in value):

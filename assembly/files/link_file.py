@@ -91,7 +91,7 @@ def _beam_link(link: Table) -> BeamLink:
 
 
 def _pieces(link: Table) -> int:
-    """Return the number of springs in series, by default 1; 8.0 is a whole number."""
+    """Return the number of springs in series, by default 1."""
     count = link.number("pieces", "-", 1.0, least=1.0, below=_MOST_PIECES + 1.0)
     if count != round(count):
         raise link.bad("pieces", f"found {count:g}, expected a whole number")

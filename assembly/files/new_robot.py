@@ -209,7 +209,7 @@ def _rus(legs: int) -> str:
 
 
 def _upu(legs: int) -> str:
-    """Return the legs of Tsai's 3-UPU, which translates because of parallel axes."""
+    """Return the legs of Tsai's 3-UPU, whose parallel axes make it translate."""
     a, b, y = (240, 0, 0), (80, 0, 450), (0, 1, 0)
     along = _minus(b, a)
     inner = _cross(along, y)

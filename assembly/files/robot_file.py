@@ -204,7 +204,7 @@ def _reference_point(root: Table) -> tuple[float, float, float] | None:
 
 
 def _diagnosis(root: Table) -> dict[str, Any]:
-    """Return the file's record of its diagnosis, with an absolute path."""
+    """Return the diagnosis recorded in the file, with an absolute path."""
     # texts, numbers and lists are stored unchanged
     content: dict[str, Any] = {}
     if root.has("diagnosis"):
@@ -280,7 +280,7 @@ def _fit_remarks(robot: Robot) -> tuple[str, ...]:
 
 
 def _frame(table: Table) -> Frame:
-    """Return one ``[[frame]]``."""
+    """Return the frame of one ``[[frame]]`` table."""
     name = table.text("name", longest=_LONGEST_NAME)
     table.place = f"frame {quoted(name)}"
     joint = table.choice("joint", JOINTS, "fixed")
@@ -390,7 +390,7 @@ def _placement(table: Table) -> tuple[NDArray, NDArray]:
 
 
 def _closure(table: Table, names: list[str]) -> tuple[str, str]:
-    """Return one ``[[closure]]``."""
+    """Return the two frames of one ``[[closure]]`` table."""
     value = table.require("frames", "two frame names")
     table.finish()
     proper = isinstance(value, list) and all(isinstance(v, str) for v in value)

@@ -98,7 +98,7 @@ def _named(steps: list[Step], tables: list[Table]) -> tuple[Step, ...]:
 
 
 def _step(table: Table, robot: Robot) -> Step:
-    """Return one ``[[step]]``."""
+    """Return the step of one ``[[step]]`` table."""
     given = [kind for kind in KINDS if table.has(kind)]
     if len(given) != 1:
         found = f"found {' and '.join(given)}" if given else "found none of its kinds"

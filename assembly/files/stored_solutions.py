@@ -166,7 +166,7 @@ def _encoded(value: Any, arrays: list[NDArray]) -> Any:
 
 
 def _decoded(value: Any, arrays: Mapping[str, NDArray]) -> Any:
-    """Return the value from which :func:`_encoded` computed its result."""
+    """Return the value that was encoded by :func:`_encoded`."""
     if isinstance(value, list):
         return [_decoded(v, arrays) for v in value]
     if not isinstance(value, dict):

@@ -15,7 +15,7 @@ from forcefit.assembly.kinematics.nominal import size_of
 from forcefit.assembly.model.robot import Robot
 from forcefit.stiffness.screws import rotation_matrix
 
-_SAME = 1e-9  # [lengths, cosine] error below which points, or right angles, are exact
+_SAME = 1e-9  # accepted error of common points [lengths] and right angles [cosine]
 
 
 @lru_cache(maxsize=64)

@@ -106,7 +106,7 @@ def place_callouts(home: Posture) -> tuple[PlacedCallout, ...]:
     widths = np.cumsum([0, *(sum(zone.dimensions) for zone in zones)])
     screws = np.zeros((len(callouts), 6, widths[-1]))
     for k in _order(callouts, datums, sides):
-        # in the feature's axes
+        # errors in the feature's axes
         own = np.zeros((6, widths[-1]))
         own[:, widths[k] : widths[k + 1]] = zones[k].columns
         frame = _datum_frame(bodies, callouts[k], datums[k], callouts, sides, screws)
@@ -136,9 +136,9 @@ def _fault(callout: Callout, found: str) -> str:
 
 
 def _bodies(home: Posture) -> _Bodies:
-    """Return the bodies: groups of frames that are fixed to each other by closures."""
+    """Return the bodies: groups of frames that closures or fixed joints connect."""
     robot, n = home.robot, len(home.robot.frames)
-    group = list(range(n + 1))  # parent -1, the base, is the last
+    group = list(range(n + 1))  # the base, whose parent index is -1, is the last
 
     def root(i: int) -> int:
         while group[i] != i:

@@ -194,7 +194,7 @@ def _positioned(robot: Robot, q: NDArray) -> Robot:
 
 
 def _independent(robot: Robot, T: NDArray) -> NDArray:
-    """Return (n,) bool: the first drives in file order that together fix the robot."""
+    """Return (n,) bool, True for the first drives in the file that fix the robot."""
     A = closure_matrices(robot, T)[0][0]
     driven = np.array([f.actuated for f in robot.frames])[mobile(robot)]
     loose = ~driven

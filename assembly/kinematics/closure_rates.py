@@ -9,7 +9,7 @@ from forcefit.assembly.kinematics.nominal import mobile, motion_screws, size_of
 from forcefit.assembly.model.robot import Robot
 
 # relative size below which a singular value of the closures counts as zero: closures
-# hold to 1e-10, and near a singularity the error of a posture is the root of that
+# hold to 1e-10, and the error of a posture near a singularity is the square root of it
 SINGULAR = 1e-6
 _NOISE = 30.0  # assumed noise of the singular values divided by the closure error
 

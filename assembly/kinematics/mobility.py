@@ -19,18 +19,18 @@ from forcefit.assembly.kinematics.posture import Posture
 from forcefit.assembly.kinematics.ranks import MISMATCH_FACTOR, rank_of
 from forcefit.assembly.model.contact_closures import contact_closures
 
-# relative size of singular values that count as zero: rounding of files with 6 digits,
-# and the error of singular postures, the root of the closure error 1e-10
+# relative size below which singular values count as zero: rounding of files with 6
+# digits, and at singular postures the square root of the closure error 1e-10
 ZERO = 1e-5
 # [rad, lengths] least motion of the platform for unit joint rates
 _PLATFORM_RANK = 1e-6
-_ERROR = 10.0  # error of free motions times the gap of the singular values
+_ERROR = 10.0  # assumed error of free motions times the ratio of singular values
 _NOISE = 1e-14  # relative rounding error of singular values
 _DISTANCE = 0.05  # [rad or lengths] distance of nearby postures
 _NEIGHBOURS = 16  # largest number of nearby postures
 _AGREEING = 3  # number of nearby postures that must agree
 _EXACT = 1e-12  # [rad, m] closure error that is only rounding
-_LEAST = 1e-8  # relative size of singular values that count as zero at such postures
+_LEAST = 1e-8  # relative size below which singular values count as zero at _EXACT
 _CLOSED = 1e-6  # [rad, m] largest closure error of a nearby posture
 _BACK = 0.1  # a posture nearer than this share of the distance counts as unmoved
 
@@ -186,14 +186,14 @@ def mobility_near(posture: Posture, here: Mobility) -> NearMobility:
         if _AGREEING in {returned, *agreeing.values()}:
             break
     if not found:
-        # the correction did not converge at any posture: no smaller number is known
+        # no correction converged, so no smaller number of freedoms is known
         return NearMobility(0 if returned == _AGREEING else here.freedoms, None)
     least = min(found, key=lambda m: (m.freedoms, m.freedoms_drives_locked))
     return NearMobility(min(least.freedoms, here.freedoms), least)
 
 
 def _certainly_least(here: Mobility) -> bool:
-    """Return whether no posture can have fewer freedoms: no dependent closures."""
+    """Return whether no posture has fewer freedoms, as all closures are independent."""
     return here.overconstraint == 0 and here.freedoms_drives_locked == 0
 
 
@@ -257,7 +257,7 @@ class _Motions:
 
     @property
     def gap(self) -> float:
-        """Least singular value that counts, over the largest that does not."""
+        """Ratio of the least singular value that counts to the largest other one."""
         rank = self.joints.shape[1] - len(self.joints)
         if not rank:
             return np.inf

@@ -49,7 +49,7 @@ class Target:
 
 
 def size_of(robot: Robot) -> float:
-    """Return the reference length [m]: the longest body's, or 1 if all are points."""
+    """Return the longest length of a body [m], or 1 if all lengths are zero."""
     lengths = np.linalg.norm(robot.fixed_transforms[:, :3, 3], axis=1)
     return float(lengths.max()) or 1.0
 

@@ -55,7 +55,7 @@ class CutRobot:
         return Posture(self.robot, q, T, posture.mismatch)
 
     def spread(self, rows: NDArray) -> NDArray:
-        """Return (..., m, k): rows (..., n, k) at the ends of beams, zero elsewhere."""
+        """Return (..., m, k) rows: those of frames at ends of beams, zero elsewhere."""
         spread = np.zeros((*rows.shape[:-2], len(self.owner), rows.shape[-1]))
         spread[..., self.last, :] = rows
         return spread
@@ -84,7 +84,7 @@ def cut_beams(robot: Robot) -> CutRobot:
 
 
 def _pieces(frame: Frame) -> list[tuple[Frame, float]]:
-    """Return the frames of one body from its base on, with distances to its tip."""
+    """Return the pieces of one body from base to tip, with distances to its tip."""
     link = frame.link
     if not isinstance(link, BeamLink) or link.pieces == 1:
         return [(frame, 0.0)]

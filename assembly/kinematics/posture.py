@@ -107,7 +107,7 @@ class Posture:
 
     @property
     def distinct(self) -> "tuple[Posture, NDArray]":
-        """The c distinct postures among R, and the (R,) index of each among them."""
+        """Distinct postures (c of R), and (R,) the index of each posture among them."""
         coordinates, transforms, which = _distinct(
             Unchanged(self.coordinates), Unchanged(self.transforms)
         )
@@ -115,7 +115,7 @@ class Posture:
         return distinct, which
 
     def pose(self) -> dict[str, float]:
-        """Return the nominal platform pose by component; base axes, rotation vector."""
+        """Return the nominal platform pose by component, with a rotation vector."""
         return dict(zip(POSE, pose_components(self.platform).tolist(), strict=True))
 
 
@@ -180,7 +180,7 @@ def _digest(array: Unchanged) -> bytes:
 
 @dataclass(frozen=True)
 class Content:
-    """Cache key: postures with equal transforms, and arrays of equal numbers."""
+    """Cache key, equal for postures and arrays with equal numbers."""
 
     digest: bytes
     postures: Posture = field(compare=False)
@@ -256,7 +256,7 @@ def _left_open(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def _either(turned: float, shifted: float, least: float) -> str:
-    """Return the mismatch in the unit in which it is too large, and the limit."""
+    """Return a text on the mismatch, in the unit in which it is too large."""
     if shifted < least:
         return f"{turned:.3g} rad with the actuated joints held, expected < 1e-06"
     return f"{shifted:.3g} m with the actuated joints held, expected < {least:.3g}"

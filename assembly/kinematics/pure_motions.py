@@ -61,7 +61,7 @@ def pure_motions(
     if not turning:
         return slides
     axes = _plain_basis(Wt[:turning], zero)
-    # velocities of c for these rotations; free translations can be added
+    # velocities at c for these rotations, up to free translations
     across = _complement(free, zero)
     rates = axes @ np.linalg.pinv(w, rcond=zero) @ v @ across.T @ across
     point, anywhere = _common_point(axes, rates, across, exact)
@@ -72,14 +72,14 @@ def pure_motions(
 
 
 def _plain_basis(rows: NDArray, zero: float) -> NDArray:
-    """Return unit vectors that span the rows, along the base axes where possible."""
+    """Return unit vectors that span the rows, along the base axes if possible."""
     rank = int((np.linalg.svd(rows, compute_uv=False) > zero).sum()) if len(rows) else 0
     if rank == 3:
         return np.eye(3)
     P = np.linalg.pinv(rows, rcond=zero) @ rows if rank else np.zeros((3, 3))
     basis: list[NDArray] = []
     for _ in range(rank):
-        # the base's axis nearest to the remaining space
+        # select the base axis nearest to the remaining space
         k = int(np.argmax(np.round(np.diag(P), 9)))
         d = P[k] / np.linalg.norm(P[k])
         d = np.where(np.abs(d) < 1e-12, 0.0, d)

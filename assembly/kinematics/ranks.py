@@ -10,7 +10,7 @@ RANK = 1e-10  # relative size below which a singular value counts as zero
 ROWS_RANK = 1e-9  # threshold for rows that only clearances can satisfy
 # factor of the nominal closure error that is added to RANK, for rounded robot files
 MISMATCH_FACTOR = 30.0
-# rounding error of columns that a projection removes, relative to their size
+# rounding error, relative to their size, of columns that a projection removes
 NOISE = 1e-12
 UNBOUNDED = 1e-8  # [rad, m] least platform motion per unit of a free motion
 

@@ -26,11 +26,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from forcefit.stiffness.screws import rotation_vector, skew, transform
 
-_SERIES = 9  # terms of the Stumpff series: 1e-17 at angle 1
+_SERIES = 9  # number of terms of the Stumpff series: error 1e-17 at 1 rad
 _STUMPFF = np.array([
     [1 / math.factorial(2 * j + k) for k in range(6)] for j in range(_SERIES)
 ])  # fmt: skip
-_ROUNDING = 1e-16  # [-] size of terms at which the series of the second derivative ends
+_ROUNDING = 1e-16  # [-] size below which terms of the second derivative are omitted
 
 
 def exponential(screw: ArrayLike) -> NDArray:
@@ -74,7 +74,7 @@ def inverse(T: NDArray) -> NDArray:
 
 
 def turn_jacobian(turn: ArrayLike) -> NDArray:
-    """Return the (..., 3, 3) J of SO(3): small rotation per change of the vector."""
+    """Return (..., 3, 3) J of SO(3): small rotation per change of a rotation vector."""
     W = skew(turn)
     _, _, c2, c3, *_ = stumpff(np.asarray(turn, dtype=float))
     return np.eye(3) + c2 * W + c3 * (W @ W)
@@ -125,7 +125,7 @@ def second_form(screw: ArrayLike, wrench: ArrayLike) -> NDArray:
     powers = [np.broadcast_to(np.eye(6), ad.shape)]
     for _ in range(orders - 1):
         powers.append(powers[-1] @ ad)
-    # w.ad^k [h, ad^j h] / (k + j + 2)! summed over k + j < orders, j not 0
+    # sum of w.ad^k [h, ad^j h] / (k + j + 2)! over k + j < orders and j > 0
     factors = [
         [1 / math.factorial(k + j + 2) if 0 < j < orders - k else 0.0
          for j in range(orders)]
@@ -139,7 +139,7 @@ def second_form(screw: ArrayLike, wrench: ArrayLike) -> NDArray:
 
 
 def _orders(screws: NDArray) -> int:
-    """Return the number of orders of brackets whose terms exceed rounding."""
+    """Return the number of bracket orders whose terms are larger than rounding."""
     most = float(np.linalg.norm(screws[..., :3], axis=-1).max(initial=0.0))
     order, size = 2, most
     while size > _ROUNDING:

@@ -22,7 +22,7 @@ from forcefit.assembly.model.robot import Robot
 
 _ASIDE = 0.02  # [rad or lengths] distance of nearby postures
 _NEIGHBOURS = 6  # number of nearby postures, of which one must not be singular
-_APART = 1e-5  # relative size above which a singular value there counts as nonzero
+_APART = 1e-5  # relative size above which a singular value nearby counts as nonzero
 _CLOSED = 1e-8  # [rad, m] largest closure error of a nearby posture
 _NOISE = 1e3  # singular values below this factor times the closure error count as zero
 

@@ -127,7 +127,7 @@ def find_singularities(robot: Robot, transforms: NDArray) -> Singularities:
 
 @dataclass(frozen=True)
 class _Ranks:
-    """Ranks away from singularities: of the closures, of Q, of its platform part."""
+    """Ranks of closures, of Q and of its platform part, away from singularities."""
 
     closures: int
     motions: int
@@ -161,7 +161,7 @@ def _rank(A: NDArray, least: float = _RANK) -> int:
 
 
 def _null_space(A: NDArray, rank: int) -> tuple[NDArray, NDArray, NDArray]:
-    """Return the null space, the least singular value above it, and its row."""
+    """Return the null space, and the least nonzero singular value with its row."""
     if not rank:
         return np.broadcast_to(np.eye(A.shape[2]), (len(A), *A.shape[2:] * 2)), *(
             np.ones(len(A)), np.zeros((len(A), A.shape[2]))
@@ -207,7 +207,7 @@ def _measure(robot: Robot, T: NDArray, ranks: _Ranks) -> Singularities:
 def _ranks_there(moved: NDArray, generic: _Ranks) -> _Ranks:
     """Return the ranks where the closures leave more motions than elsewhere."""
     motions = _rank(moved, SINGULAR)
-    # motions that never move the platform are no serial singularity here either
+    # motions that never move the platform are not a serial singularity either
     always = generic.motions - generic.platform
     return _Ranks(generic.closures, motions, min(motions - always, 6))
 
@@ -215,11 +215,11 @@ def _ranks_there(moved: NDArray, generic: _Ranks) -> _Ranks:
 def _drives_and_platform(
     N: NDArray, B: NDArray, ranks: _Ranks
 ) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
-    """Return serial and parallel distances, joint rates of both, and a screw."""
+    """Return both distances, joint rates of both motions, and a platform screw."""
     drives = B.shape[2] - 6
     W, t, Q = np.linalg.svd(N @ B, full_matrices=False)
     Q = Q[:, : ranks.motions]
-    # joint rates of the rows of Q
+    # joint rates that belong to the rows of Q
     rates = np.swapaxes(W[:, :, : ranks.motions], 1, 2) @ N
     rates = rates / np.maximum(t[:, : ranks.motions, None], 1e-300)
     serial, still_platform = _least(Q[..., drives:], ranks.platform)

@@ -83,7 +83,7 @@ def limits_passed(robot: Robot, q: NDArray) -> str:
         room = _ROUNDING * (size_of(robot) if slides else 1.0)
         low, high = frame.limits[0] - room, frame.limits[1] + room
         if frame.passive and frame.joint == "revolute":
-            # whole turns of a passive joint do not count
+            # whole turns of a passive joint are not counted as motion
             value -= 2 * np.pi * np.floor((value - low) / (2 * np.pi))
         if not low <= value <= high:
             texts.append(

@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     import xarray
 
 _ROUNDED = 1e-9  # share of the largest wrench below which a component is rounding error
-_NOTHING = 1e-12  # [N m, N] components smaller than this are rounding errors
+_NOTHING = 1e-12  # [N m, N] components of a wrench below this are rounding errors
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -88,7 +88,7 @@ class Assembly(Solution[N]):
                 "platform error": f"at most {largest(self.platform_screw[solved])}",
             }
         forces = np.linalg.norm(without_rounding(self.tip_wrenches)[:, 3:], axis=1)
-        most = largest_row(forces)  # links in series carry equal forces
+        most = largest_row(forces)  # first of equal forces: links in series
         return {
             **forced_lines(self),
             "largest force": f"{forces[most]:.4g} N, in "
@@ -257,7 +257,10 @@ class Assembly(Solution[N]):
 
     @property
     def _balancing(self) -> NDArray:
-        """(..., ny) [sqrt(2 J)] spring deformations that balance the wrenches."""
+        """(..., ny) [sqrt(2 J)] deformations of the springs that balance the wrenches.
+
+        The wrenches include those of the loads.
+        """
         columns, links = self.joints.elastic, self.joints.links
         body, joint = _flat(self.wrenches), _flat(self.joint_wrenches)
         return np.where(links, body @ columns, joint @ columns)
@@ -268,7 +271,10 @@ class Assembly(Solution[N]):
         bodies: ArrayLike | None = None,
         gravity: ArrayLike | None = None,
     ) -> bool:
-        """Return whether these loads act here, see :func:`solve_assembly`."""
+        """Return whether the assembly carries these loads.
+
+        For the arguments see :func:`solve_assembly`.
+        """
         other = all_loads(self.posture, load, bodies, gravity)
         return np.array_equal(other.body, self.frame_loads.body) and np.array_equal(
             other.joint, self.frame_loads.joint
@@ -337,7 +343,8 @@ class Assembly(Solution[N]):
 
         The divisor is at least 1e-4 of the energy without clearance.
         """
-        # inside an assembly zone the least energy is zero, so a floor replaces it
+        # the least energy is zero inside an assembly zone: the divisor has a lower
+        # limit
         least = np.maximum(1e-4 * np.asarray(self.energy_without_clearance), 1e-300)
         return plain(self.duality_gap() / np.maximum(self.stored, least))
 

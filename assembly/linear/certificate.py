@@ -36,10 +36,10 @@ from forcefit.assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE, SolverFa
 
 LARGEST_RESIDUAL = 1e-9  # [rad, reference lengths] accepted residual of a closure
 LARGEST_EXCESS = 1e-9  # [-] accepted excess of a clearance over its cone
-_SCREW, _SCREW_SHARE = 1e-5, 1e-3  # [rad, m] and relative: accepted error of the screw
-_AMPLIFIED = 10.0  # largest ratio of frame motion to spring deformation that is assumed
+_SCREW, _SCREW_SHARE = 1e-5, 1e-3  # accepted error of the screw: [rad, m] and relative
+_AMPLIFIED = 10.0  # assumed upper limit of frame motion divided by spring deformation
 _WIDTH = 3e-5  # required difference of upper and lower bound, relative to the distance
-_HELD = 0.1  # [-] share of its cone that a clearance fixed by a load can still cover
+_HELD = 0.1  # [-] largest free share of its cone with which a clearance is fixed
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def unproved(assembly: Assembly) -> str:
     allowed = GAP * (assembly.stored + abs(assembly.work))
     allowed += GAP_WITHOUT_CLEARANCE * assembly.energy_without_clearance
     sentences = []
-    # written so that NaN counts as not proved
+    # the condition is written so that NaN counts as not proved
     if not gap <= allowed:
         sentences.append(
             f"the minimum of the energy is certified to {gap:.1e} J only, "
@@ -140,7 +140,7 @@ def _allowed(assembly: Assembly) -> NDArray:
 
 
 def _springs_determined(assembly: Assembly) -> bool:
-    """Return whether the gap limits the springs' error to a negligible frame motion."""
+    """Return whether the error of the springs causes only negligible frame motions."""
     frames, springs = len(assembly.posture.robot.frames), assembly.elastic.size
     blocks = assembly.joints.elastic.reshape(frames, 6, springs)
     moved = np.linalg.norm(assembly.posture.paths @ blocks, axis=(0, 2))
@@ -229,7 +229,7 @@ def _room(
 
 
 def _farthest(reachable: ReachableSet, part: int, box: float) -> float:
-    """Return the largest certified distance [rad or m] from the centre, up to box."""
+    """Return the certified largest distance [rad or m] of the set from its centre."""
     if not 0.0 < box < np.inf:
         return box
     about_centre = replace(reachable, centre=np.zeros(6))
@@ -240,12 +240,12 @@ def _farthest(reachable: ReachableSet, part: int, box: float) -> float:
 
 
 def _extents(reachable: ReachableSet) -> NDArray:
-    """Return (6,) [rad, m] extents from the set's centre, the larger of both sides."""
+    """Return (6,) [rad, m] the larger extent of the set in both senses of each axis."""
     extents = []
     for d in np.concatenate([np.eye(6), -np.eye(6)]):
         try:
             height = reachable.support(d).height
             extents.append(height - float(d @ reachable.centre))
-        except SolverFailed:  # no bound is known in that direction
+        except SolverFailed:  # no bound is known in this direction
             extents.append(np.inf)
     return np.maximum(np.reshape(extents, (2, 6)).max(axis=0), 0.0)

@@ -153,7 +153,7 @@ def _virtual_joints(
 def _elastic(
     links: NDArray, joints: NDArray, robot: Robot
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the columns of links and joint springs, and a mask for the links."""
+    """Return the spring columns of links and joints, and (ny,) bool, True for links."""
     count = len(robot.frames)
     columns, is_link = [np.zeros((6 * count, 0))], []
     for compliances, link in ((links, True), (joints, False)):
@@ -169,7 +169,7 @@ def _elastic(
 
 
 def _cones(bounds: NDArray, scales: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Return the columns of bounded clearances, their cones and a mask for scaling."""
+    """Return bounded clearances: columns, cones, and whether the margin scales each."""
     rows, sizes, group, scaled = [], [], [], []
     count = 0
     for i, cone in np.argwhere((bounds > 0) & np.isfinite(bounds)):

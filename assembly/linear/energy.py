@@ -203,7 +203,7 @@ def _solve_one(
     if method == "reference":
         return least_energy(posture, load, loads)
     rounding, acting = _rounding_of(robot), loads.rows() if loads else None
-    # a copy: C++ reads the address of a writable array three times as fast
+    # a copy, because C++ obtains the address of a writable array three times as fast
     T = np.array(posture.transforms, ndmin=4)
     off = np.array([posture.mismatch])
     for bounded in (False, True):
@@ -217,7 +217,7 @@ def _solve_one(
     multipliers, residual = rows["multipliers"], rows["residual"] + rounding
     drop_zeros(rows["energy"], rows["bound"], multipliers, residual, acting is not None)
     if acting is None and not np.count_nonzero(multipliers):
-        rows["elastic"][:] = 0.0  # without wrenches, deformations are rounding
+        rows["elastic"][:] = 0.0  # without wrenches, deformations are rounding errors
     assembly = Assembly(
         linearisation=linearise(posture), joints=joints, load=load, frame_loads=loads,
         method="compiled", energy_without_clearance=float(rows["tight"][0]),
@@ -227,7 +227,7 @@ def _solve_one(
     return with_known(assembly, known)
 
 
-@lru_cache(maxsize=32)  # for one robot at many postures
+@lru_cache(maxsize=32)  # called for one robot at many postures
 def _rounding_of(robot: Robot) -> float:
     """Return the largest closure error [rad, lengths] that rounding can cause."""
     joints, _ = structure_of(robot)
@@ -262,7 +262,7 @@ def _solve_many(
     if left and method == "compiled":
         log_reference(robot.name, "least energy", len(left), count)
     for i in left:
-        one = points[i]  # posture and loads of the point
+        one = points[i]  # this object contains posture and loads of the point
         _record(rows, points.apart, i, _by_reference(one, own_axes_free))
     residual = rows["residual"] + closure_rounding(sets, joints, structure.size)
     _drop_rounding(rows, residual, points.loaded)
@@ -379,7 +379,7 @@ def _unsaid(count: int) -> _Rows:
 
 
 def _certify(rows: _Rows, points: Assembly) -> None:
-    """Compute the gap, the potential and its lower bound from energies and bounds."""
+    """Compute the gap, the potential and its lower bound of each point in ``rows``."""
     energy, bound, loads = rows["energy"], rows["bound"], points.frame_loads
     rows["gap"][:] = np.maximum(0.0, energy - bound)
     on_errors = loads.body @ points.posture.robot.errors.ravel()
@@ -427,7 +427,7 @@ def _of_rows(
 
 
 def _by_reference(where: Assembly, own_axes_free: bool) -> Assembly | Exception:
-    """Return one point solved by the reference, or the exception raised."""
+    """Return one point solved by the reference method, or the exception raised."""
     try:
         return least_energy(where.posture, where.load, where.frame_loads, own_axes_free)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
@@ -438,7 +438,7 @@ def _record(
     rows: _Rows, apart: dict[int, Assembly | Exception], i: int,
     found: Assembly | Exception,
 ) -> None:  # fmt: skip
-    """Write a separately solved point into row i; store it if its columns differ."""
+    """Write a separately solved point into row i; store it if it has other columns."""
     rows["method"][i] = "reference"
     if isinstance(found, Exception):
         for name in (*_NUMBERS, "platform_screw", *_VECTORS):

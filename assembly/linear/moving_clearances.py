@@ -151,10 +151,10 @@ def _places_of(robot: Robot, assumption: str) -> _Places:
 
 
 def _columns(frames: NDArray, axes: NDArray) -> list[tuple[int, int]]:
-    """Return the frame and axis of every column."""
+    """Return the pairs of frame and axis of all columns."""
     return list(zip(frames.tolist(), axes.tolist(), strict=True))
 
 
 def _indices(some: list[tuple[int, int]], among: list[tuple[int, int]]) -> NDArray:
-    """Return the indices of these frames and axes in another list of columns."""
+    """Return the indices of pairs of frame and axis in another list of pairs."""
     return np.array([among.index(one) for one in some], dtype=np.int64)

@@ -137,7 +137,7 @@ def _free_clearances(assembly: Assembly, offset: ArrayLike) -> _FreeClearances |
 
 
 def _with_clearances(assembly: Assembly, free: _FreeClearances, v: NDArray) -> Assembly:
-    """Return the assembly with new unloaded clearances and adapted free motions."""
+    """Return the assembly for new unloaded clearances, with adapted free motions."""
     joints, lin = assembly.joints, assembly.linearisation
     u = assembly.clearances.copy()
     u[free.unloaded] = v

@@ -190,7 +190,7 @@ def bound_pose_error(
 
 
 def _bounds_of_many(assembly: Assembly, asked: Asked) -> PoseError:
-    """Return compiled bounds; compute points that are not covered one by one."""
+    """Return the bounds of many points: compiled where possible, else one by one."""
     rows, left = compiled_bounds(assembly, asked)
     status, reason = assembly.status.copy(), assembly.reason.copy()
     left &= status == OK
@@ -246,7 +246,7 @@ def _too_wide(
 ) -> str:
     """Return a message if the bounds are farther apart than required, else ``""``."""
     low, high = bounds
-    # both infinite: the platform can move without bound
+    # both bounds are infinite if the platform can move without bound
     if high - low <= tolerance or low == high:
         return ""
     return (

@@ -109,7 +109,7 @@ class Solution(PointResults, Generic[N]):
         lin, robot = self.linearisation, self.posture.robot
         if self.posture.transforms.ndim > 3:
             lin = replace(lin, posture=self.posture[i])
-        # return the robot itself if it has these errors: its columns are cached
+        # with the robot's own errors, keep the robot object: its columns are cached
         if one.errors is not None and not np.array_equal(one.errors, robot.errors):
             robot = robot.with_errors(one.errors)
             lin = replace(lin, posture=replace(lin.posture, robot=robot))

@@ -78,7 +78,7 @@ class Zone(PointResults, Generic[N]):
         return {"points": points, "margin": f"at most {largest:.6g} where there is one"}
 
     def __getitem__(self, rows: Any) -> "Zone":
-        """Return a point, which raises if its solver failed; or a selection."""
+        """Return one point or a selection; raise SolverFailed for a failed point."""
         taken = super().__getitem__(rows)
         if not taken.of_many and np.isnan(taken.margin):
             raise SolverFailed("least factor on the clearances", taken.reason)
@@ -94,7 +94,7 @@ class Zone(PointResults, Generic[N]):
         """(...) reason why there is no margin or why it is not proved; else empty."""
         margin, bound = np.atleast_1d(self.margin, self.bound)
         with np.errstate(invalid="ignore"):
-            # written so that NaN counts as not proved
+            # the condition is written so that NaN counts as not proved
             proved = margin - bound <= MARGIN_GAP * margin + _GAP_ABSOLUTE
         text = np.array(self.reason, dtype=object, ndmin=1)
         for i in np.flatnonzero(~proved & (margin != bound) & (text == "")):

@@ -18,7 +18,7 @@ CONVERGED = 1e-11  # relative change of a contact's deflection at convergence
 def softened(
     posture: Posture, laws: tuple[ContactLaw, ...], compliances: NDArray
 ) -> Posture:
-    """Return the posture with springs of the laws' secant compliances in series."""
+    """Return the posture with the laws' secant compliances as springs in series."""
     if not compliances.any():
         return posture
     frames = list(posture.robot.frames)
@@ -44,7 +44,7 @@ def secants(
 
 
 def _deflection(law: ContactLaw, load: float) -> float:
-    """Return the deflection [rad or m] under a load >= 0."""
+    """Return the deflection [rad or m] of a contact under a load >= 0."""
     return float((load / law.coefficient) ** (1 / law.exponent))
 
 

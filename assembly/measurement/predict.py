@@ -339,7 +339,7 @@ def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
         np.zeros(len(conditions), dtype=bool),
     )
     if conditions.exact:
-        return unsolved  # solved one by one, under the wrenches of finite motions
+        return unsolved  # these rows are solved one by one, with finite motions
     distinct, which = conditions.postures.distinct
 
     def solve(held: Conditions) -> tuple[tuple[NDArray, NDArray], NDArray]:

@@ -205,7 +205,7 @@ class FlexibleAssembly:
 
 @lru_cache(maxsize=4)
 def _under_load(flexible: Flexibility, loads: FrameLoads) -> NDArray | None:
-    """Return (R, 6n) screws of bodies and joints due to loads, with open closures."""
+    """Return (R, 6n) screws of bodies and joints that loads cause in open chains."""
     # the result is the same for all conditions that differ only in errors
     if not loads:
         return None
@@ -234,7 +234,7 @@ def _at_postures(unchanged: Unchanged) -> Callable[[NDArray, NDArray], NDArray]:
     posture = unchanged.numbers
     names, own, count = np.unique(posture, return_inverse=True, return_counts=True)
     order = np.argsort(own, kind="stable")
-    place = np.empty_like(order)  # index of a row among the rows of its posture
+    place = np.empty_like(order)  # index of a row among the rows of the same posture
     place[order] = np.arange(len(order)) - np.repeat(np.cumsum(count) - count, count)
     most = int(count.max(initial=0))
 
@@ -318,7 +318,7 @@ def pseudo_inverse(M: NDArray) -> tuple[NDArray, NDArray]:
         return M, np.zeros(len(M), dtype=bool)
     values, vectors = np.linalg.eigh(M)
     size = np.abs(values)
-    largest = size.max(axis=1, keepdims=True)  # zero for a free motion
+    largest = size.max(axis=1, keepdims=True)  # zero if there is only a free motion
     kept = size > RANK * largest
     ambiguous = np.any((size > _ROUNDING * largest) & ~kept, axis=1)
     inverted = np.divide(1.0, values, out=np.zeros_like(values), where=kept)
@@ -332,7 +332,7 @@ def _limits(postures: Posture, free: NDArray) -> NDArray:
 
 
 def _each(matrices: NDArray, screws: NDArray) -> NDArray:
-    """Return (R, 6n): each frame's (6, 6) matrix times its screw or wrench."""
+    """Return (R, 6n) products of each frame's (6, 6) matrix and its screw or wrench."""
     blocks = np.swapaxes(screws.reshape(len(screws), -1, 6), 0, 1)
     products = blocks @ matrices.mT
     return np.swapaxes(products, 0, 1).reshape(screws.shape)

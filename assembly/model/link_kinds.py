@@ -119,7 +119,7 @@ class MeshLink:
     solution: MeshSolution | None = field(default=None, compare=False, repr=False)
 
     def __getstate__(self) -> dict[str, Any]:
-        # tens of megabytes; a worker process computes the solution from the same files
+        # the solution has tens of megabytes; worker processes compute it again
         return {**vars(self), "solution": None}
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "MeshLink":

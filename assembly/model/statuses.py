@@ -41,11 +41,11 @@ OF_POINTS = (
 # statuses of points at which no quantity is computed
 UNUSABLE = {OUT_OF_REACH, INVALID_ROBOT, SINGULAR, BEYOND_LIMITS}
 
-# verdicts on one value that is compared: OK, or one of these
+# verdicts on one compared value: OK, or one of the following
 FAILS = "fails"
 UNDECIDED = "undecided"
 NO_SIGNAL = "no signal"
-# .. and on a whole comparison: NO_SIGNAL, or
+# verdicts on a whole comparison: NO_SIGNAL, or one of the following
 PASSED = "passed"
 FAILED = "failed"
 NOT_DECIDED = "not decided"

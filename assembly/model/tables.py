@@ -134,7 +134,7 @@ def frame_table(data: "xarray.Dataset", *rows: str) -> "pandas.DataFrame":
 
     columns: dict[tuple[str, str], NDArray] = {}
     sizes = {row: data.sizes[row] for row in rows}
-    # such as the components of postures in a list
+    # variables such as the components of postures in a list
     kept = {
         str(name): v.variable.set_dims(sizes) for name, v in data.coords.items()
         if name not in data.dims and v.dims and {*v.dims} <= {*rows}

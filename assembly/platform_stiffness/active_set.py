@@ -29,9 +29,9 @@ from forcefit.assembly.linear.load import FrameLoads
 from forcefit.assembly.solvers.cones import cone_sizes
 
 AT_BOUND = 1e-6  # [-] distance within which a clearance counts as at its bound
-_NEAR_BOUND = 1e-3  # [-] distance within which it can be pressed, see ``contacts``
+_NEAR_BOUND = 1e-3  # [-] distance from its bound within which it can be pressed
 _PRESSED = 1e-8  # relative to the largest force: a smaller force counts as zero
-# relative to the energy without clearance: a smaller force counts as zero
+# relative to the energy without clearance: a force below this counts as zero
 _ROUNDING = 1e-12
 _RANK = 1e-10  # relative size below which a singular value counts as zero
 _FLAT = 1e-12  # relative to the largest curvature: smaller curvatures count as zero
@@ -88,7 +88,7 @@ def settle(assembly: Assembly) -> Assembly:
         size = cone_sizes(settled.clearances, settled.joints.group)
         if np.array_equal(contacts(settled)[0], pressed) and np.all(size <= 1 + 1e-9):
             return settled
-        # a small force was treated as zero, and its clearance moves beyond its bound
+        # a small force was wrongly set to zero: its clearance exceeds its bound
         beyond = size > 1.0 + 1e-9
         if not (beyond & ~pressed).any():
             break
@@ -135,7 +135,7 @@ def bounded_unknowns(joints: VirtualJoints) -> slice:
 
 
 def closure_rows(lin: Linearisation, joints: VirtualJoints) -> NDArray:
-    """Return the (6 closures, N) closure rows in all unknowns."""
+    """Return the (6 closures, N) closure rows for all unknowns."""
     return lin.rows @ np.hstack([joints.elastic, joints.cones, joints.free])
 
 

@@ -214,7 +214,7 @@ def _begin(
     values, Z = path.modes(local)
     motion = Z @ ((Z.T @ path.reference_load(local)) / values)
     size = np.linalg.norm(motion / local.placement.model.units) * path.range
-    weight = 1.0 / (size or 1.0) ** 2  # a rigid bar does not deform
+    weight = 1.0 / (size or 1.0) ** 2  # the size is zero if the robot is rigid
     # the load contributes half of the arc length
     rise = path.range / np.sqrt(2.0) * np.sign(last - first)
     place = _Place(first, local, motion * rise, float(rise), values, Z)
@@ -298,7 +298,7 @@ def _critical(path: _Path, low: _Place, high: _Place, step: float) -> Event:
         else:
             high, long_ = middle, (short + long_) / 2
     turns = low.rise * high.rise < 0
-    # the mode that changes is the last negative one on the side with more of them
+    # the critical mode is the last negative one on the side with more negative modes
     more = high if high.unstable > low.unstable else low
     soft = more.unstable - 1
     bent = more.modes[:, soft]

@@ -45,7 +45,7 @@ from forcefit.inputs.renamed import renamed_keywords
 from forcefit.results.display import html_table, largest_row, numbers, short_repr
 
 _HALVINGS = 14  # bisections that locate an event to 6e-5 of a load step
-_CARRIES = 1e-6  # relative to the largest force times bound: smaller ones count as zero
+_CARRIES = 1e-6  # force times bound, relative to the largest, that counts as zero
 # largest number of contact changes that are followed within a load step: in symmetric
 # robots, rounding errors can cause forces in some contacts
 _CHANGES = 8
@@ -304,7 +304,7 @@ def _events(
         low, high = _bracket(
             before, after, at, lambda p: _apart(before, p) < _apart(p, after)
         )
-        if _jumps(low, high, component):  # otherwise the robot is only soft in between
+        if _jumps(low, high, component):  # otherwise the robot is only compliant here
             way = numbers(
                 high.equilibrium.platform_screw - low.equilibrium.platform_screw
             )
@@ -321,18 +321,18 @@ def _event(point: _Point, kind: str, what: str, component: int) -> Event:
 def _bracket(
     low: _Point, high: _Point, at: _Solver, same: Callable[[_Point], bool]
 ) -> tuple[_Point, _Point]:
-    """Return the two nearest loads between which a property changes first."""
+    """Return two close loads between which a property changes for the first time."""
     for _ in range(_HALVINGS):
         try:
             middle = at((low.load + high.load) / 2, low)
         except SolverFailed:
-            break  # for example between free motion and the least load
+            break  # for example, between free motion and the smallest load
         low, high = (middle, high) if same(middle) else (low, middle)
     return low, high
 
 
 def _apart(one: _Point, other: _Point) -> float:
-    """Return the distance [m] of two platforms, with rotations times the length."""
+    """Return the distance [m] of two platforms, with rotations times a length."""
     change = other.equilibrium.platform_screw - one.equilibrium.platform_screw
     return float(np.linalg.norm(change * np.repeat([one.tangent.length, 1.0], 3)))
 
@@ -351,7 +351,7 @@ def _jumps(before: _Point, after: _Point, component: int) -> bool:
 
 
 def _mode(point: _Point) -> str:
-    """Describe the mode of negative stiffness: platform motion and bent part."""
+    """Describe the mode of negative stiffness: the platform's motion, the bent part."""
     tangent = point.tangent
     soft = int(np.flatnonzero(tangent.signs < 0)[0])
     return "buckles: " + mode_text(

@@ -48,7 +48,7 @@ from forcefit.assembly.solvers.method import Method
 
 Side = Literal["holding", "letting go"]
 _RANK = 1e-10  # relative size below which a singular value counts as zero
-_NOISE = 1e-12  # relative to a column before a projection that removes it
+_NOISE = 1e-12  # rounding error of a column that a projection removes, relative to it
 
 
 def without_clearance(posture: Posture) -> PlatformStiffness:

@@ -103,9 +103,9 @@ class Stiffnesses:
 
     @cached_property
     def _roots(self) -> tuple[NDArray, NDArray]:
-        """Singular values (k, 6) and vectors (k, 6, 6) of scaled compliance roots."""
+        """Singular values (k, 6), vectors (k, 6, 6) of the scaled compliance roots."""
         scale = np.repeat([self.length, 1.0], 3)
-        # a triangular factor with six rows first, because there can be many springs
+        # reduce to six rows by a triangular factor, because there can be many springs
         known = np.isfinite(self.springs).all(axis=(1, 2))
         values = np.full((len(self.springs), 6), np.nan)
         vectors = np.full((len(self.springs), 6, 6), np.nan)
@@ -157,7 +157,7 @@ class Stiffnesses:
         d, scale = np.asarray(direction), np.repeat([self.length, 1.0], 3)
         compliance = np.sum((self.springs @ d) ** 2, axis=1)
         largest = np.sum((self.springs * scale) ** 2, axis=(1, 2))
-        # these compliances are rounding errors of a motion that no part makes
+        # a motion that no part makes has only rounding errors as compliance
         still = compliance <= _RANK**2 * largest * np.sum((d / scale) ** 2)
         with np.errstate(divide="ignore"):
             K = 1.0 / np.where(still, 0.0, compliance)

@@ -181,7 +181,7 @@ class PlatformStiffness:
 
     @cached_property
     def _resisted(self) -> tuple[NDArray, NDArray, NDArray]:
-        """Basis of wrenches (6, r), stiffness (r, r) in it, rigid wrenches (6, .)."""
+        """Basis of resisted wrenches (6, r), stiffness in it, and rigid wrenches."""
         scale = self._scale[:, None]
         basis = null_space((scale * self.free).T) if self.free.size else np.eye(6)
         U, S, Vt = np.linalg.svd(basis.T @ (scale * self.root))
@@ -200,7 +200,7 @@ class PlatformStiffness:
         way, core, rigid = self._resisted
         values, vectors = np.linalg.eigh(core)
         scale = self._scale[:, None]
-        # orthonormal with rotations times length
+        # screws that are orthonormal if rotations are multiplied by the length
         screws = np.hstack([
             np.linalg.qr(scale * self.free)[0],
             way @ vectors / scale,

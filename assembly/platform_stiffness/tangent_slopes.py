@@ -125,14 +125,14 @@ def compliance_slope(
 def _classical(
     posture: Posture, ahead: Posture, back: Posture, step: float, asked: TangentState
 ) -> _Moved:
-    """Return the function of neighbouring tangents for the classical model."""
+    """Return a function that computes neighbouring tangents of the classical model."""
     return lambda there, by: (without_clearance(there), there.platform)
 
 
 def _linear(
     posture: Posture, ahead: Posture, back: Posture, step: float, asked: TangentState
 ) -> _Moved:
-    """Return the function of neighbouring tangents for problem (22)."""
+    """Return a function that computes neighbouring tangents of problem (22)."""
     start = settle(solve_assembly(posture, asked.load, gravity=asked.gravity))
     pressed, touching = contacts(start)
     x, multipliers = unknowns(start), start.multipliers
@@ -175,7 +175,7 @@ def _like(joints: VirtualJoints, there: Posture) -> VirtualJoints:
 def _exact(
     posture: Posture, ahead: Posture, back: Posture, step: float, asked: TangentState
 ) -> _Moved:
-    """Return the function of neighbouring tangents for the exact equilibrium."""
+    """Return a function that computes neighbouring tangents with finite motions."""
     start = solve_exact(posture, asked.load, gravity=asked.gravity)
     local = start.expansion
     at, model = local.placement, local.placement.model
@@ -223,11 +223,11 @@ def _difference(
     conditions: Callable[[Posture], tuple[NDArray, NDArray]],
     ahead: Posture, back: Posture, step: float,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return derivatives of closures and gradient at fixed unknowns."""
+    """Return the derivatives of closures and gradient for fixed unknowns."""
     there, behind = conditions(ahead), conditions(back)
     return (there[0] - behind[0]) / (2 * step), (there[1] - behind[1]) / (2 * step)
 
 
 def _unknown(tangent: PlatformStiffness) -> PlatformStiffness:
-    """Return the tangent filled with NaN, for a change of contact."""
+    """Return the tangent with NaN, because it has no derivative at a contact change."""
     return replace(tangent, root=np.full_like(tangent.root, np.nan))

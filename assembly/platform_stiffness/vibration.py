@@ -44,7 +44,7 @@ from forcefit.stiffness.beam.beam import section_axes
 from forcefit.stiffness.beam.sections import declared_section
 from forcefit.stiffness.screws import screw_map
 
-_NULL = 1e-12  # relative to the largest eigenvalue: smaller ones have no mass or spring
+_NULL = 1e-12  # eigenvalues below this share of the largest are zero
 _ROUNDING = 1e-14  # rounding of the mass matrix relative to its largest entry
 
 
@@ -184,7 +184,7 @@ def _modes(K: NDArray, M: NDArray, rounding: NDArray) -> tuple[NDArray, NDArray]
     Returns:
         (m,) squared frequencies and (k, m) modes.
     """
-    shift = np.trace(K) / np.trace(M) or 1.0  # 1 if no part is elastic
+    shift = np.trace(K) / np.trace(M) or 1.0  # 1 for a robot without elastic parts
     values, vectors = np.linalg.eigh(K + shift * M)
     least = shift * np.sum(vectors * (rounding @ vectors), axis=0)
     # omit motions without mass and spring
@@ -301,7 +301,7 @@ def _beam_mass(frame: Frame) -> NDArray:
     e, f, g = 3 * length, 4 * length**2, length**2
     bends = ((4, 2, 10, 8), 1, section.I_z), ((5, 1, 11, 7), -1, section.I_y)
     for plane, sign, second in bends:
-        # a rotation about y lowers points ahead along x
+        # a rotation about y lowers points that are ahead along x
         s = np.array([1, sign, 1, sign])
         shift = np.array([
             [156, a, 54, -b], [a, c, b, -d], [54, b, 156, -a], [-b, -d, -a, c]

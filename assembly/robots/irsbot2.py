@@ -42,9 +42,9 @@ NAMES = (
     "loop1_elbow", "loop1_idler", "loop2_platform", "loop2_link", "tip",
 )  # fmt: skip
 ERROR_FRAMES = ("elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip")
-# [rad, m] smallest errors of the paper
+# [rad, m] smallest errors in the paper
 ERROR_LEAST = (1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6)
-# [rad, m] largest errors of the paper
+# [rad, m] largest errors in the paper
 ERROR_MOST = (2e-2, 2e-2, 2e-2, 2e-4, 2e-4, 2e-4)
 
 _PARENTS = {
@@ -63,7 +63,7 @@ _REVOLUTE = ("drive", "elbow", "idler", "idler_end")
 
 @dataclass(frozen=True)
 class IRSBot2Parameters:
-    """The paper's nominal parameters [m, rad, Pa, N m/rad, N/m], by its symbols."""
+    """Nominal parameters of the paper [m, rad, Pa, N m/rad, N/m], by its symbols."""
 
     a: float = 0.050
     b: float = 0.083

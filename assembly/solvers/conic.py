@@ -34,14 +34,14 @@ _TOLERANCE = 1e-13
 _REGULARISATIONS = (0.0, 1e-10, 1e-8)
 # gap that counts as proved: relative to the energy, and to the energy without clearance
 GAP, GAP_WITHOUT_CLEARANCE = 1e-8, 1e-12
-_GAP_WITHIN = 1e-12  # relative gap required of the interior-point method
+_GAP_WITHIN = 1e-12  # required relative gap of the interior-point method
 # share of the proved gap that is required here, because the full problem increases the
 # gap
 _SHARE = 0.1
 _STOP = 1e-2  # share of this gap at which Newton's method stops
 # largest number of Newton steps, and first sigma of the method
 _STEPS, _FIRST_SIGMA = 150, 1e6
-_RESIDUAL = 1e-11  # accepted residual of a row without springs
+_RESIDUAL = 1e-11  # accepted residual of rows without springs
 # largest factor on the clearances, up to which infeasibility is proved
 _LARGEST_FACTOR = 1e8
 _UNPROVED = "PrimalInfeasible, but its multipliers do not prove it"
@@ -216,7 +216,7 @@ _SOLVERS: dict[Method, tuple[_Solver, ...]] = {
 def _certified(
     problem: ConeProgramme, u: NDArray, rigid: NDArray, method: Method
 ) -> Iterator[ConicSolution]:
-    """Yield the solution with the bound by its springs, then refined solutions."""
+    """Yield a solution certified by its springs, then solutions refined by Newton."""
     own = _certify(problem, u, problem.G @ u + problem.h, rigid)
     if method == "reference":  # Clarabel's multipliers are rarely better
         for refined in refine(problem, u, rigid):
@@ -251,7 +251,7 @@ def _certify(
     value = float(strain @ strain) / 2 - float(problem.d @ u)
     bound = _energy_bound(problem, springs, rigid)
     if not problem.d.any():
-        # any multiple of the multipliers is a valid proof: f gain - f^2 cost / 2
+        # a multiple f of the multipliers is a valid proof: f gain - f^2 cost / 2
         cost = float(springs @ springs)
         factor = max(0.0, bound + cost / 2) / cost if cost > 0.0 else 0.0
         better = _energy_bound(problem, factor * springs, factor * rigid)

@@ -43,7 +43,8 @@ def refine(problem: _Problem, u: NDArray, n: NDArray) -> Iterator[_Point]:
     G, h, d, H, _, group = problem
     y = G @ u + h
     force, slack = cone_sizes(G.T @ y - d - H.T @ n, group), 1.0 - cone_sizes(u, group)
-    # force times slack is about the solver's gap, so one of the two is nearly zero
+    # the product of force and slack is about the solver's gap: one of them is nearly
+    # zero
     scale = max(float(y @ y) / 2, float(force.max()), 1e-300)
     for near in _NEAR:
         pressed = (slack < near) | (force > scale * slack)

@@ -48,8 +48,8 @@ from forcefit.results.display import html_table, short_repr
 from forcefit.stiffness.screws import skew
 
 ASSUMPTIONS = ("frozen", "free", "budget")
-# accepted excess of squared sizes over cones: solutions are hardly more accurate, and a
-# cone at its bound would otherwise stop the step of all other cones
+# accepted excess of squared sizes over cones: a smaller value hardly improves
+# solutions, and a cone at its bound would then stop the step of all other cones
 _EXCESS = 1e-8
 
 
@@ -112,7 +112,7 @@ class ReachableSet:
     __repr__, _repr_html_ = short_repr, html_table
 
     def unbounded(self, part: int) -> bool:
-        """Return whether the rotation (part 0) or the translation (3) is unbounded."""
+        """Return whether a part is unbounded: rotation (0) or translation (3)."""
         free = self.free[part : part + 3]
         return bool(np.abs(free).max(initial=0.0) > UNBOUNDED)
 
@@ -317,7 +317,7 @@ class _Motion:
         return inverse, np.where(large, free, 0.0)
 
     def _with_mismatch(self, threshold: float) -> float:
-        """Return [-] a threshold plus the rounding error of the nominal closures."""
+        """Return a threshold [-] plus the rounding error of the nominal closures."""
         return rank_tolerance(self.assembly.posture.mismatch, threshold)
 
     @cached_property
@@ -386,6 +386,7 @@ def loaded_cones(assembly: Assembly, joints: VirtualJoints) -> NDArray:
     screws = clearance_components(joints.robot, assembly.clearance_screws).ravel()
     u = joints.cones.T @ screws / (joints.cones**2).sum(axis=0)
     slack = np.maximum(0.0, 1.0 - cone_sizes(u, joints.group))
-    # load times slack is about the solver's gap, so one of the two is nearly zero
+    # the product of load and slack is about the solver's gap: one of them is nearly
+    # zero
     scale = max(assembly.energy, 1e-9 * assembly.energy_without_clearance, 1e-300)
     return ((load > scale * slack) & (load > 1e-9 * scale))[joints.group]

@@ -233,7 +233,7 @@ def _load_multipliers(
     """Return the multipliers that balance the loads along every free motion."""
     A_q, drive = lin.rows @ joints.free, joints.free.T @ frame_loads.joint
     multipliers = np.linalg.lstsq(A_q.T, -drive, rcond=RANK)[0]
-    # the residual is orthogonal to the rows of A_q: a free motion that the load drives
+    # the residual, orthogonal to the rows of A_q, is a free motion that the load drives
     left = A_q.T @ multipliers + drive
     most = np.maximum(
         1e-8 * np.abs(drive).max(initial=1e-300),
@@ -251,7 +251,7 @@ def _load_rounding(
     lin: Linearisation, joints: VirtualJoints, frame_loads: FrameLoads
 ) -> NDArray:
     """Return (nq,) the rounding errors of the loads' work on the free motions."""
-    lengths = in_reference_lengths(lin.size)  # for a screw; for a wrench the inverse
+    lengths = in_reference_lengths(lin.size)  # factors for screws; wrenches: inverse
     largest = np.abs(frame_loads.joint.reshape(-1, 6) / lengths).max(initial=0.0)
     sizes = np.tile(lengths, len(joints.free) // 6) @ np.abs(joints.free)
     return np.asarray(_LOAD_ROUNDING * largest * sizes)
