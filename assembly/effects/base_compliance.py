@@ -57,8 +57,8 @@ def with_foundation(robot: Robot, values: Values) -> Robot:
 
     Args:
         robot: robot on a rigid base.
-        values: ``stiffness.rx`` .. ``stiffness.tz`` [N m/rad, N/m]; absent ones are
-            rigid.
+        values: ``stiffness.rx`` .. ``stiffness.tz`` [N m/rad, N/m]; the foundation is
+            rigid in directions that are not given.
 
     Returns:
         The robot on its foundation.

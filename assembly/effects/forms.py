@@ -58,13 +58,12 @@ class Form:
         name: name of the form in robot files.
         summary: description in one line.
         most: largest number of variables.
-        shapes: names of the parameters in which it is not linear, and whether each is
-            required.
+        shapes: names of the nonlinear parameters, and whether each is required.
         indices: smallest and largest integer at the beginning of a column's name; None
             if the name has none.
         words: possible ends of a column's name; ``""`` for no end.
         basis: function from column names, inputs (R,) and shapes to (R, p) columns.
-        remembers: whether the past of its first variable matters.
+        remembers: whether earlier values of the first variable influence the result.
         least: smallest number of variables.
     """
 

@@ -35,7 +35,7 @@ Unit = Mapping[str, float]  # exponents of m, N, s, K ..; rad has none
 
 
 def parse_formula(text: str) -> ast.expr:
-    """Return the tree of a formula.
+    """Return the syntax tree of a formula.
 
     Args:
         text: formula such as ``"a*sin(3*q) + b"``.
@@ -47,9 +47,7 @@ def parse_formula(text: str) -> ast.expr:
         BadInput: the text is not a formula; the message names the error.
     """
     if len(text) > _LONGEST:
-        raise BadInput(
-            f"found {len(text)} characters, expected a formula of at most {_LONGEST}"
-        )
+        raise BadInput(f"found {len(text)} characters, expected at most {_LONGEST}")
     try:
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, MemoryError, RecursionError):
@@ -102,11 +100,11 @@ def evaluate(tree: ast.expr, known: Mapping[str, NDArray]) -> NDArray:
     """Return the value of a formula.
 
     Args:
-        tree: tree of the formula.
-        known: numbers, or arrays (R,), by name.
+        tree: syntax tree of the formula.
+        known: values of variables and parameters by name: numbers, or arrays (R,).
 
     Returns:
-        (R,) values, or a number; inf or NaN where the formula has no value.
+        (R,) values, or a number; inf or NaN where the formula is not defined.
     """
     with np.errstate(all="ignore"):
         return _value(tree, known)
@@ -135,13 +133,13 @@ def parameter_units(
     """Return the units of a formula's parameters that make all its units consistent.
 
     Args:
-        tree: tree of the formula.
+        tree: syntax tree of the formula.
         variables: units of its variables by name.
-        result: unit that the formula must have; a pure number counts as a value in SI.
+        result: unit of the formula's value; a pure number counts as a value in SI.
 
     Returns:
-        Exponents by parameter; a parameter that may have any unit counts as a pure
-        number.
+        Exponents of the units by parameter; a parameter that can have any unit counts
+        as a pure number.
 
     Raises:
         BadInput: no units are consistent; the message names the conflict.

@@ -95,8 +95,8 @@ def basis(conditions: Conditions, function: Function, names: Sequence[str]) -> N
 
     Args:
         conditions: R rows.
-        function: function with a form, not a formula, and without wrenches among its
-            variables; of its parameters only the shapes are used.
+        function: function with a form (no formula) whose variables are not wrenches;
+            among its parameters, only the shapes are used.
         names: p names of columns, such as ``"1.sine"``.
 
     Returns:
@@ -139,7 +139,7 @@ def inputs_of(conditions: Conditions, function: Function) -> NDArray:
         return np.column_stack([history.direction(first)[row], *sizes])
     shapes = parameters_of(function, function.components[0])
     late = shapes["time_constant"]
-    if first in CLOCKS:  # a function of time settles like a step at time 0
+    if first in CLOCKS:  # time is the input: lag of a unit step at time 0
         return np.column_stack([1.0 - history.fading(late), history.fading(late)])[row]
     lagged = history.lagged(first, late, held=form.name == "creep")
     return np.column_stack([lagged[row], history.fading(late)[row]])
@@ -155,7 +155,7 @@ def _now(conditions: Conditions, name: str) -> NDArray:
 
 
 def value_of(function: Function, component: str, inputs: Sequence[NDArray]) -> NDArray:
-    """Return a function's value.
+    """Return the values of one component of a function.
 
     Args:
         function: the function.
@@ -163,7 +163,7 @@ def value_of(function: Function, component: str, inputs: Sequence[NDArray]) -> N
         inputs: (R,) values of each input, from :func:`inputs_of`.
 
     Returns:
-        (R,) values [rad, m, N m, N], or per wrench for a compliance.
+        (R,) values [rad, m, N m, N]; for a compliance, values per unit of the wrench.
     """
     numbers = parameters_of(function, component)
     if function.form == FORMULA:
@@ -308,15 +308,15 @@ def _yielding(
 def in_session_alone(
     conditions: Conditions, changed: Conditions, session: str
 ) -> Conditions:
-    """Return the conditions changed in the rows of one session only.
+    """Return the conditions with effects in the rows of one session only.
 
     Args:
-        conditions: R rows.
-        changed: the same conditions with effects that change them row by row.
+        conditions: R rows without the effects.
+        changed: the same R rows with effects that change individual rows.
         session: name of the session in which the effects act.
 
     Returns:
-        Changed conditions in these rows, unchanged ones in the others.
+        The rows of ``changed`` in this session, and those of ``conditions`` elsewhere.
     """
     acts = in_session(conditions, session)[:, None]
 

@@ -110,7 +110,7 @@ def clearance_step(
 
     Args:
         problem: the quadratic problem.
-        near: whether the solution is near enough for Newton's method.
+        near: whether the solution is so close that Newton's method is tried first.
         method: method of :func:`forcefit.assembly.solvers.conic.minimise_energy`.
 
     Returns:
@@ -181,7 +181,7 @@ def _newton(p: ClearanceProblem) -> tuple[NDArray, NDArray] | None:
 def _active_step(
     p: ClearanceProblem, S: NDArray, gradient: NDArray, u: NDArray, active: NDArray
 ) -> tuple[NDArray, NDArray, NDArray] | None:
-    """Return the change, multipliers of cones and rows; None if there is no minimum."""
+    """Return the step, and the multipliers of cones and rows; None without minimum."""
     C = np.hstack([boundary_normals(u, active, p.group), p.rows.T])
     count, boundaries = C.shape[1], int(active.sum())
     if count > len(u):

@@ -61,11 +61,11 @@ _RESTORATIONS = 4  # number of corrections that move a step back onto the closur
 
 
 class NotConverged(SolverFailed):
-    """Error: no equilibrium with finite motions was found near the linear one.
+    """Error: no equilibrium with finite motions was found near the linear solution.
 
     Attributes:
         problem: name of the problem.
-        status: description of the distance from equilibrium.
+        status: text on the remaining residual and imbalance.
     """
 
     def __init__(self, problem: str, status: str) -> None:

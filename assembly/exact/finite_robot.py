@@ -32,12 +32,12 @@ LINK, CLEARANCE, SPRING, OWN = range(4)
 
 @dataclass(frozen=True, eq=False)
 class FiniteRobot:
-    """A robot at a posture, prepared for finite screws.
+    """Robot at a posture, with its unknowns as columns of finite screws.
 
     Attributes:
         posture: nominal posture of the robot.
-        joints: virtual joints of the robot; their columns are the unknowns y, u, q in
-            this order.
+        joints: virtual joints of the robot; their columns are the unknowns y, u and q,
+            in this order.
     """
 
     posture: Posture
@@ -90,7 +90,7 @@ class FiniteRobot:
 
     @cached_property
     def units(self) -> NDArray:
-        """(N,) scale of the unknowns: 1 for springs; free motions become unit screws."""
+        """(N,) scale of the unknowns: 1 for springs; screws of motions get size 1."""
         units = np.ones(len(self.frame))
         units[self.bounded.stop :] /= np.linalg.norm(
             self.columns[self.bounded.stop :] * self.scale, axis=1
@@ -161,7 +161,7 @@ class FiniteRobot:
 
     @cached_property
     def comes_before(self) -> NDArray:
-        """(N, N) 1 if the first unknown moves the second, 1/2 if they are one motion."""
+        """(N, N) 1 if the first unknown moves the second, 1/2 within one motion."""
         above = self.posture.robot.on_path[self.frame][:, self.frame].T
         return above * (1.0 - np.sign(self._order[:, None] - self._order)) / 2
 

@@ -260,10 +260,10 @@ def place(model: FiniteRobot, x: NDArray) -> Placement:
     """Return the robot moved by finite screws.
 
     Args:
-        model: the prepared robot.
+        model: robot with its unknowns.
         x: (N,) values of the unknowns.
 
     Returns:
-        The placement, with positions of all frames.
+        The placement, which computes the positions of all frames.
     """
     return Placement(model, np.array(x, dtype=float))

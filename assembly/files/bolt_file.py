@@ -67,7 +67,7 @@ def _numbers(table: Table, key: str, names: tuple[str, ...] | None) -> dict[str,
 
 
 def bolt_table(bolt: LockedAt) -> Any:
-    """Return the value of ``locked_at``.
+    """Return the value of ``locked_at`` for a robot file.
 
     Args:
         bolt: the pose at which a joint is bolted.

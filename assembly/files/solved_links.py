@@ -172,10 +172,10 @@ def _check_place(frame: Frame, link: MeshLink, mesh_span: NDArray) -> None:
     most = 1e-6 + 1e-3 * float(np.linalg.norm(wanted))
     if link.axis is None and np.linalg.norm(tip - wanted) > most:
         raise BadInput(
-            f"the centre of the mesh's tip interface is at {_point(tip)} from "
-            f"that of its base, but the frame's origin is at {_point(wanted)} "
-            "from its parent's; expected the same point within 1e-6 m + 0.1 % "
-            "of the length"
+            f"the centre of the mesh's tip interface is at {_point(tip)} relative to "
+            f"the base interface, but the frame's origin is at {_point(wanted)} "
+            "relative to the parent's origin; expected equal positions within 1e-6 m "
+            "+ 0.1 % of the length"
         )
 
 

@@ -62,13 +62,13 @@ class CutRobot:
 
 
 def cut_beams(robot: Robot) -> CutRobot:
-    """Return a robot with a frame for every piece of its beams.
+    """Return a robot with one frame for every piece of its beams.
 
     Args:
         robot: robot of n frames.
 
     Returns:
-        The cut robot; the same frames if no beam has several pieces.
+        The cut robot; its frames are those of ``robot`` if no beam has several pieces.
     """
     frames: list[Frame] = []
     owner, last, back = [], [], []

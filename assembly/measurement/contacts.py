@@ -67,11 +67,12 @@ def contact_deflections(
 ) -> tuple[NDArray, NDArray]:
     """Return the deflections d of contacts with c |d|^n sign(d) = w + A d.
 
-    They minimise a strictly convex function, because A is negative semidefinite.
-    Newton's method is used; each step is halved until the gradient decreases.
+    The solution minimises a strictly convex function, because A is negative
+    semidefinite.  Newton's method is used; each step is halved until the gradient
+    decreases.
 
     Returns:
-        (R, s) deflections, and (R,) bool, True if they converged.
+        (R, s) deflections, and (R,) bool, True for rows that converged.
     """
     c = np.array([law.coefficient for law in laws])
     n = np.array([law.exponent for law in laws])

@@ -32,14 +32,15 @@ class History:
     first: NDArray
 
     def direction(self, name: str) -> NDArray:
-        """Return the side from which a variable came: -1, 1, or 0 if unknown.
+        """Return the side from which a variable reached its value: -1, 1 or 0.
 
         Args:
             name: name of the variable; ``"approach"`` is the column of this name.
 
         Returns:
-            (H,) signs.  A variable at rest keeps its last direction.  Before its first
-            motion, the column ``approach`` is used if there is one.
+            (H,) signs, 0 if unknown.  A variable that does not change keeps its last
+            direction.  Before the first change, the column ``approach`` is used if it
+            exists.
         """
         given = np.nan_to_num(self.values["approach"])
         if name == "approach":
@@ -83,11 +84,12 @@ class History:
         Args:
             name: name of the variable.
             time_constant: [s] time constant, > 0.
-            held: whether a value applies from the time of the row before it, as for a
-                load; otherwise it changes linearly between rows, as for a temperature.
+            held: whether each value applies since the time of the previous row, as for
+                a load.  If not, the variable changes linearly between rows, as for a
+                temperature.
 
         Returns:
-            (H,) in the unit of the variable.
+            (H,) lagged values in the unit of the variable.
         """
         u, state = self.values[name], 0.0
         past = self._elapsed / time_constant

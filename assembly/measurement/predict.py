@@ -60,10 +60,10 @@ class Prediction:
 
     Attributes:
         deviation: (R, 6) [rad, m] rx ry rz tx ty tz, base axes; NaN without a solution.
-        reason: (R,) reason why there is no solution, or empty.
-        undetermined: (R,) bool, True if clearances leave the pose undetermined.  In a
-            closed chain the given pose is then the one nearest to nominal, in an open
-            chain the one with centred clearances.
+        reason: (R,) reason why there is no solution, or an empty text.
+        undetermined: (R,) bool, True if clearances leave the pose undetermined.  The
+            returned pose of a closed chain is then the pose nearest to nominal; that of
+            an open chain has centred clearances.
     """
 
     deviation: NDArray

@@ -96,14 +96,14 @@ def _component_bounds(robot: Robot) -> NDArray:
 
 
 def fractions(robot: Robot, clearance_screws: NDArray) -> NDArray:
-    """Return the clearance screws relative to their bounds.
+    """Return the clearance screws divided by their bounds.
 
     Args:
         robot: robot of n frames.
         clearance_screws: (n, 6) [rad, m] clearance screws.
 
     Returns:
-        (n, 6) [-] ratios, 0 where there is no clearance.
+        (n, 6) [-] ratios; 0 for components without clearance.
     """
     bounds = _component_bounds(robot)
     finite = np.isfinite(bounds) & (bounds > 0)

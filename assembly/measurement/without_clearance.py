@@ -53,18 +53,18 @@ _CLOSED_ABSOLUTE = 1e-12  # [rad, reference lengths] residual that counts as rou
 
 @dataclass(frozen=True, eq=False)
 class Flexibility:
-    """A robot without clearances at c postures, prepared for any errors and loads.
+    """Robot without clearances at c postures, with factorised closures.
 
     Attributes:
         rows: (c, 6K, 6n) scaled closure rows.
         platform: (c, 6, 6n) map from small screws to the platform screw.
-        body_compliances: (n, 6, 6) compliances in the frames' axes.
-        joint_compliances: (n, 6, 6) compliances in the frames' axes.
+        body_compliances: (n, 6, 6) compliances of bodies in the frames' axes.
+        joint_compliances: (n, 6, 6) compliances of joints in the frames' axes.
         free: (6n, q) unit columns of the free motions.
         limit: (q,) [rad, m] bounds of the free motions, inf without a bound.
         inverse: (c, m, m) inverse of the scaled system, m = 6K + q.
         system: (c, m, m) the scaled system.
-        softness: divisor of the compliances with which the system is of order one.
+        softness: number by which compliances are divided to scale the system to 1.
         ambiguous: (c,) bool, True if the numerical rank is ambiguous.
     """
 
@@ -190,7 +190,7 @@ class FlexibleAssembly:
     """R assemblies of a robot without clearances.
 
     Attributes:
-        platform_screw: (R, 6) [rad, m] at the platform's origin, base axes.
+        platform_screw: (R, 6) [rad, m] screws at the platform's origin, base axes.
         joint_wrenches: (R, 6n) [N m, N] wrenches through all joints, in the frames'
             axes.
         multipliers: (R, 6K) multipliers of the scaled closures.

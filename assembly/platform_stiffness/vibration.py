@@ -138,7 +138,7 @@ def natural_modes(
 
 
 def check_masses(robot: Robot) -> None:
-    """Reject a robot without any mass.
+    """Raise BadInput for a robot without any mass.
 
     Raises:
         BadInput: no body has a mass.

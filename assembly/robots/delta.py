@@ -1,8 +1,9 @@
 """Clavel's Delta, R-(SS)2: each of three driven arms moves the platform by two rods.
 
 The rods between ball joints can spin about their own axes, and each spin is a degree of
-freedom: there are 9, 3 of the platform and 6 of the rods.  The six rods constrain the
-platform exactly, so geometric errors move it without elastic energy.
+freedom.  The robot has 9 degrees of freedom: 3 of the platform and 6 of the rods.  The
+six rods constrain the platform exactly, so geometric errors move it without elastic
+energy.
 
 Sources:
     Williams, The Delta parallel robot: kinematics solutions, Ohio University (2016):

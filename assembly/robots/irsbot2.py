@@ -1,14 +1,14 @@
 """The IRSBot-2 of the paper's section IV, reconstructed.
 
-The two legs are in the direction of the x axis; leg 2 is leg 1 rotated by pi about z0.
-In each leg a parallelogram (proximal module) carries an elbow body of constant
-orientation. Two parallel links between universal joints (distal module) carry the
-platform.  The paper's figures that define the axes of the universal joints are not
-public.  The axes used here give the paper's mobility everywhere in the workspace; other
-axes that were tried do not.
+The two legs extend along the x axis; leg 2 is leg 1 rotated by pi about z0.  In each
+leg, a parallelogram (proximal module) carries an elbow body of constant orientation.
+Two parallel links between universal joints (distal module) carry the platform.  The
+figures of the paper that define the axes of the universal joints are not public.  With
+the axes used here, the mobility equals that of the paper everywhere in the workspace;
+with other axes that were tested, the mobility differs.
 
-Frames have names; the paper's index is their position in :data:`NAMES`, from 1.
-Errors act at the paper's frames :data:`ERROR_FRAMES`.
+Frames have names; the index of a frame in the paper is its position in :data:`NAMES`,
+counted from 1.  Errors act at the frames :data:`ERROR_FRAMES` of the paper.
 
 ======  ===========================================================================
 symbol  meaning [m, rad]

@@ -52,7 +52,7 @@ def orthoglide(parameters: OrthoglideParameters | None = None) -> Robot:
 
     Returns:
         The robot with 30 frames and 5 closures; platform ``x.tip``.  The coordinate of
-        ``x.slide`` is r_x above.
+        ``x.slide`` is r_x, as defined at the head of this module.
     """
     P = parameters or OrthoglideParameters()
     axes = np.eye(3)

@@ -75,7 +75,7 @@ def arm_angle(
 def two_arms(
     name: str, foot: NDArray, angle: float, tip: NDArray, leg: PlanarLeg
 ) -> list[PlacedFrame]:
-    """Return drive, elbow and the frame at the second arm's end.
+    """Return the drive, the elbow and the frame at the second arm's end.
 
     The drive's coordinate is the arm's angle to the x axis.
 

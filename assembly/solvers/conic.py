@@ -66,8 +66,8 @@ class ConicSolution:
 
     Attributes:
         clearances: (nu,) clearances relative to their bounds.
-        springs: (r,) [sqrt(2 J)] multipliers of the springs, equal to G u + h up to the
-            gap.
+        springs: (r,) [sqrt(2 J)] multipliers of the springs; they equal G u + h within
+            the duality gap.
         rigid_multipliers: (p,) [J] multipliers of the rows without springs.
         value: [J] value of the objective.
         bound: [J] certified lower bound of the objective.
@@ -111,14 +111,14 @@ def minimise_energy(
         H: (p, nu) matrix of full row rank.
         k: (p,) vector.
         group: (nu,) cone of each column, counted from 0.
-        method: ``"compiled"``, with Clarabel if in doubt; ``"reference"`` for Clarabel
-            only.
+        method: ``"compiled"``, with Clarabel if the compiled solution is not proved;
+            or ``"reference"`` for Clarabel only.
 
     Returns:
         The minimiser with a certified lower bound.
 
     Raises:
-        SolverFailed: Clarabel gave no usable solution.
+        SolverFailed: Clarabel returned no usable solution.
     """
     if not (h.any() or d.any() or k.any()):  # the closures fit and no load acts
         zeros = np.zeros(len(h)), np.zeros(len(k))

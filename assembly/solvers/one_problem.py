@@ -55,7 +55,7 @@ def interior_point(
 def newton(
     problem: Problem, starts: NDArray, limits: SolverLimits, u: NDArray, y: NDArray
 ) -> None:
-    """Minimise the same objective by Newton's method on the dual.
+    """Minimise the objective of :func:`interior_point` by Newton's method on the dual.
 
     Args:
         problem: see :func:`interior_point`.
