@@ -3,8 +3,8 @@
 A joint that transmits the wrench w rests at the point of its clearance cones that is
 farthest along w.  In a robot without closures, the wrenches depend only on the loads,
 and this position is the exact minimum of (22).  With closures, this position is the
-limit for small clearances.  It follows from the envelope theorem:
-dE/d(bound) = -|w| in the cone's directions.
+limit for small clearances.  It follows from the envelope theorem: dE/d(bound) = -|w| in
+the cone's directions.
 """
 
 from dataclasses import replace

@@ -29,8 +29,7 @@ class Stiffnesses:
 
     The sizes of the arrays of :class:`PlatformStiffness` differ between postures
     (modes, free motions, rigid directions).  This class therefore stores only arrays of
-    constant
-    shape: compliances, eigen-stiffnesses and shares.
+    constant shape: compliances, eigen-stiffnesses and shares.
 
     Attributes:
         posture: the robot's nominal configuration, k postures.
