@@ -17,7 +17,7 @@ from forcefit.assembly.exact.dead_load import load_magnitudes
 from forcefit.assembly.exact.descent import Expansion
 from forcefit.assembly.solvers.cones import cone_sizes
 
-_ANGLE_ROUNDING = 1e-5  # relative to a small residual: rounding error of an angle
+_ANGLE_ROUNDING = 1e-5  # rounding error of an angle, relative to a small residual
 
 
 def imbalance(local: Expansion) -> float:

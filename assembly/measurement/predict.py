@@ -381,7 +381,7 @@ def _linear(conditions: Conditions) -> tuple[NDArray, NDArray, NDArray]:
         )
         deflections, settled = contact_deflections(conditions.laws, w, own[which])
         screws = screws + times(platform, deflections)
-        if flexible.system.size:  # the wrenches of an open chain follow from the loads
+        if flexible.system.size:  # wrenches of open chains depend on loads only
             wrenches = wrenches + times(everywhere, deflections)
         solved = solved & settled
     if conditions.exact:
