@@ -207,7 +207,7 @@ def test_effect_turns_a_drive_by_its_gain(example, tmp_path, run):
 def test_unknown_parameter_of_an_effect_is_named(example, tmp_path):
     path = written(tmp_path, ARM.replace("joint1 = 1e-3", "joint2 = 1e-3"))
     with pytest.raises(
-        BadInput, match='found "joint2", which is no parameter of drive_g'
+        BadInput, match='found "joint2", which is not a parameter of drive_g'
     ):
         ff.load_robot(path)
 

@@ -182,7 +182,7 @@ def test_missing_output_folder_is_refused_before_anything_is_written(tmp_path):
     ('between = ["tube", "rod"]', 'between = ["tube", "rood"]',
      'joint "slide".between: found "rood", expected a body or "base"'),
     ("axis2 = [0, 1, 0]", "axis2 = [-90, 0, -32]",
-     'joint "upper".axis2: found it parallel to "axis"'),
+     'joint "upper".axis2: found a direction parallel to "axis"'),
     ('type = "prismatic"', 'type = "helical"\npitch = 0', 'pitch: found 0'),
     ("[[leg]]", '[[body]]\nname = "lost"\n\n[[leg]]', 'body "lost": found no joint'),
 ])  # fmt: skip

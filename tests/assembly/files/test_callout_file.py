@@ -127,7 +127,7 @@ def test_normal_of_a_planar_joint_is_the_normal_of_the_face(tmp_path, without_ci
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("", "", 'tolerance of "leg1.pad on rod": found circular datums'),
+        ("", "", 'tolerance of "leg1.pad on rod": found datums that depend'),
         ('datums = ["foot"]', 'datums = ["foots"]',
          '"pad" on "rod".datums: found "foots", expected a joint of "rod"; did you '
          'mean "foot"'),
@@ -139,8 +139,8 @@ def test_normal_of_a_planar_joint_is_the_normal_of_the_face(tmp_path, without_ci
         ('perpendicularity = "0.02 mm"', 'perpendicularity = "0.2 mm"',
          "found 0.2 mm, expected less than that of the location, 0.1 mm"),
         ('profile = "0.04 mm"', 'coaxiality = "0.04 mm"',
-         "found one of a feature that is a plane"),
-        ('hole = "12 H7"', "", 'found (M), expected it with the position of a bore'),
+         "found for a feature that is a plane"),
+        ('hole = "12 H7"', "", 'found (M), expected only for the position of a bore'),
         ('hole = "12 H7"', 'hole = "12 H4"', '"H4", expected a grade from 5 to 11'),
         ('position = "0.1 mm"\nextent = "10 mm"', "",
          "found no tolerance, expected one of position | coaxiality"),
@@ -193,7 +193,7 @@ length = "400 +- 0.05 mm"
         ('datums = ["a"]', 'datums = [{ frame = "a", shape = "cone" }]',
          "found 'cone', expected \"axis\" | \"plane\""),
         ('datums = ["a"]', 'datums = ["a"]\ndirection = [0, 0, 1]',
-         "not at right angles to the axis"),
+         "not perpendicular to the axis"),
     ],
 )  # fmt: skip
 def test_mistake_in_a_file_of_frames_is_reported_in_one_line(
@@ -240,7 +240,7 @@ def test_fit_of_a_drawn_joint_is_that_of_its_frame(tmp_path, without_circle):
             'clearance.fit: found "25 H7/p6", an interference fit',
         ),
         ('{ fit = "12 H7/z6" }', 'clearance.fit: found "z6", expected one of the let'),
-        ('{ fit = "12 H7/g6", radial = 1e-5 }', 'radial: found it together with "fit"'),
+        ('{ fit = "12 H7/g6", radial = 1e-5 }', 'radial: found together with "fit"'),
         ("{ fit = 12 }", "clearance.fit: found 12, expected a fit such as"),
     ],
 )

@@ -331,5 +331,5 @@ def test_bearing_stiffness_is_equal_after_writing_and_reading(tmp_path):
     write_robot(robot, tmp_path / "hub.toml")
     again = read_robot(tmp_path / "hub.toml").frame("hub")
     assert np.array_equal(again.joint_stiffness, K)
-    with pytest.raises(BadInput, match="found inf along the own motion"):
+    with pytest.raises(BadInput, match="found inf along the motion"):
         replace(hub, joint_stiffness=np.diag([1.0, 1.0, np.inf, 1.0, 1.0, 1.0]))

@@ -185,7 +185,7 @@ def _platform(home, errors):
     ("callouts", "message"),
     [
         ([hole(B), replace(hole(Datum("hole")), name="B", feature="B")],
-         "circular datums"),
+         "datums that depend on each other"),
         ([replace(hole(A), datums=(Datum("tip"),))], "another body"),
         ([replace(hole(A), datums=(Datum("hole"),))], "the feature itself"),
         ([hole(A), hole(B)], "found the feature twice"),

@@ -163,5 +163,5 @@ def test_clearances_of_a_ball_are_named_so():
 def test_a_ball_takes_the_place_of_other_bounds(key):
     with pytest.raises(BadInput, match=f'clearance.{key}: found together with "ball"'):
         Clearance(ball=C, **{key: C})
-    with pytest.raises(BadInput, match=r"clearance\.ball: found one on a joint that"):
+    with pytest.raises(BadInput, match=r"clearance\.ball: found a bound on a sliding"):
         Frame("slide", joint="prismatic", clearance=Clearance(ball=C))

@@ -223,7 +223,7 @@ def test_unknown_assumption_and_budget_under_load_are_refused():
     for answer in (many, many[0]):
         with pytest.raises(ValueError, match="assumption is 'loose', expected one of"):
             bound_pose_error(answer, "loose")
-    with pytest.raises(ValueError, match="budget assumption needs no load"):
+    with pytest.raises(ValueError, match="budget assumption requires no load"):
         bound_pose_error(many[0], "budget")
 
 

@@ -92,7 +92,7 @@ def test_errors_of_random_sign_keep_their_least_absolute_value():
         (('"normal"', '"gauss"'), 'distribution: found "gauss"'),
         (("least = [5e-4", "least = [5e-3"), "least: expected 0 <= least <= most"),
         (('"literal"', '"positive"'), 'signs: found "positive"'),
-        (('"middle"', '"crank_pin"'), 'found "crank_pin.RX" again'),
+        (('"middle"', '"crank_pin"'), 'found "crank_pin.RX" a second time'),
         (("most = [0, 1.5e-3", "most = [0, 0"), "most: expected a bound > 0"),
         (("most = [1e-3, 0", "most = [1e300, 0"), "most: found"),
         (("deviation = [0, 1e-3, 0, 0, 0, 1e-5]", "deviation = [0, -1, 0, 0, 0, 0]"),

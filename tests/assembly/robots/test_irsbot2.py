@@ -154,5 +154,5 @@ def test_grid_points_are_reached_exactly_within_the_reach_of_the_links(robot):
 
 
 def test_home_pose_out_of_reach_is_refused_with_the_reach():
-    with pytest.raises(BadInput, match=r"needs a reach of 0.9\d* m, the links give"):
+    with pytest.raises(BadInput, match=r"requires a reach of 0.9\d* m, the links"):
         irsbot2(z=-0.9)

@@ -166,5 +166,5 @@ def test_3rrr_displacement_under_load_equals_its_pin_clearances(rng):
 
 
 def test_planar_legs_out_of_reach_are_refused_with_the_reach():
-    with pytest.raises(BadInput, match=r"5r: the home pose needs a reach of 3 m"):
+    with pytest.raises(BadInput, match=r"5r: the home pose requires a reach of 3 m"):
         arm_angle("5r", [0, 0], [3, 0], 1.0, 1.0, 1)

@@ -164,7 +164,7 @@ def test_delta_without_the_spins_of_its_rods_has_three_freedoms():
 
 
 def test_delta_out_of_reach_is_refused_with_the_reach():
-    with pytest.raises(BadInput, match=r"delta: a leg needs a reach of 2\.0\d* m"):
+    with pytest.raises(BadInput, match=r"delta: a leg requires a reach of 2\.0\d* m"):
         drive_angle(DeltaParameters(), 0.0, np.array([0.0, 0.0, -2.0]))
 
 

@@ -149,7 +149,7 @@ def test_fitted_contacts_are_kept_in_a_file_of_frames(tmp_path, clearance):
     ("clearance", "message"),
     [
         ('{ fit = "25 H7/p6", length = "40 mm" }', 'fit: found "25 H7/p6", an int'),
-        ('{ fit = "12 H7/g6", radial = 1e-5, length = 0.04 }', "radial: found it to"),
+        ('{ fit = "12 H7/g6", radial = 1e-5, length = 0.04 }', "radial: found to"),
         ('{ fit = "12 H7/g6", tilt = 1e-3, length = 0.04 }', "tilt: found together"),
         ('{ fit = "12 H7/g6", length = 0 }', "length: found 0, expected"),
         (
@@ -160,7 +160,7 @@ def test_fitted_contacts_are_kept_in_a_file_of_frames(tmp_path, clearance):
         (
             '{ bearings = [{ z = 0, fit = "12 H7/g6", radial = 0 }, '
             "{ z = 0.1, radial = 0 }] }",
-            'bearings[1].radial: found it together with "fit"',
+            'bearings[1].radial: found together with "fit"',
         ),
         (
             '{ bearings = [{ z = 0, fit = "12 H7/z6" }, { z = 0.1, radial = 0 }] }',
@@ -254,7 +254,7 @@ clearance = { fit = "12 H7/g6", length = 0.04, parts = "pin" }
     [
         (', parts = "pin"', "", "clearance.parts: missing"),
         ('fit = "12 H7/g6", ', "", "clearance.fit: missing"),
-        ("length", "tilt = 1e-3, length", 'clearance.tilt: found it together with "le'),
+        ("length", "tilt = 1e-3, length", 'clearance.tilt: found together with "le'),
         ("12 H7/g6", "12 H7/h6", 'clearance.fit: found "12 H7/g6" of the parts "pin"'),
         ("length = 0.04", "length = -1", "clearance.length: found -1"),
     ],

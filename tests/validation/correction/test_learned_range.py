@@ -102,4 +102,4 @@ def test_reversed_learned_range_is_refused(tmp_path, run):
     path.write_text('learned_range = { "cov.tilt" = [1.0, 0.4] }\n' + ARM)
     code, _, error = run("validation", "explain", str(path))
     assert code == 2
-    assert "cov.tilt: found [1, 0.4], expected the smaller one first" in error
+    assert "cov.tilt: found [1, 0.4], expected the smaller number first" in error
