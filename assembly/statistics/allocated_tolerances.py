@@ -151,6 +151,9 @@ def _taken(
     allocation: Allocation, key: str, reached: float, at: str
 ) -> dict[str, float | str]:
     """Return the part of a limit that clearances use, and the cost without them."""
+    plan, limit = allocation.plan, allocation.plan.limits[key]
+    # pose errors due to errors and to clearances nearly add up, and scale with
+    # tolerances
     looser = limit / (limit - reached) if reached < limit else np.inf
     without = allocation.price / looser
     if plan.cost == "logarithm":

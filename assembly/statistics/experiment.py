@@ -236,7 +236,7 @@ class Experiment:
             for i, name in enumerate(POSE_ERRORS):
                 rows[f"{name}_lower"], rows[name] = bounds[:, i].T
         else:
-            # the model "least" needs no random numbers, and generators are slow to create
+            # "least" needs no random numbers, and generators are slow to create
             numbers = np.asarray(draws).tolist() if self.clearance != "least" else []
             rngs = [draw_generator(self.seed, d, CLEARANCE_STREAM) for d in numbers]
             screws, mixed = position_clearances(
