@@ -81,9 +81,9 @@ def tangent_stiffnesses(
     conditions: Conditions, state: str
 ) -> tuple[dict[str, NDArray], dict[int, str]]:
     """Return the tangent stiffnesses of k points under errors, loads and effects.
-        conditions: conditions with k rows.
+
     Args:
-        conditions: conditions of k rows.
+        conditions: conditions with k rows.
         state: ``"contact"`` or ``"exact"``.
 
     Returns:
