@@ -209,7 +209,7 @@ class Zone:
 
     @cached_property
     def _tightest(self) -> tuple[tuple[int, ...], NDArray]:
-        """Return the set of independent bounds with the least volume, for drawing.
+        """Set of independent bounds with the least volume, used for drawing.
 
         The set is described by the dimensions of its balls, and the matrix from
         coordinates in the balls to u.
