@@ -212,7 +212,7 @@ class _Loops:
 
     @cached_property
     def carried(self) -> NDArray:
-        """(n + 1, n) bool, joints that move the bodies on each joint and on the root."""
+        """(n + 1, n) bool, joints that move the bodies on each joint; last, the root."""
         parents = self.tree[0]
         marks = np.zeros((len(parents) + 1, len(parents)))
         for i, parent in enumerate(parents):

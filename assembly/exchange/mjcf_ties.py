@@ -56,7 +56,7 @@ class Ties:
 
     @cached_property
     def equalities(self) -> list[Node]:
-        """Return the active constraints; record inactive ones as not converted."""
+        """Active constraints; inactive ones are recorded as not converted."""
         given = [n for g in self.root.children("equality") for n in g.children()]
         default = self.defaults.get("active", "true")
         off = [node for node in given if node.element.get("active", default) == "false"]

@@ -56,7 +56,6 @@ def read_sdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
 
     Raises:
         BadInput: the file violates a rule of the format, or a joint type is unknown.
-        BadInput: a rule of the format is broken, or a joint has an unknown type.
     """
     root = read_xml(path, "sdf")
     frames = frames_of(root)

@@ -60,9 +60,10 @@ def position_clearances(
         generators: generator of random numbers for each draw; not used for "least".
         contact_length: [m] length of the contact model, see :func:`contact_length_of`.
 
+    Returns:
         (k, 6) [rad, m] screws, NaN where a draw has no solution; and (k,) bool, False
-        where the random walk of the uniform model had not mixed at its greatest length,
-        see
+        where the random walk of the uniform model did not mix even at its greatest
+        length, see
         :func:`forcefit.assembly.solvers.uniform_clearance.sample_uniform_position`.
 
     Raises:

@@ -93,9 +93,8 @@ class _Positions:
         rows: (p, nw) orthonormal rows.
         group: (nw,) cone number of each clearance.
         screws: (6, nw) [rad, m] map to the platform's screw.
-        screws: (6, nw) [rad, m] map to the platform's screw.
         errors: (6n, nw) [rad, m] map to the errors locked in.
-        centre: (6,) [rad, m] platform's screw at the start.
+        centre: (6,) [rad, m] platform's screw at ``start``.
     """
 
     start: NDArray
