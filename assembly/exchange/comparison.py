@@ -69,7 +69,7 @@ class Comparison:
         what = f"bodies {self.bodies}, masses {self.masses}, loops {self.loops}"
         if not self.agrees:
             return (
-                f"{self.reader} reads {self.file} otherwise: {self.where} "
+                f"{self.reader} reads {self.file} differently: {self.where} "
                 f"differs by {self.difference:.2g}; check which of the two "
                 "programs reads the file correctly"
             )
@@ -107,6 +107,6 @@ def compare(mechanism: Mechanism, path: Path) -> Comparison:
         except subprocess.TimeoutExpired:
             return Comparison("", name, f"MuJoCo took longer than {_LONGEST:g} s")
         if not made.is_file():
-            return Comparison("", name, "MuJoCo ended without an answer")
+            return Comparison("", name, "MuJoCo terminated without a result")
         answer = pickle.loads(made.read_bytes())
     return answer if isinstance(answer, Comparison) else Comparison("", name, "none")

@@ -72,7 +72,7 @@ def _check_alone(mechanism: Mechanism, file: str) -> None:
     if residual >= CLOSED:
         ends = f"({quoted(loop.first)}, {quoted(loop.second)})"
         raise BadInput(
-            f"{file}: {loop.name} {ends} cannot close even alone: the smallest "
+            f"{file}: {loop.name} {ends} cannot close even by itself: the smallest "
             f"gap found is {residual:.3g} rad or m; expected more joints, or "
             "type 3d (--points)"
         )
@@ -212,7 +212,7 @@ class _Loops:
 
     @cached_property
     def carried(self) -> NDArray:
-        """(n + 1, n) bool, joints that move the bodies on each joint; last, the root."""
+        """(n + 1, n) bool, joints that move the bodies on each joint; last: root."""
         parents = self.tree[0]
         marks = np.zeros((len(parents) + 1, len(parents)))
         for i, parent in enumerate(parents):

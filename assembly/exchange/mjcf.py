@@ -215,7 +215,7 @@ def _add_body(node: Node, at: _Place, reading: _Reading) -> None:
     reading.number += 1
     name = node.optional("name") or f"body{reading.number}"
     if name in reading.bodies:
-        raise node.bad("name", "found it twice; expected names that differ")
+        raise node.bad("name", "found this name twice; expected unique names")
     childclass = node.text("childclass", at.childclass)
     place = _Place(name, np.eye(4), childclass, at.angles)
     reading.bodies[name] = _massive(node, place, reading)
@@ -267,7 +267,7 @@ def _freedoms(node: Node, place: _Place, reading: _Reading) -> Iterator[Joint]:
         given = _filled(inner, at.childclass, reading)
         name = given.optional("name") or f"{place.body}.joint{number}"
         if name in reading.parts:
-            raise inner.bad("name", "found it twice; expected names that differ")
+            raise inner.bad("name", "found this name twice; expected unique names")
         kind = "free"
         if inner.tag == "joint":
             kind = _KINDS[given.choice("type", tuple(_KINDS), "hinge")]

@@ -84,7 +84,7 @@ class Ties:
                 raise node.bad("", "found it, expected connect, weld, joint or tendon")
             name = node.optional("name") or f"loop{count}"
             if name in names:
-                raise node.bad("name", "found it twice; expected names that differ")
+                raise node.bad("name", "found this name twice; expected unique names")
             names.add(name)
             loop = self._loop(node, name, poses)
             if loop.first == loop.second:

@@ -191,7 +191,7 @@ def _gather(frames: Frames, model: Node, scope: str, outer: str, old: bool) -> N
         if inside is not None:
             within = f"{scope}{inside.text('name')}::"
             if within + MODEL in frames.named:
-                raise node.bad("name", "found it twice; expected names that differ")
+                raise node.bad("name", "found this name twice; expected unique names")
             _gather(frames, inside, within, scope, its)
 
 
@@ -201,7 +201,7 @@ def _take(frames: Frames, node: Node, scope: str, name: str, old: bool) -> None:
     if full in frames.named and frames.named[full].node.tag != node.tag:
         full += f"_{node.tag}"  # libsdformat uses the same new name
     if full in frames.named:
-        raise node.bad("name", "found it twice; expected names that differ")
+        raise node.bad("name", "found this name twice; expected unique names")
     frames.named[full] = Named(node, scope, old)
 
 

@@ -61,7 +61,7 @@ def read_urdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
     for node in root.children("link"):
         body = _body(node)
         if body.name in bodies:
-            raise node.bad("name", "found it twice; expected names that differ")
+            raise node.bad("name", "found this name twice; expected unique names")
         bodies[body.name] = body
     if not bodies:
         raise BadInput(f"{path}: link: missing; expected at least one")
@@ -94,7 +94,7 @@ def _add(node: Node, parts: dict[str, list[str]], several: list[Joint]) -> None:
     """Add the parts of a joint; reject a name that already exists."""
     name = node.text("name")
     if name in parts:
-        raise node.bad("name", "found it twice; expected names that differ")
+        raise node.bad("name", "found this name twice; expected unique names")
     parts[name] = [joint.name for joint in several]
 
 

@@ -53,7 +53,7 @@ def with_closing_joints(
     loops = list(mechanism.loops)
     for node, (name, several, between, loop) in _closing(mechanism, root):
         if name in parts or any(name == one.name for one in loops):
-            raise node.bad("name", "found it twice; expected names that differ")
+            raise node.bad("name", "found this name twice; expected unique names")
         if several:  # for a common point, there is no joint with a coordinate
             parts[name] = [joint.name for joint in several]
         joints += several

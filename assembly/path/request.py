@@ -192,7 +192,7 @@ def _with_times(table: PathTable, times: PathTimes, where: str) -> PathTable:
     if times.profile is None:
         for option in ("--duration", "--speed", "--acceleration"):
             if limits[option][0] is not None:
-                raise BadInput(f"{option}: found without --profile, whose limit it is")
+                raise BadInput(f"{option}: found without --profile, which it limits")
     elif times.ends == "moving":
         raise BadInput(
             "--ends moving: found together with --profile, from rest to rest"

@@ -132,7 +132,7 @@ def remarks(errors: PathErrors) -> list[str]:
             "leave out, may exceed them"
         )
     if not np.isfinite(errors.periods):
-        found.append("no natural frequency was found: vibration is left out unjudged")
+        found.append("no natural frequency was found: the vibration is unknown")
     ends = np.abs(path.second[[0, -1]]).max()
     if path.jumps or ends > _STARTS * np.abs(path.second).max(initial=0.0):
         found.append(

@@ -147,7 +147,7 @@ def _groups(root: Table, tables: Sequence[Table], robot: Robot) -> _Groups:
                 label = error_label(robot, *place)
                 first = rows[place]
                 where = "this table" if first == number else quoted(names[first])
-                raise table.bad("", f"found {quoted(label)} again, first in {where}")
+                raise table.bad("", f"found {quoted(label)} twice, first in {where}")
             rows[place] = number
         names.append(table.text("name", default))
         symbol = ("rad", "m")[unit]

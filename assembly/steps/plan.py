@@ -177,9 +177,11 @@ def check_plan(plan: Plan, robot: Robot) -> None:
     for number, step in enumerate(plan.steps, 1):
         where = f"step[{number}] {quoted(step.name)}"
         if step.name in names:
-            raise BadInput(f"{where}: the name of an earlier step, expected another")
+            found = "found the name of an earlier step"
+            raise BadInput(f"{where}: {found}, expected a new one")
         if step.name in taken:
-            raise BadInput(f"{where}: the name of {taken[step.name]}, expected another")
+            found = f"found the name of {taken[step.name]}"
+            raise BadInput(f"{where}: {found}, expected a new one")
         names.add(step.name)
         for part in _parts_of(step):
             _check_part(where, part, robot)

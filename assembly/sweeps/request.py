@@ -230,7 +230,7 @@ def _vary(design: Design, texts: Sequence[str]) -> dict[str, NDArray]:
             )
         for full in design.find(path):
             if full in owner:
-                raise BadInput(f"--vary {path}: {full} varies already")
+                raise BadInput(f"--vary {path}: {full} is varied twice")
             owner[full] = path
         parts = [parse_values(f"--vary {path}", spec) for spec in specs.split(",")]
         values = np.concatenate(parts)

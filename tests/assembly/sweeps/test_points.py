@@ -185,7 +185,7 @@ def test_point_with_a_linear_algebra_error_has_its_own_status(robot, monkeypatch
          "--vary link_a.link.beam.radius: found the same value twice"),
         ({"grid": "tx=0", "vary": ["link_a.link.beam.radius=0.03",
                                    "leg1.link_a.link.beam.radius=0.04"]},
-         "leg1.link_a.link.beam.radius varies already"),
+         "leg1.link_a.link.beam.radius is varied twice"),
         ({"grid": "tx=0", "draws": 3}, "sweep: found only one of --errors and --draws"),
         ({"grid": "tx=0", "wrench_of": ["leg1.link_q"]}, 'no frame "leg1.link_q"'),
         ({"grid": "tx=0", "near": -1.0}, "--near: found -1, expected a number from 0"),
