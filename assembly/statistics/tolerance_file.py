@@ -182,7 +182,7 @@ def _callouts(table: Table, robot: Robot, callouts: dict[int, int], number: int)
                 expected = "expected callouts without (M): their zones have one width"
                 raise table.bad("callouts", f"{fault}, {expected}")
             if callouts.setdefault(k, number) != number:
-                raise table.bad("callouts", f"found {quoted(names[k])} again")
+                raise table.bad("callouts", f"found {quoted(names[k])} twice")
     if not value:
         raise table.bad("callouts", "expected at least one")
     words = robot.callouts[next(k for k, n in callouts.items() if n == number)].words

@@ -100,7 +100,7 @@ def numbers(rng, free):
 
 
 @pytest.mark.parametrize("kind", ["revolute", "prismatic", "helical"])
-def test_a_joint_written_the_other_way_is_the_same(kind):
+def test_joint_with_exchanged_bodies_describes_the_same_robot(kind):
     """Bodies exchanged, z turned round: rows y and z of its numbers change sign."""
     rng = np.random.default_rng(5)
     given = numbers(rng, 5 if kind == "prismatic" else 2)
