@@ -62,7 +62,7 @@ def possible_errors(assembly: Assembly, part: str, assumption: str) -> ErrorBody
 
     Raises:
         BadInput: the part is unknown, or the platform moves freely, so its errors have
-            bound.
+            no bound.
         SolverFailed: the cone solver failed.
     """
     if part not in PARTS:

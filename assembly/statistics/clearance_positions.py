@@ -3,7 +3,6 @@
 In the solution of least energy, clearances that carry load are at their bounds.  The
 other clearances may move without deforming any spring, and their possible positions
 form a convex set.  The models are
-models are
 
 ======== =====================================================================
 worst    any position; the largest pose errors are computed, see
