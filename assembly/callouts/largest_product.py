@@ -112,7 +112,7 @@ def _halves(cones: Sequence[NDArray], x: NDArray) -> Iterator[tuple[NDArray, flo
             signed = np.vstack([sign * cone[:1], cone[1:]])
             height = 1.0 - float(signed[0] @ x)
             across = float(np.linalg.norm(signed[1:] @ x))
-            # (height - across) is negative outside; both factors are positive inside
+            # outside the cone, (height - across) is negative; inside, both are positive
             yield signed, (height - across) * (height + across)
 
 

@@ -189,7 +189,7 @@ _Found = tuple[str, NDArray, tuple[JointNumbers, ...]] | None
 
 
 def _universal(axes: list[NDArray], own: list[JointNumbers]) -> _Found:
-    """Return a universal joint with numbers for each bearing; None if not exact."""
+    """Return a universal joint that has the same numbers, or None if none exists."""
     z = [R[:, 2] for R in axes]
     numbers = []
     for k, other in ((0, 1), (1, 0)):
@@ -203,7 +203,7 @@ def _universal(axes: list[NDArray], own: list[JointNumbers]) -> _Found:
 
 
 def _turned(own: JointNumbers, R: NDArray) -> JointNumbers | None:
-    """Return the numbers in axes rotated about z; None if that is not exact."""
+    """Return the numbers in axes rotated about z, or None without an equivalent."""
     if np.abs(R - np.eye(3)).max() < _SAME:
         return own
     turn = np.kron(np.eye(2), R)
@@ -224,7 +224,7 @@ def _turned(own: JointNumbers, R: NDArray) -> JointNumbers | None:
 def _with_one_contact(
     kind: str, axes: list[NDArray], own: list[JointNumbers], bounds: Sequence[str]
 ) -> _Found:
-    """Return a joint with the numbers of its first frame; None if not exact."""
+    """Return a joint with its first frame's numbers, or None if that is not equivalent."""
     if not all(map(_empty, own[1:])):
         return None
     clearance = own[0].clearance or Clearance()

@@ -118,7 +118,7 @@ def _contact_rows(prepared: LinearResponse, columns: NDArray) -> NDArray:
 
 
 def _real_rows(rows: NDArray, columns: NDArray) -> NDArray:
-    """Return orthonormal independent rows of the product; none if it is rounding."""
+    """Return orthonormal rows of rows @ columns; none if all entries are rounding."""
     product = rows @ columns
     scale = np.abs(rows).max(initial=0.0) * np.linalg.norm(columns)
     _, sizes, vt = np.linalg.svd(product, full_matrices=False)

@@ -154,7 +154,7 @@ class Experiment:
         """Reject limits on quantities that are not computed.
 
         Raises:
-            BadInput: margins are not computed, or no link has a shape for stress.
+            BadInput: a limited margin is not computed, or the stress of no link is.
         """
         for name in limits:
             if name.startswith("margin") and not self.margins:

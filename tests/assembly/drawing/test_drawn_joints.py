@@ -170,7 +170,7 @@ def test_springs_of_a_joint_act_once(kind):
     assert np.abs((found.stiffness - stiff) / np.outer(size, size)).max() < 1e-12
 
 
-def test_a_link_is_the_same_from_either_end():
+def test_link_has_the_same_stiffness_from_either_end():
     """A stiffness read at one joint, and the same link read at the other."""
     rng = np.random.default_rng(3)
     root = rng.normal(size=(6, 6))
