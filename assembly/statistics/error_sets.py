@@ -108,7 +108,7 @@ def error_sets(prepared: LinearResponse, sources: Sources) -> ErrorSets:
 
 
 def _contact_rows(prepared: LinearResponse, columns: NDArray) -> NDArray:
-    """Return the closure rows between parallel contacts, without free motions."""
+    """Return the closure rows that couple the parallel contacts of a joint."""
     found = [np.zeros((0, columns.shape[1]))]
     for k in np.flatnonzero(contact_closures(prepared.posture.robot)).tolist():
         closure = prepared.closures[6 * k : 6 * k + 6]

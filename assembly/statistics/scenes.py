@@ -81,7 +81,7 @@ def _forced_robot(
     *,
     why: str,
 ) -> str:
-    """Return the scene of an assembled robot with a caption; empty if unsolved."""
+    """Return the scene of an assembled robot; empty if the assembly has no solution."""
     try:
         forced = solve_assembly(posture, load, gravity=gravity)
     except (CannotAssemble, SolverFailed):

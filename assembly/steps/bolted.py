@@ -155,7 +155,7 @@ def _with_locked(
 
 
 def last_bolt(robot: Robot) -> tuple[list[int], Machine, State]:
-    """Return the joints that are bolted last, and the machine before that.
+    """Return the joints that are bolted last, and the machine before they are bolted.
 
     Args:
         robot: robot with a joint that has ``left = "worst"``.

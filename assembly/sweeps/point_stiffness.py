@@ -1,7 +1,7 @@
 """Platform stiffness K_C at the points of a sweep.
 
 Errors, loads and clearances do not change the nominal K_C, so all draws at a posture
-have the same.  A tangent stiffness is computed point by point, either of problem (22),
+share one matrix.  A tangent stiffness is computed point by point, either of problem (22),
 with clearances free or in contact, or of the exact equilibrium, with its internal
 forces.
 """
