@@ -224,7 +224,7 @@ def _turned(own: JointNumbers, R: NDArray) -> JointNumbers | None:
 def _with_one_contact(
     kind: str, axes: list[NDArray], own: list[JointNumbers], bounds: Sequence[str]
 ) -> _Found:
-    """Return a joint with its first frame's numbers, or None if this is no equivalent."""
+    """Return a joint with its first frame's numbers, or None without an equivalent."""
     if not all(map(_empty, own[1:])):
         return None
     clearance = own[0].clearance or Clearance()

@@ -1,8 +1,8 @@
 """Platform stiffness K_C at the points of a sweep.
 
 Errors, loads and clearances do not change the nominal K_C, so all draws at a posture
-share one matrix.  A tangent stiffness is computed point by point, either of problem (22),
-with clearances free or in contact, or of the exact equilibrium, with its internal
+share one matrix.  A tangent stiffness is computed point by point, either of problem
+(22), with clearances free or in contact, or of the exact equilibrium, with its internal
 forces.
 """
 
