@@ -100,7 +100,7 @@ def numbers(rng, free):
 
 
 @pytest.mark.parametrize("kind", ["revolute", "prismatic", "helical"])
-def test_a_joint_written_the_other_way_is_the_same(kind):
+def test_joint_with_exchanged_bodies_describes_the_same_robot(kind):
     """Bodies exchanged, z turned round: rows y and z of its numbers change sign."""
     rng = np.random.default_rng(5)
     given = numbers(rng, 5 if kind == "prismatic" else 2)
@@ -170,7 +170,7 @@ def test_springs_of_a_joint_act_once(kind):
     assert np.abs((found.stiffness - stiff) / np.outer(size, size)).max() < 1e-12
 
 
-def test_a_link_is_the_same_from_either_end():
+def test_link_has_the_same_stiffness_from_either_end():
     """A stiffness read at one joint, and the same link read at the other."""
     rng = np.random.default_rng(3)
     root = rng.normal(size=(6, 6))

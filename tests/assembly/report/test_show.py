@@ -207,7 +207,7 @@ def test_format_of_figures_that_the_user_chose_is_kept(monkeypatch):
         (slack, {"errors": "translaton"}, "translation"),
     ],
 )
-def test_what_cannot_be_shown_is_named(thing, options, message):
+def test_object_that_cannot_be_shown_is_named(thing, options, message):
     with pytest.raises(BadInput, match=message):
         ff.show(thing(), **options)
 

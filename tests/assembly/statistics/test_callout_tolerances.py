@@ -111,7 +111,7 @@ def test_width_of_a_position_meets_its_yield_in_finite_geometry(tmp_path):
             "found 1 with callouts",
         ),
         (PLAN.format(**OF_CALLOUTS).replace('["hand"]', '["hnd"]'), 'found "hnd"; did'),
-        (PLAN.format(**OF_CALLOUTS).replace('["hand"]', '["arm"]'), '"arm" again'),
+        (PLAN.format(**OF_CALLOUTS).replace('["hand"]', '["arm"]'), '"arm" twice'),
         (PLAN.format(**OF_CALLOUTS).replace('["hand"]', "[]"), "at least one"),
         (PLAN.format(**OF_CALLOUTS).replace('["hand"]', "[1]"), "a list of names"),
     ],

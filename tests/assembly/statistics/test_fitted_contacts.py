@@ -106,7 +106,7 @@ def test_two_bearings_with_fits_are_worst_as_by_hand(tmp_path):
     assert worst(robot, "translation").attained == pytest.approx(reach, rel=1e-6)
 
 
-def test_bearing_with_a_stated_gap_stays_as_it_is_in_every_draw(tmp_path):
+def test_bearing_with_a_given_gap_has_the_same_gap_in_every_draw(tmp_path):
     clearance = BEARINGS.replace('fit = "8 H8/h7"', 'radial = "5 um"')
     found = drawn_rotations(spindle(tmp_path, clearance)) * 0.05
     assert found.mean() == pytest.approx(15.25e-6, rel=0.045)

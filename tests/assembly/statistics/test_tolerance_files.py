@@ -162,11 +162,11 @@ REFUSED = {
         "tolerance[2].components: expected components that are all angles or all "
         "lengths, at least one"),
     "an error twice in a table": ('"TX"', '"TX", "TX"',
-        'tolerance[1]: found "leg1.link_a.TX" again, first in this table'),
+        'tolerance[1]: found "leg1.link_a.TX" twice, first in this table'),
     "an error in two tables": (
         '["leg1.tip"]\ncomponents = ["RX", "RY"]',
         '["leg2.link_a"]\ncomponents = ["TX"]',
-        'tolerance[2]: found "leg2.link_a.TX" again, first in "length"'),
+        'tolerance[2]: found "leg2.link_a.TX" twice, first in "length"'),
     "a name twice": ('["RX", "RY"]', '["TX"]\nname = "length"',
         "tolerance: found two tolerances of the same name, expected different names"),
     "no table": (FILE, "yield = 0.9",

@@ -75,7 +75,7 @@ def test_two_round_pins_leave_the_platform_anywhere_in_the_lens(rng):
         assert found.pvalue > 1e-3
 
 
-def test_pins_that_must_be_forced_are_left_where_the_energy_is_least():
+def test_pins_apart_by_two_radii_are_left_where_both_touch():
     """A single position closes: apart by two radii, both pins touch."""
     robot = platform_of_two_pins({"radial": 1e-4}, 2e-4)
     screws = bolted(robot, 20)
