@@ -1,4 +1,4 @@
-"""The commands ``forcefit assembly ...``: parse, call one function, print or save."""
+"""The commands ``forcefit assembly ...``: parse options, call a function, print."""
 
 from typing import Annotated
 
@@ -81,7 +81,7 @@ def error(
     along: AlongOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Bound the largest pose error, problem (27)."""
+    """Compute certified bounds of the largest pose error, problem (27)."""
     from forcefit.assembly.linear.reference.pose_error import ASSUMPTIONS
     from forcefit.assembly.model.largest import LARGEST_LENGTH
     from forcefit.assembly.report.pose_errors import pose_error_of, pose_error_text

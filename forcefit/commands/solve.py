@@ -52,7 +52,7 @@ def solve(
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """Solve the forced assembly: mobility, energy, pose, wrenches."""
+    """Solve the forced assembly: mobility, energy, pose and wrenches."""
     exact = parse_state(state, ("contact", "exact")) == "exact"
     if quantities is not None:
         _check_margins(quantities, exact, load=load, gravity=gravity, under=under)
@@ -67,7 +67,7 @@ def solve(
 
 
 def _results(applied: Any) -> tuple[dict[str, Any], str]:
-    """Return the solution of small motions, problem (22), and its text."""
+    """Return the solution for small motions, problem (22), and its text."""
     from forcefit.assembly.model.statuses import OK
     from forcefit.assembly.report.results import solution_of, solution_text
 
@@ -79,7 +79,7 @@ def _results(applied: Any) -> tuple[dict[str, Any], str]:
 
 
 def _exact_results(applied: Any) -> tuple[dict[str, Any], str]:
-    """Return the solution of finite motions, and its text."""
+    """Return the solution for finite motions, and its text."""
     from forcefit.assembly.report.results import exact_of, exact_text
 
     with one_thread(), progress_lines() as update:
@@ -91,7 +91,7 @@ def _exact_results(applied: Any) -> tuple[dict[str, Any], str]:
 
 
 def _check_margins(quantities: str, exact: bool, **loads: list[str] | None) -> None:
-    """Refuse quantities other than margins, and options that no margin depends on."""
+    """Raise an error for other quantities than margins, or for options they ignore."""
     for name in (part.strip() for part in quantities.split(",")):
         if name not in _MARGINS:
             hint = nearest(name, _MARGINS)
