@@ -36,7 +36,7 @@ class Record:
 
 @dataclass(frozen=True)
 class Each:
-    """A JSON object whose keys are names, for example of frames, with equal contents."""
+    """A JSON object whose keys are names, such as frame names, with equal contents."""
 
     content: Content
 
