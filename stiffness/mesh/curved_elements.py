@@ -186,7 +186,7 @@ def _face_nodes_by_edges(moved: NDArray) -> NDArray:
 def _cubic_faces(
     corners: NDArray, patch: NDArray, shapes: tuple[Shape | None, ...], reach: float
 ) -> NDArray:
-    """Return (f, 3) displacements of face middles, for known displacements of others."""
+    """Return (f, 3) displacements of face middles, given those of all other nodes."""
     # interpolated at three points; there the cubic that equals the quartic x^2, with x
     # = L_1 L_2 + L_2 L_3 + L_3 L_1, along the edges also has the integral of x^2, so
     # that the error of a shape has zero mean

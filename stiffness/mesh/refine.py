@@ -167,7 +167,7 @@ def chosen_by_all(of_cell: NDArray, chosen: NDArray, edges: int) -> NDArray:
 def _terminal_edges(
     points: NDArray, ends: NDArray, of_cell: NDArray, wanted: NDArray
 ) -> NDArray:
-    """Return (e,) bool, True for edges to split now: the longest in all their cells."""
+    """Return (e,) bool: longest edges of all their cells, to split for wanted cells."""
     rank = length_ranks(points, ends)
     longest = np.take_along_axis(
         of_cell, rank[of_cell].argmax(axis=1)[:, None], axis=1

@@ -38,7 +38,7 @@ def test_remarks_are_printed_only_where_logging_is_configured(wanted, tmp_path):
     assert line in done.stderr if wanted else not done.stderr
 
 
-def test_point_without_proof_is_logged_with_its_robot(caplog):
+def test_point_without_certificate_is_logged_with_its_robot(caplog):
     caplog.set_level(logging.INFO, "forcefit")
     solve_assembly(beams())
     assert caplog.messages == []

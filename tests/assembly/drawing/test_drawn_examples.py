@@ -22,7 +22,7 @@ EXAMPLES = {
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_examples_are_short(name):
+def test_files_of_drawn_example_robots_are_short(name):
     most = EXAMPLES[name][0]
     assert len((DRAWN / f"{name}.toml").read_text().splitlines()) <= most
 

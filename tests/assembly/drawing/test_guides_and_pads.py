@@ -138,7 +138,7 @@ def errors_of(seed):
     ("prismatic", GUIDE, guide_slabs(), [5]), ("planar", PAD, pad_slabs(), [2, 3, 4])
 ])  # fmt: skip
 @pytest.mark.parametrize("seed", range(3))
-def test_the_energy_of_a_forced_guide_equals_that_of_its_slabs_in_cvxpy(
+def test_energy_of_a_forced_guide_equals_that_of_its_inequalities_solved_by_cvxpy(
     seed, kind, clearance, slabs, free, drawn
 ):
     """Least v K v / 2 of a spring's screw v; v + clearance + error close the loop."""
@@ -227,7 +227,7 @@ def test_pose_errors_of_two_rigid_guides_are_those_of_a_linear_programme(drawn, 
         assert reach >= low * (1 - 0.02)
 
 
-def test_two_guides_on_springs_have_the_energy_of_their_slabs(drawn, rng):
+def test_energy_of_two_guides_on_springs_equals_that_of_their_inequalities(drawn, rng):
     """An over-constrained pair: spring of the second guide, errors beyond the gaps."""
     import cvxpy as cp
 
@@ -268,7 +268,7 @@ def test_both_exact_methods_agree_on_a_forced_guide(kind, clearance, drawn):
 @pytest.mark.parametrize(("kind", "clearance"), [
     ("prismatic", GUIDE), ("planar", PAD)
 ])  # fmt: skip
-def test_finite_motions_of_a_guide_differ_from_small_ones_by_the_square(
+def test_finite_motions_of_a_guide_differ_from_small_ones_by_second_order(
     kind, clearance, drawn
 ):
     """Errors and clearances times s = 1, 1/2, 1/4: energies, s^2, differ by s^3."""

@@ -154,7 +154,7 @@ def test_comparison_names_the_first_difference_from_mujoco(tmp_path):
         assert answer.where == where
 
 
-def test_attached_model_keeps_its_angle_units_and_names(tmp_path):
+def test_attached_mjcf_model_keeps_its_angle_units_and_names(tmp_path):
     file_of(tmp_path, """<compiler angle="radian" eulerseq="zyx"/><default>
         <joint axis="1 0 0"/><default class="d"><site pos="1 1 1"/></default></default>
         <worldbody><body name="x" pos="0 0 1" euler="0.5 0 0.1"><geom size="0.1"/>

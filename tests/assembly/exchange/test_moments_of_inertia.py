@@ -101,7 +101,7 @@ def test_automatic_moments_of_a_shape_are_those_of_the_textbook(shape, tmp_path)
     np.testing.assert_allclose(body.inertia, expected, atol=1e-15)
 
 
-def test_moments_that_no_body_has_are_left_out_and_named(tmp_path):
+def test_moments_of_inertia_that_no_body_can_have_are_left_out_and_reported(tmp_path):
     text = URDF.replace('izz="0.04"', 'izz="0.4"')
     answer = convert(file_of(tmp_path, text, "r.urdf"), tmp_path / "r.toml")
     assert "moments of inertia that no body has: 1 (b)" in answer.left_out
@@ -170,7 +170,7 @@ def test_written_moments_of_inertia_are_read_back(ending, tmp_path):
     np.testing.assert_allclose(theirs, ours, rtol=1e-8)
 
 
-def test_difference_of_moments_from_mujoco_is_named(tmp_path):
+def test_difference_of_moments_of_inertia_from_mujoco_is_reported(tmp_path):
     pytest.importorskip("mujoco", reason="MuJoCo is not installed")
     from forcefit.assembly.exchange.mujoco_reading import compare_here
 

@@ -130,7 +130,7 @@ def test_static_models_of_a_world_are_reported_as_left_out(tmp_path):
     assert "model of the world: 1 (ground)" in mechanism.left_out
 
 
-def test_joint_with_the_name_of_a_link_is_renamed(tmp_path):
+def test_joint_that_has_the_name_of_a_link_is_renamed(tmp_path):
     mechanism = model(
         tmp_path, joint("arm", "base", "arm") + ARM + '<link name="arm"/>'
     )
@@ -192,7 +192,7 @@ def test_automatic_inertia_equals_volume_times_density(shape, tmp_path):
     assert bodies["two"].centre[0] == pytest.approx(0.2 * mass / (mass + ball))
 
 
-def test_missing_masses_have_the_default_of_the_format(tmp_path):
+def test_missing_masses_have_the_default_value_of_the_format(tmp_path):
     """The default is 1 kg; a mass with auto is kept, with the centre of the shapes."""
     text = (
         ARM

@@ -81,7 +81,7 @@ def arm(lengths=(0.5, 0.4), angles=(0.3, 0.9)):
 
 
 @pytest.mark.parametrize("x", [0.2, 0.5, 0.85])
-def test_arm_reaches_a_pose_in_the_elbow_mode_of_home(x):
+def test_arm_reaches_a_pose_with_the_elbow_on_the_same_side_as_at_home(x):
     y = 0.2
     posture = place_robot(arm(), pose={"tx": x, "ty": y})
     far = (x**2 + y**2 - 0.5**2 - 0.4**2) / (2 * 0.5 * 0.4)

@@ -148,7 +148,7 @@ def test_errors_that_cancel_up_to_rounding_store_no_energy():
             assert found == pytest.approx(1e6 * gap**2 / 2, rel=1e-9)
 
 
-def test_wrong_multipliers_give_the_gap_worked_out_by_hand():
+def test_wrong_multipliers_have_the_duality_gap_computed_by_hand():
     """Wrong multipliers and springs open a gap of the size worked out by hand."""
     robot = coaxial_beams(np.array([0, 0, 0, 2e-4, 0, 0]), (1e6, 3e6))
     answer = solve_assembly(home_posture(robot))

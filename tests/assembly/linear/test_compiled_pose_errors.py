@@ -107,7 +107,7 @@ def test_motion_limits_of_passive_joints_apply_to_many_points(spin, assumption):
 
 
 @pytest.mark.parametrize("assumption", ASSUMPTIONS)
-def test_only_points_that_reach_a_motion_limit_use_the_reference_method(assumption):
+def test_only_points_at_a_motion_limit_use_the_reference_method(assumption):
     """In every other of six draws the errors are so large that a limit is reached."""
     home = home_posture(hinged_frame(2e-3))
     sizes = 1e-4 * np.array([0, 1, 3, 10, 30, 100])[:, None]

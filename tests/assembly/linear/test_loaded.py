@@ -127,7 +127,9 @@ def cases_at_random():
 
 
 @pytest.mark.parametrize("loaded", [False, True])
-def test_random_robots_equal_the_reference_method_or_its_refusal(loaded):
+def test_results_for_random_robots_equal_the_reference_method_or_are_refused_by_both(
+    loaded,
+):
     """Loads on every body, errors over decades; potentials agree within the gaps."""
     solved = 0
     for number, home in enumerate(cases_at_random()):

@@ -148,7 +148,9 @@ def test_nearest_pose_under_a_load_keeps_the_energy(name, margin):
 
 
 @pytest.mark.parametrize("clearance", [2e-5, 8e-5])
-def test_platform_on_two_pins_is_off_by_its_error_minus_one_clearance(clearance):
+def test_pose_error_of_a_platform_on_two_pins_is_its_error_minus_one_clearance(
+    clearance,
+):
     """Two rigid chains to one platform, 0.1 mm off, their pins with clearance c.
 
     The platform stands where both pins reach it: nearest to nominal it is off by

@@ -92,7 +92,7 @@ def test_sampled_cosine_is_approached_with_the_fourth_order_of_acceleration():
     assert (orders > 3.5).all()
 
 
-def test_profile_along_many_rows_turns_without_a_jump():
+def test_motion_profile_over_many_rows_has_no_jump_of_acceleration():
     """The speed along three rows on a line is the profile's; the curve is smooth."""
     path = profiled(line(0.0, 0.1, 0.4), 101, "quintic", 1.0, duration=1.0)
     straight = profiled(line(0.0, 0.4), 101, "quintic", 1.0, duration=1.0)
@@ -156,7 +156,7 @@ def test_path_file_that_breaks_a_rule_is_refused(tmp_path, content, message):
     assert str(file) in str(raised.value)
 
 
-def test_path_file_keeps_times_names_and_ids(tmp_path):
+def test_path_file_preserves_times_names_and_ids(tmp_path):
     file = tmp_path / "path.csv"
     file.write_text("id,pose.tx,time,pose.ty\na,0,0.5,0.14\nb,0.01,1.5,0.15\n")
     path = read_path(file, load_robot("five_bar"))
@@ -166,6 +166,6 @@ def test_path_file_keeps_times_names_and_ids(tmp_path):
     np.testing.assert_array_equal(path.values, [[0, 0.14], [0.01, 0.15]])
 
 
-def test_times_that_go_back_are_refused_without_a_file():
+def test_decreasing_times_are_refused_and_no_file_is_written():
     with pytest.raises(ValueError, match="path: row 2, time: found -1 s after 0 s"):
         check_path(line(0, 1, times=np.array([0.0, -1.0])))

@@ -179,7 +179,9 @@ def rounded(digits):
 
 
 @pytest.mark.parametrize("name", [*WORDS, "bennett"])
-def test_counts_of_files_rounded_at_6_digits_are_those_of_exact_ones(name, monkeypatch):
+def test_mobility_of_files_rounded_to_6_digits_equals_that_of_exact_files(
+    name, monkeypatch
+):
     """Of Bennett's linkage they would be 0 if all its singular values counted."""
     make, expected = MECHANISMS[name]
     monkeypatch.setattr(mechanisms, "DrawnJoint", rounded(6))
@@ -192,7 +194,7 @@ def test_counts_of_files_rounded_at_6_digits_are_those_of_exact_ones(name, monke
     assert found["finite_freedoms"] == found["freedoms"] - 2 * (name == "snu")
 
 
-def test_counts_without_a_gap_are_reported_as_not_certain():
+def test_mobility_is_reported_as_uncertain_if_the_singular_values_have_no_gap():
     """Axes tilted by 1e-4 and 2e-5 rad: the equations they add are of those sizes."""
     robot = mechanism(
         "one", [0.1, 0.2, 0],
@@ -208,7 +210,7 @@ def test_counts_without_a_gap_are_reported_as_not_certain():
     assert "differ only by" in mobility_lines(found)["counts not certain"]
 
 
-def test_show_writes_mobility_and_axes_without_a_picture(run):
+def test_show_writes_mobility_and_axes_when_no_picture_is_requested(run):
     status, out, err = run(
         "assembly", "show", DRAWN / "three_upu.toml", "--json", "-"
     )  # fmt: skip

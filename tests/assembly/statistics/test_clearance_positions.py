@@ -154,7 +154,7 @@ def drawn():
 
 
 @pytest.mark.parametrize("play", ["uniform", "contact"])
-def test_unloaded_clearances_move_the_platform_by_finite_screws(drawn, play):
+def test_unloaded_clearances_cause_finite_displacements_of_the_platform(drawn, play):
     """Clearances are loaded only in draws that store energy."""
     one, found = drawn
     loaded = loaded_clearances(one, found)

@@ -41,7 +41,7 @@ def test_clearance_shares_of_a_pin_sum_to_the_largest_error():
     assert parts["rotation"]["clearances"] == pytest.approx({"pin.tilt": TILT})
 
 
-def test_a_ball_adds_to_the_tilt_of_its_pin():
+def test_clearance_of_a_ball_adds_to_the_tilt_of_its_pin():
     """Both in the same direction: shares b and L t."""
     translation = perfect_parts(experiment(arm(ball=RADIAL, tilt=TILT)))["translation"]
     by_kind = translation["clearances"]

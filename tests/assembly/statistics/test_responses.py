@@ -92,7 +92,9 @@ def test_response_has_the_random_clearances_of_the_experiment(play, key):
 
 
 @pytest.mark.parametrize("component", [3, 4])
-def test_platform_beyond_a_pin_follows_the_part_closed_with_it(component):
+def test_platform_attached_to_a_pin_follows_the_part_that_is_closed_with_the_pin(
+    component,
+):
     """Rigid parts: the pin's clearance takes up the errors of the part below it."""
     robot = rigid_pair(radial=PLAY)
     widths = np.zeros(6)

@@ -160,7 +160,7 @@ def energy_by_cvxpy(robot, posture, errors, locked=None):
 
 
 @pytest.mark.parametrize("angle", [0.4, 1.2, 2.0])
-def test_energy_over_the_stroke_is_that_of_the_stand_bolted_at_one_pose(
+def test_energy_over_the_stroke_includes_the_wrenches_from_bolting_at_one_pose(
     tmp_path, angle
 ):
     """The screw locked in is compared through the energies that it causes."""
@@ -232,7 +232,7 @@ def test_robot_with_a_bolted_joint_is_written_as_it_was_read(tmp_path):
         ("{ pose = { tx = 5.0 } }", "locked_at"),
     ],
 )
-def test_bad_pose_of_a_bolt_is_one_line(tmp_path, key, text):
+def test_invalid_pose_of_a_bolted_joint_is_reported_in_one_line(tmp_path, key, text):
     with pytest.raises(BadInput) as caught:
         load_robot(four_bar(tmp_path, key))
     assert text in str(caught.value)
@@ -240,7 +240,7 @@ def test_bad_pose_of_a_bolt_is_one_line(tmp_path, key, text):
     assert "\n" not in str(caught.value)
 
 
-def test_bolt_of_a_joint_without_clearance_is_refused(tmp_path):
+def test_bolting_of_a_joint_without_clearance_is_refused(tmp_path):
     path = tmp_path / "robot.toml"
     text = FOUR_BAR.replace("LOCKED", "").replace(
         'name = "end"', 'name = "end"\nlocked_at = "home"'

@@ -64,7 +64,7 @@ def test_order_changes_the_end_only_where_an_influence_is_not_zero(places, rng):
     assert zero == (places[1] == 0.6)
 
 
-def test_remark_names_the_joins_that_move_a_slot():
+def test_remark_names_the_joining_steps_that_move_a_slot():
     slot, pins = join(4, Z), (join(1), join(2))
     still = planar_platform([0.0, 0.4, 0.1, 0.6], [0, 0, 40e-6, 0])
     moved = planar_platform([0.0, 0.4, 0.1, 0.3], [0, 0, 40e-6, 0])

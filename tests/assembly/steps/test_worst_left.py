@@ -75,7 +75,7 @@ def test_platform_on_two_round_pins_reaches_the_edge_of_the_lens(distance):
 
 
 @pytest.mark.parametrize("angle", [0.4, 1.6])
-def test_bracket_of_a_four_bar_holds_all_sampled_positions(tmp_path, angle):
+def test_bounds_of_a_four_bar_contain_all_sampled_positions(tmp_path, angle):
     """Pins with clearance between springs: no position drawn is beyond the bound."""
     key = '{ joints = { crank = 1.2 }, left = "worst" }'
     robot = load_robot(str(four_bar(tmp_path, key)))

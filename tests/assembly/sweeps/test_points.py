@@ -76,7 +76,7 @@ def test_swept_bounds_and_finite_motions_equal_those_of_one_posture(robot, data)
     assert float(there.linearisation_energy) == pytest.approx(gap.relative_energy)
 
 
-def test_error_by_clearances_alone_has_the_symmetry_of_the_robot(data):
+def test_pose_error_from_clearances_alone_has_the_symmetry_of_the_robot(data):
     """Without errors x and -x are equal, to the bounds' gap of 1e-6."""
     for name in ("rotation_error_clearance", "translation_error_clearance"):
         values = data[name].sel(bound="upper").values
@@ -270,7 +270,7 @@ def test_sweep_marks_postures_beyond_joint_limits():
     assert str(data["reason"].values.ravel()[0]).startswith("x.slide at ")
 
 
-def test_point_changed_by_finite_motions_is_marked_as_singular():
+def test_singular_point_where_finite_motions_change_the_energy_is_marked():
     """A short rod near its dead centre stores energy only by finite motions."""
     rod = BeamLink({"radius": 0.01}, 70e9, 0.33)
     robot = slider_crank(0.3, rod, error=-2e-4)

@@ -76,7 +76,9 @@ def test_solve_reports_the_linearisation_error_under_gravity(run):
     )
 
 
-def test_error_under_a_load_is_the_sag_plus_the_error_of_clearances(run, tmp_path):
+def test_pose_error_under_a_load_is_the_sag_plus_the_error_from_clearances(
+    run, tmp_path
+):
     """A pin with clearance on an elastic post under a downward load.
 
     The load closes the axial clearance, so that only the radial one remains; the post
@@ -130,7 +132,7 @@ parent = "hinge"
 """
 
 
-def test_each_assumption_and_component_has_its_own_answer(run, tmp_path):
+def test_each_assumption_and_component_has_a_separate_result(run, tmp_path):
     """A moment that the hinge's own spring carries:
     by hand M / k, and the clearance."""
     file = tmp_path / "hinge.toml"

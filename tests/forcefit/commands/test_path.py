@@ -166,7 +166,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_bad_options_of_a_path_are_refused_in_one_line(run, slide, name):
+def test_invalid_options_of_a_path_are_refused_in_one_line(run, slide, name):
     words, message = BAD[name]
     output = slide / "out.nc"
     status, out, err = run(
@@ -179,7 +179,7 @@ def test_bad_options_of_a_path_are_refused_in_one_line(run, slide, name):
     assert not output.exists()
 
 
-def test_row_out_of_reach_is_named(run, tmp_path):
+def test_message_about_a_path_row_out_of_reach_names_the_row(run, tmp_path):
     file = tmp_path / "far.csv"
     file.write_text("id,time,pose.tx,pose.ty\na,0,0,0.14\nb,1,0.01,0.9\n")
     status, out, err = run("assembly", "path", "five_bar", "--path", file)

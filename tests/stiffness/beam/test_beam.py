@@ -141,7 +141,7 @@ def test_thin_tube_reaches_cowpers_limit():
         (lambda: Section(1, 1, 1, 0, 1, 1), "section: J = 0 must be finite and > 0"),
     ],
 )
-def test_wrong_beam_is_refused(call, message):
+def test_invalid_beam_is_refused(call, message):
     with pytest.raises(BadInput) as caught:
         call()
     assert message in str(caught.value)
@@ -191,13 +191,13 @@ PARALLEL[[0, 1], [1, 0]] = np.nextafter(1.0, 0.0)
         (np.full((6, 6), math.nan), "expected (6, 6) of finite numbers"),
     ],
 )
-def test_wrong_compliance_is_refused(C, message):
+def test_invalid_compliance_is_refused(C, message):
     with pytest.raises(BadInput) as caught:
         LinkStiffness("test", C, tip=[0, 0, 0], base=[0, 0, 0])
     assert message in str(caught.value)
 
 
 @pytest.mark.parametrize("vector", [[1.0, math.nan, 0.0], [1.0, 2.0], [1.0] * 4])
-def test_direction_that_is_not_three_finite_numbers_is_refused(vector):
+def test_direction_that_does_not_consist_of_three_finite_numbers_is_refused(vector):
     with pytest.raises(BadInput, match="axis: found .*, expected 3 finite numbers"):
         unit_vector("axis", vector)

@@ -144,7 +144,7 @@ def test_turning_the_curve_turns_its_compliance(rng):
         (lambda: i_section(0.1, math.nan, 0.01, 0.01, NU), "height = nan"),
     ],
 )
-def test_wrong_curve_or_section_is_refused(call, message):
+def test_invalid_curve_or_section_is_refused(call, message):
     with pytest.raises(BadInput) as caught:
         call()
     assert message in str(caught.value)

@@ -67,7 +67,7 @@ def test_interface_without_a_sharp_edge_ends_where_the_rounding_begins(tmp_path)
 
 
 @pytest.mark.slow
-def test_rounded_block_has_no_forbidden_coupling_and_stays_below_an_upper_bound(
+def test_stiffness_of_a_rounded_block_is_symmetric_and_below_an_upper_bound(
     tmp_path,
 ):
     """Couplings that its mirror planes forbid vanish; 119 142 N m/rad is an upper

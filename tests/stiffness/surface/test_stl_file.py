@@ -63,7 +63,7 @@ def read(tmp_path, content):
         "name of keywords", "several solids",
     ],
 )  # fmt: skip
-def test_text_stl_is_read_exactly(tmp_path, content):
+def test_text_stl_file_is_read_without_rounding(tmp_path, content):
     """In double precision, equal to the last bit."""
     np.testing.assert_array_equal(read(tmp_path, content), CORNERS)
 
@@ -84,7 +84,7 @@ def test_text_stl_is_read_exactly(tmp_path, content):
         "count of -1", "last tag cut",
     ],
 )  # fmt: skip
-def test_binary_stl_is_read(tmp_path, content):
+def test_binary_stl_file_is_read(tmp_path, content):
     """In single precision, as the format has."""
     found = read(tmp_path, content)
     np.testing.assert_array_equal(found, CORNERS.astype("<f4"))

@@ -79,7 +79,7 @@ def test_step_file_with_a_wrong_unit_is_refused_with_the_likely_unit(
         read_surface("bar.step", "inch")
 
 
-def test_points_of_no_triangle_are_ignored():
+def test_points_that_belong_to_no_triangle_are_ignored():
     """Such a point may be NaN or far away."""
     points = np.concatenate([[[np.nan] * 3, [1e6, 0, 0]], CUBE])
     surface = check_surface(points, CUBE_TRIANGLES + 2, "cube")

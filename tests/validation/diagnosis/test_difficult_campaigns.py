@@ -90,7 +90,7 @@ def test_effects_outside_the_library_are_learned(name, diagnosed):
 
 
 @pytest.mark.slow
-def test_scatter_of_repeats_is_not_claimed_as_drift(diagnosed):
+def test_scatter_of_repeats_is_not_reported_as_drift(diagnosed):
     """Errors are in units of the stated sigma, and hysteresis is not a drift."""
     found = diagnosed(CASES / "hyst")
     assert not set(found.claimed) & {"drift", "encoder_eccentricity"}

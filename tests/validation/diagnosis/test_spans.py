@@ -59,7 +59,7 @@ def heated(tmp_path_factory):
     return diagnosed(folder, read, covariates), noise
 
 
-def test_causes_are_learned_as_polynomials(heated):
+def test_dependences_on_measured_variables_are_learned_as_polynomials(heated):
     """Noise correlated in time would favour splines and functions of time.
 
     The tolerance of the bed's gain is five of its standard errors. The noise is 2.5 um,
