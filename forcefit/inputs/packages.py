@@ -73,7 +73,6 @@ def need(*packages: str) -> None:
 
     Raises:
         ModuleNotFoundError: a package is missing; the message names the first one.
-        ModuleNotFoundError: names the first missing package.
     """
     from importlib.util import find_spec
 

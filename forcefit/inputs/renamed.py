@@ -33,7 +33,6 @@ def renamed_keywords(
 
     Returns:
         The decorator.
-        A decorator.
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:

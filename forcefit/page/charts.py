@@ -31,9 +31,9 @@ class Axis:
     """An axis of a chart.
 
     Attributes:
+        title: words that describe the quantity of the axis.
         unit: SI unit; empty for a dimensionless number.
         options: options of the plotly axis, such as ``{"type": "log"}``.
-        options: options of plotly's axis, such as ``{"type": "log"}``.
     """
 
     title: str

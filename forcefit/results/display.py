@@ -7,7 +7,6 @@ A dataclass uses these functions by one line in its body::
 The values come from the method ``_figures`` of the object.  Without this method, the
 abbreviated fields of the object are shown.  The text is for a console, and the HTML
 table is for a notebook.  Both are a few lines long.
-notebook; both have a few lines.
 """
 
 import html

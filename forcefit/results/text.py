@@ -86,7 +86,6 @@ def lines_of(results: Mapping[str, Any], names: str) -> dict[str, str]:
 
     Returns:
         Values as text; the keys are the words of the quantities.
-        The values as text, by the words of the quantities.
     """
     lines: dict[str, str] = {}
     for path in names.split():

@@ -220,7 +220,6 @@ def material_errors(
         true = shear_at(places.reshape(-1, 3)).reshape(w.shape)
         # tractions are continuous across the face, so the compliant side stores more
         # energy
-        # energy
         ratio = np.maximum(own / true, true / own)
         sign = np.where(own > true, 1.0, -1.0) * (np.abs(ratio - 1) > _SAME_MODULUS)
         some = np.flatnonzero(sign.any(axis=1))

@@ -157,8 +157,8 @@ def chosen_by_all(of_cell: NDArray, chosen: NDArray, edges: int) -> NDArray:
         chosen: edge chosen by each tetrahedron that chooses one.
         edges: number of edges.
 
-    (e,) bool, True for such edges.
-        (e,) bool.
+    Returns:
+        (e,) bool, True for such edges.
     """
     around = np.bincount(of_cell.ravel(), minlength=edges)
     return np.asarray(around == np.bincount(chosen, minlength=edges))

@@ -21,12 +21,12 @@ _EXPECTED = '"z=0.452", "bore=px,py,pz/ax,ay,az/r", a table {plane, radius} or {
 class Interface:
     """The part of a link's surface that a joint holds, in the mesh's axes.
 
-    kind: ``"plane"`` for the part of the surface that lies on a plane; ``"disc"``
-        for the part of the plane within a radius of the point; ``"bore"`` for a
-        cylindrical seat.
-    point: (3,) [m] point on the plane; centre of the disc; or point on the axis of
-        the bore.  Screws are read at the centre of the disc and at this point of
-        the bore.
+    Attributes:
+        kind: ``"plane"`` for the part of the surface on a plane; ``"disc"`` for the
+            part of the plane within a radius of the point; ``"bore"`` for a cylindrical
+            seat.
+        point: (3,) [m] point on the plane; centre of the disc; or the point on the axis
+            of the bore at which screws are read.
         direction: (3,) unit normal of the plane, or axis of the bore.
         radius: [m] radius of the disc or the bore; infinite for a plane.
     """

@@ -59,7 +59,6 @@ def _edge_through(points: NDArray, triangles: NDArray, pairs: NDArray) -> NDArra
         q = points[triangles[pairs[:, 0], (k + 1) % 3]]
         # signed volumes tell on which side of the plane, and of each edge, a line
         # passes
-        # passes
         dp = np.einsum("ij,ij->i", normal, p - a)
         dq = np.einsum("ij,ij->i", normal, q - a)
         tiny = 1e-9 * size * np.linalg.norm(q - p, axis=1)

@@ -177,12 +177,12 @@ def sides(model: Any, owners: Mapping[int, int]) -> dict[int, tuple[int, int]]:
     """Return the faces of solids, with the solids on both sides of each face.
 
     Args:
+        model: gmsh model of the file.
         owners: number of the solid to which each volume belongs.
-        owners: number of the solid that each volume belongs to.
 
-    For each face tag the numbers of both solids, -1 if there is none; all faces of
-    the model if no face belongs to a volume.
-        volume.
+    Returns:
+        For each face tag the numbers of both solids, -1 if there is none; all faces of
+        the model if no face belongs to a volume.
     """
     found: dict[int, list[int]] = {}
     for volume, owner in owners.items():
