@@ -35,8 +35,8 @@ def convert(
     loops: Annotated[
         Path | None,
         typer.Option(
-            help="File with loops and drives of a URDF (YAML, closed_loop). Default: "
-            "a YAML file in the same folder, with the name of the URDF or robot.yaml."
+            help="File with loops and drives of a URDF (YAML, closed_loop). Default: a "
+            "YAML file in the same folder that has the name of the URDF, or robot.yaml."
         ),
     ] = None,
     overlay: Annotated[
@@ -46,9 +46,9 @@ def convert(
     points: Annotated[
         str | None,
         typer.Option(
-            help="Loops closed in a point only, without orientation: loop1 for the "
-            "first, or the name of an end, separated by commas; all; none: types as "
-            "declared."
+            help="Loops that are closed in a point only, without orientation: loop1 "
+            "(the first loop) or names of their ends, separated by commas; all; or "
+            "none, which uses the declared types."
         ),
     ] = None,
     rest: RestOption = None,

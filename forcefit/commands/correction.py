@@ -124,7 +124,7 @@ def compensate(
     as_read: Annotated[
         bool,
         typer.Option(
-            "--as-read", help="Also correct effects that only change the readings."
+            "--as-read", help="Also correct effects that change only the readings."
         ),
     ] = False,
     json: JsonOption = None,
@@ -192,13 +192,14 @@ def carry(
     setup: Annotated[
         str,
         typer.Option(
-            help="Set-up rows: the first N of each session, or 1-20,31, or labels."
+            help="Set-up rows: the first N rows of each session; or rows such as "
+            "1-20,31; or labels of rows."
         ),
     ],
     fit: Annotated[
         str,
         typer.Option(
-            help="Quantities that are fitted in each session: registration,tool,zeros."
+            help="Quantities to fit in each session: registration,tool,zeros."
         ),
     ] = "registration",
     output: Annotated[

@@ -52,14 +52,14 @@ def deflection(
         ),
     ] = "contact",
     back: Annotated[
-        bool, typer.Option("--back", help="Afterwards return to the first load.")
+        bool, typer.Option("--back", help="Return to the first load afterwards.")
     ] = False,
     follow: Annotated[
         bool,
         typer.Option(
             "--follow",
-            help="Follow the path by arc length past limit points, stable or not "
-            "(finite motions, clearances at zero).",
+            help="Follow the equilibrium path by arc length past limit points, also "
+            "where it is unstable (finite motions, clearances at zero).",
         ),
     ] = False,
     figure: FigureOption = None,

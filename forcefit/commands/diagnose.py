@@ -23,8 +23,8 @@ def diagnose(
     calibrate: Annotated[
         int,
         typer.Option(
-            help="Number of campaigns that are simulated on the same design, for the "
-            "error rates.",
+            help="Number of campaigns that are simulated on the same design to "
+            "estimate error rates.",
             min=0,
             max=1_000_000,
         ),
@@ -39,14 +39,14 @@ def diagnose(
     without: Annotated[
         list[str] | None,
         typer.Option(
-            help="Name of an effect to leave out; also function (all "
-            "functions), geometry, springs."
+            help="Name of an effect to leave out, or function (all functions), "
+            "geometry, springs."
         ),
     ] = None,
     only: Annotated[
         list[str] | None,
         typer.Option(
-            help="Name of an effect to consider, no others; names as for --without."
+            help="Consider only effects with this name; names as for --without."
         ),
     ] = None,
     prior: Annotated[
@@ -54,7 +54,8 @@ def diagnose(
         typer.Option(help="Factor on the prior odds of an effect: NAME=FACTOR."),
     ] = None,
     save: Annotated[
-        Path | None, typer.Option(help="Also write the robot with the effects found.")
+        Path | None,
+        typer.Option(help="Also write the robot with the identified effects."),
     ] = None,
 ) -> None:
     """Identify effects that a model lacks from measured deviations.

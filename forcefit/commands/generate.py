@@ -109,7 +109,9 @@ def generate(
     ] = 0.0,
     hidden_frame: Annotated[
         float,
-        typer.Option(help="[rad, m] Magnitude of the measuring frame's unknown pose."),
+        typer.Option(
+            help="[rad, m] Magnitude of the unknown pose of the device frame."
+        ),
     ] = 0.0,
     at: AtOption = None,
     program: Annotated[

@@ -17,8 +17,8 @@ def new(
     kind: Annotated[
         str | None,
         typer.Option(
-            help="Joints of a leg from the base: UPS | RUS | UPU | PRS | RRR (in a "
-            "plane) | delta. Asked for on a terminal."
+            help="Joints of a leg from the base: UPS | RUS | UPU | PRS | RRR (planar) "
+            "| delta. If it is missing, a terminal asks for it."
         ),
     ] = None,
     legs: Annotated[

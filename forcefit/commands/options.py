@@ -62,7 +62,7 @@ DriveForceOption = Annotated[
     list[str] | None,
     typer.Option(
         "--drive-force",
-        help="Forces of drives that hold no coordinate [N m or N], such as elbow=200.",
+        help="Forces of force-controlled drives [N m or N], such as elbow=200.",
     ),
 ]
 

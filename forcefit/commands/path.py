@@ -74,11 +74,12 @@ def path(
     ends: Annotated[
         str,
         typer.Option(
-            help="Ends of a path with times: rest (no speed, no acceleration) | moving."
+            help="State at the ends of a path with times: rest (zero speed and "
+            "acceleration) | moving."
         ),
     ] = "rest",
     points: Annotated[
-        int, typer.Option(help="Number of instants computed, equally spaced.")
+        int, typer.Option(help="Number of computed instants, equally spaced.")
     ] = 201,
     load: LoadOption = None,
     gravity: GravityOption = None,

@@ -62,8 +62,8 @@ def stiffness(
     by: Annotated[
         list[str] | None,
         typer.Option(
-            help="Path of a value in the robot file by which the compliance is also "
-            "differentiated."
+            help="Path of a value in the robot file; the derivative of the compliance "
+            "by this value is also computed."
         ),
     ] = None,
     figure: FigureOption = None,

@@ -44,8 +44,8 @@ def plot(
     kind: Annotated[
         str | None,
         typer.Option(
-            help="Kind of the figure: histogram | tornado | allocation. Default: by "
-            "the file."
+            help="Kind of the figure: histogram | tornado | allocation. Default: a "
+            "kind that suits the file."
         ),
     ] = None,
     quantities: Annotated[

@@ -37,7 +37,7 @@ _File = Annotated[
 
 @app.callback()
 def report() -> None:
-    """Comparison of two runs."""
+    """Compare the results of two runs."""
 
 
 @app.command()

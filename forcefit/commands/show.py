@@ -38,8 +38,8 @@ def show(
         Path | None,
         typer.Option(
             "--figure",
-            help="Picture to write: PNG, JPEG, BMP or TIFF, with --closing GIF; or "
-            "HTML, a scene to turn in a browser. Without it and --json a window opens.",
+            help="Picture to write: PNG, JPEG, BMP, TIFF, GIF (with --closing) or HTML "
+            "(an interactive scene). A window opens if --figure and --json are absent.",
         ),
     ] = None,
     closing: Annotated[
@@ -69,8 +69,8 @@ def show(
     assumption: Annotated[
         str | None,
         typer.Option(
-            help="Assumption of that set: frozen | free | budget. Default: budget; "
-            "under a load frozen."
+            help="Assumption for the set of --error-body: frozen | free | budget. "
+            "Default: budget; under a load frozen."
         ),
     ] = None,
     json: JsonOption = None,

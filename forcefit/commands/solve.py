@@ -39,15 +39,15 @@ def solve(
     state: Annotated[
         str,
         typer.Option(
-            help="contact (small motions) | exact (finite motions: closures hold "
-            "exactly)."
+            help="contact (small motions) | exact (finite motions, which satisfy the "
+            "closures exactly)."
         ),
     ] = "contact",
     quantities: Annotated[
         str | None,
         typer.Option(
-            help="margin: only the zone margins, the factors on all clearances at "
-            "which the robot just assembles without force."
+            help="margin: compute only the zone margins, which are the factors on all "
+            "clearances at which the robot just assembles without force."
         ),
     ] = None,
     json: JsonOption = None,

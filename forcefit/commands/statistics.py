@@ -77,7 +77,7 @@ def statistics(
     rest: RestOption = None,
     mismatch: MismatchOption = None,
     draws: Annotated[
-        int, typer.Option(help="Number of draws of all errors.", min=2, max=10**9)
+        int, typer.Option(help="Number of draws of the errors.", min=2, max=10**9)
     ] = 10_000,
     seed: Annotated[
         int, typer.Option(help="Seed of the random draws.", min=0, max=2**63 - 1)
@@ -118,22 +118,24 @@ def statistics(
     state: Annotated[
         str | None,
         typer.Option(
-            help="Also the distribution of the platform's stiffness in a state: "
-            "contact (clearances pressed or free) | exact (internal forces too)."
+            help="Also compute the distribution of the platform's stiffness in a "
+            "state: contact (clearances pressed or free) | exact (also internal "
+            "forces)."
         ),
     ] = None,
     capability: Annotated[
         bool,
         typer.Option(
-            "--capability", help="Also Cp, Cpk and parts per million of every --limit."
+            "--capability",
+            help="Also compute Cp, Cpk and parts per million of every --limit.",
         ),
     ] = False,
     worst_case: Annotated[
         bool,
         typer.Option(
             "--worst-case",
-            help="Also the largest pose errors over all errors within tolerance and "
-            "all clearances.",
+            help="Also compute the largest pose errors over all errors within "
+            "tolerance and all clearances.",
         ),
     ] = False,
     confidence: Annotated[

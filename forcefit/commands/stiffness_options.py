@@ -91,8 +91,8 @@ Parts = Annotated[
         "--part",
         help="Part with another material: "
         '"z=0.2..0.4/young=2e11,poisson=0.3,density=7800", a box along the mesh\'s '
-        'axes [m], or "solid=one+other/young=...", of a STEP file (fea: list prints '
-        "its solids). May be repeated; the last counts.",
+        'axes [m], or "solid=one+other/young=..." for solids of a STEP file, which '
+        "--part list of fea prints. May be repeated; the last part has precedence.",
     ),
 ]
 Masses = Annotated[

@@ -105,8 +105,9 @@ def sweep(
     state: Annotated[
         str | None,
         typer.Option(
-            help="Also K_C and the compliance of each part: nominal (clearances at "
-            "zero) | contact | exact (both with errors, loads and clearances)."
+            help="Also compute K_C and the compliance of each part: nominal "
+            "(clearances at zero) | contact | exact (both with errors, loads and "
+            "clearances)."
         ),
     ] = None,
     frequencies: Annotated[
