@@ -8,8 +8,9 @@ with one or two hidden effects from the library or outside it, each five times a
 as the noise.  Readings of the robot are simulated and diagnosed, and the identified
 robot is used to correct commands at configurations that were not measured.  The robot
 is then simulated with the corrected commands.  The error is the distance from the
-required position, without noise and without the measuring device.  The error is also given as the
-reading of a device of this noise over the noise, which is 1 for a perfect robot.
+required position, without noise and without the measuring device.  The error is also
+given as the reading of a device with this noise over the noise; it is 1 for a perfect
+robot.
 """
 
 import argparse

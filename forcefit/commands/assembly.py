@@ -81,7 +81,7 @@ def error(
     along: AlongOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Compute certified bounds of the largest pose error, problem (27)."""
+    """Bound the largest pose error, problem (27)."""
     from forcefit.assembly.linear.reference.pose_error import ASSUMPTIONS
     from forcefit.assembly.model.largest import LARGEST_LENGTH
     from forcefit.assembly.report.pose_errors import pose_error_of, pose_error_text

@@ -26,7 +26,7 @@ def inspect(
     report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Inspect measured data; compute characteristics of ISO 9283 and ISO 230-2.
+    """Inspect measured data; characteristics of ISO 9283 and 230-2.
 
     The report states the numbers of rows, the ranges of loads and covariates, the noise
     estimated from repeats against the declared sigma, the visible effects, and the

@@ -26,7 +26,7 @@ def build(
     ] = 1,
     json: JsonOption = None,
 ) -> None:
-    """Compute the entries of a build file that the library does not contain yet."""
+    """Compute the missing entries of a build file."""
     from forcefit.stiffness.report.library_build import build_library, read_spec
 
     wanted = read_spec(spec)

@@ -69,7 +69,7 @@ def stiffness(
     figure: FigureOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Compute the stiffness of the platform and the compliance that each part adds."""
+    """Compute the platform's stiffness and each part's compliance."""
     from forcefit.assembly.model.statuses import OK
     from forcefit.assembly.report.platform_stiffness import stiffness_of, stiffness_text
     from forcefit.assembly.report.share_pictures import plot_shares

@@ -47,7 +47,7 @@ def compare(
     page: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Compare two runs; list all values that differ, largest change first."""
+    """Compare two runs: the values that differ, largest change first."""
     from forcefit.page.comparison import compare as compare_results
     from forcefit.page.comparison import comparison_page, comparison_text
 

@@ -52,7 +52,7 @@ def solve(
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """Solve the forced assembly: mobility, energy, pose and wrenches."""
+    """Solve the forced assembly: mobility, energy, pose, wrenches."""
     exact = parse_state(state, ("contact", "exact")) == "exact"
     if quantities is not None:
         _check_margins(quantities, exact, load=load, gravity=gravity, under=under)

@@ -152,7 +152,7 @@ def statistics(
     csv: CsvOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Draw random errors; estimate yield, pose errors and the importance of errors.
+    """Draw random errors: estimate yield and pose errors.
 
     With OUTPUT, finished draws are stored in OUTPUT.journal.  After an interruption,
     the same command continues from this journal and produces the same file.

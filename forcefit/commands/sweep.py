@@ -142,7 +142,7 @@ def sweep(
     csv: CsvOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Compute margins, energies and errors over postures and designs.
+    """Compute margins, energies, errors over postures and designs.
 
     Finished points are stored in OUTPUT.journal.  After an interruption, the same
     command continues from this journal and produces the same file.

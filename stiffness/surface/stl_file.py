@@ -36,7 +36,7 @@ def read_stl(path: Path) -> tuple[NDArray, NDArray]:
     content = path.read_bytes()
     corners = _text(path, content) if _is_text(content) else _binary(path, content)
     if len(corners) == 0:
-        raise BadInput(f"{path}: holds no triangles, or is not STL")
+        raise BadInput(f"{path}: contains no triangles, or is not STL")
     return corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
 
 

@@ -176,7 +176,7 @@ def check_surface(
             share an edge.
     """
     if len(triangles) == 0:
-        raise BadInput(f"{name}: holds no triangles")
+        raise BadInput(f"{name}: contains no triangles")
     if triangles.min() < 0 or triangles.max() >= len(points):
         raise BadInput(f"{name}: a triangle has a corner that is not among the points")
     _check_coordinates(points, triangles, name, unit)

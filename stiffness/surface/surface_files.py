@@ -65,7 +65,7 @@ def read_triangles(
     points, faces, solids = read["points"], read["faces"], None
     if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
         kind = path.suffix[1:].upper()
-        raise BadInput(f"{path}: holds no triangles, or is not {kind}")
+        raise BadInput(f"{path}: contains no triangles, or is not {kind}")
     faces = faces.astype(np.int64)
     if len(read.get("names", ())) > 1:
         names, overlaps = (

@@ -88,5 +88,5 @@ def test_wrong_obj_line_is_refused_with_its_number(tmp_path, line, message):
 def test_obj_file_without_faces_is_refused(tmp_path):
     path = tmp_path / "points.obj"
     path.write_text(POINTS)
-    with pytest.raises(BadInput, match="holds no triangles, or is not OBJ"):
+    with pytest.raises(BadInput, match="contains no triangles, or is not OBJ"):
         read_surface(path)

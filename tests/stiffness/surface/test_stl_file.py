@@ -93,7 +93,7 @@ def test_binary_stl_file_is_read(tmp_path, content):
 @pytest.mark.parametrize(("content", "message"), [
     (BINARY[:-60], "found 10 whole triangles, expected 12"),
     (b"no stl at all", "not a readable STL file"),
-    (b"solid cube\nendsolid cube\n", "holds no triangles, or is not STL"),
+    (b"solid cube\nendsolid cube\n", "contains no triangles, or is not STL"),
     (TEXT[: TEXT.rindex(b"vertex")], "facet 12: found 2 vertices, expected 3; the"),
     (TEXT.replace(b"  endloop\n", b"vertex 1 1 1\n", 1), "facet 1: found 4 vertic"),
     (TEXT.replace(b" facet", b" faces", 1), "before the first facet: found 3"),

@@ -147,7 +147,7 @@ DUST = 1e-9 * np.random.default_rng(0).normal(size=(60_000, 3))
 REFUSED = [
     (CUBE, with_corner(-1), "a triangle has a corner that is not among the points"),
     (CUBE, with_corner(8), "a triangle has a corner that is not among the points"),
-    (CUBE, CUBE_TRIANGLES[:0], "holds no triangles"),
+    (CUBE, CUBE_TRIANGLES[:0], "contains no triangles"),
     (np.where(CUBE == CUBE[3], [0, np.nan, 0], CUBE), CUBE_TRIANGLES, "not finite"),
     (CORNERS, TETRAHEDRON[:3], "found 3 triangles with an area"),
     (CORNERS, SLIVERS, "found 3 triangles with an area"),

@@ -199,7 +199,7 @@ BAD_TABLES = {
         r'; the decimal mark here is not ",": write "0.00001", or set in \[table\] '
         r'delimiter = ";", decimal = "," in campaign.toml and separate cells by ";"'),
     "a NUL in a label": (HEAD, [ROWS[0].replace("m1", "m\0"), *ROWS[1:]],
-        r"line 2 holds NUL; expected a text file"),
+        r"line 2 contains NUL; expected a text file"),
     "a line break in a label": (HEAD, [ROWS[0].replace("m1", '"m\n1"')],
         r"line 3, \"id\": found 'm\\n1', expected text without line breaks"),
     "ragged": (HEAD, [*ROWS[:2], "m9,0.1"], r"line 4: found 2 cells, expected 11 as"),
