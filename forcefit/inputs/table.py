@@ -108,7 +108,9 @@ def read_text(path: Path | str) -> str:
         ) from None
     if (place := text.find("\0")) >= 0:
         line = text.count("\n", 0, place) + 1
-        raise BadInput(f"{path}: line {line} contains NUL; expected a text file in UTF-8")
+        raise BadInput(
+            f"{path}: line {line} contains NUL; expected a text file in UTF-8"
+        )
     mending = MENDING.get()
     return text if mending is None else mending.text(str(path), text)
 

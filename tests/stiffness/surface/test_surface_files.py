@@ -228,7 +228,9 @@ def test_files_written_by_gmsh_are_read(tmp_path, gmsh, version, binary, dimensi
 def test_a_broken_step_file_is_refused(tmp_path, gmsh):
     path = tmp_path / "part.step"
     path.write_text("rubbish")
-    with pytest.raises(BadInput, match="not a readable STEP file|contains no triangles"):
+    with pytest.raises(
+        BadInput, match="not a readable STEP file|contains no triangles"
+    ):
         read_surface(path)
 
 
