@@ -1,14 +1,14 @@
-"""Wrong expressions of one line, drawn at random from the numerical modules.
+"""Random faults: wrong expressions of one line in the numerical modules.
 
-A file is as likely as it is long; pages and pictures (``report.py``, ``plot.py``,
-``figures.py``, ``scene.py``) are left out: what they show is tested where it is a
-number.
+The probability of a file is proportional to its length.  Pages and pictures
+(``report.py``, ``plot.py``, ``figures.py``, ``scene.py``) are excluded, because their
+numbers are tested where they are computed.
 
-An operator becomes its opposite (``+`` and ``-``, ``<`` and ``>=``, ``and`` and
-``or``), a sign or a ``not`` is dropped, a number becomes one larger, as mutmut and
-cosmic-ray do it: a tolerance of 1e-9 becomes 1.  A number above ten becomes one: 401
-steps at most instead of 400 would be no fault.  Left out are the places
-of a size that ``reshape`` is to find, where any negative number is the same.
+An operator is replaced by its opposite (``+`` and ``-``, ``<`` and ``>=``, ``and`` and
+``or``), a sign or a ``not`` is removed, or a number is increased by one, as mutmut and
+cosmic-ray do; a tolerance of 1e-9 becomes 1.  A number above ten becomes one, because
+401 instead of 400 steps would not be a fault.  Sizes that ``reshape`` has to find are
+excluded, because any negative number has the same effect.
 """
 
 import ast

@@ -9,11 +9,11 @@ everything, and judged by ``fuzz_faults.py``. Input i of a seed is always the sa
 ``--every-option`` draws nothing: each option that takes a value, of each command, gets
 each of EXTREMES once.
 
-What is asked of each: an exit status of 0, 1, 2 or 130; with 2 one line that begins
-``forcefit: `` and no new file; nothing on stderr but that and progress; only whole
-files, none that was there changed; nothing left beside them or in the temporary
-folder. A command that takes longer than LIMIT of processor time is interrupted, as by
-Ctrl-C, and asked the same.
+Requirements on each command: the exit status is 0, 1, 2 or 130; with status 2, stderr
+contains one line that begins with ``forcefit: ``, and no new file exists; stderr
+contains nothing else except progress; all files are complete, and existing files are
+unchanged; no temporary files remain.  A command that takes more than LIMIT of processor
+time is interrupted as by Ctrl-C, and must then satisfy the same requirements.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""Stops commands at random moments until they are done, and counts what was lost.
+"""Kill commands at random moments until they are done, and count lost results.
 
 Run from the repository's root: ``python benchmarks/kills.py [KILLS] [--seed N]``. Four
 commands, ``assembly sweep``, ``statistics``, ``tolerances`` and ``validation
@@ -8,9 +8,9 @@ may not grow beyond a random size, or the folder is a small tmpfs where mounting
 allowed. Between, journals are cut or one of their bits is turned. Then the same command
 runs to its end, and its files are compared with those of an undisturbed run.
 
-Lost is a point that a child had put into the journal, that no cut or turned bit hit,
-and that is not there or is solved again. Half-written is a file that stands under its
-name without being one of those of the undisturbed run.
+A point is lost if a child had written it to the journal, no cut or flipped bit affected
+it, and it is missing or solved again.  A file is half-written if it exists under its
+final name but differs from that of the undisturbed run.
 """
 
 import argparse
