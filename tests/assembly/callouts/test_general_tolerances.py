@@ -43,7 +43,7 @@ def test_general_tolerances_of_lengths_equal_the_transcribed_standard(row):
             assert found == pytest.approx(float(value) * 1e-3)
 
 
-def test_coarser_class_and_longer_length_are_never_tighter():
+def test_general_tolerance_never_decreases_with_a_coarser_class_or_a_longer_length():
     lengths = np.array([2.9, 5, 20, 100, 300, 900, 1500]) * 1e-3
     table = [[linear_tolerance(x, k) for x in lengths] for k in "fmc"]
     assert (np.diff(table, axis=0) > 0).all()
@@ -68,7 +68,7 @@ def test_length_without_a_value_is_refused(mm, kind):
         linear_tolerance(mm * 1e-3, kind)
 
 
-def test_texts_of_tolerances_are_read():
+def test_texts_of_general_tolerances_are_parsed():
     assert parse_general("ISO 2768-mK") == ("m", "K")
     assert parse_general("ISO 2768 - f") == ("f", "")
     assert parse_length("452 +- 0.1 mm") == pytest.approx((0.452, 1e-4))

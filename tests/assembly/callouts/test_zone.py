@@ -139,7 +139,7 @@ def test_limit_of_a_normal_interval_is_three_cp_standard_deviations_from_its_cen
     pytest.param(round_plane_position(4e-5, 0.04), marks=pytest.mark.slow),
     pytest.param(plane_position(4e-5, 0.04, 0.03), marks=pytest.mark.slow),
 ])  # fmt: skip
-def test_truncated_draws_stay_in_the_zone_and_have_its_covariance(zone):
+def test_truncated_draws_are_inside_the_zone_and_have_its_covariance(zone):
     screws = drawn(zone, "truncated", 0.6)
     sizes = [np.linalg.norm(screws @ b.T, axis=1).max() for b in zone.bounds]
     assert max(sizes) <= 1 + 1e-9

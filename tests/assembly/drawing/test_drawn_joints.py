@@ -75,7 +75,7 @@ def test_relative_motion_of_a_joint_is_spanned_by_its_free_screws(kind):
     ("revolute", [*(0.3 * AXIS)]), ("prismatic", [*(0.3 * AXIS)]),
 ])  # fmt: skip
 @pytest.mark.parametrize("reverse", [False, True])
-def test_a_coordinate_moves_the_second_body_along_the_axis(kind, step, reverse):
+def test_joint_coordinate_moves_the_second_body_along_the_axis(kind, step, reverse):
     """Relative to the first; so it does from the second body to the first."""
     ends = ("table", "base") if reverse else ("base", "table")
     drawn = robot(joint(kind, *ends, actuated=True, position=0.2))

@@ -45,7 +45,7 @@ def test_rough_home_coordinates_are_corrected_to_close():
     )
 
 
-def test_message_states_where_a_limited_crank_stops():
+def test_message_states_the_angle_at_which_a_limited_crank_stops():
     """Coupler and rocker of 0.3 m are in line when the crank's end is 0.6 m away."""
     short = 0.3
     robot = Robot(
@@ -89,7 +89,7 @@ def test_arm_reaches_a_pose_with_the_elbow_on_the_same_side_as_at_home(x):
     np.testing.assert_allclose(posture.platform[:2, 3], [x, y], rtol=0, atol=EXACT)
 
 
-def test_missing_angle_equals_that_between_the_two_rotations():
+def test_missing_rotation_in_the_message_equals_the_angle_between_the_two_rotations():
     """A hinge about z cannot tilt: SciPy's angle from its last pose to the target."""
     robot = Robot("hinge", "hand", (
         frame("a", **driven(0.3)), frame("hand", "a", (0.4, 0, 0), (0.2, -0.1, 0.3)),

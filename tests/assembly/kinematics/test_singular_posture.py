@@ -56,7 +56,7 @@ GIVEN = [{"tz": HEIGHT}, {"tx": 0.0, "ty": 0.0, "tz": HEIGHT}, flat()]
 
 
 @pytest.mark.parametrize("pose", GIVEN)
-def test_singular_distances_are_zero_for_every_form_of_the_singular_pose(pose):
+def test_singularity_distances_are_zero_in_every_way_to_give_the_singular_pose(pose):
     robot = three_upu()
     found = find_singularities(robot, place_robot(robot, pose=pose).transforms[None])
     assert found.parallel[0] == 0.0

@@ -21,7 +21,7 @@ from tests.linkages_for_tests import five_bar
 EXACT = 1e-9  # closures are solved to 1e-10 of the longest body, all near 1 m here
 
 
-def test_many_poses_equal_those_placed_one_by_one():
+def test_poses_of_many_targets_equal_those_placed_one_by_one():
     robot = five_bar()
     goals = np.full((3, 6), np.nan)
     goals[:, :2] = [[0.1, 0.5], [0.0, 2.0], [-0.1, 0.6]]
@@ -38,7 +38,7 @@ def test_many_poses_equal_those_placed_one_by_one():
 
 
 @pytest.mark.parametrize("name", ["irsbot2", "orthoglide"])
-def test_direct_track_ends_in_the_posture_of_many_short_steps(name):
+def test_direct_track_ends_in_the_same_posture_as_many_short_steps(name):
     """Home's assembly mode: through 40 targets on the line, each from the previous."""
     robot = load_robot(name)
     home = home_posture(robot)

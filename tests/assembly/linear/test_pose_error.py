@@ -229,9 +229,7 @@ def test_unknown_assumption_and_budget_under_load_are_refused():
 
 @pytest.mark.parametrize(("case", "point"), CASES)
 @pytest.mark.parametrize(("key", "assumption"), [("rigid", "frozen"), ("free", "free")])
-def test_pose_error_brackets_overlap_the_published_brackets(
-    case, point, key, assumption
-):
+def test_pose_error_bounds_overlap_the_published_bounds(case, point, key, assumption):
     """Both hold the truth, so they overlap; 1e-7 is what the reference's own
     deformations leave uncertain where the energy is nearly zero.
     """

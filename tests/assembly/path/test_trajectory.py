@@ -71,7 +71,7 @@ def test_two_rows_with_times_are_the_quintic_profile():
         )
 
 
-def test_moving_ends_reproduce_a_quintic_motion():
+def test_path_with_moving_ends_reproduces_a_quintic_motion():
     """A spline of degree five through samples of t^5 is t^5, at unequal times too."""
     times = np.array([0.0, 0.3, 0.5, 0.9, 1.4, 1.7, 2.0])
     path = timed(line(*times**5, times=times), 41, ends="moving")
@@ -79,7 +79,7 @@ def test_moving_ends_reproduce_a_quintic_motion():
     np.testing.assert_allclose(path.second[:, 0], 20 * path.times**3, atol=1e-9)
 
 
-def test_sampled_cosine_is_approached_with_the_fourth_order_of_acceleration():
+def test_acceleration_of_a_sampled_cosine_converges_with_fourth_order():
     """The second derivative of a quintic spline errs by h^4 away from its ends."""
     errors = []
     for count in (11, 21, 41):
@@ -127,7 +127,7 @@ def test_motion_profile_over_many_rows_has_no_jump_of_acceleration():
         ),
     ],
 )
-def test_path_that_cannot_be_made_is_refused(call, message):
+def test_path_that_cannot_be_computed_is_refused(call, message):
     with pytest.raises(ValueError, match=message):
         call(line(0.0, 0.1))
 

@@ -80,7 +80,7 @@ def test_seoul_robot_has_fewer_freedoms_near_its_singular_home():
     assert "near it 3 freedoms" in mobility_lines(found)["singular posture"]
 
 
-def test_three_parallel_axes_in_a_plane_move_at_first_order_only():
+def test_three_coplanar_parallel_axes_allow_only_infinitesimal_motions():
     """Two bars of 0.3 and 0.2 m stretched between hinges 0.5 m apart are rigid."""
     robot = mechanism(
         "one", [0.1, 0, 0],

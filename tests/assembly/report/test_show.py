@@ -215,7 +215,7 @@ def test_message_about_an_object_that_cannot_be_shown_names_its_type(
 
 
 @pytest.mark.slow
-def test_browser_draws_a_nominal_robot_in_its_frame(tmp_path):
+def test_browser_draws_a_nominal_robot_inside_its_frame(tmp_path):
     frame = ff.load_robot("hexapod").show(interactive=True)._repr_html_()
     (tmp_path / "cell.html").write_text(f"<meta charset=utf-8>{frame}", "utf-8")
     tab = browser()

@@ -76,7 +76,7 @@ def test_slopes_of_the_largest_error_of_an_arm_equal_its_closed_form():
 
 @pytest.mark.parametrize("play", ["least", "contact", "uniform"])
 @pytest.mark.parametrize("key", ["rotation", "translation"])
-def test_response_has_the_random_clearances_of_the_experiment(play, key):
+def test_sampled_response_uses_the_random_clearances_of_the_experiment(play, key):
     """For each draw; the slopes are the direction of the platform's error."""
     posture, sources = tip()
     values = sources.draw(0, 12, seed=1)

@@ -87,7 +87,7 @@ def test_yield_falls_to_zero_with_the_worst_clearance():
     assert share["worst"] < share["contact"] < share["uniform"] < share["least"]
 
 
-def test_worst_clearance_adds_nothing_if_a_load_takes_up_all_clearance():
+def test_worst_clearance_adds_no_error_if_a_load_closes_all_clearances():
     """A load presses the pin to one side of its disc, so it cannot move sideways."""
     robot = arm(radial=RADIAL)
     sources, load = tip_errors(robot, 1e-4), (0, 0, 0, 10.0, 0, 0)

@@ -82,7 +82,7 @@ def test_clearance_in_a_leg_is_explained_as_clearance(diagnosed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["fb_wear", "fb_gear"])
-def test_effects_outside_the_library_are_learned(name, diagnosed):
+def test_effects_outside_the_library_are_learned_as_functions(name, diagnosed):
     """A rod that grows with time and a gear's waves are learned down to the noise."""
     found = diagnosed(CASES / name)
     assert (found.verdict, found.claimed) == ("learned", ())

@@ -71,7 +71,7 @@ def test_growth_with_time_is_attributed_to_a_body_instead_of_the_reading(columns
     assert selected.functions[0].candidate.parts[0].where != "reading"
 
 
-def test_search_excludes_outliers(columns):
+def test_model_search_excludes_outliers(columns):
     sigma = CAMPAIGN.sigma[0, 3]
     readings = np.zeros((ROWS, 6))
     readings[[1, 10, 21], [3, 4, 3]] = 40 * sigma
@@ -93,7 +93,7 @@ def test_effects_that_are_visible_only_by_rounding_are_excluded():
 
 
 @pytest.mark.parametrize("size", [6.0, 25.0])
-def test_single_row_selects_no_function(columns, size):
+def test_no_function_is_selected_from_a_single_row(columns, size):
     readings = np.zeros((ROWS, 6))
     readings[17] = size * CAMPAIGN.sigma[17] * [1, -1, 1, 1, -1, 1]
     selected = found(columns, readings)

@@ -85,7 +85,7 @@ def test_invisible_effect_is_compared_at_any_size(rng):
     assert found.classes() == [("a", "b")]
 
 
-def test_rank_counts_unknowns_of_unequal_scale(rng):
+def test_rank_is_correct_for_unknowns_of_different_scales(rng):
     """An angle of 1e4 and an orthogonal shift of 100 sigma, and their sum."""
     A = np.eye(3)[:, :2] * [1e4, 100.0]
     found = compare_signatures({"a": np.column_stack([A, A.sum(axis=1)])})

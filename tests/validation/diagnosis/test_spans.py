@@ -89,7 +89,7 @@ def test_held_out_spans_of_time_are_predicted_to_the_noise(heated):
     assert diagnosis.after.position < 1.5 * left
 
 
-def test_many_outliers_do_not_prevent_learning(tmp_path):
+def test_many_outliers_do_not_prevent_learning_a_function(tmp_path):
     """Eleven outliers, each two thirds as large as the one before."""
     rng = np.random.default_rng(9)
     warm = np.sin(np.linspace(0, 20, 320))

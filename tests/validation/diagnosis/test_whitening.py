@@ -26,7 +26,7 @@ def covariance(root, loadings, visit):
 
 
 @pytest.mark.parametrize("k", [1, 3, 6])
-def test_cells_are_independent_after_whitening(k):
+def test_cells_of_readings_are_independent_after_whitening(k):
     rng = np.random.default_rng(k)
     root, L = rng.uniform(0.2, 2, 11), 3 * rng.normal(size=(11, k))
     C = covariance(root, L, VISIT)
