@@ -165,7 +165,7 @@ def _home(tmp_path):
     return path
 
 
-def test_link_model_of_a_drawn_body_lies_between_its_joints(example, tmp_path):
+def test_link_model_of_a_drawn_body_connects_its_joints(example, tmp_path):
     """The same cone in a file of bodies: a pin at its start, the platform's point."""
     drawn = f"""
 format = 2

@@ -78,7 +78,7 @@ def test_rotation_vector_is_exact_for_half_turns_and_the_identity():
 
 
 @pytest.mark.parametrize("shape", [(), (0,), (2, 5)])
-def test_rotation_functions_keep_leading_axes(shape):
+def test_rotation_functions_preserve_leading_axes(shape):
     matrices = rotation_matrix(np.zeros((*shape, 3)))
     assert matrices.shape == (*shape, 3, 3)
     assert rotation_vector(matrices).shape == (*shape, 3)

@@ -23,7 +23,9 @@ from forcefit.inputs.table import BadInput
         ("25 H7/p6", (0, 21), (22, 35), (-35, -1), "interference"),
     ],
 )
-def test_fit_has_the_limits_of_the_worked_table(text, hole, shaft, clearance, kind):
+def test_limits_of_a_fit_equal_the_table_of_examples(
+    text, hole, shaft, clearance, kind
+):
     fit = parse_fit(text)
     um = 1e6
     assert np.multiply(fit.hole, um) == pytest.approx(hole)

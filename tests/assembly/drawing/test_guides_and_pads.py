@@ -181,7 +181,7 @@ def two_guide_slabs():
 
 
 @pytest.mark.parametrize("method", ["compiled", "reference"])
-def test_the_margin_of_two_rigid_guides_is_that_of_a_linear_programme(
+def test_margin_of_two_rigid_guides_equals_that_of_a_linear_programme(
     method, drawn, rng
 ):
     """Least t with abs(slabs (x - error of the guide)) <= t on both guides."""
@@ -200,7 +200,7 @@ def test_the_margin_of_two_rigid_guides_is_that_of_a_linear_programme(
         assert found.margin == pytest.approx(least.fun, rel=1e-6)
 
 
-def test_pose_errors_of_two_rigid_guides_are_those_of_a_linear_programme(drawn, rng):
+def test_pose_errors_of_two_rigid_guides_equal_those_of_a_linear_programme(drawn, rng):
     """The table may be where both guides allow it: support function and reach."""
     posture = on_two_guides(drawn, np.zeros(6), passive=False)
     slabs = two_guide_slabs()
@@ -299,7 +299,7 @@ def test_uniform_positions_on_a_pad_fill_the_octahedron_evenly(drawn):
     np.testing.assert_allclose((screws**2).mean(axis=0), 0.1, atol=4 * 0.0036)
 
 
-def test_uniform_positions_in_a_guide_are_those_of_rejection(drawn, rng):
+def test_uniform_positions_in_a_guide_agree_with_rejection_sampling(drawn, rng):
     """Mean squares of the five small motions, against samples of the slabs."""
     found = uniform_screws(one_joint(drawn, "prismatic", GUIDE), 1500)[:, :5]
     box = np.array([2.5e-4, 2.5e-4, 5e-4, C, C])

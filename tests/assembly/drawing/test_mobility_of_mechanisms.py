@@ -214,7 +214,7 @@ def test_the_seoul_robot_has_three_freedoms_away_from_home():
     assert mobility(at).overconstraint == 0
 
 
-def test_tsais_robot_keeps_its_freedoms_away_from_home():
+def test_tsais_robot_has_the_same_freedoms_away_from_home():
     at = place_robot(three_upu(Y), {"tx": 0.05, "ty": 0.02, "tz": 0.5})
     assert counts(at) == (3, 3, 0, 0, 0)
     rotation = [at.pose()[key] for key in ("rx", "ry", "rz")]

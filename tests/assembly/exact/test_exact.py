@@ -102,7 +102,7 @@ def bar_force(e, longer):
 
 
 @pytest.mark.parametrize("longer", [0.05, 0.12])
-def test_elastic_bar_takes_its_share_of_the_energy(longer):
+def test_energy_of_an_elastic_bar_equals_its_share_in_closed_form(longer):
     """One scalar equation; differences of 1e-6 leave 1e-10 of the force."""
     e = brentq(bar_force, -longer, longer, args=(longer,), xtol=1e-15)
     one, two = triangle(B + longer + e)

@@ -111,7 +111,7 @@ QUICK = {"hexapod": "urdf", "delta": "xml", "orthoglide": "", "irsbot2": ""}
                   else pytest.mark.slow)
      for name in BUILT_IN for ending in ("urdf", "xml")],
 )  # fmt: skip
-def test_built_in_robots_keep_their_frames_after_conversion_and_back(
+def test_frames_of_built_in_robots_are_equal_after_conversion_and_back(
     name, ending, tmp_path
 ):
     """Drives, platform, and every frame by its name, in the home pose and elsewhere."""

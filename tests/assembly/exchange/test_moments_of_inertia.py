@@ -88,7 +88,7 @@ SHAPES = {  # principal moments of 1 kg, textbooks
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_automatic_moments_of_a_shape_are_those_of_the_textbook(shape, tmp_path):
+def test_automatic_moments_of_inertia_of_a_shape_equal_the_textbook(shape, tmp_path):
     """Of 5 kg, turned by a quarter about x: y and z are exchanged."""
     pose = f"<pose>0.2 0 0 {np.pi / 2} 0 0</pose>"
     text = f"""<sdf version="1.12"><model name="m"><link name="a"><inertial auto="true">

@@ -38,7 +38,7 @@ def test_motions_of_a_compiled_mujoco_model_equal_those_in_mujoco(kind, tmp_path
     assert answer.bodies == model.nbody - 1
 
 
-def test_model_of_a_written_robot_keeps_its_platform(tmp_path):
+def test_mujoco_model_of_a_written_robot_has_the_same_platform(tmp_path):
     """A written MJCF names the platform in a custom text."""
     path = tmp_path / "delta.xml"
     ff.write_robot(ff.load_robot("delta"), path)
@@ -75,7 +75,7 @@ def test_robot_from_a_mujoco_model_equals_the_robot_from_its_file(kind, tmp_path
     assert np.hypot(pin[0] - 0.3, pin[1]) == pytest.approx(0.3)
 
 
-def test_model_changed_in_memory_gives_the_changed_robot(tmp_path):
+def test_mujoco_model_changed_in_memory_is_read_with_its_changes(tmp_path):
     """A crank twice as long, which no file has."""
     model = mujoco.MjModel.from_xml_string(f"<mujoco>{FOUR_BAR}</mujoco>")
     model.body_pos[mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "coupler")] *= 2

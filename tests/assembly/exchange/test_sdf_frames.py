@@ -81,7 +81,7 @@ def test_poses_are_resolved_through_nested_models_and_frames(tmp_path):
     assert mechanism.root == WORLD
 
 
-def test_included_model_keeps_its_own_sdf_version(tmp_path):
+def test_included_model_is_read_by_its_own_sdf_version(tmp_path):
     """A hand of version 1.4, whose axis is given in the hand, turned by 90 degrees
     about x; the same robot written out, in which the axis says so itself."""
     hand = (

@@ -100,7 +100,7 @@ def test_remarks_name_the_joints_at_which_loops_are_closed(read):
     )
 
 
-def test_a_remark_says_between_which_of_many_joints_a_link_is(read):
+def test_remark_states_between_which_of_many_joints_a_link_is_placed(read):
     """Of the platform, which has one in each leg; none where a key says it."""
     link = "link = { beam = { radius = 0.01 }, young = 7e10, poisson = 0.3 }"
     text = TSAI.replace("mass = 3.0", f"mass = 3.0\n{link}")
@@ -306,7 +306,7 @@ def test_copies_of_an_arc_are_turned_with_their_leg(read):
     ('section = {', 'sektion = {', "section"),
     ("poisson = 0.3", "poisson = 0.3\nbeam = { radius = 0.1 }", "link.beam: found it "),
 ])  # fmt: skip
-def test_a_mistake_in_a_curve_is_one_line(old, new, message, read):
+def test_mistake_in_a_curve_is_reported_in_one_line(old, new, message, read):
     with pytest.raises(BadInput) as caught:
         read(ARC.replace(old, new))
     assert message in str(caught.value)
@@ -618,7 +618,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_a_mistake_in_a_drawing_is_one_line(case, read):
+def test_mistake_in_a_drawing_is_reported_in_one_line(case, read):
     old, new, message = REFUSED[case]
     assert old in TSAI
     with pytest.raises(BadInput) as caught:

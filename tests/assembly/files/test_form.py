@@ -116,7 +116,9 @@ def test_flatness_widens_the_gap_of_a_pad(tmp_path):
          'found "pn", expected a joint of "rod"; did you mean "pin"'),
     ],
 )  # fmt: skip
-def test_form_that_is_not_modelled_is_refused_in_one_line(tmp_path, old, new, message):
+def test_form_tolerance_that_is_not_modelled_is_refused_in_one_line(
+    tmp_path, old, new, message
+):
     assert old in ARM
     with pytest.raises(BadInput, match=re.escape(message)) as error:
         read(tmp_path, ARM.replace(old, new))

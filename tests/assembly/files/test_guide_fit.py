@@ -96,7 +96,9 @@ def test_one_gap_of_a_guide_is_drawn_along_each_axis(tmp_path):
         ('"40 H7/g6", gap = "5 um"', 'guide.gap: found it together with "fit"'),
     ],
 )
-def test_fit_that_a_guide_cannot_have_is_refused_in_one_line(tmp_path, fit, message):
+def test_fit_that_is_not_possible_for_a_guide_is_refused_in_one_line(
+    tmp_path, fit, message
+):
     with pytest.raises(BadInput, match=re.escape(message)) as error:
         read(tmp_path, GUIDE.replace("FIT", fit))
     assert "\n" not in str(error.value)

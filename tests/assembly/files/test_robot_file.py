@@ -65,7 +65,9 @@ LOADS = {
 
 
 @pytest.mark.parametrize("change", LOADS.values(), ids=LOADS)
-def test_equivalent_file_forms_give_the_same_robot(change, write_file, tmp_path):
+def test_equivalent_forms_of_a_file_describe_the_same_robot(
+    change, write_file, tmp_path
+):
     expected = read_robot(write_file(FOUR_BAR))
     changed = change(FOUR_BAR)
     assert changed != FOUR_BAR

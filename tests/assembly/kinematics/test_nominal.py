@@ -107,7 +107,7 @@ def test_missing_rotation_in_the_message_equals_the_angle_between_the_two_rotati
     assert float(short) == pytest.approx(between.magnitude(), rel=1e-5)
 
 
-def test_unspecified_pose_components_stay_nearest_to_home():
+def test_unspecified_pose_components_are_chosen_nearest_to_home():
     """Of all elbow angles with the hand at x, the nearest to home."""
     robot = arm()
     home = home_posture(robot)

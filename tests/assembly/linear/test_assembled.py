@@ -55,7 +55,7 @@ def solvable(rng):
             continue
 
 
-def test_any_wrenches_give_a_lower_bound_of_the_energy(rng):
+def test_any_wrenches_imply_a_lower_bound_of_the_energy(rng):
     """Weak duality; the bound is the sum that its docstring defines."""
     some = list(solvable(rng))
     assert len(some) >= 3

@@ -35,7 +35,7 @@ def test_redundant_free_motions_have_the_least_norm():
     assert batch.platform_screw[0, 2] == pytest.approx(1e-3, rel=1e-9)
 
 
-def test_stiff_spring_in_series_with_a_soft_one_keeps_its_energy():
+def test_energy_of_a_stiff_spring_in_series_with_a_soft_one_is_accurate():
     """1 and 1e-8 rad/(N m) about one axis, twice 1e-8 across it."""
     soft = np.diag([1.0, 1e8, 1e8, 1e8, 1e8, 1e8])
     gap = np.array([1e-2, 1e-4, 0, 0, 0, 0])

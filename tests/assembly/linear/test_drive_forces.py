@@ -159,7 +159,7 @@ def test_force_of_a_drive_can_balance_a_weight(solve):
     np.testing.assert_allclose(assembly.platform_screw, np.zeros(6), atol=1e-15)
 
 
-def test_drive_force_turns_clearance_of_other_joints_to_one_side():
+def test_drive_force_presses_clearances_of_other_joints_to_one_side():
     """Axial play of the rod's end +-20 um: the pull takes all of it up."""
     robot = opposing_slides(4e6)
     first = replace(robot.frames[0], clearance=Clearance(axial=2e-5))

@@ -97,7 +97,7 @@ def test_all_points_of_the_papers_robot_are_certified(grid, kappa, size):
     assert many.clearance_excess().max() < 1e-14
 
 
-def test_wrenches_give_the_complementary_energy_bound(grid):
+def test_wrenches_imply_the_complementary_energy_bound(grid):
     """The complementary energy in NumPy is independent of the kernels."""
     _, postures = grid
     many = solve_assembly(postures, LOAD, gravity=GRAVITY)

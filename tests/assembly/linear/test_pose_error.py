@@ -173,7 +173,7 @@ def test_screws_of_the_bounds_are_feasible_in_the_closed_chain(spin, rng):
 
 
 @pytest.mark.parametrize("asked", [{}, {"energy_budget": 0.5}])
-def test_energy_budget_of_two_springs_gives_a_ball_of_known_radius(asked):
+def test_energy_budget_of_two_springs_allows_a_ball_of_known_radius(asked):
     """E - E* = (k1 + k2)/2 |x - x*|^2 for every motion of the meeting point."""
     k1, k2, gap, eta = 1e6, 3e6, 2e-4, asked.get("energy_budget", 0.05)
     robot = coaxial_beams(np.array([0, 0, 0, gap, 0, 0]), (k1, k2))

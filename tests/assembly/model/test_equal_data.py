@@ -93,7 +93,7 @@ def test_robot_written_and_read_equals_the_written_one(name, tmp_path):
     assert ff.load_robot(name) == robot
 
 
-def test_links_of_other_stiffness_under_one_key_do_not_share_results():
+def test_links_of_different_stiffness_with_equal_keys_do_not_share_results():
     """C = screw of a unit wrench; the library's file was replaced in between."""
     screws = []
     for factor in (1.0, 2.0):
@@ -130,7 +130,7 @@ def test_equal_robots_are_equal_in_another_process(tmp_path):
     subprocess.run([sys.executable, "-c", code, tmp_path / "robot"], check=True)
 
 
-def test_diagonal_of_a_joint_stiffness_is_that_of_the_matrix():
+def test_diagonal_of_a_joint_stiffness_equals_that_of_its_matrix():
     diagonal = [np.inf, np.inf, 10.0, np.inf, np.inf, 2e5]
     short, full = (
         Frame("hinge", joint_stiffness=K) for K in (diagonal, np.diag(diagonal))

@@ -52,7 +52,7 @@ def test_polynomial_profiles_end_without_acceleration_or_jerk():
 
 
 @pytest.mark.parametrize("profile", PEAKS)
-def test_limits_of_speed_and_acceleration_give_the_shortest_duration(profile):
+def test_limits_of_speed_and_acceleration_determine_the_shortest_duration(profile):
     speed, acceleration = PEAKS[profile]
     path, D = line(0.1, 0.3), 0.2
     by_speed = profiled(path, 11, profile, 1.0, speed=0.5)

@@ -76,7 +76,7 @@ def test_spring_along_x_has_infinite_stiffness_across_it():
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_one_of_many_stiffnesses_equals_that_of_its_posture_at_any_point(method):
+def test_stiffness_among_many_equals_that_of_its_single_posture_at_any_point(method):
     """Compliance, stiffness and shares of each posture."""
     robot = load_robot("irsbot2")
     poses = np.full((3, 6), np.nan)

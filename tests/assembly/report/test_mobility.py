@@ -102,7 +102,7 @@ def test_regular_home_is_not_singular(name):
     assert "near" not in found
 
 
-def test_ball_joint_turned_by_a_right_angle_keeps_three_freedoms():
+def test_ball_joint_rotated_by_a_right_angle_has_three_freedoms():
     """Whatever three axes it is made of: it turns about every axis."""
     robot = mechanism("ball", [0, 0, 0.2], joint("spherical", "base", "ball", [0] * 3))
     home = home_posture(robot)
@@ -155,7 +155,7 @@ SCREWS = {
 
 @pytest.mark.parametrize("name", SCREWS)
 @pytest.mark.parametrize("size", [1.0, 1e-3])
-def test_pure_motions_of_screw_systems_equal_hand_results(name, size):
+def test_pure_motions_of_screw_systems_equal_hand_calculation(name, size):
     screws, expected = SCREWS[name]
     found = pure_motions(np.array(screws, float), np.zeros(3), size)
     assert [m.kind for m in found] == [kind for kind, _, _ in expected]

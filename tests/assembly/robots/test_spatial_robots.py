@@ -139,7 +139,7 @@ def lower_meeting_point(centres, radius):
     return centres[0] + middle + math.sqrt(radius**2 - middle @ middle) * down
 
 
-def test_delta_platform_keeps_its_orientation_and_its_rods_stay_parallel(rng):
+def test_delta_platform_has_constant_orientation_and_parallel_rods(rng):
     robot = BUILT_IN["delta"]()
     for _ in range(5):
         posture = place_robot(robot, pose=random_pose("delta", rng))
@@ -184,7 +184,7 @@ def test_pose_error_of_the_delta_robot_is_the_farthest_of_64_corners(rng):
     assert_pose_error_is_of_64_corners(posture, np.array(lines), joints)
 
 
-def test_orthoglide_legs_keep_their_length(rng):
+def test_lengths_of_orthoglide_legs_are_constant(rng):
     robot = BUILT_IN["orthoglide"]()
     for _ in range(5):
         posture = place_robot(robot, pose=random_pose("orthoglide", rng))

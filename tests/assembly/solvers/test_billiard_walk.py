@@ -50,7 +50,7 @@ def reflected(starts, M, u, speed, left):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_billiard_trajectory_equals_reflections_by_hand(seed, rng):
+def test_billiard_trajectory_equals_reflections_computed_by_hand(seed, rng):
     """In the coordinates of Dikin's ellipsoid, for any axes; also for a thin one."""
     starts = [0, 2, 3, 5]
     for M in (np.eye(5), rng.normal(size=(5, 5)), rng.normal(size=(5, 3))):

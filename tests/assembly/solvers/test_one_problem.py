@@ -81,7 +81,7 @@ def test_value_of_the_interior_point_method_equals_clarabel_and_is_certified(
 
 @pytest.mark.parametrize("widest", [1, 2, 3, 20])
 @pytest.mark.parametrize("springs", [0, 5])
-def test_least_energies_of_both_methods_lie_above_both_bounds(rng, widest, springs):
+def test_least_energies_of_both_methods_are_above_both_bounds(rng, widest, springs):
     """The certified bound of each method is at most the other's value."""
     for _ in range(6):
         group = random_cones(rng, widest)

@@ -48,7 +48,7 @@ def test_scaling_approaches_a_jump_from_the_admissible_side(start, within, beyon
         assert 3.0 * (1 - precision) <= found <= 3.0
 
 
-def test_scaling_keeps_proportions_within_the_bounds_of_the_plan():
+def test_scaling_preserves_proportions_within_the_bounds_of_the_plan():
     """Samples (1, 1) of tolerances 1 to 4; tolerances at their loosest stay there."""
     known = Known(lambda size: size / 6.0, least=0.5, most=8.0, tolerances=3)
     found = scale_uniformly(known, Samples(np.ones((1, 3)), 0), np.array([1.0, 2, 4]))

@@ -40,7 +40,7 @@ class Coin:
         return share, share
 
 
-def test_repeated_verification_keeps_its_error_probability(monkeypatch):
+def test_repeated_verification_does_not_exceed_its_error_probability(monkeypatch):
     """The last interval misses the truth in at most 5 % of all verifications.
 
     The yield is just so low that most looks contradict it and another follows; with

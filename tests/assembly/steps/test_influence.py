@@ -30,7 +30,7 @@ def after(posture, *done, run=()):
 
 
 @pytest.mark.parametrize(("place", "expected"), [(0.3, 3.75e-7), (0.6, 0.0)])
-def test_influence_of_a_pin_on_a_slot_is_that_of_two_springs(place, expected):
+def test_influence_of_a_pin_on_a_slot_equals_that_of_two_springs(place, expected):
     """Platform on springs k at 0 and L: C = ((1 - a/L)(1 - s/L) + a s / L^2) / k."""
     by_hand = ((1 - 0.1 / 0.4) * (1 - place / 0.4) + 0.1 * place / 0.16) / 1e6
     assert by_hand == pytest.approx(expected, abs=1e-20)

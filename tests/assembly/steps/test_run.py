@@ -314,7 +314,7 @@ def test_gough_platform_moves_by_the_inverse_jacobian_without_force():
     ("components", "change", "left"),
     [(("TZ",), -40.0e-6, 6.6e-6), (("TX", "TY", "TZ"), -34.1e-6, 5.4e-6)],
 )
-def test_one_adjustable_leg_brings_one_reading_to_zero_and_not_the_pose(
+def test_one_adjustable_leg_corrects_one_reading_but_not_the_whole_pose(
     components, change, left
 ):
     reading = Measure("pose", "platform", components)

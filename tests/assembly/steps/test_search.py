@@ -116,7 +116,7 @@ def test_least_energy_changes_the_adjustments_within_their_increments():
         assert found.value == pytest.approx(energy, rel=1e-6, abs=1e-12)
 
 
-def test_adjustment_to_a_closure_stays_before_the_step_that_joins_it():
+def test_adjustment_for_a_closure_is_never_moved_after_the_step_that_joins_it():
     """Closing costs no force once leg 1 is cut to what leg 0 leaves open."""
     posture = legs_on_a_guide((10e-6, 60e-6))
     gap = Measure("gap", ("platform", "leg1"))

@@ -116,7 +116,7 @@ def test_swept_draws_are_bit_identical_to_robots_with_those_errors(tmp_path):
             assert np.array_equal(there[name], one[name], equal_nan=True), name
 
 
-def test_list_and_grid_of_the_same_postures_give_equal_energies(robot, tmp_path):
+def test_list_and_grid_of_the_same_postures_have_equal_energies(robot, tmp_path):
     write_robot(robot, tmp_path / "robot.toml")
     grid = sweep_poses(robot, parse_grid(GRID))
     x, z = np.meshgrid(grid.tx.values, grid.tz.values, indexing="ij")
@@ -199,7 +199,7 @@ def test_invalid_sweep_options_are_refused_with_one_message(options, message):
     assert message in str(error.value)
 
 
-def test_figures_are_drawn_from_the_data_set_alone(tmp_path):
+def test_figures_are_drawn_from_the_data_set_without_solving(tmp_path):
     path = tmp_path / "errors.toml"
     path.write_text(ERRORS)
     grid = "tx=-0.02:0.02:0.02,ty=0.12:0.14:0.02"

@@ -330,7 +330,9 @@ def test_rest_option_bends_the_named_link_by_the_closure_gap(run, tmp_path):
     [(["solve", "five_bar", "--rest", "ankle"], '--rest: no frame "ankle"'),
      (["solve", "five_bar", "--mismatch", "glue"], '--mismatch: found "glue"')],
 )  # fmt: skip
-def test_rest_and_mismatch_options_refuse_what_they_cannot_use(run, words, message):
+def test_rest_and_mismatch_options_refuse_unusable_links_and_drives(
+    run, words, message
+):
     status, out, err = run("assembly", *words)
     assert (status, out) == (2, "")
     assert message in err

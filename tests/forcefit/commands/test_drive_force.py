@@ -23,7 +23,9 @@ def path(tmp_path):
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_solve_gives_the_force_that_a_drive_causes_and_names_it(run, path, state):
+def test_solve_reports_the_forces_due_to_a_drive_force_and_names_the_drive(
+    run, path, state
+):
     words = ["solve", path, "--drive-force", "rocker=12", "--state", state]
     status, out, _ = run("assembly", *words, "--json", "-")
     answer = json.loads(out)

@@ -92,7 +92,7 @@ def test_path_writes_data_figure_and_page(run, tmp_path):
     assert files["png"].read_bytes().startswith(b"\x89PNG")
 
 
-def test_path_beyond_a_limit_keeps_the_results_before_it(run, slide):
+def test_path_beyond_a_limit_reports_the_results_before_the_limit(run, slide):
     """The rail may go to 50 mm: half of a path of 100 mm, up to the highest speed."""
     file = slide / "slide.toml"
     text = file.read_text().replace(

@@ -90,7 +90,7 @@ def test_turning_the_beam_turns_its_compliance(rng):
     assert_same(turned, A @ straight @ A.T, 1e-13)
 
 
-def test_section_height_lies_along_the_up_direction():
+def test_section_height_is_along_the_up_direction():
     """A plate on edge is stiff against a force along its height."""
     plate = rectangular_section(width=0.01, height=0.1, nu=NU)
     C = beam_compliance(1.0, plate, E, NU, axis=[1, 0, 0], up=[0, 0, 1], theory="euler")
@@ -162,7 +162,7 @@ def test_link_stiffness_is_read_only_and_the_inverse_of_its_compliance():
         link.stiffness[0, 0] = 1
 
 
-def test_turning_a_link_keeps_its_energy(rng):
+def test_rotating_a_link_does_not_change_its_energy(rng):
     link = paper_link()
     R = rotation_matrix(rng.normal(size=3))
     turned = turn_link(link, R)

@@ -204,7 +204,7 @@ def test_matrix_of_six_rows_is_the_stiffness_at_the_tip(tmp_path):
     )
 
 
-def test_mass_matrix_gives_mass_centre_and_inertia(tmp_path):
+def test_mass_centre_and_inertia_are_computed_from_a_mass_matrix(tmp_path):
     """Two lumps at the ends:
     the centre is in the middle, the inertia about it m L^2 / 4."""
     path = tmp_path / "k.mtx"

@@ -72,7 +72,7 @@ LAYOUTS = [between_commas, cards_between_commas, between_blanks, large_fields]
 
 
 @pytest.mark.parametrize("write", LAYOUTS)
-def test_dmig_of_every_layout_gives_the_textbook_stiffness_and_mass(write, tmp_path):
+def test_dmig_of_every_layout_has_the_textbook_stiffness_and_mass(write, tmp_path):
     """In mm and tonnes; stiffness of the beam's closed forms, and mass rho A L."""
     path = tmp_path / "beam.dmig"
     path.write_text(

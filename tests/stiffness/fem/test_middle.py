@@ -35,7 +35,7 @@ def test_estimated_error_covers_the_whole_interval(seed, size):
         assert (gap <= np.abs(told) * (1 + 1e-9) + 1e-12 * np.abs(K_h).max()).all()
 
 
-def test_geometry_error_adds_to_the_stated_error_and_keeps_the_middle():
+def test_geometry_error_increases_the_estimated_error_and_not_the_stiffness():
     K, E = random_definite(3), random_definite(4, 1e-3)
     geometry = 1e-4 * random_definite(5) * np.where(np.eye(6), -1, 1)
     middle, told = middle_stiffness(K, E, geometry)

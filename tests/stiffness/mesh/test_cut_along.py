@@ -27,7 +27,7 @@ def area_of(solid, patch):
 
 
 @pytest.mark.parametrize("edge", [0.37, 0.5, 0.52, 0.601])
-def test_face_cut_along_a_line_has_the_area_up_to_the_line(edge):
+def test_face_that_is_cut_along_a_line_has_the_area_up_to_the_line(edge):
     """The bottom of a unit box belongs to patch 0 up to x = edge, to patch 3 beyond."""
     box = box_solid((4, 3, 3), (1.0, 1.0, 1.0))
     middle = box.points[box.faces].mean(axis=1)

@@ -183,7 +183,7 @@ def curve_file(tmp_path: Path, content: str) -> Path:
     return path
 
 
-def test_curve_file_of_an_l_shape_gives_the_compliance_by_hand(tmp_path):
+def test_compliance_of_an_l_shape_from_a_curve_file_equals_hand_calculation(tmp_path):
     """The command prints the result of the function; the length is 0.35 m.
 
     Castigliano by hand for a force along y at the tip: both legs bend, the first
@@ -205,7 +205,7 @@ def test_curve_file_of_an_l_shape_gives_the_compliance_by_hand(tmp_path):
     assert C[4, 4] == pytest.approx(expected, rel=1e-9)
 
 
-def test_curve_file_of_tapers_and_arcs_gives_closed_forms(tmp_path):
+def test_compliance_of_tapers_and_arcs_from_a_curve_file_equals_closed_forms(tmp_path):
     """The axial compliance of a cone is L / (E pi r1 r2);
     a quarter circle ends on its axis."""
     cone = """

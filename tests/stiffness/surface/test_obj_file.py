@@ -41,7 +41,7 @@ def cube(corner="{k}", line="f {corners}\n"):
         "no last line end",
     ],
 )  # fmt: skip
-def test_obj_corners_in_every_notation_give_the_same_cube(tmp_path, content):
+def test_obj_corners_in_every_notation_describe_the_same_cube(tmp_path, content):
     path = tmp_path / "cube.obj"
     path.write_bytes(content.encode())
     points, faces = read_obj(path)

@@ -80,7 +80,7 @@ def test_margin_of_two_bushes_for_a_shift_across_the_tilt_is_a_root_of_squares()
     assert bush_margin(at) == pytest.approx(expected, rel=1e-9)
 
 
-def test_two_bushes_lie_between_full_and_half_disc_and_cone(posture):
+def test_margin_of_two_bushes_is_between_those_of_full_and_half_disc_and_cone(posture):
     """Both in energy and in margin."""
     frames = tuple(
         replace(f, clearance=replace(
@@ -110,7 +110,7 @@ def test_bushes_do_not_change_joints_without_tilt_clearance():
 
 @pytest.mark.exudyn
 @pytest.mark.slow
-def test_simulation_with_two_bushes_gives_the_same_energy_ratio(posture):
+def test_simulation_with_two_bushes_has_the_same_energy_ratio(posture):
     """Energy of bushes over that of disc and cone, in the limit of small errors.
 
     At a sixteenth both models of contact differ from finite rotations by 0.2 per cent,
