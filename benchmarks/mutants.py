@@ -45,7 +45,7 @@ LEAST_SECONDS = 15  # of processor time, for collecting tests
 
 
 def chosen(tests: list[str], trace: Trace, seconds: float) -> list[str]:
-    """As many of the first tests as take so long."""
+    """Return as many of the first tests as fit into the given time."""
     total = 0.0
     some: list[str] = []
     for test in tests:
@@ -69,7 +69,7 @@ def caught(fault: Fault, tree: Path, trace: Trace, seconds: float) -> str | None
 
 
 def seen(fault: Fault, tree: Path, trace: Trace, seconds: float) -> str | None:
-    """The first test that sees the fault in the tree; None if none does."""
+    """Return the first test that detects the fault in the tree, or None."""
     tests = trace.nearest(fault)
     for share in (seconds / 8, seconds):
         some = chosen(tests, trace, share)
@@ -122,7 +122,7 @@ def asked_for(asked: argparse.Namespace) -> list[Fault]:
 
 
 def main() -> None:
-    """Draw faults, count those caught, name those that were not."""
+    """Test the faults, print the share of detected ones, and list the others."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("count", nargs="?", type=int, default=300)
     parser.add_argument("--seed", type=int, default=1)
