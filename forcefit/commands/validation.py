@@ -153,9 +153,8 @@ def crosscheck(
     state: Annotated[
         str | None,
         typer.Option(
-            help="State in which the platform's stiffness is compared instead: exact "
-            "(around "
-            "the equilibrium with errors and loads)."
+            help="Compare the platform's stiffness instead of the pose, in the state "
+            "exact (around the equilibrium with errors and loads).",
         ),
     ] = None,
     grid: Annotated[
