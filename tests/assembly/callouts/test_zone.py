@@ -211,7 +211,7 @@ def test_parallelism_cuts_the_double_cone_of_a_round_face():
 
 
 @pytest.mark.parametrize("size", [0.0, 0.4, 1.0])
-def test_position_in_a_growing_zone_depends_only_on_the_size_of_the_hole(size):
+def test_position_in_a_growing_zone_depends_only_on_the_size(size):
     """A size is drawn first, then the position in the zone of that size: uniform in
     the part of the tilts that perpendicularity allows."""
     zone = intersection([

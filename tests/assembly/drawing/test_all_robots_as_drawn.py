@@ -122,9 +122,7 @@ def test_conversion_of_a_screw_to_bodies_and_joints_keeps_its_pitch_and_names(tm
     assert turned.pose()["tz"] == pytest.approx(0.4 - 0.005, abs=1e-12)
 
 
-def test_data_that_a_file_of_bodies_and_joints_cannot_contain_are_reported(
-    run, tmp_path
-):
+def test_data_that_a_drawing_cannot_represent_are_reported(run, tmp_path):
     """Axes of the platform that are not the base's, as of a flange."""
     status, out, err = run(
         "convert", "arm6", "-o", tmp_path / "arm.toml", "--format", "2", "--json",

@@ -66,7 +66,7 @@ def postures(pair):
         yield place_robot(drawn, pose), place_robot(expected, pose)
 
 
-def test_drawn_robots_have_the_same_pose_as_robots_defined_by_frames(pair):
+def test_robots_of_both_formats_have_the_same_poses(pair):
     """The platform's origin, and its rotation from home: axes there are the base's."""
     home = home_posture(pair[1]).platform[:3, :3]
     for drawn, expected in postures(pair):

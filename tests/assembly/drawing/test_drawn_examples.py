@@ -43,7 +43,7 @@ def test_the_tricept_is_as_stiff_along_z_as_its_drives():
     assert K[5, 5] == pytest.approx(3 * 1.5e8 * 81 / 85, rel=1e-12)
 
 
-def test_the_tricept_turns_only_as_its_tube_does():
+def test_tricept_platform_rotates_with_its_tube():
     """Its flange is at right angles to the line from the cross."""
     robot = load_robot(DRAWN / "tricept.toml")
     at = place_robot(robot, {"tx": 0.1, "ty": -0.05, "tz": -0.9}).platform

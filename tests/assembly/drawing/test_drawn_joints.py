@@ -100,7 +100,7 @@ def numbers(rng, free):
 
 
 @pytest.mark.parametrize("kind", ["revolute", "prismatic", "helical"])
-def test_exchanging_the_bodies_of_a_joint_does_not_change_the_robot(kind):
+def test_joint_with_exchanged_bodies_describes_the_same_robot(kind):
     """Bodies exchanged, z turned round: rows y and z of its numbers change sign."""
     rng = np.random.default_rng(5)
     given = numbers(rng, 5 if kind == "prismatic" else 2)
@@ -170,7 +170,7 @@ def test_springs_of_a_joint_of_several_frames_act_only_once(kind):
     assert np.abs((found.stiffness - stiff) / np.outer(size, size)).max() < 1e-12
 
 
-def test_stiffness_of_a_link_does_not_depend_on_the_end_at_which_it_is_read():
+def test_link_has_the_same_stiffness_from_either_end():
     """A stiffness read at one joint, and the same link read at the other."""
     rng = np.random.default_rng(3)
     root = rng.normal(size=(6, 6))

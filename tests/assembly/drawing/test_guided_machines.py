@@ -267,7 +267,7 @@ def test_only_a_fixed_joint_may_have_an_unbounded_clearance(tmp_path):
 
 
 @pytest.mark.exudyn
-def test_simulated_arm_without_clearance_accepts_errors_in_every_frame(drawn, rng):
+def test_simulated_arm_without_clearance_accepts_errors_of_every_frame(drawn, rng):
     """Tight contacts are one rigid guide: only the load bends the spring, F^2 / 2 K."""
     robot = without_clearance(sprung_slide(drawn))
     robot = robot.with_errors(1e-4 * rng.uniform(-1, 1, size=(len(robot.frames), 6)))

@@ -319,7 +319,7 @@ def uniform_screws(posture, count):
 
 
 @pytest.mark.parametrize("version", [1, 2])
-def test_a_guide_is_the_same_in_a_file_of_either_format(version, drawn, tmp_path):
+def test_guide_has_the_same_clearance_in_both_file_formats(version, drawn, tmp_path):
     posture = on_two_guides(drawn, [3e-4, 2e-4, 1e-4, 4e-5, -4e-5, 0], passive=False)
     write_robot(posture.robot, tmp_path / "frames.toml")
     convert(tmp_path / "frames.toml", tmp_path / "again.toml", version=version)

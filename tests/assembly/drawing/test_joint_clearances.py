@@ -92,9 +92,7 @@ def bore_support(w, c=C, length=L):
 
 
 @pytest.mark.parametrize("reverse", [False, True])
-def test_clearance_set_of_a_bore_is_the_intersection_of_the_sets_of_its_two_ends(
-    reverse, one_joint, rng
-):
+def test_small_screws_of_a_bore_equal_those_of_its_two_ends(reverse, one_joint, rng):
     """By its support function, its volume, and members drawn without the program."""
     wrenches = rng.normal(size=(40, 6)) * [1 / L, 1 / L, 0, 1, 1, 0]
     posture = one_joint("revolute", BORE, reverse=reverse)

@@ -312,7 +312,7 @@ def test_driven_joint_of_a_coupled_pair_becomes_the_leader(tmp_path):
     assert robot.frame("a").position == pytest.approx(0.2, abs=1e-12)
 
 
-def test_tendons_and_their_actuators_are_reported_as_left_out(run, tmp_path):
+def test_tendons_and_their_actuators_are_reported_as_omitted(run, tmp_path):
     path = file_of(tmp_path, TWO + """<tendon><spatial name="cable"><site site="s"/>
         <site site="t"/></spatial></tendon><actuator><motor tendon="cable"/><motor
         joint="j"/></actuator><equality><tendon tendon1="cable"/><connect name="off"

@@ -101,7 +101,7 @@ def test_automatic_moments_of_inertia_of_a_shape_equal_the_textbook(shape, tmp_p
     np.testing.assert_allclose(body.inertia, expected, atol=1e-15)
 
 
-def test_moments_of_inertia_that_no_body_can_have_are_left_out_and_reported(tmp_path):
+def test_impossible_moments_of_inertia_are_omitted_and_reported(tmp_path):
     text = URDF.replace('izz="0.04"', 'izz="0.4"')
     answer = convert(file_of(tmp_path, text, "r.urdf"), tmp_path / "r.toml")
     assert "moments of inertia that no body has: 1 (b)" in answer.left_out

@@ -84,7 +84,7 @@ def test_mujoco_model_changed_in_memory_is_read_with_its_changes(tmp_path):
     assert np.linalg.norm(elbow) == pytest.approx(0.2)
 
 
-def test_tendon_of_a_mujoco_model_is_reported_as_left_out():
+def test_tendon_of_a_model_is_reported_as_omitted():
     model = mujoco.MjModel.from_xml_string("""<mujoco><worldbody><body name="a">
         <joint name="j"/><geom size="0.1"/></body></worldbody><tendon><fixed name="t">
         <joint joint="j" coef="1"/></fixed></tendon><actuator><motor tendon="t"/>

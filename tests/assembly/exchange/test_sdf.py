@@ -133,7 +133,7 @@ def test_home_of_a_screw_that_follows_its_slide_is_solved(tmp_path):
     assert found == pytest.approx(-0.02 / (1 + lead), abs=1e-9)
 
 
-def test_range_and_spring_of_a_screw_are_left_out_by_name(tmp_path):
+def test_range_and_spring_of_a_screw_joint_are_reported_as_omitted(tmp_path):
     nut = "<limit><lower>-1</lower><upper>1</upper></limit>"
     nut += "<dynamics><spring_stiffness>3</spring_stiffness></dynamics>"
     answer, robot = press(tmp_path, spindle(RIGHT, nut=nut))

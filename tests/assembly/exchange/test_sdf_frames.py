@@ -117,7 +117,7 @@ def test_model_pose_is_resolved_in_a_frame_of_the_world(tmp_path):
     assert poses["arm"][:3, 3] == pytest.approx([1, 0, 0.7])
 
 
-def test_static_models_of_a_world_are_reported_as_left_out(tmp_path):
+def test_static_models_of_a_world_are_reported_as_omitted(tmp_path):
     path = tmp_path / "robot.sdf"
     ground = '<model name="ground"><static>true</static><link name="plane"/></model>'
     arm = joint("j", "base", "arm")

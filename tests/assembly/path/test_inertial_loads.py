@@ -135,7 +135,7 @@ def test_beam_in_pieces_deflects_as_the_whole_beam(theory):
         np.testing.assert_allclose(screw, screws[0], atol=1e-9 * size)
 
 
-def test_section_force_at_the_start_of_a_beam_equals_the_force_on_the_hub():
+def test_section_at_the_start_of_a_beam_transmits_the_wrench_of_the_hub():
     """Equilibrium of the whole beam: its load and a tool beside its tip."""
     robot, path = spinning_beam(80.0, 3000.0, radius=0.03, axis=(0.3, -0.5, 1))
     tool = Frame(

@@ -94,7 +94,7 @@ def test_power_of_the_drives_is_the_rate_of_the_energy(name):
 
 
 @pytest.mark.parametrize("name", ["hexapod", "five_bar"])
-def test_mass_of_the_platform_causes_a_deflection_by_the_platform_compliance(name):
+def test_inertia_of_only_the_platform_deflects_by_the_platform_compliance(name):
     """Deflection = C times the d'Alembert wrench of the platform."""
     robot, names = heavy(name, density=0.0), CASES[name]
     tight = without_clearance(robot)

@@ -207,9 +207,7 @@ def test_figure_format_chosen_by_the_user_is_not_changed(monkeypatch):
         (slack, {"errors": "translaton"}, "translation"),
     ],
 )
-def test_message_about_an_object_that_cannot_be_shown_names_its_type(
-    thing, options, message
-):
+def test_object_that_cannot_be_shown_is_named(thing, options, message):
     with pytest.raises(BadInput, match=message):
         ff.show(thing(), **options)
 

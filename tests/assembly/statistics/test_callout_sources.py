@@ -100,7 +100,7 @@ translation = [0.4, 0, 0]
 """
 
 
-def test_every_draw_of_a_fit_has_a_separate_clearance(tmp_path):
+def test_clearance_of_a_fit_differs_between_draws(tmp_path):
     """The tip of an exact arm on one pin moves as far as its radial clearance: 6 to 35
     um of diameter, on average 20.5 um, with a deviation of 6.09 um."""
     path = tmp_path / "arm.toml"

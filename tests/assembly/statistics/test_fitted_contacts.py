@@ -106,7 +106,7 @@ def test_worst_case_of_two_bearings_with_fits_equals_hand_calculation(tmp_path):
     assert worst(robot, "translation").attained == pytest.approx(reach, rel=1e-6)
 
 
-def test_bearing_with_a_declared_gap_has_the_same_clearance_in_every_draw(tmp_path):
+def test_bearing_with_a_given_gap_has_the_same_gap_in_every_draw(tmp_path):
     clearance = BEARINGS.replace('fit = "8 H8/h7"', 'radial = "5 um"')
     found = drawn_rotations(spindle(tmp_path, clearance)) * 0.05
     assert found.mean() == pytest.approx(15.25e-6, rel=0.045)

@@ -150,7 +150,7 @@ def test_importance_table_has_um_per_um_for_lengths_and_um_per_mrad_for_angles()
     assert len(set(ends)) == 1
 
 
-def test_importance_table_reports_left_out_draws_and_further_groups():
+def test_importance_table_reports_omitted_draws_and_further_groups():
     lines = told(["m"] * 18, left_out=0.015)
     assert "energy: up to 1.5% of the draws have no solution and are left out" in lines
     assert lines[-1] == "and 3 more, see --json"

@@ -72,7 +72,7 @@ def test_perfect_parts_include_the_displacement_by_the_load():
 
 
 @pytest.mark.parametrize("limit", [5e-4, 2e-3])
-def test_advice_names_the_clearances_if_clearances_alone_exceed_the_limit(
+def test_advice_names_the_clearances_if_perfect_parts_exceed_the_limit(
     tmp_path, run, limit
 ):
     """Clearances alone move the tip by 0.806 mm; the errors are of 1 um."""

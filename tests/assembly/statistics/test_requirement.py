@@ -84,7 +84,7 @@ def test_limit_below_the_pose_error_from_clearances_alone_is_refused(
         ("energy", [("two", 4)], "two.TY"),
     ],
 )
-def test_error_that_no_clearance_or_spring_can_compensate_is_refused_by_name(
+def test_error_that_no_clearance_or_spring_can_close_is_refused_by_name(
     limit, places, named
 ):
     """Clearance in x and y takes up no error along z, and stores no energy.

@@ -76,7 +76,7 @@ def test_advice_omits_tolerances_at_their_loosest():
     assert tiles(none)["Tolerance to tighten"][0] == "nothing"
 
 
-def test_report_without_a_certified_scale_states_this_and_has_no_empty_table():
+def test_report_without_a_proof_says_so_and_has_no_empty_table():
     page = shown([1e-3, 1e-4], [1.0, 1.0])
     assert "not proved" in page
     assert "at least none" not in page

@@ -98,7 +98,7 @@ def test_margin_bound_distributes_errors_over_several_clearances():
         assert found == pytest.approx(expected, rel=1e-6)
 
 
-def test_error_that_no_clearance_can_compensate_has_an_infinite_bound():
+def test_error_that_no_clearance_can_close_has_an_infinite_bound():
     """Along z of a pin; a tolerance of zero has no effect, 1e-14 m is rounding."""
     robot = rigid_pair(radial=PLAY)
     posture = home_posture(robot)

@@ -105,7 +105,7 @@ def test_all_corners_of_the_tolerances_meet_the_limit_in_finite_geometry(tmp_pat
     assert 0.998 * LIMIT < largest <= LIMIT * (1 + 1e-9)
 
 
-def test_largest_clearance_of_a_fit_reduces_the_limit_left_for_errors(tmp_path):
+def test_largest_clearance_of_a_fit_follows_from_its_limits(tmp_path):
     """A disc of 17.5 um adds to every direction of the plane."""
     clearance = {"clearance": Clearance(radial=10.25e-6)}
     robot = replace(arm(**clearance), fits={"elbow": "12 H7/g6"})

@@ -232,7 +232,7 @@ def test_robot_with_a_bolted_joint_is_written_as_it_was_read(tmp_path):
         ("{ pose = { tx = 5.0 } }", "locked_at"),
     ],
 )
-def test_invalid_pose_of_a_bolted_joint_is_reported_in_one_line(tmp_path, key, text):
+def test_invalid_pose_of_a_bolt_is_reported_in_one_line(tmp_path, key, text):
     with pytest.raises(BadInput) as caught:
         load_robot(four_bar(tmp_path, key))
     assert text in str(caught.value)

@@ -75,7 +75,7 @@ def test_drawn_positions_of_a_platform_on_two_round_pins_fill_the_lens_uniformly
         assert found.pvalue > 1e-3
 
 
-def test_forced_pins_are_bolted_at_the_position_of_least_energy():
+def test_pins_apart_by_two_radii_are_left_where_both_touch():
     """A single position closes: apart by two radii, both pins touch."""
     robot = platform_of_two_pins({"radial": 1e-4}, 2e-4)
     screws = bolted(robot, 20)

@@ -46,7 +46,7 @@ def join_leg(i, **more):
     return Join(f"join {i}", LEG[i], **more)
 
 
-def test_energies_of_two_bars_joined_over_a_gap_equal_hand_calculation_with_springs():
+def test_two_bars_and_a_gap_store_and_dissipate_the_energy_of_the_springs():
     """F = g k1 k2 / (k1 + k2), E = F g / 2; a wall removed loses all of it."""
     bolt = Join("bolt", ("wall", "bar2"))
     plan = Plan((bolt, Release("wall removed", ("bolt",))))
@@ -221,7 +221,7 @@ def test_platform_on_two_pins_with_clearance_is_at_a_position_that_both_allow(or
 @pytest.mark.parametrize(
     ("at", "force"), [(-20e-6, 60.0), (0.0, 20.0), (10e-6, 0.0), (15e-6, 0.0)]
 )
-def test_energy_of_a_slot_bolted_after_a_pin_follows_from_its_position(at, force):
+def test_energy_of_a_slot_bolted_after_one_pin_follows_from_its_position(at, force):
     """Pin 2 then forces the platform to 10 um against a leg of 2e6 N/m at x3."""
     posture = legs_with_pins((0.0, 30e-6, 0.0), (20e-6, 20e-6, None))
     steps = (
@@ -233,7 +233,7 @@ def test_energy_of_a_slot_bolted_after_a_pin_follows_from_its_position(at, force
     assert last.energy == pytest.approx(force**2 / 4e6, abs=1e-7)
 
 
-def test_joint_with_clearance_that_is_bolted_keeps_its_position():
+def test_bolted_joint_with_clearance_retains_its_position():
     """Pin 1 bolted at -20 um acts as a rigid pin there."""
     posture = legs_with_pins((0.0, 30e-6), (20e-6, None), k=(1e6, None))
     down = np.array([0, 0, 0, 0, 0, -5.0])
@@ -461,7 +461,7 @@ def test_legs_cut_to_increments_have_errors_equal_to_the_rounding_of_their_lengt
 
 
 @pytest.mark.parametrize(("increment", "change"), [(0.0, -50e-6), (40e-6, -40e-6)])
-def test_shim_closes_a_loop_without_force_within_the_clearance(increment, change):
+def test_shim_closes_without_force_at_the_position_of_the_clearance(increment, change):
     """Pin 1 lies in the middle of +- 20 um: leg 2, 50 um long, is cut to it; rounded
     to 40 um, the clearance takes up the 10 um left."""
     posture = legs_with_pins((0.0, 50e-6), (20e-6, None), k=(1e6, 1e6))
@@ -588,9 +588,7 @@ def test_adjustment_is_possible_once_every_joint_with_clearance_is_bolted():
 
 
 @pytest.mark.parametrize("name", ["four_bar", "five_bar", "3rrr", "irsbot2", "delta"])
-def test_energy_of_pinned_robots_with_clearances_equals_that_of_solve_assembly(
-    name, rng
-):
+def test_pinned_robots_with_clearances_store_the_energy_of_solve_assembly(name, rng):
     """The compiled solver has an elimination of its own; any order ends there."""
     robot = load_robot(name)
     errors = rng.normal(size=robot.errors.shape) * np.repeat([3e-3, 3e-4], 3)

@@ -76,7 +76,7 @@ def test_swept_bounds_and_finite_motions_equal_those_of_one_posture(robot, data)
     assert float(there.linearisation_energy) == pytest.approx(gap.relative_energy)
 
 
-def test_pose_error_from_clearances_alone_has_the_symmetry_of_the_robot(data):
+def test_error_due_to_clearances_without_errors_has_the_robot_symmetry(data):
     """Without errors x and -x are equal, to the bounds' gap of 1e-6."""
     for name in ("rotation_error_clearance", "translation_error_clearance"):
         values = data[name].sel(bound="upper").values
@@ -199,7 +199,7 @@ def test_invalid_sweep_options_are_refused_with_one_message(options, message):
     assert message in str(error.value)
 
 
-def test_figures_are_drawn_from_the_data_set_without_solving(tmp_path):
+def test_figures_need_only_the_data_set(tmp_path):
     path = tmp_path / "errors.toml"
     path.write_text(ERRORS)
     grid = "tx=-0.02:0.02:0.02,ty=0.12:0.14:0.02"
