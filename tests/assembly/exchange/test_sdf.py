@@ -106,7 +106,7 @@ RIGHT = "<screw_thread_pitch>0.01</screw_thread_pitch>"  # [m per turn]
     (f"<thread_pitch>5</thread_pitch>{RIGHT}", 0.01),
 ])  # fmt: skip
 @pytest.mark.parametrize("backwards", [False, True])
-def test_right_hand_thread_of_an_sdf_lowers_the_nut(
+def test_right_hand_thread_of_an_sdf_file_lowers_the_nut(
     tmp_path, pitch, expected, backwards
 ):
     """A nut that does not turn sinks by the pitch when its spindle turns by +360 deg.

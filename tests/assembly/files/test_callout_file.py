@@ -103,7 +103,7 @@ def test_file_of_frames_written_from_bodies_has_the_same_callouts(
         assert one.errors == pytest.approx(other.errors, abs=1e-15)
 
 
-def test_copies_of_a_leg_have_callouts_turned_with_them(tmp_path, without_circle):
+def test_callouts_of_a_copied_leg_are_rotated_with_the_leg(tmp_path, without_circle):
     robot = read(tmp_path, without_circle)
     first, second = placed(robot)[2:]
     one = first.errors[robot.index("leg1.pad.slide_x")]
@@ -112,7 +112,7 @@ def test_copies_of_a_leg_have_callouts_turned_with_them(tmp_path, without_circle
     assert one == pytest.approx(other, abs=1e-15)
 
 
-def test_normal_of_a_planar_joint_is_the_normal_of_the_face(tmp_path, without_circle):
+def test_normal_of_a_face_is_the_normal_of_its_planar_joint(tmp_path, without_circle):
     """Profile 0.1: TZ within 50 um along the normal, which is the first frame's y;
     perpendicularity 0.02 over 40 by 30 mm: 0.5 mrad about the joint's y."""
     robot = read(tmp_path, without_circle)
@@ -152,7 +152,7 @@ def test_normal_of_a_planar_joint_is_the_normal_of_the_face(tmp_path, without_ci
          "found a length of 590 mm, expected that at home, 600 mm"),
     ],
 )  # fmt: skip
-def test_mistake_is_reported_in_one_line(tmp_path, old, new, message):
+def test_mistake_in_a_callout_is_reported_in_one_line(tmp_path, old, new, message):
     assert old in FILE
     with pytest.raises(BadInput, match=re.escape(message)) as error:
         read(tmp_path, FILE.replace(old, new, 1))
@@ -196,7 +196,7 @@ length = "400 +- 0.05 mm"
          "not perpendicular to the axis"),
     ],
 )  # fmt: skip
-def test_mistake_in_a_file_of_frames_is_reported_in_one_line(
+def test_mistake_in_a_callout_of_a_file_of_frames_is_reported_in_one_line(
     tmp_path, old, new, message
 ):
     with pytest.raises(BadInput, match=re.escape(message)):
@@ -225,7 +225,7 @@ def test_contacts_of_a_joint_do_not_move_its_feature(tmp_path):
 FIT = FRAMES.replace('name = "b"', 'name = "b"\nclearance = { fit = "12 H7/g6" }')
 
 
-def test_fit_of_a_drawn_joint_is_that_of_its_frame(tmp_path, without_circle):
+def test_fit_of_a_drawn_joint_equals_the_fit_of_its_frame(tmp_path, without_circle):
     joint = 'name = "foot"\ntype = "revolute"'
     text = without_circle.replace(joint, joint + '\nclearance = { fit = "12 H7/g6" }')
     robot = read(tmp_path, text)

@@ -294,7 +294,7 @@ CONTENTS = {
 
 
 @pytest.mark.parametrize(("content", "message"), CONTENTS.values(), ids=CONTENTS)
-def test_message_about_a_file_that_is_no_robot_omits_its_content(
+def test_message_about_a_file_that_is_not_a_robot_file_omits_its_content(
     content, message, write_file
 ):
     path = write_file(content)

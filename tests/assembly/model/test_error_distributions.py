@@ -43,7 +43,7 @@ def test_draws_do_not_depend_on_their_division_into_blocks(sources):
     np.testing.assert_array_equal(np.vstack(cut), whole)
 
 
-def test_different_seeds_and_streams_give_different_numbers(sources):
+def test_different_seeds_and_streams_have_different_random_numbers(sources):
     draws = [sources.draw(0, 200, *key) for key in ((1, 0), (2, 0), (1, 1))]
     for a, b in ((0, 1), (0, 2), (1, 2)):
         assert not np.any(draws[a] == draws[b])

@@ -55,14 +55,14 @@ def drawn_rotations(robot):
     return run_draws(experiment, 400)["rotation"].values
 
 
-def test_bore_with_a_fit_is_worst_at_its_largest_clearance(tmp_path):
+def test_worst_case_of_a_bore_with_a_fit_is_at_its_largest_clearance(tmp_path):
     """2 c / L and, 200 mm above the middle, 2 c h / L with c = 17.5 um."""
     robot = spindle(tmp_path, BORE)
     assert worst(robot, "rotation").attained == pytest.approx(875e-6, rel=1e-6)
     assert worst(robot, "translation").attained == pytest.approx(175e-6, rel=1e-6)
 
 
-def test_commands_with_one_clearance_use_the_mean_of_a_bore(tmp_path):
+def test_commands_that_use_one_clearance_take_the_mean_clearance_of_a_bore(tmp_path):
     fitted = spindle(tmp_path, BORE)
     stated = spindle(tmp_path, 'clearance = { radial = "10.25 um", length = "40 mm" }')
     assert [f.name for f in fitted.frames] == [f.name for f in stated.frames]
@@ -73,7 +73,7 @@ def test_commands_with_one_clearance_use_the_mean_of_a_bore(tmp_path):
     assert '"bore" 12 H7/g6, 10.25 um of 3 to 17.5' in remark
 
 
-def test_both_ends_of_a_bore_have_the_clearance_of_one_draw(tmp_path):
+def test_both_ends_of_a_bore_have_the_same_drawn_clearance(tmp_path):
     """Rotation 2 c / L has the deviation of c; independent ends would have 0.71 of it.
 
     Three standard errors of 400 draws are 4.5 % of the mean and 11 % of the deviation.
@@ -97,7 +97,7 @@ def test_two_bearings_have_independent_clearances_of_their_fits(tmp_path):
     ]  # fmt: skip
 
 
-def test_two_bearings_with_fits_are_worst_as_by_hand(tmp_path):
+def test_worst_case_of_two_bearings_with_fits_equals_hand_calculation(tmp_path):
     """Offsets 17.5 um at -20 mm and -18.5 um at 30 mm: 141.1 um at 200 mm."""
     robot = spindle(tmp_path, BEARINGS)
     slope = (17.5e-6 + 18.5e-6) / 0.05
@@ -204,7 +204,7 @@ length = "100 +- 0.03 mm"
 """
 
 
-def test_bolted_slot_with_a_fit_assembles_where_its_clearance_reaches(tmp_path):
+def test_bolted_slot_with_a_fit_assembles_if_its_clearance_covers_the_error(tmp_path):
     """A rigid plate closes only if the clearance c exceeds the error e of the length:
     e is uniform to 30 um, so the share is the mean of c over 30 um, 0.342.
 

@@ -56,7 +56,7 @@ def additive(scale=1.0, shift=0.0):
     return design, scale * (x @ [3.0, 2.0, 1.0])[:, None] + shift
 
 
-def test_result_that_varies_by_rounding_only_has_nan_indices():
+def test_sobol_indices_of_a_result_that_varies_only_by_rounding_are_nan():
     design, results = additive()
     rounded = 1e6 + 1e-8 * np.sign(results)
     found = sobol_indices(design, np.hstack([results, rounded, np.nan * results]))

@@ -62,7 +62,7 @@ def test_platform_that_follows_each_error_has_gains_of_one():
     assert [total[name][0] for name in NAMES] == pytest.approx([1, 0, 0], abs=0.15)
 
 
-def test_group_of_angles_and_lengths_has_parts_and_no_gain():
+def test_group_of_angles_and_lengths_has_a_standard_deviation_but_no_gain():
     """The part of a frame is the root sum of squares of its errors' parts."""
     data, report = solved("frame")
     (one,) = report["platform"].values()

@@ -79,7 +79,7 @@ def test_present_errors_within_clearance_have_zero_energy_and_rigid_parts_nan():
     assert np.isnan(found["slopes"][0]["energy_slope"])
 
 
-def test_grid_of_postures_contains_only_reached_ones():
+def test_grid_of_postures_contains_only_reachable_postures():
     robot = load_robot("irsbot2")
     postures, _ = grid_postures(robot, "tx=-0.1:0.1:0.1,tz=-9.5:-0.5:9")
     places = [(p.pose()["tx"], p.pose()["tz"]) for p in postures]

@@ -40,7 +40,7 @@ class Coin:
         return share, share
 
 
-def test_repeated_verification_keeps_its_error_probability(monkeypatch):
+def test_repeated_verification_does_not_exceed_its_error_probability(monkeypatch):
     """The last interval misses the truth in at most 5 % of all verifications.
 
     The yield is just so low that most looks contradict it and another follows; with
@@ -91,7 +91,7 @@ def test_tolerance_file_is_read_with_groups_costs_and_limits(write_file):
 
 
 @pytest.mark.parametrize("cost", ["logarithm", "reciprocal"])
-def test_price_follows_its_cost_function(cost, write_file):
+def test_price_of_tolerances_follows_the_cost_function(cost, write_file):
     """Tolerances of costs 2 and 1, multiplied by e or by 2, together and separately."""
     plan = read_plan(write_file(FILE.replace("logarithm", cost)), load_robot("irsbot2"))
     t = np.array([3e-4, 2e-2])

@@ -55,7 +55,7 @@ def test_screws_of_the_worst_clearance_attain_its_bounds(rng):
     "share", [0.02, pytest.param(0.3, marks=pytest.mark.slow), 1.0]
 )
 @pytest.mark.parametrize("play", ["least", "uniform", "contact"])
-def test_no_clearance_model_exceeds_the_worst_in_any_draw(share, play):
+def test_no_clearance_model_exceeds_the_certified_worst_case_in_any_draw(share, play):
     """Inside the zone, at its edge and outside; 1e-9: two solutions of (22)."""
     worst, other = papers(share), papers(share, clearance=play)
     values = worst.sources.draw(0, 60, seed=1)

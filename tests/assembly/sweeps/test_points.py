@@ -116,7 +116,7 @@ def test_swept_draws_are_bit_identical_to_robots_with_those_errors(tmp_path):
             assert np.array_equal(there[name], one[name], equal_nan=True), name
 
 
-def test_list_and_grid_of_the_same_postures_give_equal_energies(robot, tmp_path):
+def test_list_and_grid_of_the_same_postures_have_equal_energies(robot, tmp_path):
     write_robot(robot, tmp_path / "robot.toml")
     grid = sweep_poses(robot, parse_grid(GRID))
     x, z = np.meshgrid(grid.tx.values, grid.tz.values, indexing="ij")
@@ -270,7 +270,7 @@ def test_sweep_marks_postures_beyond_joint_limits():
     assert str(data["reason"].values.ravel()[0]).startswith("x.slide at ")
 
 
-def test_point_changed_by_finite_motions_is_marked_as_singular():
+def test_singular_point_where_finite_motions_change_the_energy_is_marked():
     """A short rod near its dead centre stores energy only by finite motions."""
     rod = BeamLink({"radius": 0.01}, 70e9, 0.33)
     robot = slider_crank(0.3, rod, error=-2e-4)

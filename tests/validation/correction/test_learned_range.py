@@ -50,7 +50,7 @@ def test_learned_range_has_a_margin_of_five_per_cent(tmp_path):
     (("q.two", "q.one"), "scaled_waves", "1.sine", 1),
     (("q.one",), "powers", "1", 1),
 ])  # fmt: skip
-def test_full_turn_of_a_joint_stays_in_the_learned_range(
+def test_full_turn_of_a_joint_is_inside_the_learned_range(
     variables, form, name, outside, tmp_path
 ):
     """Except for functions of the angle that are not periodic."""
