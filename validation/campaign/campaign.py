@@ -143,7 +143,7 @@ class Campaign:
         return campaign_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a pandas table of the measurements with columns (variable, component)."""
+        """Return a pandas table, one row per measurement (variable, component)."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "row")
