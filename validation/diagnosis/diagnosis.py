@@ -133,7 +133,7 @@ class Diagnosis:
 
     @property
     def better(self) -> bool:
-        """Whether the identified machine predicts held-out rows better than declared."""
+        """Whether held-out errors are smaller than those of the declared machine."""
         found = bool(len(self.fit.unknowns)) or bool(self.effects)
         return found and self.after.normalised < self.before.normalised
 

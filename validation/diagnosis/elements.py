@@ -60,7 +60,7 @@ class Element:
 
     @property
     def origin(self) -> "Element":
-        """Return the element linearised at its start values."""
+        """The element linearised at its start values."""
         return self.first or self
 
     @property

@@ -2,7 +2,7 @@
 
 Steps:
 
-1. Score the addition of every library effect and every function to each model of the beam.
+1. Score adding every library effect and function to each model of the beam.
 2. Add the best candidates, and optimise the prior standard deviations.
 3. Try all forms of an added function; linearise effects again at their estimates.
 4. Repeat until no added element increases the log posterior.

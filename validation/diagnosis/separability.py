@@ -68,7 +68,7 @@ class Separability:
 
     @property
     def shows_at(self) -> NDArray:
-        """(m,) factor on plausible sizes at which an effect exceeds the noise, or inf."""
+        """(m,) factor on plausible sizes at which effects exceed the noise, or inf."""
         size = np.where(self.traced, self.strength * self.left, 0.0)
         return np.divide(SEEN, size, out=np.full(len(size), np.inf), where=size > 0)
 
@@ -95,7 +95,7 @@ class Separability:
         return groups
 
     def imitated(self) -> list[tuple[str, str]]:
-        """Return pairs (a, b) with the span of a inside the span of b, not vice versa."""
+        """Return pairs (a, b) in which the span of b contains the span of a."""
         one_way = (self.shared > LIKE) & (self.shared.T <= LIKE)
         one_way &= np.outer(self.traced, self.traced)
         return [(self.names[i], self.names[j]) for i, j in np.argwhere(one_way)]

@@ -100,7 +100,7 @@ def whitening_of(campaign: Campaign, cells: NDArray) -> Whitening:
 
 
 def independent(campaign: Campaign, residual: NDArray) -> NDArray:
-    """Transform a residual (R, 6) [rad, m] to N cells with independent noise.
+    """Return the N cells of a residual (R, 6) [rad, m] with independent noise.
 
     If the residual is noise, the result (N,) has unit variance.  Values that are not
     finite count as zero.

@@ -196,7 +196,7 @@ def _left_out(joined: Match, placed: Placed, total: int) -> list[str]:
 
 
 def _remarks(declared: TargetsFile, joined: Match, placed: Placed) -> list[str]:
-    """Return remarks on the readings in the campaign."""
+    """Return remarks about the readings in the campaign."""
     remarks = []
     if joined.copies:
         remarks.append(
