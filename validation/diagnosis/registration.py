@@ -78,8 +78,8 @@ def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]
     thought = (nominal + model[:, 3:])[full]
     if not turned.any() and not off_one_line(thought):
         raise BadInput(
-            f"{campaign.name}: registration is unknown, and there are neither "
-            f"rotations nor {_FEWEST_POINTS} measured points off one line; "
+            f"{campaign.name}: found an unknown registration, but neither rotations "
+            f"nor {_FEWEST_POINTS} measured points that are not on one line; "
             "expected one of the two"
         )
     parts = campaign.measured[turned, :3], model[turned, :3]

@@ -78,7 +78,7 @@ def read_targets(path: Path | str) -> TargetsFile:
         )
     for key in places:
         if not key or set(key) & set(".:,"):
-            raise table.bad("", f"found {quoted(key)}, expected no . , : in a name")
+            raise table.bad("", f"found {quoted(key)}, expected a name without . , :")
     decimal, commands_decimal = _decimals(root)
     writing = Writing(
         unit=_choice(root, "unit", LENGTHS),

@@ -114,9 +114,9 @@ def plan_rows(
     }
     if not columns:
         raise BadInput(
-            f"{robot.name}: found no effect that changes the readings without "
-            "clearances, which a plan leaves out; expected geometric errors that close "
-            "without them"
+            f"{robot.name}: found no effect that changes the readings if all "
+            "clearances are zero, as a plan assumes; expected geometric errors with "
+            "which the loops can be closed without clearances"
         )
     names = tuple(columns)
     criterion = _Criterion([columns[name] for name in names], count)

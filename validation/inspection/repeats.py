@@ -204,7 +204,7 @@ class _RepeatFit:
         return columns - (sums / self.count[:, None])[self.set]
 
     def suspect(self) -> Suspect | None:
-        """Return the reading that differs most from its repeats; None if by noise."""
+        """Return the reading that differs most from its repeats; None if noise."""
         if self.degrees < 2 or self.rss == 0.0:
             return None
         free = np.maximum(1 - self.leverage, 1e-12)

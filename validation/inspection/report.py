@@ -85,7 +85,7 @@ def _library(inspection: Inspection) -> int:
 
 
 def _good(inspection: Inspection) -> bool | None:
-    """Return True without warnings, None with any, False if a diagnosis is impossible."""
+    """Return True without warnings, None with any, False if no diagnosis can begin."""
     unregistered = bool(inspection.signatures.unregistered)
     if unregistered or not inspection.separability.visible.any():
         return False

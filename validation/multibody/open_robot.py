@@ -105,8 +105,8 @@ def link_springs(
             springs[frame.name] = given[frame.name]
         else:
             raise BadInput(
-                f"simulate_assembly: the link of frame '{frame.name}' becomes a "
-                "spring, expected its 6 by 6 matrix in `stiffness`"
+                f"simulate_assembly: the link of frame '{frame.name}' is simulated "
+                "as a spring; expected its 6 by 6 matrix in `stiffness`"
             )
     return springs
 

@@ -76,7 +76,7 @@ def read_statistics(root: Table, robot: Robot) -> DrawnTolerances | None:
     if not root.has("statistics"):
         return DrawnTolerances() if drawn and not closing else None
     if closing:
-        fault = f'found it together with "{closing[0]}", whose misfit no part has'
+        fault = f'found it together with "{closing[0]}", whose errors are not of parts'
         raise root.bad("statistics", f"{fault}; expected one of them")
     table = root.table("statistics")
     if not drawn:

@@ -193,8 +193,9 @@ def _closed(root: Table, name: Path | str, links: bool) -> Robot:
         if driven(robot):
             raise root.bad(
                 "robot",
-                "found a robot with drive_force; expected one without, because a study "
-                "bounds errors of a robot without load (assembly solve computes it)",
+                "found a robot with drive_force; expected one without drive_force, "
+                "because a study computes error bounds without load; use assembly "
+                "solve for this robot",
             )
         return robot
     except BadInput as error:

@@ -195,9 +195,8 @@ def _configurations(
         if len(reachable) >= design.configurations:
             return np.array(reachable[: design.configurations])
     raise BadInput(
-        f"{robot.name}: the closures hold at hardly any configuration within "
-        f"{design.reach:g} rad of "
-        "home; expected a smaller reach"
+        f"{robot.name}: the loops can be closed at hardly any configuration within "
+        f"{design.reach:g} rad of the home position; expected a smaller reach"
     )
 
 
@@ -217,7 +216,7 @@ def _commands(
     if not track.reached.all():
         raise BadInput(
             f"{robot.name}: a full platform pose cannot be commanded; expected a robot "
-            'of six freedoms, or command = "joints"'
+            'with six degrees of freedom, or command = "joints"'
         )
     return poses, tuple(f"pose.{name}" for name in POSE), track.coordinates
 

@@ -291,9 +291,10 @@ def _scaled_effect(
         factor *= multiple / reached
         if factor > _MOST:
             raise NotApplicable(
-                f"{effect.name}: {multiple:g} times the noise needs more than "
-                f"{_MOST:g} times the plausible size of the effect, because "
-                "this robot or its loads hardly show it; choose another effect"
+                f"{effect.name}: a contribution of {multiple:g} times the noise "
+                f"requires more than {_MOST:g} times the plausible size of the "
+                "effect, because the effect hardly changes the readings of this "
+                "robot under these loads; choose another effect"
             )
     return tried, exact, sigma
 

@@ -83,7 +83,7 @@ def rest_poses(
             return poses
     raise SimulationFailed(
         machines[0].robot.name,
-        "the search for equilibrium with its joints' laws does not converge",
+        "the iteration for the equilibrium with nonlinear joints does not converge",
     )
 
 
