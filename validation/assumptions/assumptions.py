@@ -115,7 +115,7 @@ def _solid_cost(posture: Posture, load: ArrayLike | None, solids: bool) -> Cost:
 def stiffness_costs(
     postures: Sequence[Posture], solids: bool = False
 ) -> PlatformCosts | str:
-    """Return the errors of the platform's stiffness that are due to beam theory.
+    """Return the errors of the platform's stiffness that beam theory causes.
 
     Args:
         postures: configurations of one robot, at least one.

@@ -21,7 +21,7 @@ from forcefit.validation.assumptions.validity import Cost
 
 @dataclass(frozen=True, eq=False)
 class CostsOverPoses:
-    """Errors of all assumptions at the reachable poses of a list.
+    """Errors that all assumptions cause at the reachable poses of a list.
 
     Attributes:
         robot: robot with its geometric errors.

@@ -158,7 +158,7 @@ class Campaign:
 
     @property
     def not_measured(self) -> list[str]:
-        """Names of the components that no row has measured."""
+        """Names of the components that were not measured in any row."""
         seen = zip(READING, self.cells.T, strict=True)
         return [name for name, cells in seen if not cells.any()]
 
@@ -224,7 +224,7 @@ class Campaign:
 
 
 def number_rows(*columns: ArrayLike, step: float = 1e-9) -> NDArray:
-    """Return a number for each row; equal rows have the same number, counted from 0.
+    """Number the rows, counted from 0; equal rows get the same number.
 
     Args:
         columns: (R,) or (R, k) arrays to compare; NaN equals NaN.

@@ -41,7 +41,7 @@ def check_commands(table: MeasurementTable, robot: Robot) -> None:
     for name, values in table.columns.items():
         group, _, rest = name.partition(".")
         if group == "q" and robot.frame(rest).turns:
-            lead = abs(robot.frame(rest).lead)  # [m/rad] a screw makes many turns
+            lead = abs(robot.frame(rest).lead)  # [m/rad] screws make many turns
             largest = max(_TURNS, 10 * reach / lead) if lead else _TURNS
             _within(table, name, values, largest, f"an angle in rad{_UNITS}")
         elif group == "q":

@@ -1,6 +1,6 @@
 """Convert results for the rows of a campaign to labelled arrays over ``row``.
 
-Columns of the file ``measurements.csv`` have the same names here.
+The names of the columns are those of the file ``measurements.csv``.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ _UNITS = {"temperature": "K", "time": "s", "approach": "1"}
 
 
 def screw(words: str, meaning: str = "") -> Quantity:
-    """Return the description of a quantity whose values are small screws."""
+    """Return the description of a quantity with small screws as values."""
     return Quantity(words, "rad, m", ("screw",), meaning)
 
 
@@ -33,7 +33,7 @@ def row_dataset(
     Args:
         campaign: campaign of R rows.
         values: arrays as for :func:`forcefit.assembly.model.tables.labelled`; the first
-            axis of every array has length R.
+            axis of every array must have length R.
         labels: labels of further dimensions.
 
     Returns:

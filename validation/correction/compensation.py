@@ -108,7 +108,7 @@ class Compensation:
 
 
 def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
-    """Return commands at which the corrected robot has the pose of the nominal one.
+    """Return commands with which the corrected robot reaches the nominal poses.
 
     Args:
         targets: commands for the corrected robot.
@@ -199,7 +199,7 @@ def _limits(robot: Robot, driven: NDArray) -> tuple[NDArray, NDArray]:
 def _too_far(
     robot: Robot, driven: NDArray, change: NDArray, reason: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Find rows whose corrections (R, d) are larger than the robot, and state why.
+    """Find rows with corrections (R, d) larger than the robot, and the reasons.
 
     Returns:
         (R,) bool, True for such rows, and (R,) texts of the reasons.
@@ -281,7 +281,7 @@ class _Machine:
         return replace(conditions, base=still, tool=still[:3], reading=0.0)
 
     def at(self, q: NDArray, last: Campaign) -> tuple[_Standing, NDArray]:
-        """Return the machine's state at commands, and (R,) reasons for failure.
+        """Return the state of the machine at commands, and (R,) reasons of failures.
 
         Args:
             q: (R, d) commands.

@@ -121,7 +121,7 @@ class Pair:
 
 
 def sprung(robot: Robot) -> NDArray:
-    """Mark the joint components with springs; rigid ones have no wrench to compare.
+    """Mark the joint components with springs, which are compared.
 
     Args:
         robot: robot of n frames.

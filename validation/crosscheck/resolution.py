@@ -42,7 +42,7 @@ from forcefit.validation.crosscheck.pair import (
 from forcefit.validation.crosscheck.pose_metric import PoseMetric
 
 _CHANGE = 1e-2  # [-] relative change by which the effect of a parameter is computed
-# Name of the check whose value is proportional to the square of a change.
+# Name of the check with a value proportional to the square of a change.
 _QUADRATIC = "optimality gap"
 # [-] A parameter is unproved if a relative change of this size is not detected.
 UNPROVED = 1.0

@@ -1,4 +1,4 @@
-"""Describe the candidate functions of a diagnosis: effects that the library lacks.
+"""Describe candidate functions of a diagnosis: effects outside the library.
 
 A candidate function is a small screw or a compliance at a place of the robot.  Its
 value depends on one or two variables.

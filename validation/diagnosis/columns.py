@@ -42,7 +42,7 @@ from forcefit.validation.diagnosis.whitening import (
 )
 
 FUNCTION = "function"
-_CLOCK = 0.999  # a variable with this correlation with time counts as time
+_CLOCK = 0.999  # correlation with time above which a variable is taken as the time
 # Number of randomly drawn rows by which functions are scored in the first step.
 _SAMPLE = 500
 # A candidate counts as imitated by the measuring frame if the fraction of its column

@@ -13,7 +13,7 @@ the current robot.  A step that increases F is halved.
 symbol  code            shape      meaning
 ======  ==============  =========  ===================================================
 y       ``measured``    (n,)       readings of the fitted cells
-W       ``whiten``      (n, n)     makes their noise independent (:mod:`.whitening`)
+W       ``whiten``      (n, n)     transformation to independent noise
 A       ``A``           (n, k)     slopes over sigma, whitened
 P       ``precision``   (k,)       1 / s^2
 C       ``covariance``  (k, k)     (A'A + P)^-1

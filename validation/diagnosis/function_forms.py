@@ -29,7 +29,7 @@ _TURNS = 0.5
 # Largest number of turns over the travel; in addition, at most two turns per position.
 _MOST_TURNS = 200.0
 _FINER = 1.2  # first factor in the refinement of a shape parameter
-# Loads below this fraction of the largest load do not take up backlash.
+# Smaller loads, relative to the largest load, do not close backlash.
 _NO_LOAD = 1e-3
 _HIGH = 12  # highest order of waves that is tried separately
 _CLOCKS = "time", "cov.time"

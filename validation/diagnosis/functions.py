@@ -82,7 +82,7 @@ class Functions:
         self._depend_on(variables)
 
     def _depend_on(self, variables: list[str]) -> None:
-        """Set the variables; each response is computed once."""
+        """Set the variables on which functions depend; compute each response once."""
         self.variables = variables
         self.shapes_of = cache(self._shapes_of)
         self.prior = cache(self._prior)
@@ -258,7 +258,7 @@ class Functions:
         return columns * forms.falling(shape, columns.shape[1])
 
     def equivalents(self, one: Candidate) -> list[tuple[CandidatePart, ...]]:
-        """Return the places at which a candidate function has equal columns."""
+        """Return the other places at which a candidate function has equal columns."""
         if len(one.parts) > 1:
             return []
         part = one.parts[0]

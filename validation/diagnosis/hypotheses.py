@@ -262,7 +262,7 @@ def _each(h: Hypothesis, sessions: Sequence[str]) -> Hypothesis:
 
 
 def sessions_of(h: Hypothesis) -> tuple[str | None, ...]:
-    """Return the sessions for which a hypothesis has parameters; (None,) for all."""
+    """Return the sessions of the parameters; (None,) if they apply to all rows."""
     return tuple(dict.fromkeys(slot.session for slot in h.slots)) or (None,)
 
 

@@ -23,8 +23,8 @@ from forcefit.validation.campaign.campaign import LOAD, Campaign, number_rows
 from forcefit.validation.diagnosis.noise import repeat_scatter
 from forcefit.validation.diagnosis.separability import orthonormal_basis
 
-SIGNIFICANT = 1e-4  # a residual with a smaller p-value is not noise
-UNLIKELY = 1e-3  # a smaller p-value is unlikely for one of many tested residuals
+SIGNIFICANT = 1e-4  # probability below which a residual is not noise
+UNLIKELY = 1e-3  # probability below which one of many tested residuals is unlikely
 OUTLIERS = 20  # one outlier is accepted per this number of rows
 # Number of bins of a covariate's range; rows in one bin count as replicates.
 _LEVELS = 30

@@ -75,7 +75,7 @@ def beyond(robot: Robot, campaign: Campaign) -> tuple[Beyond, ...]:
     """Return the variables outside the range in which a robot was identified.
 
     A variable is listed if it exceeds its range by more than a twentieth of the width.
-    The list is empty if the robot's file states no range.
+    The list is empty if the robot file contains no range.
     """
     left = []
     for name, values, outside in _outside(robot, campaign):

@@ -21,7 +21,7 @@ _LEFT_OUT = 1e-12  # relative precision assigned to a blunder
 _CLEAR = 10.0  # smallest residual / tau of a blunder before a model is fitted
 # Largest fraction of blunders, as in the final test; more outliers indicate an effect.
 _MANY = 0.05
-_UNLIKE = 4.0  # tau is reported if it differs from 1 by more standard deviations
+_UNLIKE = 4.0  # standard deviations by which tau must differ from 1 to be reported
 _CLOSE = 0.2  # smallest reported abs(ln tau)
 _CHANCE = 1e-4  # p-value below which the readings count as not repeatable
 _MEDIAN = 0.4549  # median of chi-square with one degree of freedom

@@ -28,7 +28,7 @@ LARGEST_SHIFT = 0.1
 # A column that is smaller than this fraction of the largest column of its group changes
 # no reading.
 _ROUNDING = 1e-9
-_SAME = 1 - 1e-6  # columns with a larger cosine are equal
+_SAME = 1 - 1e-6  # cosine above which two columns are equal
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +107,7 @@ def nuisance(
 
 
 def _may_give(robot: Robot, name: str) -> bool:
-    """Return whether a frame may have a joint stiffness."""
+    """Return whether a joint stiffness can be defined for a frame."""
     return name != robot.platform and all(name not in pair for pair in robot.closures)
 
 

@@ -36,7 +36,7 @@ _LIKELY = "check the declared stiffness, the units and the registration"
 
 
 def impossible_rows(campaign: Campaign) -> NDArray:
-    """Return (R,) bool, True for rows with a temperature that no machine can have."""
+    """Return (R,) bool, True for rows with an impossible temperature."""
     wrong = np.zeros(len(campaign), dtype=bool)
     for name, values in campaign.covariates.items():
         if "temperature" in name:

@@ -19,7 +19,7 @@ from forcefit.validation.diagnosis.sequence import LEARNED
 
 # Verdicts for which effects are listed.
 LISTED = {statuses.EXPLAINED, statuses.AMBIGUOUS, statuses.LEARNED}
-_HARDLY = 0.05  # frames with fewer determined combinations are not listed
+_HARDLY = 0.05  # number of determined combinations below which a frame is not listed
 # Half width of the interval that contains 90 % of a normal distribution [standard
 # deviations].
 _INTERVAL = 1.645

@@ -86,7 +86,7 @@ def select(
         sizes = common_sizes(states[0]) if common is None else shared
         if np.array_equal(again, good) and stable(sizes, shared):
             break
-        states.clear()  # large columns
+        states.clear()  # a model may have columns of hundreds of megabytes
         good, shared = again, sizes
         search = search_of(good, shared)
         states = search.run(update)
@@ -172,7 +172,7 @@ def _probability(name: str, states: Sequence[State], weights: NDArray) -> float:
 
 
 def _confirmed(search: Search, states: list[State]) -> list[State]:
-    """Remove the best models whose functions fail cross-validation."""
+    """Remove the best models with functions that fail cross-validation."""
     blocks, models = search.columns.block[search.readings.cells], search.models
     while len(np.unique(blocks)) >= _FEWEST and len(states) > 1:
         best = states[0]
@@ -240,7 +240,7 @@ def _best_first(states: Sequence[State]) -> list[State]:
 
 
 def _joined(one: State, other: State) -> State:
-    """Return a model whose weight includes the weight of another model."""
+    """Add the weight of another model to the weight of a model."""
     return replace(one, score=float(np.logaddexp(one.score, other.score)))
 
 

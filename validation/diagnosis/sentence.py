@@ -90,7 +90,7 @@ def calibration_text(tally: Calibration) -> str:
 
 
 def open_text(open_: NDArray) -> str:
-    """Return a line with the number of rows whose pose clearances do not determine."""
+    """Return a line with the number of rows in which the pose is undetermined."""
     return (
         f"clearances leave the pose undetermined in {int(open_.sum())} of "
         f"{len(open_)} rows (marked open): there one of the poses of least "

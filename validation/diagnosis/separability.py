@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from forcefit.validation.diagnosis.signatures import UNSEEN
 
-LIKE = 0.98  # signatures with a larger cosine are indistinguishable
+LIKE = 0.98  # cosine above which a design cannot distinguish two signatures
 SEEN = 3.0  # [sigma] smallest norm of a detectable signature
 # A direction with a smaller relative size is imitated by other columns, apart from
 # rounding errors.

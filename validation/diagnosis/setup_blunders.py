@@ -70,7 +70,7 @@ class SetupBlunder:
 def setup_blunders(
     campaign: Campaign, conditions: Conditions
 ) -> tuple[SetupBlunder, ...]:
-    """Return the set-up blunders whose correction reduces the residual decisively.
+    """Return set-up blunders; correcting them reduces the residual decisively.
 
     Args:
         campaign: measured deviations.
@@ -222,7 +222,7 @@ class _Judge:
         if setup.places is not given.places or setup.axes is not given.axes:
             wide = np.nanstd(setup.points, axis=0).max()
             if np.std(setup.places, axis=0).max() > _FAR * wide:
-                return None  # unreachable targets may take long
+                return None  # unreachable targets take long
             poses = np.hstack([setup.places, rotation_vector(setup.axes)])
             postures, _ = place_many(moved.robot, poses)
         elif setup.coordinates is not given.coordinates:

@@ -65,7 +65,7 @@ def text(diagnosis: Diagnosis, tally: Calibration | None = None) -> str:
 
 
 def _effect_lines(effect: Table) -> list[str]:
-    """Return lines about an effect; geometric errors and springs have others."""
+    """Return lines about an effect other than geometric errors and springs."""
     if "combinations" in effect:
         return []
     there = f" in session {effect['session']}" if "session" in effect else ""

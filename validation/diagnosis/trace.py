@@ -329,6 +329,6 @@ def _fitted(traced: Traced) -> MachineFit:
 
 
 def _size(fit: MachineFit, one: Acting) -> float:
-    """Return the squared change [sigma^2] of the fitted readings due to an effect."""
+    """Return the squared change [sigma^2] that an effect causes in fitted readings."""
     x, _, slopes = fit.own(one)
     return float(np.sum((slopes @ x) ** 2))

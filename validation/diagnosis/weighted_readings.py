@@ -9,8 +9,8 @@ from forcefit.validation.diagnosis.columns import Columns
 from forcefit.validation.diagnosis.elements import Element
 from forcefit.validation.diagnosis.prior_sizes import Eigen
 
-NARROW = 50  # elements with more columns are not cached
-_RANK = 1e-9  # columns with smaller relative singular values are dependent
+NARROW = 50  # largest number of columns of an element whose fitted cells are cached
+_RANK = 1e-9  # relative singular value below which a column depends on others
 NONE = (0.0, 0.0)  # standard deviations if there is no shared noise
 
 

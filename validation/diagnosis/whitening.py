@@ -102,8 +102,8 @@ def whitening_of(campaign: Campaign, cells: NDArray) -> Whitening:
 def independent(campaign: Campaign, residual: NDArray) -> NDArray:
     """Return the N cells of a residual (R, 6) [rad, m] with independent noise.
 
-    If the residual is noise, the result (N,) has unit variance.  Values that are not
-    finite count as zero.
+    If the residual is noise, the result (N,) has unit variance.  Values that are
+    not finite count as zero.
     """
     cells = campaign.cells
     z = np.nan_to_num(residual[cells] / campaign.sigma[cells])

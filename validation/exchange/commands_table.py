@@ -115,7 +115,7 @@ def read_commands(path: Path | str, robot: Robot, writing: Writing) -> Commands:
 
 
 def _check_label(place: str, label: str, seen: Mapping[str, int]) -> None:
-    """Reject a missing label, or a label that another row has."""
+    """Reject a missing label and a repeated label."""
     if not label:
         raise BadInput(f"{place}: empty; expected a label")
     if label in seen:

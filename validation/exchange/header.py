@@ -150,7 +150,7 @@ def _by_order(columns: Sequence[Column], targets: list[str]) -> list[Column]:
 
 
 def _complete(columns: Sequence[Column], least: int = 1) -> bool:
-    """Return whether every named target has each of x, y, z exactly once."""
+    """Return whether columns x, y and z occur exactly once for every named target."""
     axes: dict[str, str] = {}
     for column in columns:
         if column.kind == "axis" and column.target:
@@ -216,7 +216,7 @@ def _is_number(cell: str, decimal: str = ".") -> bool:
 
 
 def by_target(columns: Sequence[Column]) -> Mapping[str, list[int]]:
-    """Return the columns of each target; columns without a target have an empty name.
+    """Group the columns by target; the key of columns without a target is empty.
 
     Args:
         columns: columns of a table.

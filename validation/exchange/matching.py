@@ -116,7 +116,7 @@ def _repeated(readings: Sequence[Reading]) -> str:
 
 
 def _same(a: Reading, b: Reading) -> bool:
-    """Return whether two readings have equal digits, name and time."""
+    """Return whether digits, name and time of two readings are equal."""
     timed = a.time == b.time or bool(np.isnan(a.time) and np.isnan(b.time))
     return timed and a.names == b.names and np.array_equal(a.position, b.position)
 
@@ -131,7 +131,8 @@ def _of_targets(
         if len(named) > 1:
             expected = ", ".join(map(quoted, targets[:6]))
             raise BadInput(
-                f"{reading.place}: expected the name of one target: {expected}"
+                f"{reading.place}: found the names of several targets, expected one: "
+                f"{expected}"
             )
         if named:
             ours.append((reading, named[0]))
@@ -140,7 +141,8 @@ def _of_targets(
     if not ours:
         expected = ", ".join(map(quoted, targets[:6]))
         raise BadInput(
-            f"{readings[0].place}: expected the name of one target in it: {expected}"
+            f"{readings[0].place}: found no name of a target, expected one of: "
+            f"{expected}"
         )
     return ours
 

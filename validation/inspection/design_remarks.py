@@ -17,7 +17,7 @@ from forcefit.validation.inspection.repeats import RepeatNoise
 # [1/K] Thermal expansion of aluminium, which is nearly the largest of machine
 # materials.
 _EXPANSION = 2.4e-5
-_TOGETHER = 0.9  # covariates with a larger correlation are indistinguishable
+_TOGETHER = 0.9  # correlation above which two covariates cannot be distinguished
 # Deviations above this fraction of the robot's size are hardly manufacturing errors.
 _UNIT = 0.02
 

@@ -136,7 +136,7 @@ def plan_rows(
 def _pool(
     robot: Robot, design: CampaignDesign, wanted: int, rng: np.random.Generator
 ) -> CampaignPlan:
-    """Return the rows to choose from; they take as long as the required rows."""
+    """Return the rows to choose from, spread over the duration of the required rows."""
     # The temperature changes slowly, so rows at equal times have equal temperatures.
     plan = plan_campaign(robot, design, rng)
     time = np.array([row.covariates["time"] for row in plan.rows])
@@ -297,7 +297,7 @@ def text(planned: Planned) -> str:
 
 
 def unmeasured(planned: Planned) -> Synthetic:
-    """Return a plan as a campaign without readings, whose file is to be completed."""
+    """Return a plan as a campaign without readings, to be filled in later."""
     missing = np.full((len(planned.plan.rows), 6), np.nan)
     return Synthetic(
         robot=planned.robot, plan=planned.plan,

@@ -9,8 +9,8 @@ from forcefit.validation.inspection.measuring_order import Revisits, session_clo
 from forcefit.validation.inspection.remark import CAREFUL, FINE, LOST, Remark
 from forcefit.validation.inspection.repeats import MOST, RepeatNoise
 
-_FEW = 20  # with fewer degrees of freedom, the noise is uncertain by over 30 %
-_SEVERAL = 4  # more suspect readings probably have a common cause
+_FEW = 20  # degrees of freedom below which the uncertainty of the noise exceeds 30 %
+_SEVERAL = 4  # number of suspect readings from which on a common cause is likely
 
 
 def on_repeats(

@@ -40,7 +40,7 @@ _NARROWING_STEPS = 30
 _CLOSING_STEPS = 30
 # Largest number of steps; each reduces the residual by a factor of a million.
 _RELAXING_STEPS = 4
-_RESTS = 1e-10  # [rad, m] free motions that change less are at rest
+_RESTS = 1e-10  # [rad, m] change below which free motions count as at rest
 _STAGES = (
     "closures are closed and loads increase",
     "contacts stiffen and free motions are released",

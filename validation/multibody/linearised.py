@@ -41,7 +41,7 @@ from forcefit.validation.multibody.open_robot import OpenTree
 # are some nm.
 _STEPS, _CONTACT_STEPS = (2e-4, 1e-4, 5e-5), (1e-8, 3e-9, 1e-9, 3e-10)
 _GAP_STEP = 1e-5
-_RANK = 1e-7  # smaller relative derivatives of closure errors are zero
+_RANK = 1e-7  # relative size below which a derivative of a closure error counts as zero
 # Relative to a joint's motion.  A motion with a smaller stiffness is resisted only by
 # the weak spring of the joint.
 _ROLLS = 1e-4

@@ -237,7 +237,7 @@ def _own_motion(frame: Frame, q: float) -> NDArray:
 
 
 def _add_beam(model: Model, place: Place, frame: Frame, elements: int) -> Elastic:
-    """Add a straight beam that is clamped to a body and whose tip is at the place."""
+    """Add a straight beam that is clamped to a body and ends at the place."""
     link = frame.link
     assert isinstance(link, BeamLink)
     length, x = beam_span(frame, link)

@@ -1,7 +1,7 @@
 """Write the conclusions of a study: assembly, pose error and checks.
 
 The first pose error is the certified bound over all positions within the clearances.
-Every other pose error is stated with its assumption about the clearances.
+Every other pose error is printed with its assumption about the clearances.
 """
 
 from typing import Any

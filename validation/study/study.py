@@ -240,7 +240,7 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
 
 
 def points_solved(maps: Any) -> int:
-    """Return the number of grid points that have a solution."""
+    """Return the number of grid points with a solution."""
     return int((maps["status"] == OK).sum())
 
 

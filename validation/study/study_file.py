@@ -99,7 +99,7 @@ def read_study(
             running the study.
 
     Returns:
-        The study; its whole content has been checked.
+        The study, after a check of its whole content.
 
     Raises:
         BadInput: the study file or the robot file violates a rule.
@@ -321,7 +321,7 @@ def _scales(root: Table) -> tuple[float, ...]:
 def _checks(
     root: Table, meshes: bool, grid: bool, scales: bool
 ) -> tuple[tuple[str, ...], set[str]]:
-    """Return the checks to run: requested ones, and by default all that have input."""
+    """Return the checks to run, and the names of the checks in the table [checks]."""
     possible = {"stiffness": meshes, "maps": grid, "crosscheck": scales}
     if not root.has("checks"):
         return tuple(c for c in _CHECKS if possible.get(c, True)), set()

@@ -272,7 +272,7 @@ def _load_gain(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _body_mass(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Make a body heavier by a mass [kg] whose centre is moment [kg m] over mass."""
+    """Add a mass [kg] to a body, with its centre at the moment [kg m] over the mass."""
     robot = machine.robot
     keys = ("mass", "moment.x", "moment.y", "moment.z")
     for name in dict.fromkeys(n for key in keys for n in named(given, key)):
@@ -286,7 +286,7 @@ def _body_mass(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _geometric_stiffening(machine: Machine, row: Row, given: Parameters) -> Machine:
-    return machine  # the simulation contains this effect; only a linear model lacks it
+    return machine  # the simulation always contains this effect
 
 
 def _registration(pose: NDArray, row: Row, given: Parameters) -> NDArray:

@@ -25,7 +25,7 @@ from forcefit.validation.synthetic.effects import SCREW, WRENCH, Row, own_compli
 from forcefit.validation.synthetic.generator import Synthetic
 from forcefit.validation.synthetic.machine import Hidden, simulate_readings
 
-SAME = 10.0  # a smaller residual chi-square is hidden by the noise
+SAME = 10.0  # residual chi-square below which the difference is hidden by noise
 # Tested time constants of a drift, relative to the duration.
 _DRIFTS = (0.1, 0.3, 1.0)
 _STEP = 1e-5  # [rad, m] step of a finite difference

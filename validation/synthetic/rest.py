@@ -4,12 +4,13 @@ The laws are solved by fixed-point iteration.  The machine is simulated with a l
 spring or an offset in the joint.  The resulting load on the joint determines the next
 spring or offset.  The iteration ends when the change is below a tolerance.
 
-- A stiffening contact has its secant stiffness.  It moves less than its last stiffness
-  predicts, so each step reduces the error at least by 1 - 1/n.
-- A joint with clearance is displaced by its load up to its bounds.  On an open chain
-  the load does not depend on the clearance.  A weak spring (grease, seals) keeps the
-  joint near the middle under small loads; otherwise rounding would determine its
-  position.
+- A stiffening contact is replaced by a spring of its secant stiffness.  The deflection
+  is smaller than the last stiffness predicts.  Each step therefore multiplies the error
+  by at most 1 - 1/n, where n is the exponent of the contact law.
+- The load displaces a joint with clearance up to the bounds of the clearance.  On an
+  open chain, the load does not depend on the clearance.  A weak spring (grease, seals)
+  centres the joint under small loads.  Without the spring, rounding errors would
+  determine the position of the joint.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence

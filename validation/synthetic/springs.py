@@ -41,8 +41,8 @@ from forcefit.validation.synthetic.effects import Machine, Rest
 
 _STEPS = 60
 _CONVERGED = 1e-12  # [rad, m] size of the last step at convergence
-_DIVERGED = 1e3  # [rad, m] larger coordinates mean divergence
-_RANK = 1e-10  # smaller relative singular values belong to free motions
+_DIVERGED = 1e3  # [rad, m] coordinate above which the iteration has diverged
+_RANK = 1e-10  # relative size below which singular values belong to free motions
 
 
 @dataclass(frozen=True, eq=False)
