@@ -172,7 +172,7 @@ def join_tables(tables: Sequence[MeasurementTable]) -> MeasurementTable:
 
 
 def _cells(path: Path, dialect: Dialect) -> tuple[list[int], list[list[str]]]:
-    """Return the stripped cells of each row, and the number of its last line."""
+    """Return the stripped cells of each row, and the file line where the row ends."""
     lines, rows = [], []
     text = io.StringIO(read_text(path), newline="")
     reader = csv.reader(text, delimiter=dialect.delimiter, strict=True)

@@ -137,7 +137,7 @@ def sprung(robot: Robot) -> NDArray:
 
 
 def _named(robot: Robot, part: str, rows: NDArray) -> dict[str, NDArray]:
-    """Return the rows of frames with a link or joint (``part``), by frame name."""
+    """Return the row of each frame with a link or joint (``part``), by frame name."""
     return {
         frame.name: row
         for frame, row in zip(robot.frames, rows, strict=True)

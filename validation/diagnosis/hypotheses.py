@@ -24,7 +24,7 @@ from forcefit.assembly.model.robot import Robot
 
 PER_SESSION = ("registration", "encoder_offset", "drift")
 # Largest number of unknowns of one effect; if an effect requires more, frames of the
-# same kind have one unknown in common.
+# same kind share one unknown.
 _MOST_UNKNOWNS = 24
 
 

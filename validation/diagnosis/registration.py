@@ -93,14 +93,14 @@ def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]
 def device_rotation(
     points: NDArray, seen: NDArray, turns: NDArray, seen_turns: NDArray
 ) -> NDArray:
-    """Return device's rotation: the mean of rotations, or Kabsch's rotation of points.
+    """Return the rotation of the device, fitted to rotations or else to points.
 
     Args:
         points: (P, 3) [m] points in the axes of the base.  Without rotations, the
             points must not be on one line.
         seen: (P, 3) [m] the same points in the axes of the device.
         turns: (T, 3, 3) orientations in the axes of the base.
-        seen_turns: (T, 3, 3) the same orientations in the device's axes.
+        seen_turns: (T, 3, 3) the same orientations in the axes of the device.
 
     Returns:
         (3, 3) rotation from the base's axes to the device's axes.

@@ -161,7 +161,7 @@ class Sensitivities:
         """
         m = len(self.axes(one))
         by = 0.0 if x is None or len(x) == m else float(x[-1])
-        # The memory is ordered by unknown, as the computation reads it.
+        # Values of one unknown are adjacent in memory, because they are read together.
         blocks = [columns.T[:, :, None] * s for s, columns in self._factors(one, by)]
         if x is not None and len(x) > m:
             step = _STEP * float(one.shape.bends[0])

@@ -143,7 +143,7 @@ class State:
         return found
 
     def expected_squares(self) -> NDArray:
-        """Return (n,) expected squared residuals, without weights."""
+        """Return the (n,) expected squares of the unweighted residuals."""
         X = self._columns()
         spread = np.einsum("ij,ij->i", X @ self.sizes.covariance, X)
         return self.left**2 + spread * self.tau**2 / self.readings.weights

@@ -48,7 +48,7 @@ class Whitening:
         return values * (self.root if values.ndim == 1 else self.root[:, None])
 
     def inverse(self, values: NDArray) -> NDArray:
-        """Return the (n,) values over sigma that the map transforms to given values."""
+        """Return the (n,) values over sigma before this transformation."""
         if self.matrix is not None:
             return np.asarray(spsolve(self.matrix, values))
         return values / self.root

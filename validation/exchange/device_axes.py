@@ -26,8 +26,8 @@ _UNITS = {**LENGTHS, "ft": 0.3048}
 # uncorrected scatter.
 _FAR_BETTER = 0.25
 _SCALED = 0.02  # largest relative scatter of distance ratios for a wrong unit
-# Accepted relative error of the factor between two units; errors of the robot
-# contribute.
+# Accepted relative error of the factor between two units, which errors of the robot
+# change.
 _UNIT = 0.05
 # Distances are computed from each reading to this number of following readings.
 _PAIRED = 10

@@ -86,7 +86,7 @@ def _first_column(
 
 
 def _of_one(values: CellValues, line: int, cells: list[str], counted: bool) -> Reading:
-    """Return a row of name, x, y, z; if ``counted``, an integer may be the name."""
+    """Return a row of name, x, y, z; the name may be an integer if ``counted``."""
     names, cells = [], list(cells)
     decimal = values.sheet.decimal
     while cells and not np.isfinite(parse_number(cells[0], decimal)):

@@ -14,8 +14,7 @@ from forcefit.validation.inspection.remark import CAREFUL, FINE, LOST, Remark
 from forcefit.validation.inspection.repeat_remarks import on_repeats
 from forcefit.validation.inspection.repeats import RepeatNoise
 
-# [1/K] Thermal expansion of aluminium, which is nearly the largest of machine
-# materials.
+# [1/K] Thermal expansion of aluminium; few machine materials expand more.
 _EXPANSION = 2.4e-5
 _TOGETHER = 0.9  # correlation above which two covariates cannot be distinguished
 # Deviations above this fraction of the robot's size are hardly manufacturing errors.

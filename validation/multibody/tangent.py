@@ -160,7 +160,7 @@ def _tangent(
     case: Case, regularisation: Regularisation, load_steps: int, steps: bool,
     started: float, limit: float,
 ) -> SimulatedTangent:  # fmt: skip
-    """Build, solve and differentiate a model, and release the memory."""
+    """Build and solve a model, compute its compliance, and release its memory."""
     robot = case.posture.robot
     program = Model(*import_exudyn(), robot.name, regularisation)
     program.deadline = started + limit

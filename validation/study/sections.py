@@ -58,7 +58,7 @@ def robot_section(results: StudyResults) -> str:
 
 
 def _error_body(results: StudyResults) -> ErrorBody | None:
-    """Return a body of the translations within the clearances; None if unbounded."""
+    """Return a 3-D body of the possible platform translations; None if unbounded."""
     assert results.assembly is not None
     reach = reachable_screws(results.assembly, WORST)
     if reach.unbounded(3):

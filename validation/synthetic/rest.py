@@ -43,8 +43,8 @@ from forcefit.validation.synthetic.springs import rest_on_springs
 _ELEMENTS = 2
 _STEPS = 60
 _SETTLED = 1e-11  # [rad, m] change of power-law springs at convergence
-# [rad, m] Change of clearances at convergence.  At small loads, rounding in the force
-# sensor prevents a smaller value.
+# [rad, m] Change of a joint's position in its clearance at convergence.  At small
+# loads, rounding in the force sensor prevents a smaller value.
 _SETTLED_CLEARANCE = 5e-9
 # [N/m, N m/rad] Springs that centre joints in their clearances.
 _CENTRING = {"radial": 3e3, "axial": 3e3, "tilt": 3e2, "spin": 3e2}
