@@ -1,9 +1,10 @@
-"""Checks of the model: by a multibody simulation and by measured data.
+"""Comparisons of the model with a multibody simulation and with measured data.
 
-Begin with ``crosscheck/crosscheck.py`` and ``diagnosis/diagnose.py``.
+Start with ``crosscheck/crosscheck.py`` for the simulation, and with
+``diagnosis/diagnose.py`` for measured data.
 """
 
-if __name__ == "validation":  # the name of the last release, in a checkout
+if __name__ == "validation":  # imported by its former name from a checkout
     from forcefit.old_packages import use_present_name
 
     use_present_name(__name__)

@@ -1,4 +1,4 @@
-"""Errors that each assumption of the model causes at a robot's pose.
+"""Errors of the platform's pose and stiffness that each assumption of the model causes.
 
-Begin with ``assumptions.py``.
+Start with ``assumptions.py``.
 """

@@ -1,4 +1,4 @@
-"""Errors of all assumptions of ``validity.py`` at one configuration of a robot."""
+"""Compute the errors of all assumptions of ``validity.py`` at one posture."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -40,17 +40,18 @@ def assumption_costs(
     gravity: ArrayLike | None = None,
     solids: bool = False,
 ) -> dict[str, Cost | str]:
-    """Return the costs of all assumptions at one posture.
+    """Return the error that each assumption of the model causes at one posture.
 
-    Closures are compared without clearances, because the pose is then unique.
+    The error of linear closures is computed without clearances, because the pose of the
+    platform is unique only then.
 
     Args:
         posture: the robot's configuration.
-        load: (6,) [N m, N] on the platform at its origin, base axes, or by component,
-            ``{"fz": -50}``.
-        gravity: (3,) [m/s^2] base axes; none if absent.
-        solids: whether beams are compared with meshed solids, which takes some seconds
-            for each cross-section.
+        load: (6,) [N m, N] load on the platform at its origin, in base axes, or a
+            mapping from component to value such as ``{"fz": -50}``.
+        gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
+        solids: whether beams are compared with meshed solids.  Meshing takes some
+            seconds for each cross-section.
 
     Returns:
         Mapping from each assumption to its error, or to the reason why it is not known.
@@ -75,7 +76,7 @@ def assumption_costs(
 
 
 class _NotApplicable(Exception):
-    """Error: the robot does not use an assumption, or its error is not computed."""
+    """Error: an assumption does not apply, or its error is not computed."""
 
 
 def _pieces_cost(
@@ -93,14 +94,14 @@ def _pieces_cost(
 def _weight_cost(
     posture: Posture, gravity: ArrayLike | None, load: ArrayLike | None
 ) -> Cost:
-    """Return the error of placing the weight of a link at its two ends."""
+    """Return the error of replacing the weight of a link by forces at its two ends."""
     if gravity is None or not energy_between_ends(posture, gravity):
         raise _NotApplicable("there is no gravity, or no beam has a density")
     return spread_cost(posture, gravity, load)
 
 
 def _solid_cost(posture: Posture, load: ArrayLike | None, solids: bool) -> Cost:
-    """Return the error of beam theory, in comparison with solid finite elements."""
+    """Return the error of beam theory, compared with solid finite elements."""
     beams = [f for f in posture.robot.frames if isinstance(f.link, BeamLink)]
     if beams and not solids:
         raise _NotApplicable(_NOT_MESHED)
@@ -114,7 +115,7 @@ def _solid_cost(posture: Posture, load: ArrayLike | None, solids: bool) -> Cost:
 def stiffness_costs(
     postures: Sequence[Posture], solids: bool = False
 ) -> PlatformCosts | str:
-    """Return the errors of the platform's stiffness that are due to beam theory.
+    """Return the errors of the platform's stiffness that beam theory causes.
 
     Args:
         postures: configurations of one robot, at least one.

@@ -1,4 +1,4 @@
-"""Pins held in two bushes each, instead of independent bounds of translation and tilt.
+"""Model a pin in two bushes instead of independent bounds of translation and tilt.
 
 The paper bounds a pin's radial clearance |(TX, TY)| <= c and its tilt |(RX, RY)| <= t
 independently.  A pin in two bushes of clearance c, at z = +-h with h = c / t, is
@@ -6,11 +6,13 @@ bounded by the position of its axis there:
 
     |(TX + h RY, TY - h RX)| <= c   and   |(TX - h RY, TY + h RX)| <= c,
 
-These are again two circular bounds, in other coordinates: a pin that is translated by c
-cannot tilt.  The paper's bounds with half the clearances imply the bushes' bounds, and
-the bushes' bounds imply the paper's.  So the energy with bushes is at least the energy
-with the paper's bounds, and at most the energy with half the clearances.  The bushes at
-most double the zone margin.
+Each bound limits the position of the pin's axis in one bush to a circle.  A pin that is
+translated by c cannot tilt.  A motion that satisfies the paper's bounds with half the
+clearances also satisfies the bounds of the bushes.  A motion that satisfies the bounds
+of the bushes also satisfies the paper's bounds.  Therefore the energy with bushes is at
+least the energy with the paper's bounds, and at most the energy with half the
+clearances.  The zone margin with bushes is at most twice the margin with the paper's
+bounds.
 """
 
 from dataclasses import replace
@@ -26,7 +28,7 @@ from forcefit.assembly.linear.reference.energy import solve_with
 
 
 def bush_joints(joints: VirtualJoints) -> VirtualJoints:
-    """Return virtual joints with each pin of radial and tilt clearance as two bushes.
+    """Replace each pin with radial and tilt clearance by a pin in two bushes.
 
     Args:
         joints: virtual joints with the paper's bounds.
@@ -36,7 +38,8 @@ def bush_joints(joints: VirtualJoints) -> VirtualJoints:
         columns.
     """
     cones = joints.cones.copy()
-    # each column of a bounded clearance has one entry: the inverse of its bound
+    # Each column of a bounded clearance contains one nonzero entry, the inverse of its
+    # bound.
     rows = np.abs(joints.cones).argmax(axis=0)
     column = {int(row): k for k, row in enumerate(rows)}
     for i in range(len(joints.robot.frames)):
@@ -53,7 +56,7 @@ def bush_joints(joints: VirtualJoints) -> VirtualJoints:
 
 
 def solve_bushes(posture: Posture, load: ArrayLike | None = None) -> Assembly:
-    """Return the assembly of least energy with pins in two bushes each.
+    """Return the assembly of least energy if each pin is held in two bushes.
 
     Args:
         posture: the robot's configuration; the limits of passive joints are ignored.
@@ -63,7 +66,7 @@ def solve_bushes(posture: Posture, load: ArrayLike | None = None) -> Assembly:
         The assembly.  Its ``clearance_excess`` is computed with the paper's bounds.
 
     Raises:
-        CannotAssemble: no motion of the virtual joints can close a closure.
+        CannotAssemble: no motion of the virtual joints closes the kinematic loops.
         FreeMotion: the load acts along a motion without stiffness.
         SolverFailed: the cone solver failed.
     """

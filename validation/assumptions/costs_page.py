@@ -1,4 +1,4 @@
-"""Pages of the errors due to the model's assumptions, at one pose and at many."""
+"""Create report pages of the errors that the model's assumptions cause."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -28,15 +28,15 @@ Cells = list[list[Cell]]
 def costs_page(
     costs: CostsOverPoses, results: Mapping[str, Any], provenance: Provenance
 ) -> str:
-    """Return the page of the errors of all assumptions.
+    """Return the report page of the errors of all assumptions.
 
     Args:
-        costs: errors at one pose or at many.
-        results: plain values of the errors, for ``forcefit report compare``.
-        provenance: command and files.
+        costs: errors at one pose or at many poses.
+        results: the errors as plain values, which ``forcefit report compare`` reads.
+        provenance: command and input files.
 
     Returns:
-        HTML, which needs no other file.
+        A self-contained HTML page.
     """
     reached = len(costs.reached)
     return page(
@@ -59,7 +59,7 @@ def costs_page(
 
 
 def _known(costs: CostsOverPoses) -> dict[str, list[tuple[Mapping[str, float], Cost]]]:
-    """Return the poses and errors of each assumption whose error is known somewhere."""
+    """Return the poses and errors of each assumption with a known error."""
     pairs = {
         name: [
             (pose, cost)
@@ -72,7 +72,7 @@ def _known(costs: CostsOverPoses) -> dict[str, list[tuple[Mapping[str, float], C
 
 
 def _significant(costs: CostsOverPoses) -> list[str]:
-    """Return the assumptions whose error is significant at a pose."""
+    """Return the assumptions whose error is significant at one or more poses."""
     return [
         name for name, found in _known(costs).items()
         if any(cost.matters for _, cost in found)
@@ -80,7 +80,7 @@ def _significant(costs: CostsOverPoses) -> list[str]:
 
 
 def _verdict(costs: CostsOverPoses) -> str:
-    """Return the assumptions with significant errors in a sentence."""
+    """Return a sentence that lists the assumptions with significant errors."""
     known, found = len(_known(costs)), _significant(costs)
     if not known:
         return "No error of an assumption is known: there is nothing to compare."
@@ -95,7 +95,7 @@ def _verdict(costs: CostsOverPoses) -> str:
 
 
 def _good(costs: CostsOverPoses) -> bool | None:
-    """Return whether no error is significant; None if one is; False without any."""
+    """Return True without significant errors, None with any, False if none is known."""
     if not costs.known:
         return False
     return None if _significant(costs) else True
@@ -122,7 +122,7 @@ def _tiles(costs: CostsOverPoses) -> list[Tile]:
 
 
 def _assumptions(costs: CostsOverPoses) -> list[str]:
-    """Return the largest errors of each assumption, or why they are not known."""
+    """Return a table of the largest error of each assumption, or why it is unknown."""
     known = _known(costs)
     rows: Cells = []
     for name, found in known.items():
@@ -163,7 +163,7 @@ def _assumptions(costs: CostsOverPoses) -> list[str]:
 
 
 def _platform(costs: CostsOverPoses) -> list[str]:
-    """Return the relative differences of the platform's compliance."""
+    """Return a table of the relative differences of the platform's compliance."""
     platform = costs.platform
     if isinstance(platform, str):
         return [paragraph(f"Not known: {platform}.")]
@@ -190,7 +190,7 @@ def _platform(costs: CostsOverPoses) -> list[str]:
 
 
 def _poses(costs: CostsOverPoses) -> str:
-    """Return the errors at every pose; empty for one pose."""
+    """Return a table of the errors at every pose; an empty text for one pose."""
     if len(costs.asked) < 2:
         return ""
     head = ["pose [m, rad]", *(f"{name}, position" for name in costs.assumptions)]
@@ -202,12 +202,12 @@ def _poses(costs: CostsOverPoses) -> str:
 
 
 def _position(cost: Cost | str) -> Cell:
-    """Return the error of the position, or a dash."""
+    """Return the position error as text; a dash if the error is unknown."""
     return "-" if isinstance(cost, str) else Value(cost.position, "m", 3)
 
 
 def _unreached(costs: CostsOverPoses) -> Sequence[str]:
-    """Return the poses that are not reached, with the reasons."""
+    """Return a table of the unreachable poses and the reasons."""
     rows = [
         [pose_text(pose), why]
         for pose, why in zip(costs.asked, costs.unreached, strict=True) if why

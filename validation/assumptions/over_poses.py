@@ -1,4 +1,4 @@
-"""Errors that the model's assumptions cause at many poses of a robot."""
+"""Compute the errors that the model's assumptions cause at many poses of a robot."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -21,16 +21,17 @@ from forcefit.validation.assumptions.validity import Cost
 
 @dataclass(frozen=True, eq=False)
 class CostsOverPoses:
-    """Errors of all assumptions at the poses that the robot reaches.
+    """Errors that all assumptions cause at the reachable poses of a list.
 
     Attributes:
         robot: robot with its geometric errors.
-        asked: required pose components of each of the k poses [m or rad].
+        asked: for each of the k requested poses, the prescribed pose components [m or
+            rad].
         unreached: (k,) reason why the robot cannot reach a pose; empty if it can.
-        costs: for each of the r reached poses, each assumption's error or the reason
-            why it is not known.
+        costs: for each of the r reached poses, the error of each assumption, or the
+            reason why the error is unknown.
         platform: errors of the platform's stiffness at the reached poses, or the reason
-            why they are not known.
+            why these errors are unknown.
     """
 
     robot: Robot
@@ -43,7 +44,7 @@ class CostsOverPoses:
 
     @property
     def reached(self) -> tuple[Mapping[str, float], ...]:
-        """(r,) required pose components of the reached poses."""
+        """Prescribed pose components of the r reached poses."""
         return tuple(
             asked
             for asked, why in zip(self.asked, self.unreached, strict=True)
@@ -57,7 +58,7 @@ class CostsOverPoses:
 
     @property
     def known(self) -> bool:
-        """Whether the error of any assumption is known at any pose."""
+        """Whether the error of at least one assumption was computed at a pose."""
         return isinstance(self.platform, PlatformCosts) or any(
             isinstance(cost, Cost) for at in self.costs for cost in at.values()
         )
@@ -75,17 +76,20 @@ def costs_over_poses(
 
     Args:
         robot: robot with its geometric errors.
-        targets: poses or joint coordinates.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes; none if absent.
-        solids: whether the links are meshed; they are meshed once for all poses.
-        progress: called after each pose with the number done and the total.
+        targets: the requested poses or joint coordinates.
+        load: (6,) [N m, N] load on the platform at its origin, in base axes.
+        gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
+        solids: whether the links are compared with meshed solids.  The meshes are
+            computed once for all poses.
+        progress: function called after each pose with the number of finished poses and
+            the total number.
 
     Returns:
         The errors of all assumptions at every pose.
 
     Raises:
-        BadInput: the closures do not hold in the home pose, or a surface is not usable.
+        BadInput: the kinematic loops are not closed in the home pose, or a surface
+            cannot be meshed.
     """
     rows = targets.at(np.arange(int(np.prod(targets.shape))))
     place = place_many_joints if of_joints(targets.names) else place_many
@@ -118,7 +122,7 @@ def costs_at(
     gravity: ArrayLike | None = None,
     solids: bool = False,
 ) -> CostsOverPoses:
-    """Return errors of all assumptions at one pose; see :func:`costs_over_poses`."""
+    """Return the errors of all assumptions at one posture."""
     costs = assumption_costs(posture, load, gravity, solids)
     platform = stiffness_costs([posture], solids)
     asked = (posture.pose(),)

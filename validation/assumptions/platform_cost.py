@@ -1,7 +1,7 @@
-r"""Errors of the platform's stiffness that are due to links modelled as beams.
+r"""Compute the error of the platform's stiffness caused by modelling links as beams.
 
-Four models of one robot are compared at many postures, with clearances held at zero and
-without geometric errors:
+Four models of one robot are compared at many postures.  All clearances and geometric
+errors are zero:
 
 ==============  ==================================================================
 model           stiffness of the links
@@ -13,12 +13,13 @@ solids          the finite elements themselves, both ends free to move: the
 spread          virtual joints with K_E of the same mesh, wrenches spread over ends
 ==============  ==================================================================
 
-The results of meshed and solids must agree to rounding, because condensation is exact
-where joints hold the ends rigidly.  The difference between spread and meshed is the
-error of rigid ends; a real seat is between the two.  A difference is the largest
-relative difference of the compliance over all directions of the wrench, which depends
-on no choice of point or length.  Links do not change with the pose, so they are meshed
-once; a pose needs milliseconds.
+The models ``meshed`` and ``solids`` must agree except for rounding errors, because
+static condensation is exact if joints hold the ends rigidly.  The difference between
+``spread`` and ``meshed`` is the error of assuming rigid ends.  A real seat is between
+these two models.  Each difference is the largest relative difference of the compliance
+over all directions of the wrench.  This measure does not depend on a reference point or
+a reference length.  Links do not change with the pose, so each link is meshed once.
+The computation for one pose then takes milliseconds.
 """
 
 from collections.abc import Mapping, Sequence
@@ -36,7 +37,8 @@ from forcefit.assembly.platform_stiffness.platform_stiffness import platform_sti
 from forcefit.stiffness.screws import screw_map
 from forcefit.validation.assumptions.solid_links import SolidLink, solid_links
 
-# relative to the largest singular value; smaller singular values count as zero
+# [-] Singular values that are smaller than this fraction of the largest one count as
+# zero.
 _RANK = 1e-9
 
 
@@ -48,19 +50,21 @@ class NoSolids(Exception):
 class PlatformCosts:
     """Relative errors of the platform's compliance at k poses.
 
-    Rows are NaN where the platform has a motion without stiffness.
+    The values are NaN at poses where the platform has a motion without stiffness.
 
     Attributes:
-        beams: (k,) [-] difference between beams and solids.
-        meshed: (k,) [-] difference between meshed K_E and solids, which is due to
-            rounding.
-        ends: (k,) [-] difference between rigid ends and wrenches spread over the ends.
-        by_link: (k,) [-] difference between a robot with one link as a beam and one
-            with all links as solids, by link; largest first.
-        left: names of the links without a shape; all models use their declared
-            stiffness.
+        beams: (k,) [-] difference between the models ``beams`` and ``solids``.
+        meshed: (k,) [-] difference between the models ``meshed`` and ``solids``, caused
+            by rounding.
+        ends: (k,) [-] difference between the models ``meshed`` (rigid ends) and
+            ``spread`` (wrenches distributed over the ends).
+        by_link: for each link, (k,) [-] difference between the robot with only this
+            link modelled as a beam and the robot with all links as solids; the link
+            with the largest difference is first.
+        left: names of the links without a known shape.  All four models use the
+            declared stiffness of these links.
         mesh_error: [-] estimate of the largest error of a solid's K_E, each entry
-            divided by sqrt(K_ii K_jj); smaller differences may be due to the mesh.
+            divided by sqrt(K_ii K_jj).  The mesh can cause differences up to this size.
     """
 
     beams: NDArray
@@ -72,7 +76,7 @@ class PlatformCosts:
 
 
 def platform_costs(postures: Sequence[Posture]) -> PlatformCosts:
-    """Compare the platform's stiffness with beams and with solids.
+    """Compare the platform's stiffness for links modelled as beams and as solids.
 
     Args:
         postures: configurations of one robot, at least one.
@@ -117,7 +121,7 @@ def platform_costs(postures: Sequence[Posture]) -> PlatformCosts:
 def _compliances(
     postures: Sequence[Posture], stiffness: Mapping[str, NDArray]
 ) -> NDArray:
-    """Return (k, 6, 6) compliances by virtual joints, with some K_E replaced."""
+    """Return (k, 6, 6) compliances; ``stiffness`` replaces K_E of some links."""
     links = {name: MatrixLink(K) for name, K in stiffness.items()}
     robot = postures[0].robot.with_links({**links})
     linked = [replace(posture, robot=robot) for posture in postures]
@@ -125,7 +129,7 @@ def _compliances(
 
 
 def _differences(C: NDArray, other: NDArray) -> NDArray:
-    """Return (k,) largest relative differences; NaN where a compliance is not known."""
+    """Return (k,) largest relative differences; NaN where a compliance is unknown."""
     known = np.isfinite(C).all(axis=(1, 2)) & np.isfinite(other).all(axis=(1, 2))
     values = np.full(len(C), np.nan)
     for i in np.flatnonzero(known):
@@ -137,11 +141,11 @@ def difference(C: NDArray, other: NDArray) -> float:
     """Return the largest relative difference of two compliances over all wrenches.
 
     Args:
-        C: (6, 6) symmetric, positive semidefinite.
+        C: (6, 6) compliance, symmetric and positive semidefinite.
         other: (6, 6) reference compliance.
 
     Returns:
-        [-] the largest of abs(w.C w / w.C_other w - 1) over all wrenches w.
+        [-] the maximum of abs(w.C w / w.C_other w - 1) over all wrenches w.
     """
     size = np.sqrt(np.diag(other))
     size = np.where(size > 0.0, size, 1.0)
@@ -153,19 +157,19 @@ def difference(C: NDArray, other: NDArray) -> float:
 
 
 def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArray:
-    """Return platform's compliance with links as solids, by the displacement method.
+    """Return the platform's compliance with links as solids (displacement method).
 
-    Unknowns are the motions of each link's end relative to its base, of the joints'
-    springs and of free joints.  A solid's energy depends on the motions of both its
-    ends.
+    The unknowns are the displacement of each link's tip relative to its base, the
+    deformations of the joint springs and the motions of the free joints.  The elastic
+    energy of a solid depends on the displacements of both of its ends.
 
     Args:
-        posture: the robot's configuration; clearances are fixed at zero.
-        solids: solid of each frame; the links of other frames are springs with their
-            K_E.
+        posture: the robot's configuration; its clearances count as zero.
+        solids: solids by name of the frame; the links of all other frames are springs
+            with stiffness K_E.
 
     Returns:
-        (6, 6) [rad/(N m) .. m/N] at the platform's origin, base axes.
+        (6, 6) [rad/(N m) .. m/N] compliance at the platform's origin, in base axes.
     """
     robot, T = posture.robot, posture.transforms
     joints, count = virtual_joints(robot), len(robot.frames)
@@ -175,7 +179,8 @@ def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArr
     other = np.ones(joints.elastic.shape[1], dtype=bool)
     owner = np.abs(joints.elastic).argmax(axis=0) // 6
     other[joints.links & np.isin(owner, rows)] = False
-    # columns: springs other than solids, free joints, motions of the solids' ends
+    # The columns belong to springs other than solids, free joints and the ends of
+    # solids.
     columns = np.hstack([joints.elastic[:, other], joints.free])
     steps = columns.reshape(count, 6, columns.shape[1])
     first = steps.shape[2]
@@ -192,7 +197,8 @@ def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArr
     springs = int(other.sum())
     K[:springs, :springs] = np.eye(springs)
     for i, solid in zip(rows, solids.values(), strict=True):
-        # the joint of the frame itself moves the part beyond the solid's end
+        # The frame's own joint moves the part that follows the solid's tip in the
+        # chain.
         own = steps[i].copy()
         own[:, :first] = 0.0
         turn = T[i, :3, :3] @ solid.turn
@@ -208,7 +214,7 @@ def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArr
 
 
 def _closed(robot: Robot, ends: NDArray) -> NDArray:
-    """Return orthonormal columns: the motions that keep the closures closed."""
+    """Return an orthonormal basis of the motions that keep the loops closed."""
     pairs = [
         ends[robot.index(one)] - ends[robot.index(two)] for one, two in robot.closures
     ]
@@ -223,7 +229,7 @@ def _closed(robot: Robot, ends: NDArray) -> NDArray:
 
 
 def _loaded(K: NDArray, basis: NDArray, platform: NDArray) -> NDArray:
-    """Return the platform's (6, 6) compliance, without motions of no stiffness."""
+    """Return the platform's (6, 6) compliance, ignoring motions without stiffness."""
     H, moved = basis.T @ K @ basis, platform @ basis
     size = np.sqrt(np.diag(H))
     size[size == 0.0] = 1.0

@@ -1,4 +1,4 @@
-"""Figures of the assumptions' errors."""
+"""Plot the errors of the model's assumptions."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -18,17 +18,17 @@ _BARS = 12  # largest number of links shown; links with smaller errors are omitt
 def platform_cost_figure(
     costs: PlatformCosts, asked: Sequence[Mapping[str, float]], robot: str
 ) -> "Figure":
-    """Return figure of the errors of the platform's stiffness and of each link's share.
+    """Return a figure of the platform's stiffness errors and of each link's part.
 
     Args:
         costs: errors at k poses.
-        asked: (k,) required pose components of each pose [m or rad].
+        asked: for each of the k poses, the prescribed pose components [m or rad].
         robot: name of the robot.
 
     Returns:
-        Curves of the errors over the pose component that changes, or over the numbers
-        of the poses; bars of each link's median and largest error.  For one pose there
-        are only the bars.
+        The figure.  Curves show the errors over the varied pose component, or over the
+        index of the pose.  Bars show the median and the largest error of each link.
+        For one pose, the figure contains only the bars.
     """
     from matplotlib.figure import Figure
 

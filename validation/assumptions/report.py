@@ -1,4 +1,4 @@
-"""Errors due to the model's assumptions, as plain values and as text."""
+"""Convert the errors of the model's assumptions to plain values and to text."""
 
 import math
 from collections import Counter
@@ -13,7 +13,7 @@ from forcefit.validation.assumptions.over_poses import CostsOverPoses
 from forcefit.validation.assumptions.platform_cost import PlatformCosts
 from forcefit.validation.assumptions.validity import ENERGY_LIMIT, POSITION_LIMIT, Cost
 
-# the two models whose difference each error of the platform's compliance measures
+# Each error of the platform's compliance is the difference between these two models.
 COMPARED = {
     "beams": "beams, not solids",
     "meshed": "meshed K_E, not solids",
@@ -25,7 +25,7 @@ _Pose = Mapping[str, float]
 
 
 def costs_table(costs: CostsOverPoses) -> dict[str, Any]:
-    """Return errors at one pose [rad], [m], [-], or the reason why they are unknown."""
+    """Return the errors [rad], [m], [-] at one pose, or why they are unknown."""
     return {
         "robot": costs.robot.name, "pose": costs.asked[0], "limits": _LIMITS,
         **_at(costs, 0),
@@ -72,7 +72,7 @@ def _values(cost: Cost | str) -> dict[str, Any]:
 
 
 def _platform(costs: PlatformCosts, shown: Callable[[NDArray], Any]) -> dict[str, Any]:
-    """Return the errors of the platform's compliance [-], largest over all wrenches."""
+    """Return the errors [-] of the platform's compliance, maximum over all wrenches."""
     return {
         "compliance": {name: shown(getattr(costs, name)) for name in COMPARED},
         "by_link": {name: shown(values) for name, values in costs.by_link.items()},
@@ -81,7 +81,7 @@ def _platform(costs: PlatformCosts, shown: Callable[[NDArray], Any]) -> dict[str
 
 
 def spread(values: NDArray, where: Sequence[_Pose]) -> dict[str, Any]:
-    """Return the median and largest finite value, and the pose of the largest."""
+    """Return the median, the largest finite value, and the pose of the latter."""
     known = np.isfinite(values)
     if not known.any():
         return {"median": np.nan, "largest": np.nan, "at": None}
@@ -92,7 +92,7 @@ def spread(values: NDArray, where: Sequence[_Pose]) -> dict[str, Any]:
 
 
 def _summary(costs: CostsOverPoses, name: str) -> dict[str, Any]:
-    """Return assumption's errors over all poses, and reasons where they are unknown."""
+    """Return the errors of one assumption over all poses, and why some are unknown."""
     pairs = [
         (asked, at[name]) for asked, at in zip(costs.reached, costs.costs, strict=True)
     ]
@@ -127,7 +127,7 @@ def costs_text(costs: CostsOverPoses) -> str:
 
 
 def over_poses_text(costs: CostsOverPoses) -> str:
-    """Return a line for each assumption: median and largest error, and its pose."""
+    """Return a text line for each assumption: median and largest error, its pose."""
     count = len(costs.reached)
     lines = [
         f"{costs.robot.name}: errors due to the model's assumptions over {count} of "
@@ -158,7 +158,7 @@ def _energy_text(share: float) -> str:
 
 
 def _platform_lines(over: CostsOverPoses) -> list[str]:
-    """Return lines on the platform's compliance: one pose, or median and largest."""
+    """Return text lines about the platform's compliance, at one pose or at many."""
     costs = over.platform
     if isinstance(costs, str):
         return [f"{'stiffness by solids':>30}: {costs}"]
@@ -187,7 +187,7 @@ def _platform_lines(over: CostsOverPoses) -> list[str]:
 
 
 def pose_text(asked: _Pose | None) -> str:
-    """Return the text of a pose, such as ``tx=0.1, tz=-0.5``; ``-`` for none."""
+    """Return a pose as text, such as ``tx=0.1, tz=-0.5``; ``-`` if there is no pose."""
     if asked is None:
         return "-"
     return ", ".join(f"{name}={value:.6g}" for name, value in asked.items())

@@ -1,9 +1,10 @@
-"""Links as solids of cubic finite elements, with both rigid ends free to move.
+"""Model links as solids of cubic finite elements whose two rigid ends can move.
 
-A beam's solid is a straight bar with the beam's section.  In units of its length and
-modulus it depends only on the proportions of the section and on Poisson's ratio, so
-links of one shape are solved once.  K_E does not change with the pose.  Virtual joints
-hold the ends rigidly; K_E with wrenches spread over the ends is computed too.
+The solid of a beam is a straight bar with the cross-section of the beam.  The stiffness
+of a bar with unit length and unit modulus depends only on the proportions of the
+cross-section and on Poisson's ratio.  Therefore links of the same proportions are
+solved once.  K_E does not change with the pose.  Two versions of K_E are computed: with
+rigidly held ends, as for virtual joints, and with wrenches distributed over the ends.
 """
 
 from collections.abc import Mapping
@@ -24,7 +25,7 @@ from forcefit.stiffness.link import scaled
 
 _KEPT = 32  # largest number of shapes in the cache
 _OPTIONS = FemOptions(
-    # at this accuracy the error of the mesh's own K_E is below 1e-3 of sqrt(K_ii K_jj)
+    # At this accuracy, the error of the mesh's K_E is below 1e-3 of sqrt(K_ii K_jj).
     accuracy=5e-4,
     budget=Budget(seconds=40.0, unknowns=250_000),
 )
@@ -32,14 +33,15 @@ _OPTIONS = FemOptions(
 
 @dataclass(frozen=True, eq=False)
 class SolidLink:
-    """A link as a solid, in the axes of its mesh.
+    """Stiffness matrices of a link modelled as a solid, in the axes of its mesh.
 
     Attributes:
-        ends: (12, 12) [N m/rad .. N/m] wrenches at the centres of base and tip that
-            cause unit screws of both.
-        distributing: (6, 6) K_E at the tip with wrenches spread over both ends.
+        ends: (12, 12) [N m/rad .. N/m] stiffness of both ends: the wrenches at the
+            centres of base and tip that cause unit displacements of base and tip.
+        distributing: (6, 6) [N m/rad .. N/m] K_E at the tip if the wrenches are
+            distributed over both ends.
         span: (3,) [m] vector from base to tip.
-        turn: (3, 3) rotation from the mesh's axes to the frame's.
+        turn: (3, 3) rotation from the axes of the mesh to the axes of the frame.
         error: [-] estimate of the largest error of the mesh's K_E, each entry divided
             by sqrt(K_ii K_jj).
     """
@@ -57,7 +59,7 @@ class SolidLink:
 
     @property
     def spread(self) -> NDArray:
-        """(6, 6) K_E at the frame, in its axes, with wrenches spread over both ends."""
+        """(6, 6) K_E at the frame, in its axes, with distributed wrenches."""
         return self._in_frame(self.distributing)
 
     def _in_frame(self, K: NDArray) -> NDArray:
@@ -72,11 +74,13 @@ def solid_link(frame: Frame) -> SolidLink | None:
         frame: frame of a robot.
 
     Returns:
-        The solid; None if the frame has no link, or a link without a shape (a matrix, a
-        link of a library, a beam given by the constants of its section).
+        The solid.  None if the frame has no link, or if the shape of the link is
+        unknown: a stiffness matrix, a library link, or a beam given by section
+        constants.
 
     Raises:
-        BadInput: a mesh was not solved when the robot was loaded, or cannot be made.
+        BadInput: the link cannot be meshed, or its mesh was not solved when the robot
+            was loaded.
     """
     link = frame.link
     if isinstance(link, MeshLink):
@@ -107,7 +111,7 @@ def solid_link(frame: Frame) -> SolidLink | None:
 
 
 def solid_links(robot: Robot) -> Mapping[str, SolidLink]:
-    """Return the links of a robot that have a shape, as solids.
+    """Return the solids of all links with a known shape.
 
     Args:
         robot: robot whose meshes have been solved.
@@ -116,7 +120,8 @@ def solid_links(robot: Robot) -> Mapping[str, SolidLink]:
         Mapping from the frame's name to the solid.
 
     Raises:
-        BadInput: a mesh was not solved when the robot was loaded, or cannot be made.
+        BadInput: a link cannot be meshed, or its mesh was not solved when the robot was
+            loaded.
     """
     solids = {frame.name: solid_link(frame) for frame in robot.frames}
     return {name: solid for name, solid in solids.items() if solid is not None}
@@ -124,7 +129,8 @@ def solid_links(robot: Robot) -> Mapping[str, SolidLink]:
 
 def _mesh_error(solved: MeshedLink) -> float:
     """Return the [-] estimate of the largest error of the mesh's own K_E."""
-    # link.stiffness is the middle of an interval; the mesh's own K_E is its upper end
+    # link.stiffness is the middle of an error interval; the mesh's K_E is its upper
+    # end.
     K = solved.link.stiffness
     above = np.abs(scaled(solved.level.solution.stiffness - K, K))
     return float((above + solved.link.relative_errors).max())
@@ -132,13 +138,13 @@ def _mesh_error(solved: MeshedLink) -> float:
 
 @lru_cache(maxsize=_KEPT)
 def _bar(shape: tuple[tuple[str, float], ...], poisson: float) -> MeshedLink:
-    """Return the solved bar with length 1 and modulus 1."""
+    """Return the finite-element solution of a bar with length 1 and modulus 1."""
     return solve_bar(dict(shape), Material(1.0, poisson), _OPTIONS)
 
 
 @lru_cache(maxsize=_KEPT)
 def _stiffnesses(solved: MeshedLink) -> tuple[NDArray, NDArray]:
-    """Return stiffness between both ends, and K_E with wrenches spread over both."""
+    """Return the stiffness of both ends, and K_E with distributed wrenches."""
     lam, mu = solved.level.material[:, :2].T
     kind = "distributing-both"
     spread = condense(solved.level.mesh, lam, mu, solved.centers, kind).stiffness

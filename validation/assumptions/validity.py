@@ -1,24 +1,24 @@
-"""The error of each assumption of the virtual-joint model at a posture.
+"""Compute the error of each assumption of the virtual-joint model at a posture.
 
 Each of five assumptions is compared with a model that does not make it:
 
 ==================  ==================================================================
 assumption          compared with
 ==================  ==================================================================
-linear closures     closures that hold with finite motions, :func:`.solve_exact`
-beams               solids with held ends, by finite elements
-loads at the ends   a weight spread over its link
-disc and cone       a pin in two bushes, :mod:`forcefit.validation.assumptions.bushes`
-one spring a beam   the same beam in ever more pieces, finite motions
+linear closures loop closure with finite motions, :func:`.solve_exact` beams solids with
+rigid ends, computed by finite elements loads at the ends a weight spread over its link
+disc and cone a pin in two bushes, :mod:`forcefit.validation.assumptions.bushes` one
+spring a beam the same beam cut into more and more pieces, finite motions
 ==================  ==================================================================
 
-The error of an assumption is a difference of the platform's pose and a relative
-difference of the energy.  It is significant above one per cent or 20 um, which is the
-accuracy required of the paper's robot.  If neither model stores energy or moves the
-platform, there is nothing to compare.
+Two numbers measure the error of an assumption: the difference of the platform's pose
+and the relative difference of the elastic energy.  The error is significant if the
+energy differs by more than one per cent, or the position by more than 20 um, the
+required accuracy of the paper's robot.  If no energy is stored and the platform does
+not move in either model, the error is unknown.
 
-Poses are compared at the solution of least energy.  Where no load acts on a clearance,
-this pose is not unique; see ``docs/validity.md``.
+The poses of the solutions of least energy are compared.  This pose is not unique if no
+load acts on a clearance, see ``docs/validity.md``.
 """
 
 import math
@@ -47,10 +47,10 @@ class Cost:
     Attributes:
         rotation: [rad] error of the platform's orientation.
         position: [m] error of the position of the platform's origin.
-        energy: [-] error of the elastic energy, relative to the energy of the better
-            model.
-        pieces: number of pieces of every beam at which the errors are below the limits;
-            None for other assumptions.
+        energy: [-] error of the elastic energy, relative to the energy of the more
+            accurate model.
+        pieces: number of pieces into which every beam must be cut for errors below the
+            limits; None for other assumptions.
     """
 
     rotation: float
@@ -60,12 +60,12 @@ class Cost:
 
     @property
     def matters(self) -> bool:
-        """Whether the error exceeds one per cent or 20 um."""
+        """Whether the energy error exceeds one per cent or the position error 20 um."""
         return self.position > POSITION_LIMIT or self.energy > ENERGY_LIMIT
 
     @property
     def known(self) -> bool:
-        """Whether the models could be compared."""
+        """Whether both models could be compared."""
         return not (math.isnan(self.position) and math.isnan(self.energy))
 
 
@@ -77,12 +77,13 @@ def cost_between(
     Args:
         model: solution with the assumption.
         better: solution without the assumption.
-        missing: [J] energy of the better model that is contained in neither solution.
+        missing: [J] part of the more accurate model's energy that neither solution
+            contains.
 
     Returns:
         The error.  Without loads, an energy below 1e-6 of the energy without clearances
-        is replaced by that limit: inside an assembly zone both energies are rounding
-        errors.
+        is replaced by this limit, because inside an assembly zone both energies are
+        rounding errors.
     """
     energy = better.energy + missing
     least = 0.0 if model.frame_loads else 1e-6 * model.energy_without_clearance
@@ -103,7 +104,7 @@ def cost_between(
 
 
 def closure_cost(posture: Posture, load: ArrayLike | None = None) -> Cost:
-    """Return the error of linearised closures, compared with finite motions.
+    """Return the error of linearising the loop closure, compared with finite motions.
 
     Args:
         posture: the robot's configuration.
@@ -129,7 +130,8 @@ def link_cost(
 
     Args:
         posture: the robot's configuration.
-        stiffness: reference K_E (6, 6) [N m/rad .. N/m] by name of the frame.
+        stiffness: mapping from frame name to the reference K_E, (6, 6) [N m/rad ..
+            N/m].
         load: (6,) [N m, N] on the platform at its origin, base axes.
 
     Returns:
@@ -147,10 +149,10 @@ def link_cost(
 def spread_cost(
     posture: Posture, gravity: ArrayLike, load: ArrayLike | None = None
 ) -> Cost:
-    """Return the error of placing the weights of links at their ends.
+    """Return the error of replacing the weights of links by loads at their ends.
 
-    The equivalent loads at the ends, :mod:`forcefit.assembly.linear.load`, cause the
-    correct pose; they lack the energy that beams store between their ends.
+    These equivalent loads (:mod:`forcefit.assembly.linear.load`) cause the correct pose
+    of the platform.  The energy that a beam stores between its ends is missing.
 
     Args:
         posture: the robot's configuration.
@@ -158,7 +160,7 @@ def spread_cost(
         load: (6,) [N m, N] on the platform at its origin, base axes.
 
     Returns:
-        The error; to first order the poses are equal.
+        The error.  The poses of both models are equal to first order.
 
     Raises:
         CannotAssemble: the robot cannot be assembled.
@@ -188,11 +190,11 @@ def bush_cost(posture: Posture, load: ArrayLike | None = None) -> Cost:
 def pieces_cost(
     posture: Posture, load: ArrayLike | None = None, gravity: ArrayLike | None = None
 ) -> Cost:
-    """Return the error of a beam as one spring, compared with many pieces.
+    """Return the error of modelling a beam as one spring, compared with many pieces.
 
     The error of n pieces decreases as 1 / n^2 (``docs/proofs.md``).  The solutions with
-    one and two pieces determine the limit for many pieces, and the number of pieces
-    with errors below the limits.
+    one and two pieces therefore determine the limit for infinitely many pieces, and the
+    number of pieces for which the errors are below the limits.
 
     Args:
         posture: the robot's configuration.
@@ -220,7 +222,7 @@ def pieces_cost(
 
 
 def _in_pieces(posture: Posture, count: int) -> Posture:
-    """Return the configuration with every beam cut into pieces."""
+    """Return the configuration with every beam cut into ``count`` pieces."""
     links = {
         frame.name: replace(frame.link, pieces=count)
         for frame in posture.robot.frames

@@ -1,4 +1,4 @@
-"""Reading and checking of measured data (campaigns).
+"""Read and check measured data (campaigns).
 
-Begin at ``campaign.py``; the format is ``docs/campaigns.md``.
+Start with ``campaign.py``.  The format is described in ``docs/campaigns.md``.
 """

@@ -1,4 +1,4 @@
-"""Measured deviations of a machine, one row for each measurement, with checks."""
+"""Measured deviations of a machine's platform, one row for each measurement."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -22,28 +22,31 @@ LOAD = ("mx", "my", "mz", "fx", "fy", "fz")
 
 @dataclass(frozen=True, eq=False)
 class Campaign:
-    """Measured deviations of a machine, in the order of the file.
+    """Measured deviations of a machine's platform, in the order of the file.
 
-    The campaign has R rows, one for each measurement; the robot has n frames.  A
-    campaign exists only if the nominal robot can reach every commanded configuration.
+    The campaign contains R rows, one for each measurement.  The robot consists of n
+    frames.  A campaign is created only if the nominal robot can reach every commanded
+    configuration.
 
     Attributes:
         name: name of the campaign's folder.
         robot: the declared robot.
         ids: R unique labels.
-        coordinates: (R, n) [rad or m] of every joint, for the nominal robot with closed
-            closures.
+        coordinates: (R, n) [rad or m] coordinate of every joint of the nominal robot
+            with closed kinematic loops.
         transforms: (R, n, 4, 4) poses of the frames in the base frame, without
             imperfections.
-        mismatch: (R,) [rad, m] nominal closure error due to rounded robot files; it is
-            ignored.
-        commanded: kind of the file's commands, ``"joints"`` or ``"pose"``.
-        loads: (R, 6) [N m, N] on the platform at the reference point, base axes.
-        measured: (R, 6) [rad, m] rx ry rz tx ty tz at the reference point, base axes;
-            NaN where not measured.
-        sigma: (R, 6) [rad, m] standard deviation of each reading; NaN only where
-            nothing was measured and no standard deviation is stated.
-        covariates: (R,) values by name of the covariate, without ``cov.``.
+        mismatch: (R,) [rad, m] closure error of the nominal robot that is caused by
+            rounded numbers in robot files.  This error is neglected.
+        commanded: kind of the commands in the file, ``"joints"`` or ``"pose"``.
+        loads: (R, 6) [N m, N] loads on the platform at the reference point, base axes.
+        measured: (R, 6) [rad, m] measured deviations rx ry rz tx ty tz at the reference
+            point, base axes; NaN for components that were not measured.
+        sigma: (R, 6) [rad, m] standard deviation of each reading; NaN only for
+            components that were not measured and whose standard deviation is not
+            stated.
+        covariates: mapping from the name of each covariate, without ``cov.``, to (R,)
+            values.
         reference_point: (3,) [m] measured point, platform axes.
         registration: ``"known"``, or ``"unknown"`` if the pose of the measuring device
             is unknown.
@@ -52,19 +55,20 @@ class Campaign:
         repeat: (R,) number of the pair of configuration and load, counted from 0 by
             first use; rows with the same number are repeats.
         session: (R,) name of each row's session; None if the file has none.
-        motion_units: ``rad`` or ``m``, by name of the covariate that is a measured
-            motion.
-        points: (3,) [m] further measured points by name, platform axes.
+        motion_units: mapping from the name of each covariate that is a measured motion
+            to its unit, ``rad`` or ``m``.
+        points: mapping from the name of each further measured point to its position
+            (3,) [m], platform axes.
         per_session: names of additional effects that may differ between sessions.
-        partial: (R,) values by name of further covariates; NaN in sessions without
-            them.
+        partial: mapping from the name of each covariate that only some sessions
+            recorded to (R,) values; NaN in the other sessions.
         point: (R,) name of the measured point, ``""`` for the reference point; None if
             all rows measure the reference point.  A row of the file becomes one row for
             each point.
-        common: (R, 6, k) [rad, m] noise that all readings of one row of the file share,
-            in addition to the noise of ``sigma``: change of each reading per standard
-            deviation of k independent numbers, drawn once for the row; None if there is
-            none.
+        common: (R, 6, k) [rad, m] correlated noise of the readings of one row of the
+            file, in addition to ``sigma``.  The noise is ``common`` times k independent
+            standard normal variables, drawn once for each row of the file.  None if
+            there is no correlated noise.
     """
 
     name: str
@@ -93,7 +97,7 @@ class Campaign:
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 
     def _figures(self) -> Figures:
-        """Return lines about the size of the campaign and its noise."""
+        """Return text lines about the number of rows and the noise of the campaign."""
         cells, sizes = self.cells, []
         for unit, part in (("urad", slice(3)), ("um", slice(3, 6))):
             sigma = self.sigma[:, part][cells[:, part]]
@@ -133,13 +137,13 @@ class Campaign:
         object.__setattr__(self, "covariates", covariates)
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return a data set over ``row``; see :mod:`.tables`."""
+        """Return an xarray data set over ``row``; see :mod:`.tables`."""
         from forcefit.validation.campaign.tables import campaign_dataset
 
         return campaign_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a row for each measurement, columns (variable, component)."""
+        """Return a pandas table, one row per measurement (variable, component)."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "row")
@@ -154,7 +158,7 @@ class Campaign:
 
     @property
     def not_measured(self) -> list[str]:
-        """Names of the components that no row has measured."""
+        """Names of the components that were not measured in any row."""
         seen = zip(READING, self.cells.T, strict=True)
         return [name for name, cells in seen if not cells.any()]
 
@@ -167,7 +171,7 @@ class Campaign:
 
     @property
     def targets(self) -> NDArray:
-        """(R, 3) [m] measured point of each row, platform axes."""
+        """(R, 3) [m] position of the measured point of each row, platform axes."""
         if self.point is None:
             return np.broadcast_to(self.reference_point, (len(self), 3))
         places = {**self.points, "": self.reference_point}
@@ -175,7 +179,7 @@ class Campaign:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """R labels of the file's rows; the points of one row have the same label."""
+        """R labels of the file's rows; all points of one row share a label."""
         if self.point is None:
             return self.ids
         pairs = zip(self.ids, self.point.tolist(), strict=True)
@@ -183,7 +187,7 @@ class Campaign:
 
     @property
     def measured_at_once(self) -> NDArray:
-        """(R,) int, equal for the points of one row of the file."""
+        """(R,) int, equal for all points of one row of the file."""
         number = dict[str, int]()
         rows = [number.setdefault(label, len(number)) for label in self.labels]
         return np.array(rows, dtype=int)
@@ -194,13 +198,13 @@ class Campaign:
         return every if session is None else np.asarray(self.session == session)
 
     def take(self, rows: ArrayLike | slice) -> "Campaign":
-        """Return selected rows; ``configuration`` and ``repeat`` keep their numbers.
+        """Return selected rows; ``configuration`` and ``repeat`` are not renumbered.
 
         Args:
             rows: numbers of rows, a mask (R,), or a slice.
 
         Returns:
-            A campaign of those rows, in the order given.
+            A campaign of the selected rows, in the given order.
         """
         chosen = np.arange(len(self))[rows if isinstance(rows, slice) else _index(rows)]
         names = (
@@ -220,14 +224,14 @@ class Campaign:
 
 
 def number_rows(*columns: ArrayLike, step: float = 1e-9) -> NDArray:
-    """Return a number for each row; equal rows have the same number, counted from 0.
+    """Number the rows, counted from 0; equal rows get the same number.
 
     Args:
-        columns: (R,) or (R, k) arrays; NaN equals NaN.
-        step: smaller differences count as zero.
+        columns: (R,) or (R, k) arrays to compare; NaN equals NaN.
+        step: largest difference between equal values, in the unit of the columns.
 
     Returns:
-        (R,) int.
+        (R,) int, the number of each row.
     """
     table = np.column_stack([np.asarray(c, dtype=float) for c in columns])
     table = np.round(table / step)
@@ -240,13 +244,13 @@ def number_rows(*columns: ArrayLike, step: float = 1e-9) -> NDArray:
 
 
 def _index(rows: ArrayLike) -> NDArray:
-    """Return numbers or a mask of rows as an index; an empty list selects no row."""
+    """Convert row numbers or a mask to an index array; an empty list selects no row."""
     index = np.asarray(rows)
     return index.astype(int) if index.size == 0 else index
 
 
 def _locked(campaign: Campaign, name: str, shape: tuple[int, ...]) -> NDArray:
-    """Return a read-only copy of the right shape."""
+    """Return a read-only copy of a campaign's array after a check of its shape."""
     array = np.array(getattr(campaign, name))
     if array.shape != shape:
         whose = f"campaign '{campaign.name}': {name}"
@@ -256,7 +260,7 @@ def _locked(campaign: Campaign, name: str, shape: tuple[int, ...]) -> NDArray:
 
 
 def _column(values: ArrayLike, rows: int, name: str) -> NDArray:
-    """Return a read-only covariate."""
+    """Return a read-only copy of a covariate after a check of its length and values."""
     array = np.array(values, dtype=float)
     if array.shape != (rows,) or not np.isfinite(array).all():
         raise ValueError(f"covariate '{name}': expected {rows} finite numbers")

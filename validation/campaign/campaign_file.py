@@ -1,7 +1,4 @@
-"""Reader of campaign folders: ``campaign.toml`` and its table, with all checks.
-
-The format is described in ``docs/campaigns.md``.
-"""
+"""Read campaign folders: ``campaign.toml`` and its table, with all checks."""
 
 import os.path
 from collections.abc import Sequence
@@ -45,13 +42,14 @@ from forcefit.validation.campaign.measurement_table import (
     read_table,
 )
 
-# [rad, m] largest accepted closure error, which rounding of robot files causes
+# [rad, m] Largest accepted closure error; rounded numbers in robot files cause such
+# errors.
 _CLOSED = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class _Declared:
-    """The content of ``campaign.toml``, or the defaults for a table alone."""
+    """Content of ``campaign.toml``, or the defaults for a table without that file."""
 
     root: Table
     name: str
@@ -69,15 +67,16 @@ def read_campaign(folder: Path | str, *, links: bool = True) -> Campaign:
 
     Args:
         folder: folder with a file ``campaign.toml``, or that file.
-        links: whether links given by meshes are solved, which diagnoses need.
+        links: whether the stiffness of meshed links is computed, which diagnoses
+            require.
 
     Returns:
-        The campaign, with joint coordinates of every configuration.
+        The campaign, including the joint coordinates of every configuration.
 
     Raises:
         BadInput: the folder violates a rule of the format, a value is not plausible, or
-            a configuration is unreachable; the message names file, place, found and
-            expected value.
+            a configuration is unreachable.  The message names the file, the place, the
+            value found and the expected value.
     """
     root = read_toml(_declaration(folder))
     robot_name = root.text("robot", expected="a built-in robot or a robot file")
@@ -89,13 +88,15 @@ def read_commands(source: Path | str, robot: Robot) -> Campaign:
     """Return the commands of a machine as a campaign; measurements may be missing.
 
     Args:
-        source: a campaign, or a table with the same columns alone, in SI units.  The
-            readings of a table are those of the measured point of the robot's
-            identification, or of the platform's origin.
-        robot: the robot that replaces the campaign's.
+        source: a campaign, or a single table with the same columns in SI units.  The
+            readings of a single table belong to the measured point for which the robot
+            was identified, or to the platform's origin if the robot file names no
+            point.
+        robot: robot that replaces the robot of the campaign.
 
     Returns:
-        A campaign with one row for each point of each row, NaN where not measured.
+        A campaign with one row for each point of each row of the file; readings that
+        were not measured are NaN.
 
     Raises:
         BadInput: for the same reasons as in :func:`read_campaign`.
@@ -112,13 +113,13 @@ def read_commands(source: Path | str, robot: Robot) -> Campaign:
 
 
 def _declaration(folder: Path | str) -> Path:
-    """Return the file ``campaign.toml`` of a folder, or the file given."""
+    """Return the path of ``campaign.toml`` for a folder or for this file."""
     file = Path(folder)
     return file if os.path.isfile(file) else file / "campaign.toml"
 
 
 def _declared(root: Table) -> _Declared:
-    """Return the content of ``campaign.toml`` except its robot."""
+    """Return the content of ``campaign.toml`` without its robot."""
     folder = Path(root.file).parent
     declared = _Declared(
         root=root,
@@ -136,7 +137,7 @@ def _declared(root: Table) -> _Declared:
 
 
 def _per_session(root: Table) -> tuple[str, ...]:
-    """Return the effects that may differ from session to session."""
+    """Return the effects whose parameters may differ between sessions."""
     given = root.get("per_session", [])
     valid = [name for name, effect in LIBRARY.items() if effect.by_row]
     if not isinstance(given, list):
@@ -150,7 +151,7 @@ def _per_session(root: Table) -> tuple[str, ...]:
 
 
 def _table_names(root: Table) -> list[str]:
-    """Return the name of one table, or a name for each session."""
+    """Return the names of the tables: one table, or one table for each session."""
     given = root.get("measurements")
     if not isinstance(given, list):
         return [root.text("measurements", expected="a CSV file")]
@@ -192,7 +193,7 @@ def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Ca
     _check_points(declared, extent)
     if measured:
         check_measured(table, points)
-    # readings and their sigma by point; the reference point is first
+    # Readings and their sigma by measured point; the reference point is first.
     every: dict[str, tuple[NDArray, NDArray]] = {}
     for name, at in {"": point, **points}.items():
         every[name] = _readings(table, name, declared.noise)
@@ -236,7 +237,7 @@ def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Ca
 
 
 def _check_points(declared: _Declared, extent: float) -> None:
-    """Reject measured points that are far from a robot of a given extent [m]."""
+    """Reject measured points that are far outside a robot of size ``extent`` [m]."""
     points = {f"points.{name}": at for name, at in declared.points.items()}
     for place, at in ({"reference_point": declared.point} | points).items():
         if np.linalg.norm(at) > 10 * extent:
@@ -251,7 +252,7 @@ def _check_points(declared: _Declared, extent: float) -> None:
 def _labels(
     ids: Sequence[str], points: Sequence[str], row: NDArray, which: NDArray
 ) -> tuple[str, ...]:
-    """Return a label for each row: the file's label, and the point's name if any."""
+    """Return the label of each row: its label in the file, and its point's name."""
     return tuple(
         f"{ids[i]}:{points[k]}" if points[k] else ids[i]
         for i, k in zip(row, which, strict=True)
@@ -261,21 +262,22 @@ def _labels(
 def _rows_of_points(
     every: dict[str, tuple[NDArray, NDArray]], measured: bool
 ) -> tuple[NDArray, NDArray]:
-    """Return the numbers of the file's rows, repeated for every measured point.
+    """Return the index of each row of the file, once for every measured point.
 
     Args:
-        every: readings (R, 6) and their sigma, by point.
-        measured: whether only measurements are kept; otherwise a row without a reading
-            stays, once for each declared point.
+        every: mapping from the name of each point to its readings (R, 6) and their
+            sigma.
+        measured: whether rows without a reading are omitted.  Otherwise such a row is
+            returned once for each declared point.
 
     Returns:
-        (C,) row of the file, ascending, and (C,) number of the point.
+        (C,) index of the row of the file, ascending, and (C,) index of the point.
     """
     taken = np.column_stack([
         np.isfinite(readings).any(axis=1) for readings, _ in every.values()
     ])
     if not measured:
-        # rows with several points, none of which has been measured yet
+        # Keep rows of commands for several points if no point has been measured.
         alone = not taken.any() and len(every) > 1
         taken[~taken.any(axis=1)] = taken.any(axis=0) if taken.any() else True
         taken[:, 0] &= not alone
@@ -284,7 +286,7 @@ def _rows_of_points(
 
 
 def _read_points(root: Table) -> dict[str, NDArray]:
-    """Return (3,) [m] of ``[points]`` by name, platform axes; empty if absent."""
+    """Return the positions (3,) [m] in ``[points]`` by name, platform axes."""
     if not root.has("points"):
         return {}
     table = root.table("points")
@@ -298,7 +300,7 @@ def _read_points(root: Table) -> dict[str, NDArray]:
 def _readings(
     table: MeasurementTable, point: str, noise: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return (R, 6) readings of a point, and sigma [rad, m] of table or device."""
+    """Return (R, 6) readings of a point, and sigma [rad, m] of the table or device."""
     at = f".{point}" if point else ""
     stated = table.stack(f"sigma{at}", READING, np.nan)
     sigma = np.where(np.isnan(stated), noise, stated)
@@ -319,7 +321,7 @@ def _read_noise(root: Table) -> NDArray:
 
 
 def _read_robot(root: Table, name: str, links: bool) -> Robot:
-    """Return robot: a built-in one, or one of a file next to the campaign's file."""
+    """Return the robot: a built-in robot, or one from a file in the folder."""
     if name in BUILT_IN:
         return BUILT_IN[name]()
     path = Path(root.file).parent / name
@@ -332,7 +334,7 @@ def _read_robot(root: Table, name: str, links: bool) -> Robot:
 
 
 def _commanded(table: MeasurementTable, robot: Robot) -> str:
-    """Return the names of the table's commands: joints, or components of the pose."""
+    """Return the names of the table's command columns: joints, or pose components."""
     actuated = [f"q.{f.name}" for f in robot.frames if f.actuated]
     given = [name for name in table.columns if name.startswith("q.")]
     pose = [name for name in table.columns if name.startswith("pose.")]
@@ -358,7 +360,7 @@ def _commanded(table: MeasurementTable, robot: Robot) -> str:
 
 
 def _command(table: MeasurementTable, robot: Robot, commanded: str) -> NDArray:
-    """Return (R, 6) poses ``[t r]``, or (R, n) joint coordinates; NaN where free."""
+    """Return (R, 6) poses ``[t r]`` or (R, n) joint coordinates; NaN where free."""
     if commanded == "pose":
         return table.stack("pose", POSE, np.nan)
     return table.stack("q", tuple(f.name for f in robot.frames), np.nan)
@@ -366,7 +368,7 @@ def _command(table: MeasurementTable, robot: Robot, commanded: str) -> NDArray:
 
 def _place(table: MeasurementTable, robot: Robot, commanded: str,
            rows: NDArray) -> list[Posture]:  # fmt: skip
-    """Return the posture of each row; reject the first unreachable row."""
+    """Return the posture of each row; raise BadInput at the first unreachable row."""
     place = place_many if commanded == "pose" else place_many_joints
     postures, reasons = place(robot, _command(table, robot, commanded)[rows])
     placed = []

@@ -1,4 +1,4 @@
-"""Schema of ``campaign.toml`` for editors: the keys that the reader accepts."""
+"""JSON schema of ``campaign.toml`` for editors: the keys that the reader accepts."""
 
 from forcefit.assembly.effects import LIBRARY
 from forcefit.results.quantities import number, text

@@ -1,7 +1,7 @@
-"""Plausibility checks of a campaign: a deviation of 153 m is a wrong unit.
+"""Check whether the numbers of a campaign are plausible.
 
-The values checked here are well-formed numbers.  A value that is impossible for a
-machine is refused, and the message names the likely mistake.
+A value that is impossible for a machine is refused, and the message names the likely
+mistake.  For example, a deviation of 153 m suggests a wrong unit.
 """
 
 from collections.abc import Iterable
@@ -14,14 +14,16 @@ from forcefit.assembly.model.robot import Robot
 from forcefit.validation.campaign.campaign import LOAD, READING
 from forcefit.validation.campaign.measurement_table import MeasurementTable
 
-# [rad] largest accepted command of a joint; a larger one is probably in degrees
+# [rad] Largest accepted command of a revolute joint; a larger value is probably in
+# degrees.
 _TURNS = 8 * np.pi
-_FORCE = 1e7  # [N], [N m] largest accepted load; it exceeds the load of any platform
-# [K] largest accepted difference from calibration; 293 would be an absolute temperature
+_FORCE = 1e7  # [N], [N m] largest accepted load, far above that of any platform
+# [K] Largest accepted temperature difference from calibration; a value such as 293
+# would be an absolute temperature.
 _WARMEST = 250.0
-_LATEST = 3e8  # [s] largest accepted time, ten years; a larger number is a date
-_ROOM = 1000.0  # [m] largest accepted distance of a measuring device
-_FINEST = 1e-15  # [rad, m] smallest accepted standard deviation of a device
+_LATEST = 3e8  # [s] largest accepted time, ten years; larger numbers are dates
+_ROOM = 1000.0  # [m] largest accepted distance between machine and measuring device
+_FINEST = 1e-15  # [rad, m] smallest accepted standard deviation of a reading
 _UNITS = "; declare other units in [units] of campaign.toml"
 
 
@@ -39,7 +41,7 @@ def check_commands(table: MeasurementTable, robot: Robot) -> None:
     for name, values in table.columns.items():
         group, _, rest = name.partition(".")
         if group == "q" and robot.frame(rest).turns:
-            lead = abs(robot.frame(rest).lead)  # [m/rad] a screw makes many turns
+            lead = abs(robot.frame(rest).lead)  # [m/rad] screws make many turns
             largest = max(_TURNS, 10 * reach / lead) if lead else _TURNS
             _within(table, name, values, largest, f"an angle in rad{_UNITS}")
         elif group == "q":
@@ -94,14 +96,15 @@ def check_measured(table: MeasurementTable, points: Iterable[str]) -> None:
 
 def check_readings(table: MeasurementTable, point: str, sigma: NDArray,
                    registration: str, extent: float) -> None:  # fmt: skip
-    """Reject deviations larger than the robot, and invalid sigma.
+    """Reject deviations that exceed the size of the robot, and invalid values of sigma.
 
     Args:
         table: the table in SI units.
         point: name of the measured point, ``""`` for the reference point.
-        sigma: (R, 6) [rad, m] standard deviation of each reading, NaN where none is
+        sigma: (R, 6) [rad, m] standard deviation of each reading; NaN if it is not
             stated.
-        registration: for ``"unknown"`` the device may be anywhere in a room.
+        registration: ``"known"`` or ``"unknown"``.  For ``"unknown"``, deviations up to
+            the size of a room are accepted, because the pose of the device is unknown.
         extent: [m] size of the robot over all configurations.
 
     Raises:
@@ -136,14 +139,14 @@ def check_readings(table: MeasurementTable, point: str, sigma: NDArray,
 
 
 def extent_of(transforms: NDArray, reference_points: NDArray) -> float:
-    """Return diagonal [m] of the box around the base, all origins and measured points.
+    """Return the diagonal [m] of the box around base, frames and measured points.
 
     Args:
-        transforms: (k, n, 4, 4) frames of the configurations.
+        transforms: (k, n, 4, 4) poses of the frames in each configuration.
         reference_points: (k, 3) [m] measured points, base axes.
 
     Returns:
-        The diagonal; 1 if all of these coincide.
+        The diagonal; 1 if all these points coincide.
     """
     origins = transforms[..., :3, 3].reshape(-1, 3)
     points = np.concatenate([np.zeros((1, 3)), origins, reference_points])
@@ -151,7 +154,7 @@ def extent_of(transforms: NDArray, reference_points: NDArray) -> float:
 
 
 def _body_length(robot: Robot) -> float:
-    """Return [m] total length of all bodies, at least the largest travel at home."""
+    """Return the total length [m] of all bodies, or the largest travel if larger."""
     lengths = np.linalg.norm(robot.fixed_transforms[:, :3, 3], axis=1).sum()
     slides = [abs(f.position) for f in robot.frames if f.joint == "prismatic"]
     return float(lengths + sum(slides)) or 1.0
@@ -159,7 +162,7 @@ def _body_length(robot: Robot) -> float:
 
 def _within(table: MeasurementTable, name: str, values: NDArray, largest: float,
             expected: str) -> None:  # fmt: skip
-    """Reject the first value that exceeds the largest accepted size."""
+    """Raise BadInput at the first value whose size exceeds the largest accepted one."""
     for i in np.flatnonzero(np.abs(values) > largest * (1 + 1e-9))[:1]:
         message = f"found {values[i]:g}, expected {expected}"
         raise table.bad(int(i), name, message)

@@ -1,6 +1,7 @@
-"""Format of a campaign's table: delimiter, decimal mark and units.
+"""Read the format of a campaign's table: delimiter, decimal mark and units.
 
-``campaign.toml`` declares the format; the defaults are comma, point and SI units.
+The format is declared in ``campaign.toml``.  The defaults are comma, decimal point and
+SI units.
 """
 
 import math
@@ -16,7 +17,7 @@ _ANGLES = {
     "rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180,
     "arcsec": math.pi / 648000,
 }  # fmt: skip
-# factors to SI of the units that each key of [units] accepts; the SI unit is first
+# Factors from the accepted units of each key in [units] to the SI unit, listed first.
 UNITS = {
     "position": _LENGTHS,
     "rotation": _ANGLES,
@@ -37,7 +38,7 @@ class Dialect:
     Attributes:
         delimiter: character between cells.
         decimal: the decimal mark.
-        units: unit by key; keys that are not declared are in SI units.
+        units: mapping from each declared key to its unit; other keys are in SI units.
         motions: unit of each covariate that is a measured motion, by name.
     """
 
@@ -56,16 +57,16 @@ class Dialect:
 
     @property
     def motion_units(self) -> dict[str, str]:
-        """``rad`` or ``m``: the SI unit of each measured motion."""
+        """SI unit, ``rad`` or ``m``, of each covariate that is a measured motion."""
         return {n: "m" if u in _LENGTHS else "rad" for n, u in self.motions.items()}
 
 
 def read_dialect(root: Table) -> Dialect:
-    """Return the format of the table from ``campaign.toml``.
+    """Return the table format that ``campaign.toml`` declares.
 
     Args:
-        root: root of ``campaign.toml``; its optional ``[table]`` and ``[units]`` are
-            read.
+        root: root of ``campaign.toml``; the optional tables ``[table]`` and ``[units]``
+            are read.
 
     Returns:
         The format.
@@ -97,7 +98,7 @@ def read_dialect(root: Table) -> Dialect:
 
 
 def parse_number(cell: str, decimal: str) -> float:
-    """Return the number in a cell; NaN for other text, such as "nan" or "1_000"."""
+    """Return the number in a cell; NaN for any other text, such as "nan" or "1_000"."""
     if decimal != ".":
         cell = cell.replace(".", "?").replace(decimal, ".")
     return float(cell) if _NUMBER.fullmatch(cell) else math.nan

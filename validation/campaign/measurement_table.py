@@ -1,8 +1,7 @@
-"""The table of a campaign: conversion of text to numbers, with checks of every cell.
+"""Read the table of a campaign: convert its text to numbers and check every cell.
 
-The reader accepts only the declared format: ``campaign.toml`` declares delimiter,
-decimal mark and units.  A table in another format is refused, and the message names the
-key that would declare it.
+Delimiter, decimal mark and units are declared in ``campaign.toml``.  A table in another
+format is refused, and the message names the key that declares this format.
 """
 
 import csv
@@ -34,22 +33,23 @@ from forcefit.validation.campaign.dialect import (
     parse_number,
 )
 
-_TEXTS = ("id", "session")  # columns that are not numbers
+_TEXTS = ("id", "session")  # columns that contain text instead of numbers
 
 
 @dataclass(frozen=True, eq=False)
 class MeasurementTable:
-    """A table of numbers in SI units.
+    """Numbers of a campaign's table in SI units.
 
     Attributes:
         file: name of the file, for messages.
         ids: unique label of each row.
-        lines: line of the file on which each row ends, for messages.
-        columns: (R,) values by name of the column, in the order of the file, without
-            ``id``; NaN for an empty cell.
+        lines: number of the line in the file at which each row ends, for messages.
+        columns: mapping from the name of each column except ``id`` to its (R,) values,
+            in the order of the file; an empty cell is NaN.
         dialect: format of the table.
-        sessions: name of the session of each row; empty if the file has none.
-        files: name of each row's file, if there are several files.
+        sessions: name of the session of each row; empty if the file contains no
+            sessions.
+        files: name of the file of each row, if the campaign consists of several files.
     """
 
     file: str
@@ -64,14 +64,14 @@ class MeasurementTable:
         return len(self.ids)
 
     def bad(self, row: int, column: str, message: str) -> BadInput:
-        """Return the error for a cell, to be raised by the caller."""
+        """Return the error for a cell; the caller raises it."""
         place = f"line {self.lines[row]} (id {quoted(self.ids[row])})"
         where = f"{place}, {column}" if column else place
         file = self.files[row] if self.files else self.file
         return BadInput(f"{file}: {where}: {message}")
 
     def stack(self, prefix: str, names: tuple[str, ...], absent: float) -> NDArray:
-        """Return (R, k) columns of a group, with ``absent`` for a missing column."""
+        """Return (R, k) columns ``prefix.name``; ``absent`` fills missing columns."""
         empty = np.full(len(self), absent)
         return np.column_stack([
             self.columns.get(f"{prefix}.{n}", empty) for n in names
@@ -81,11 +81,11 @@ class MeasurementTable:
 def read_table(
     path: Path | str, robot: Robot, dialect: Dialect, points: Iterable[str] = ()
 ) -> MeasurementTable:
-    """Return a table of measurements.
+    """Read a table of measurements.
 
     Args:
         path: a CSV file with a header.
-        robot: robot with actuated joints that may be columns.
+        robot: robot whose actuated joints may occur as columns.
         dialect: format of the table.
         points: names of further measured points.
 
@@ -122,22 +122,23 @@ def read_table(
     for k, name in enumerate(header):
         if name not in _TEXTS:
             table.columns[name] = _numbers(table, robot, name, [row[k] for row in rows])
-    _check_labels(table)  # after the conversion, whose messages name a wrong format
+    _check_labels(table)  # after the conversion, because that reports wrong formats
     return table
 
 
 def join_tables(tables: Sequence[MeasurementTable]) -> MeasurementTable:
-    """Join tables; the rows of a table without sessions are one session.
+    """Join tables; each table without a column ``session`` is one session.
 
     Args:
         tables: tables of one campaign, at least one.
 
     Returns:
-        The joined table; labels begin with the file's name if there are several tables.
+        The joined table.  If there are several tables, each label begins with the name
+        of its file.
 
     Raises:
-        BadInput: a table lacks a column of another one.  Only covariates may be absent
-            from a whole table; they are NaN there.
+        BadInput: a column of one table is missing in another table and is not a
+            covariate.  Missing covariates are filled with NaN.
     """
     if len(tables) == 1:
         return tables[0]
@@ -171,7 +172,7 @@ def join_tables(tables: Sequence[MeasurementTable]) -> MeasurementTable:
 
 
 def _cells(path: Path, dialect: Dialect) -> tuple[list[int], list[list[str]]]:
-    """Return stripped cells, and the line number at the end of each row."""
+    """Return the stripped cells of each row, and the file line where the row ends."""
     lines, rows = [], []
     text = io.StringIO(read_text(path), newline="")
     reader = csv.reader(text, delimiter=dialect.delimiter, strict=True)
@@ -187,7 +188,7 @@ def _cells(path: Path, dialect: Dialect) -> tuple[list[int], list[list[str]]]:
 
 
 def _check_printable(path: Path, line: int, rows: list[list[str]]) -> None:
-    """Reject control characters, including NUL, in the last row read."""
+    """Reject control characters, including NUL, in the row that was read last."""
     header, row = rows[0], rows[-1]
     for k, cell in enumerate(row):
         if not cell.isprintable() and not printable(cell):
@@ -202,7 +203,7 @@ def _check_printable(path: Path, line: int, rows: list[list[str]]) -> None:
 def _header(
     path: Path, names: list[str], robot: Robot, points: tuple[str, ...]
 ) -> list[str]:
-    """Return the header, after a check that every name is the name of a column."""
+    """Return the header after a check that every name is a valid column name."""
     q = [f"q.{f.name}" for f in robot.frames if f.actuated]
     groups: dict[str, tuple[str, ...]] = {
         "pose": POSE, "load": LOAD, "meas": READING, "sigma": READING,
@@ -212,7 +213,7 @@ def _header(
     known = [*_TEXTS, *q, *(f"{g}.{c}" for g, cs in groups.items() for c in cs)]
     known += ["cov.temperature", "cov.time", "cov.approach"]
     if not any(name in known or name.startswith("cov.") for name in names):
-        # the names are not printed, because the file may not be a table
+        # The message does not print the names, because the file may not be a table.
         raise BadInput(
             f"{path}: line 1: found no column of a table of "
             f"measurements{_other(names)}; expected id, q.<frame> or pose.tx "
@@ -237,7 +238,7 @@ def _header(
 
 
 def _passive(name: str, robot: Robot) -> str:
-    """Return reason why a joint of the robot cannot be commanded, if it is passive."""
+    """Return the reason why a joint cannot be commanded, if the joint is passive."""
     frames = {f"q.{f.name}": f for f in robot.frames}
     if name not in frames:
         return ""
@@ -246,7 +247,7 @@ def _passive(name: str, robot: Robot) -> str:
 
 
 def _other(names: list[str]) -> str:
-    """Return the remedy for a header that was read as one cell."""
+    """Return a hint for a header that was read as a single cell."""
     for word, mark in DELIMITERS.items():
         if len(names) == 1 and mark in names[0]:
             return (f"; it contains {word}: if this separates the cells, set "
@@ -255,7 +256,7 @@ def _other(names: list[str]) -> str:
 
 
 def _dialect_hint(row: list[str], expected: int, dialect: Dialect) -> str:
-    """Return the likely cause of a row with another number of cells."""
+    """Return the likely cause of a wrong number of cells in a row."""
     if dialect.delimiter == "," and len(row) > expected:
         return (
             '; if the decimal mark is a comma, separate cells by ";" and set '
@@ -265,7 +266,7 @@ def _dialect_hint(row: list[str], expected: int, dialect: Dialect) -> str:
 
 
 def _check_labels(table: MeasurementTable) -> None:
-    """Reject a missing id, or an id that another row has."""
+    """Reject missing ids and repeated ids."""
     seen: dict[str, int] = {}
     for label, line in zip(table.ids, table.lines, strict=True):
         where = f"{table.file}: line {line}, id"
@@ -282,7 +283,7 @@ def _check_labels(table: MeasurementTable) -> None:
 def _numbers(
     table: MeasurementTable, robot: Robot, name: str, cells: list[str]
 ) -> NDArray:
-    """Return a column in SI units; a missing reading is NaN."""
+    """Return a column as numbers in SI units; an empty reading is NaN."""
     key = _unit_key(name, robot)
     unit = table.dialect.unit(key) if key else ""
     factor = table.dialect.factor(key) if key else 1.0
@@ -310,12 +311,12 @@ def _numbers(
 
 
 def _number_hint(name: str, cell: str, dialect: Dialect) -> str:
-    """Return the likely meaning of a cell that is not a number."""
+    """Return the likely meaning of a cell that cannot be read as a number."""
     other = "," if dialect.decimal == "." else "."
     if math.isfinite(parse_number(cell, other)):
         written = quoted(cell.replace(other, dialect.decimal))
         setting = f'decimal = "{other}" in campaign.toml'
-        # quoted, because the comma would also separate cells
+        # The decimal comma is written in quotes, because the delimiter is a comma too.
         if other == dialect.delimiter:
             setting = f'delimiter = ";", {setting} and separate cells by ";"'
         return (
@@ -329,7 +330,7 @@ def _number_hint(name: str, cell: str, dialect: Dialect) -> str:
 
 
 def _unit_key(name: str, robot: Robot) -> str:
-    """Return the key of ``[units]`` for a column, empty if it has no unit."""
+    """Return the key in ``[units]`` for a column; empty for a pure number."""
     group, _, rest = name.partition(".")
     if group in {"meas", "sigma"}:
         turns = rest.rpartition(".")[2][0] == "r"

@@ -1,6 +1,6 @@
-"""Results on the rows of a campaign as labelled arrays over ``row``.
+"""Convert results for the rows of a campaign to labelled arrays over ``row``.
 
-Column names are those of the file ``measurements.csv`` where it has them.
+The names of the columns are those of the file ``measurements.csv``.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ _UNITS = {"temperature": "K", "time": "s", "approach": "1"}
 
 
 def screw(words: str, meaning: str = "") -> Quantity:
-    """Return a quantity whose values are small screws."""
+    """Return the description of a quantity with small screws as values."""
     return Quantity(words, "rad, m", ("screw",), meaning)
 
 
@@ -28,23 +28,23 @@ def row_dataset(
     values: Mapping[str, Any],
     labels: Mapping[str, Sequence[Any]] = NO_LABELS,
 ) -> "xarray.Dataset":
-    """Return arrays with a row for each row of a campaign.
+    """Return a data set of arrays with one entry for each row of a campaign.
 
     Args:
         campaign: campaign of R rows.
-        values: see :func:`forcefit.assembly.model.tables.labelled`; the first axis of
-            every array has length R.
+        values: arrays as for :func:`forcefit.assembly.model.tables.labelled`; the first
+            axis of every array must have length R.
         labels: labels of further dimensions.
 
     Returns:
-        Data set over ``row``, whose labels are the ids of the rows.
+        Data set over ``row``.  The ids of the rows are its labels.
     """
     data = labelled(values, "row", list(campaign.ids), labels)
     return data.assign_attrs(campaign=campaign.name, robot=campaign.robot.name)
 
 
 def campaign_dataset(campaign: "Campaign") -> "xarray.Dataset":
-    """Return the commands, loads, readings and covariates of a campaign."""
+    """Return a data set of a campaign's commands, loads, readings and covariates."""
     moves = mobile(campaign.robot)
     units = _UNITS | dict(campaign.motion_units)
     at_point = "at the reference point, base axes"

@@ -1,4 +1,4 @@
-"""Use of a corrected robot: predicted readings, corrected commands, new sessions.
+"""Apply a corrected robot: predict readings, correct commands, fit new sessions.
 
-Begin at ``prediction.py``; see ``docs/correction.md``.
+Start with ``prediction.py``; see ``docs/correction.md``.
 """

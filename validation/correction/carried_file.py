@@ -1,4 +1,4 @@
-"""Robot file of a robot fitted to new sessions, and the file of its covariance."""
+"""Save a robot that was fitted to new sessions, together with its covariance."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -21,11 +21,12 @@ from forcefit.validation.diagnosis.saved_covariance import (
 
 
 def save(carried: CarriedRobot, path: Path | str) -> None:
-    """Write the robot in its new sessions, and its covariance in another file.
+    """Write the fitted robot to a file, and its covariance to a second file.
 
     Args:
-        carried: the robot in these sessions.
-        path: path of the robot file; the covariance has the suffix ``.npz``.
+        carried: the robot, fitted to the new sessions.
+        path: path of the robot file.  The file of the covariance has the same name with
+            the suffix ``.npz``.
 
     Raises:
         BadInput: a file cannot be written.
@@ -44,7 +45,7 @@ def covariance_of(carried: CarriedRobot, robot: Robot) -> SavedCovariance:
     """Return the covariance of the parameters that were fitted to the set-up rows.
 
     Args:
-        carried: the robot in these sessions.
+        carried: the robot, fitted to the new sessions.
         robot: the robot as written to its file.
 
     Returns:
@@ -70,7 +71,7 @@ def covariance_of(carried: CarriedRobot, robot: Robot) -> SavedCovariance:
 
 
 def _with_std(robot: Robot, known: SavedCovariance) -> Robot:
-    """Return the robot with the present standard deviations of its functions."""
+    """Return the robot whose functions have the standard deviations of ``known``."""
     functions = list(robot.functions)
     for number, sigma in zip(known.numbers, known.std.tolist(), strict=True):
         if number.kind == FUNCTION:

@@ -1,13 +1,14 @@
-r"""A saved robot in a new session: fit to set-up rows, test on the other rows.
+r"""Fit a saved robot to set-up rows of a new session, and test it on other rows.
 
 The parameters of a session are the pose of the measuring device, the changes with time
 and, if requested, the measured point and the zeros of the joints
-(:mod:`.session_unknowns`).  The robot's parameters have their saved values and
-covariance as prior (:mod:`.machine_numbers`).  Both are fitted to the set-up rows of
-all sessions (:mod:`.session_fit`), and tested on all other rows.
+(:mod:`.session_unknowns`).  The prior of the robot's parameters consists of their saved
+values and covariance (:mod:`.machine_numbers`).  All parameters are fitted to the
+set-up rows of all sessions (:mod:`.session_fit`), and tested on all other rows.  Set-up
+rows are the rows that are measured first to fit a new session.
 
-The set-up rows are insufficient if the covariance of the fit allows larger changes of
-the other rows than the residual of the set-up rows with the saved robot.
+The set-up rows are insufficient if the uncertainty of the fit, propagated to the other
+rows, exceeds the residual of the set-up rows with the saved robot.
 """
 
 import math
@@ -46,16 +47,17 @@ class Carried:
         unknowns: the k fitted parameters.
         values: (k,) [rad, m] fitted values.
         std: (k,) standard deviations of the values.
-        rows: number of set-up rows and number of other rows.
+        rows: number of set-up rows, and number of other rows.
         error: error on the other rows.
-        declared: error of the campaign's declared robot, fitted in the same way.
+        declared: error of the robot that the campaign declares, fitted in the same way.
         uncertainty: [m] rms uncertainty of the predicted points of the other rows.
         left: [m] rms residual of the set-up rows.
-        held: [m] rms residual of the set-up rows with the saved robot's parameters.
-        open_: names of the most uncertain parameters, if the set-up rows are
-            insufficient.
+        held: [m] rms residual of the set-up rows if the robot's parameters are fixed at
+            their saved values.
+        open_: names of the most uncertain parameters if the set-up rows are
+            insufficient, otherwise empty.
         left_behind: changes with time in the original session that are not fitted here,
-            because they need a clock.
+            because the new session has no column ``cov.time``.
     """
 
     session: str | None
@@ -75,23 +77,23 @@ class Carried:
 
     @property
     def suffices(self) -> bool:
-        """Whether the set-up rows are sufficient."""
+        """Whether the set-up rows determine the fitted parameters accurately enough."""
         return not self.open_
 
     @property
     def better(self) -> bool:
-        """Whether the robot predicts the other rows better than the declared one."""
+        """Whether this robot predicts the other rows better than the declared robot."""
         error, declared = self.error.normalised, self.declared.normalised
         return math.isnan(declared) or error <= declared
 
 
 @dataclass(frozen=True, eq=False)
 class CarriedRobot:
-    """A robot in its new sessions.
+    """A robot that was fitted to new sessions.
 
     Attributes:
-        fit: fit of the sessions' values and of the robot's own numbers.
-        sessions: the sessions, tested on their other rows.
+        fit: fitted parameters of the sessions and of the robot.
+        sessions: results of the sessions, tested on the rows that were not fitted.
     """
 
     fit: SessionsFit
@@ -99,7 +101,7 @@ class CarriedRobot:
 
     @property
     def good(self) -> bool:
-        """Whether set-up rows are sufficient and the robot beats the declared one."""
+        """Whether set-up rows suffice and the robot is better than the declared one."""
         return all(one.suffices and one.better for one in self.sessions)
 
 
@@ -109,7 +111,7 @@ def carry(
     setup: NDArray,
     fitted: Sequence[str] = ("registration",),
 ) -> CarriedRobot:
-    """Fit a saved robot to the set-up rows of sessions, and test it on the others.
+    """Fit a saved robot to the set-up rows of sessions, and test it on all other rows.
 
     Args:
         campaign: campaign with the saved robot.
@@ -121,7 +123,7 @@ def carry(
         The robot in these sessions, and the result of every session.
 
     Raises:
-        BadInput: a session has no set-up rows, or no other rows.
+        BadInput: a session consists only of set-up rows, or contains none.
     """
     clock = "time" in campaign.covariates
     unknowns = session_unknowns(campaign.robot, fitted, clock=clock)
@@ -147,7 +149,7 @@ def _sessions(campaign: Campaign) -> tuple[str | None, ...]:
 
 
 def _of(campaign: Campaign, session: str | None, setup: NDArray) -> NDArray:
-    """Return (R,) bool of a session's rows; some but not all must be set-up rows."""
+    """Return (R,) bool of a session's rows; check that some, not all, are set-up."""
     own = campaign.in_session(session)
     if setup[own].any() and not setup[own].all():
         return own
@@ -159,14 +161,14 @@ def _of(campaign: Campaign, session: str | None, setup: NDArray) -> NDArray:
 
 
 def _left_behind(robot: Robot, unknowns: SessionUnknowns) -> tuple[str, ...]:
-    """Return the titles of changes with time that a session does not fit."""
+    """Return the titles of changes with time that are not fitted in a new session."""
     drift, functions = of_one_session(robot)
     whole = [DRIFT] if drift and unknowns.constant is None else []
     return (*whole, *(f.title for f in functions if f not in unknowns.functions))
 
 
 def _judged(fit: SessionsFit, other: SessionsFit, number: int) -> Carried:
-    """Return one session, tested on the rows that were not fitted."""
+    """Return the result of one session, tested on the rows that were not fitted."""
     one, alike = fit.sessions[number], other.sessions[number]
     campaign, setup, values = one.campaign, one.rows, fit.values(number)
     read = one.read(fit.robot, values)
@@ -180,7 +182,7 @@ def _judged(fit: SessionsFit, other: SessionsFit, number: int) -> Carried:
     ]
     level = max(*off, float(np.median(campaign.sigma[own])))
     cells = campaign.cells & ~setup[:, None]
-    cells[:, :3] &= not cells[:, 3:].any()  # rotations only without positions
+    cells[:, :3] &= not cells[:, 3:].any()  # positions only, if there are any
     variance, blame = fit.spread(number, cells)
     names = [*(name for _, name in one.unknowns.names), _MACHINE]
     worst = np.flatnonzero(blame > 0.1 * blame.max()).tolist()
@@ -202,13 +204,13 @@ def _judged(fit: SessionsFit, other: SessionsFit, number: int) -> Carried:
 
 
 def carried_robot(carried: CarriedRobot) -> Robot:
-    """Return the robot in its new sessions, without the values of its original session.
+    """Return the fitted robot without the parameters of its original session.
 
     Args:
-        carried: the robot in these sessions.
+        carried: the robot, fitted to the new sessions.
 
     Returns:
-        The robot, as saved.
+        The robot as it is written to a file.
     """
     robot = without_session(carried.fit.robot)
     for number, one in enumerate(carried.sessions):
@@ -222,7 +224,7 @@ def carried_robot(carried: CarriedRobot) -> Robot:
 
 
 def _added(before: Any, more: dict[str, dict[str, float]]) -> dict[str, Any]:
-    """Return effects with values added to their parameters; a drift is replaced."""
+    """Return effects with ``more`` added to their parameters; a drift is replaced."""
     merged = {name: dict(values) for name, values in before.items()}
     for effect, values in more.items():
         own = merged.setdefault(effect, {})

@@ -1,4 +1,4 @@
-"""New sessions of a robot, as plain values and as text."""
+"""Convert the results of new sessions to plain values and to text."""
 
 from dataclasses import asdict
 from typing import Any
@@ -8,7 +8,7 @@ from forcefit.validation.correction.carrying import CarriedRobot
 
 
 def table(carried: CarriedRobot) -> dict[str, Any]:
-    """Return plain values: sessions, their fitted values and errors on other rows."""
+    """Return plain values: sessions, fitted parameters and errors on the other rows."""
     return {
         "machine": {
             "numbers": len(carried.fit.machine.numbers),
@@ -44,7 +44,7 @@ def table(carried: CarriedRobot) -> dict[str, Any]:
 
 
 def text(carried: CarriedRobot) -> str:
-    """Return the sessions as text."""
+    """Return the results of the sessions as text."""
     lines = []
     if carried.fit.machine.numbers:
         lines.append(

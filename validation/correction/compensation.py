@@ -1,21 +1,21 @@
-r"""Commands with which a corrected robot reaches the pose of the declared one.
+r"""Compute commands with which a corrected robot reaches the pose of the declared one.
 
-For a command q a controller moves the drives so that the nominal robot would have the
-wanted pose.  The machine deviates from this pose by d(q), which the corrected model
-predicts.  Gauss-Newton's method solves for commands that cancel this deviation, for all
-rows together:
+The controller computes commands q for which the nominal robot has the wanted pose.  The
+machine deviates from this pose by d(q), which the corrected model predicts.  The
+Gauss-Newton method computes, for all rows together, commands for which the machine has
+the wanted pose:
 
-    nominal pose(q) with deviation d(q)  =  pose wanted
+ nominal pose(q) changed by the deviation d(q)  =  wanted pose
 
 ======  =============  ==========  ===================================================
 symbol  code           shape       meaning
 ======  =============  ==========  ===================================================
-q       ``drives``     (R, d)      commands of the driven joints
-e       ``error``      (R, 6)      from the machine's pose to the wanted pose
-J       ``jacobian``   (R, 6, d)   derivative of the platform's pose by the drives
+q ``drives`` (R, d) commands of the driven joints e ``error`` (R, 6) motion from the
+machine's pose to the wanted pose J ``jacobian`` (R, 6, d) derivative of the platform's
+pose by the drives
 ======  =============  ==========  ===================================================
 
-With fewer than six drives, positions have precedence.
+If a robot has fewer than six drives, correcting positions has priority over rotations.
 
 Sources:
     Nocedal, Wright, Numerical Optimization, section 10.3 (Gauss-Newton).
@@ -49,7 +49,7 @@ _STEPS = 25
 _HALVINGS = 8
 _STILL = 1e-10  # [rad or m] smaller changes of a command count as zero
 _TURN = np.pi  # [rad] largest accepted correction of a revolute drive
-# factor on the weight of rotations, if the drives cannot correct all six components
+# Factor on the weight of rotations if the drives cannot correct all six components.
 _LOW = 1e-4
 
 
@@ -59,18 +59,19 @@ class Compensation:
 
     Attributes:
         targets: the commands at which the nominal robot would have the wanted poses.
-        drives: names of the d driven joints.
+        drives: names of the d actuated joints.
         commands: (R, d) [rad or m] corrected commands; rows without a solution are
             unchanged.
         transforms: (R, n, 4, 4) nominal frames at the commands.
         coordinates: (R, n) [rad or m] coordinate of every joint at the commands.
-        before: (R, 6) [rad, m] distance of the machine from the wanted pose for the
+        before: (R, 6) [rad, m] deviation of the machine from the wanted pose for the
             given commands, at the reference point, base axes.
-        after: (R, 6) [rad, m] the same distance for the corrected commands.
+        after: (R, 6) [rad, m] deviation of the machine from the wanted pose for the
+            corrected commands.
         spread: (R, 6) [rad, m] standard deviation of ``after`` due to the uncertainty
             in the robot's file.
         limited: (R,) bool, True where a joint's limit prevents the correction.
-        reason: (R,) reason why there is no solution, else empty.
+        reason: (R,) reason why a row has no solution; empty if it has one.
     """
 
     targets: Campaign
@@ -87,7 +88,7 @@ class Compensation:
     __repr__, _repr_html_ = short_repr, html_table
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return a data set over ``row``: commands, offsets and errors."""
+        """Return an xarray data set over ``row``: commands, offsets and errors."""
         from forcefit.validation.correction.compensation_table import (
             compensation_dataset,
         )
@@ -95,7 +96,7 @@ class Compensation:
         return compensation_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a row for each command, columns (variable, component)."""
+        """Return a pandas table, one row per command, columns (variable, component)."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "row")
@@ -107,18 +108,20 @@ class Compensation:
 
 
 def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
-    """Return commands at which the corrected robot has the pose of the nominal one.
+    """Return commands with which the corrected robot reaches the nominal poses.
 
     Args:
         targets: commands for the corrected robot.
-        as_read: whether the device's reading becomes zero.  Otherwise effects of the
-            device itself are not corrected.
+        as_read: whether the commands also cancel effects of the measuring device, so
+            that its readings become zero.  Otherwise only deviations of the machine are
+            corrected.
 
     Returns:
-        The commands; a row without a solution keeps its command.
+        The corrected commands; the command of a row without a solution is unchanged.
 
     Raises:
-        BadInput: an effect of the robot depends on a covariate that the targets lack.
+        BadInput: an effect of the robot depends on a covariate that is missing in the
+            targets.
     """
     targets = _each_once(targets)
     robot, driven = targets.robot, _driven(targets.robot)
@@ -144,7 +147,7 @@ def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
             if not worse.any():
                 break
             share = np.where(worse, share / 2, share)
-        # the residual is due to rounding or to joint limits
+        # The remaining error is caused by rounding or by joint limits.
         going &= moving & ~worse
         q = np.where(going[:, None], tried, q)
         standing = next_ if going[moving].all() else machine.at(q, targets)[0]
@@ -173,7 +176,7 @@ def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
 
 
 def _each_once(targets: Campaign) -> Campaign:
-    """Return the commands once each, instead of once for each measured point."""
+    """Return each command once, instead of once for each measured point."""
     if targets.point is None:
         return targets
     labels = tuple(dict.fromkeys(targets.labels))
@@ -182,12 +185,12 @@ def _each_once(targets: Campaign) -> Campaign:
 
 
 def _driven(robot: Robot) -> NDArray:
-    """Return the (d,) indices of the driven frames."""
+    """Return the (d,) indices of the frames with actuated joints."""
     return np.flatnonzero([frame.actuated for frame in robot.frames])
 
 
 def _limits(robot: Robot, driven: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the (d,) smallest and (d,) largest commands."""
+    """Return the (d,) lower and (d,) upper limits of the commands."""
     given = [robot.frames[i].limits or (-np.inf, np.inf) for i in driven]
     least, most = np.array(given).reshape(-1, 2).T
     return least, most
@@ -196,10 +199,10 @@ def _limits(robot: Robot, driven: NDArray) -> tuple[NDArray, NDArray]:
 def _too_far(
     robot: Robot, driven: NDArray, change: NDArray, reason: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return the rows with corrections (R, d) larger than the robot, and the reasons.
+    """Find rows with corrections (R, d) larger than the robot, and the reasons.
 
     Returns:
-        (R,) bool, and (R,) texts.
+        (R,) bool, True for such rows, and (R,) texts of the reasons.
     """
     slides = np.array([robot.frames[i].joint == "prismatic" for i in driven])
     most = np.where(slides, size_of(robot), _TURN)
@@ -217,7 +220,7 @@ def _too_far(
 
 
 def _astray(robot: Robot, error: NDArray, reason: NDArray) -> NDArray:
-    """Return (R,) texts, one for each row with an error (R, 6) beyond the robot."""
+    """Return (R,) reasons, one for each error (R, 6) larger than the robot."""
     size, reason = size_of(robot), reason.copy()
     off = np.linalg.norm(error[:, 3:], axis=1)
     for row in np.flatnonzero((off > size) & (reason == "")):
@@ -229,7 +232,7 @@ def _astray(robot: Robot, error: NDArray, reason: NDArray) -> NDArray:
 
 
 def _weights(robot: Robot, drives: int) -> NDArray:
-    """Return the (6,) [m/rad and 1] weights of the components of an error."""
+    """Return the (6,) [m/rad and 1] weights of the components of a pose error."""
     turn = size_of(robot) * (1.0 if drives >= 6 else _LOW)
     return np.repeat([turn, 1.0], 3)
 
@@ -240,7 +243,7 @@ class _Standing:
 
     Attributes:
         campaign: the commands.
-        conditions: conditions of the measurement at the commands.
+        conditions: postures, loads and covariates of the measurement at the commands.
         error: (R, 6) [rad, m] motion to the wanted pose; NaN without a solution.
         jacobian: (R, 6, d) derivative of the reference point's pose by the drives.
     """
@@ -251,7 +254,7 @@ class _Standing:
     jacobian: NDArray
 
     def size(self, weights: NDArray) -> NDArray:
-        """Return the (R,) [m] weighted length of the error."""
+        """Return the (R,) [m] weighted norm of the error."""
         return np.linalg.norm(self.error * weights, axis=1)
 
 
@@ -262,7 +265,7 @@ class _Machine:
     Attributes:
         targets: the given commands.
         goal: (R, 4, 4) wanted platform poses.
-        as_read: whether effects of the device are corrected too.
+        as_read: whether effects of the measuring device are corrected too.
     """
 
     targets: Campaign
@@ -270,7 +273,7 @@ class _Machine:
     as_read: bool
 
     def conditions(self, campaign: Campaign) -> Conditions:
-        """Return the conditions of commands, read at the reference point."""
+        """Return the measurement's conditions at commands, for the reference point."""
         conditions = replace(finite_conditions(campaign), target=None)
         if self.as_read:
             return conditions
@@ -278,7 +281,7 @@ class _Machine:
         return replace(conditions, base=still, tool=still[:3], reading=0.0)
 
     def at(self, q: NDArray, last: Campaign) -> tuple[_Standing, NDArray]:
-        """Return the machine's state at commands, and (R,) reasons for failure.
+        """Return the state of the machine at commands, and (R,) reasons of failures.
 
         Args:
             q: (R, d) commands.
@@ -298,7 +301,7 @@ class _Machine:
 
 
 def _commanded(last: Campaign, q: NDArray) -> tuple[Campaign, NDArray]:
-    """Return the commands as a campaign; unreachable ones are unchanged."""
+    """Return a campaign with new commands; unreachable commands are not changed."""
     robot = last.robot
     driven = _driven(robot)
     wanted = np.full((len(q), len(robot.frames)), np.nan)
@@ -320,7 +323,7 @@ def _commanded(last: Campaign, q: NDArray) -> tuple[Campaign, NDArray]:
 
 
 def _between(conditions: Conditions, deviation: NDArray, goal: NDArray) -> NDArray:
-    """Return the (R, 6) motion from the present to the wanted pose, base axes."""
+    """Return the (R, 6) motion from the present pose to the wanted pose, base axes."""
     nominal = conditions.postures.platform
     arm = nominal[:, :3, :3] @ conditions.point
     R = rotation_matrix(deviation[:, :3]) @ nominal[:, :3, :3]

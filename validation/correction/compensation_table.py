@@ -1,4 +1,4 @@
-"""Results of a compensation for controllers, as plain values and as text."""
+"""Convert the results of a compensation to tables for controllers and to text."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -26,8 +26,9 @@ def command_table(compensation: "Compensation") -> str:
         compensation: result of :func:`.compensation.compensate`.
 
     Returns:
-        CSV with ``id``, ``q.*`` or ``pose.*``, and the given loads and covariates; the
-        file can be commanded, measured and compensated again.
+        CSV with ``id``, ``q.*`` or ``pose.*``, and the given loads and covariates.  A
+        controller can execute this file, and after a measurement it can be compensated
+        again.
     """
     targets = compensation.targets
     platform = compensation.transforms[:, targets.robot.index(targets.robot.platform)]
@@ -51,13 +52,13 @@ def command_table(compensation: "Compensation") -> str:
 def offset_table(compensation: "Compensation") -> str:
     """Return the controller's offsets, and the error before and after, as a table.
 
-    compensation: result of :func:`.compensation.compensate`.
-        compensation: compensation of any targets.
+    Args:
+        compensation: result of :func:`.compensation.compensate`.
 
     Returns:
-        CSV with ``id``, ``offset.<drive>`` [rad or m], ``before`` and ``after`` in
-        position [m] and rotation [rad], and the standard deviation ``spread`` [m] of
-        the position after.
+        CSV with ``id``, ``offset.<drive>`` [rad or m], the errors ``before`` and
+        ``after`` correction in position [m] and rotation [rad], and the standard
+        deviation ``spread`` [m] of the position after correction.
     """
     columns: dict[str, Any] = {
         f"offset.{n}": x
@@ -71,7 +72,7 @@ def offset_table(compensation: "Compensation") -> str:
 
 
 def compensation_dataset(compensation: "Compensation") -> "xarray.Dataset":
-    """Return a compensation over ``row``.
+    """Return a compensation as a data set over ``row``.
 
     Args:
         compensation: result of :func:`.compensation.compensate`.
@@ -102,7 +103,7 @@ def compensation_dataset(compensation: "Compensation") -> "xarray.Dataset":
 
 
 def _text(compensation: "Compensation", columns: dict[str, Any]) -> str:
-    """Return the columns as CSV with their names."""
+    """Return the columns as CSV with a header of their names."""
     rows = {
         label: {
             name: values[i] if name == "session" else float(values[i])
@@ -125,8 +126,9 @@ def summary(
 
     Returns:
         Plain values.  ``expected`` combines the error after correction, the standard
-        deviation by the file and the unexplained error of the diagnosis; it is None if
-        neither the file nor ``diagnosed`` has data.
+        deviation of the parameters in the file, and the unexplained error of the
+        diagnosis.  ``expected`` is None if neither the file nor ``diagnosed`` contains
+        this error.
     """
     ids = compensation.targets.ids
     record = compensation.targets.robot.diagnosis
@@ -173,7 +175,7 @@ def _unexplained(
 
 
 def _sizes(error: NDArray) -> dict[str, float | None]:
-    """Return the rms of positions and of rotations; None without values."""
+    """Return the rms of positions and of rotations; None for rows without values."""
 
     def rms(part: NDArray) -> float | None:
         known = part[np.isfinite(part).all(axis=1)]
@@ -183,7 +185,7 @@ def _sizes(error: NDArray) -> dict[str, float | None]:
 
 
 def summary_text(compensation: "Compensation", table: Mapping[str, Any]) -> str:
-    """Return the text of ``table``, the result of :func:`summary`."""
+    """Return ``table``, the result of :func:`summary`, as text."""
     lines = [f"{table['rows']} commands, drives {', '.join(compensation.drives)}"]
     says = {
         "before": "as commanded", "after": "corrected", "spread": "spread of the model",

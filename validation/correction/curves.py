@@ -1,7 +1,8 @@
-"""Functions of a robot's file as curves, with bands of uncertainty.
+"""Compute curves of the functions in a robot file, with their uncertainty.
 
-A function with memory is plotted as its response to a unit step over time.  A function
-of the direction of motion is plotted for motion from below.
+Functions describe deviations that depend on temperature, time, load or position.  If a
+function has memory, its response to a unit step is plotted over time.  A function that
+depends on the direction of motion is plotted for an approach from below.
 """
 
 from collections.abc import Mapping
@@ -31,9 +32,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _POINTS = 181
-_SHOWN = 13  # number of points of a curve in a text
-_LATE = 4.0  # plotted duration, in time constants or periods
-# half of the plotted range of each variable, in its unit
+_SHOWN = 13  # number of points of each curve in the text
+_LATE = 4.0  # [time constants or periods] plotted duration
+# Half of the plotted range of each variable, in the unit of the variable.
 _RANGES = {"temperature": 10.0, "approach": 1.0}
 _LOAD = 100.0  # [N, N m] half of the plotted range of a load
 _TRAVEL = 0.5  # [m] half of the plotted range of a position
@@ -41,19 +42,19 @@ _TRAVEL = 0.5  # [m] half of the plotted range of a position
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Curve of one component of a function.
+    """Values of one component of a function along one variable.
 
     Attributes:
         function: the function.
-        component: component of the screw or compliance.
-        variable: variable along which it is plotted.
-        beside: (name, value) of a second variable, which is fixed; None if there is
-            none.
+        component: component of the screw or compliance that the function returns.
+        variable: variable on the horizontal axis.
+        beside: (name, value) of the second variable, which is constant along the curve;
+            None for a function of one variable.
         x: (k,) values of the variable, in its unit.
-        values: (k,) values of the component [rad, m, N m, N], or per wrench for a
+        values: (k,) values of the component [rad, m, N m, N]; divided by N or N m for a
             compliance.
         std: (k,) standard deviations; zero if the file states none.
-        units: unit of x and unit of the values.
+        units: unit of ``x``, and unit of ``values``.
     """
 
     function: Function
@@ -75,12 +76,12 @@ def curves_of(
 
     Args:
         robot: robot with its functions.
-        over: smallest and largest value by variable; the default is a full turn, the
-            knots of a spline, or a typical range.
+        over: mapping from a variable to its smallest and largest plotted value.  The
+            default is a full turn, the range of a spline's knots, or a typical range.
 
     Returns:
-        One curve for each component; with two variables, one for each of three values
-        of the second variable.
+        One curve for each component.  For a function of two variables, one curve for
+        each component and each of three values of the second variable.
     """
     curves = []
     for function in robot.functions:
@@ -98,7 +99,7 @@ def curves_of(
 
 
 def _variables(function: Function) -> tuple[str, str]:
-    """Return the plotted variable, and the second variable if there is one."""
+    """Return the plotted variable, and a second variable if there is one."""
     first, *rest = function.variables
     if function.form in {"lag", "creep"}:
         return "time", ""
@@ -111,7 +112,7 @@ def _curve(
     robot: Robot, function: Function, component: str, along: str,
     fixed: tuple[str, float] | None, x: NDArray,
 ) -> Curve:  # fmt: skip
-    """Return one curve, with standard deviations by its parameters' covariance."""
+    """Return one curve with standard deviations from its parameters' covariance."""
     values = _values(function, component, x, fixed)
     numbers, C = _covariance_of(robot, function)
     slopes = np.zeros((len(numbers), len(values)))
@@ -152,7 +153,7 @@ def _covariance_of(robot: Robot, function: Function) -> tuple[list[str], NDArray
 def _values(
     function: Function, component: str, x: NDArray, fixed: tuple[str, float] | None
 ) -> NDArray:
-    """Return the function's values along x."""
+    """Return the values of a component of the function along x."""
     own = parameters_of(function, component)
     inputs = [x]
     if function.form in {"lag", "creep"}:
@@ -239,7 +240,7 @@ def text(curves: list[Curve]) -> str:
 
 
 def figure_of(curves: list[Curve]) -> "Figure":
-    """Return a figure: a panel for each curve, with a band of two standard deviations.
+    """Plot each curve in its own panel, with a band of two standard deviations.
 
     Args:
         curves: result of :func:`curves_of`, at least one curve.

@@ -1,9 +1,10 @@
-r"""Prior of the machine's parameters in a new session: saved values and covariance.
+r"""Compute the prior of a machine's parameters in a new session.
 
-The geometric errors, compliances, effects and functions of a saved robot are known with
-the covariance C of the fit.  This is their prior in another session.  The machine may
-have changed by more than this uncertainty, so the prior covariance is k C; k is chosen
-by cross-validation on the set-up rows (:mod:`.session_fit`).
+The file of a saved robot contains its geometric errors, compliances, effects and
+functions, and the covariance C of their fit.  The machine may have changed by more than
+this uncertainty before the new session.  Therefore the prior mean is the saved values
+and the prior covariance is k C. The factor k is chosen by cross-validation on the
+set-up rows (:mod:`.session_fit`).
 
 ======  =============  =========  ====================================================
 symbol  code           shape      meaning
@@ -28,7 +29,8 @@ from forcefit.validation.diagnosis.saved_covariance import (
     known_covariance,
 )
 
-# relative to the largest eigenvalue of the correlations; smaller ones are rounding
+# Eigenvalues of the correlations below this fraction of the largest one are rounding
+# errors.
 _RANK = 1e-10
 
 
@@ -39,7 +41,7 @@ class MachineNumbers:
     Attributes:
         robot: the saved robot.
         numbers: the m parameters.
-        root: (m, r) factor of their covariance.
+        root: (m, r) factor L of their covariance L L'.
     """
 
     robot: Robot
@@ -61,7 +63,8 @@ class MachineNumbers:
             u: (r,).
 
         Returns:
-            The robot; a parameter that cannot be negative is multiplied by a factor.
+            The robot.  A parameter that cannot be negative is multiplied by a positive
+            factor instead of adding the change.
         """
         robot = self.robot
         if not np.any(u):
@@ -83,7 +86,7 @@ def machine_numbers(robot: Robot) -> MachineNumbers:
         pose of a measuring device.
 
     Raises:
-        BadInput: the covariance that the file names cannot be read.
+        BadInput: the file of the covariance cannot be read.
     """
     known = known_covariance(robot)
     own = np.array([_is_shared(n, robot) for n in known.numbers], dtype=bool)
@@ -107,7 +110,7 @@ def _is_shared(number: Number, robot: Robot) -> bool:
 
 
 def _possible(number: Number, robot: Robot, by: float) -> float:
-    """Return a change that keeps a parameter in its possible range."""
+    """Return a change of a parameter that does not leave its admissible range."""
     value = number.of(robot)
     if number.kind == EFFECT and value > 0.0:
         unknowns = LIBRARY[number.owner].unknowns(robot)
@@ -117,18 +120,19 @@ def _possible(number: Number, robot: Robot, by: float) -> float:
 
 
 def unchanging(robot: Robot) -> MachineNumbers:
-    """Return a robot whose parameters are taken as exact."""
+    """Return the robot without any uncertainty of its parameters."""
     return MachineNumbers(robot, (), np.zeros((0, 0)))
 
 
 def renumbered(machine: MachineNumbers) -> list[Number]:
-    """Return the parameters with new indices, without those of changes in time.
+    """Return the parameters, renumbered after removing the functions of time.
 
     Args:
         machine: parameters of a saved robot.
 
     Returns:
-        The same parameters; functions are numbered without the functions of time.
+        The same parameters.  The indices of functions count only functions that do not
+        depend on time.
     """
     own, places = of_one_session(machine.robot)[1], dict[str, str]()
     for place, function in enumerate(machine.robot.functions):

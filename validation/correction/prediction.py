@@ -1,4 +1,4 @@
-"""Readings that a robot predicts for commands, with or without measurements."""
+"""Predict the readings of a robot for commands, with or without measurements."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -28,27 +28,28 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_MOVED = 3.0  # factor on the residual above which the measuring device has been moved
+_MOVED = 3.0  # a residual above this factor shows that the device was moved
 
 
 @dataclass(frozen=True, eq=False)
 class PredictedReadings:
-    """Predicted readings for commands.
+    """Readings that a robot predicts for commands.
 
     Attributes:
         commands: the commands, R rows.
-        prediction: the robot's readings.
-        error: error of the readings minus the predicted ones; NaN where not measured.
+        prediction: the predicted readings.
+        error: measured readings minus predicted readings; NaN for components that were
+            not measured.
         spread: (R, 6) [rad, m] standard deviation of the prediction due to the
             uncertainty in the robot's file.
         noise: (R, 6) [rad, m] standard deviation of a reading about the machine's true
             deviation; NaN if neither the table nor the robot's file states it.
-        extrapolated: (R,) names of variables outside the range in which the robot was
-            identified, or empty.
-        registration: ``"known"``, ``"of the robot file"``, ``"fitted to these rows"``
-            or ``"none"``.
-        point: measured point of the identification, if the readings are of another
-            point.
+        extrapolated: (R,) names of the variables whose values are outside the range in
+            which the robot was identified; empty if there are none.
+        registration: source of the pose of the measuring device: ``"known"``, ``"of the
+            robot file"``, ``"fitted to these rows"`` or ``"none"``.
+        point: measured point for which the robot was identified, if the readings belong
+            to a different point.
     """
 
     commands: Campaign
@@ -63,7 +64,7 @@ class PredictedReadings:
     __repr__, _repr_html_ = short_repr, html_table
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return a data set over ``row``: measured and predicted readings."""
+        """Return an xarray data set over ``row``: measured and predicted readings."""
         return row_dataset(
             self.commands,
             {
@@ -77,13 +78,13 @@ class PredictedReadings:
         )
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a row for each reading, columns (variable, component)."""
+        """Return a pandas table, one row per reading, columns (variable, component)."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "row")
 
     def table(self) -> dict[str, Any]:
-        """Return plain values."""
+        """Return the predictions as plain values."""
         rows = zip(self.commands.ids, self.prediction.reason, strict=True)
         far = zip(self.commands.ids, self.extrapolated, strict=True)
         missing = list(self.commands.robot.diagnosis.get("not_measured", []))
@@ -114,9 +115,10 @@ def _both(values: NDArray) -> dict[str, float]:
 def predict(commands: Campaign) -> PredictedReadings:
     """Return the readings of a campaign's robot for its commands.
 
-    An unknown registration is taken from the robot's file.  It is fitted to the
-    measured rows if the file has none, or if the residual of these rows shows that the
-    device was moved.
+    The registration is the pose of the measuring device.  An unknown registration is
+    read from the robot file.  The registration is fitted to the measured rows if the
+    file contains none, or if the residual of these rows shows that the device was
+    moved.
 
     Args:
         commands: campaign with the robot, its effects and its rows.
@@ -125,7 +127,8 @@ def predict(commands: Campaign) -> PredictedReadings:
         The predicted readings with their uncertainty.
 
     Raises:
-        BadInput: the registration is unknown, and the rows do not determine it.
+        BadInput: the registration is unknown, and the rows do not determine the pose of
+            the measuring device.
     """
     conditions, registration = _registered(commands, finite_conditions(commands))
     prediction = predict_rows(conditions)
@@ -155,7 +158,7 @@ _FITTED = "fitted to these rows"
 
 
 def _registered(commands: Campaign, conditions: Conditions) -> tuple[Conditions, str]:
-    """Return the conditions with the measuring frame, and the source of its pose."""
+    """Return the conditions with the device's pose, and the source of this pose."""
     if commands.registration == "known":
         return conditions, "known"
     carried = np.broadcast_to(conditions.base, (len(commands), 6)).any(axis=1).all()
@@ -179,7 +182,7 @@ def _registered(commands: Campaign, conditions: Conditions) -> tuple[Conditions,
 
 
 def _unplaced(robot: Robot) -> Robot:
-    """Return the robot without the pose of any measuring frame."""
+    """Return the robot without the poses of measuring devices."""
     for session in (None, *robot.session_effects):
         effects = {name: dict(v) for name, v in effects_in(robot, session).items()}
         for name in BASE:
@@ -189,7 +192,7 @@ def _unplaced(robot: Robot) -> Robot:
 
 
 def _noise(commands: Campaign) -> NDArray:
-    """Return (R, 6) [rad, m] scatter of a reading: sigma, or that of held-out rows."""
+    """Return (R, 6) [rad, m] noise: sigma, or the scatter of held-out rows."""
     record = commands.robot.diagnosis
     known = [record.get("noise_rotation"), record.get("noise_position")]
     sizes = [x if isinstance(x, float) else np.nan for x in known]
@@ -203,11 +206,11 @@ def reading_names(commands: Campaign) -> list[tuple[str, str, int]]:
     """Return the columns of a table of readings as triples: column, point, component.
 
     Args:
-        commands: the rows of the table; components that no row measured are left out,
-            unless no component was measured.
+        commands: the rows of the table.  Components that were not measured in any row
+            are omitted, unless the table contains no measurement at all.
 
     Returns:
-        A triple for each column.
+        One triple for each column.
     """
     points = [""]
     if commands.point is not None:
@@ -234,10 +237,10 @@ def reading_table(predicted: PredictedReadings) -> str:
         predicted: result of :func:`predict`.
 
     Returns:
-        CSV; a cell is empty without a solution.  If the robot's file has uncertainties,
-        the columns ``std.`` and ``noise.`` of every reading follow, and
-        ``extrapolated`` with the names of variables outside the range in which the
-        robot was identified.
+        CSV. The cells of a row without a solution are empty.  If the robot file
+        contains uncertainties, columns ``std.`` and ``noise.`` for every reading
+        follow.  The column ``extrapolated`` lists the variables whose values are
+        outside the range in which the robot was identified.
     """
     commands, deviations = predicted.commands, predicted.prediction.deviation
     columns = reading_names(commands)
@@ -265,7 +268,7 @@ def csv_text(rows: Mapping[str, Mapping[str, object]], columns: Sequence[str]) -
     """Return a table with labelled rows as CSV.
 
     Args:
-        rows: for each label, the cells by name of the column.
+        rows: mapping from each label to the cells of its row, by name of the column.
         columns: names of the columns after ``id``, in order.
 
     Returns:
@@ -278,7 +281,7 @@ def csv_text(rows: Mapping[str, Mapping[str, object]], columns: Sequence[str]) -
 
 
 def _cell(value: object) -> str:
-    """Return a number with ten digits, or a text unchanged."""
+    """Format a number with ten digits; return a text unchanged."""
     if not isinstance(value, float):
         return str(value)
     return "" if np.isnan(value) else f"{value:.10g}"

@@ -1,24 +1,26 @@
-r"""Fit of sessions to their set-up rows: parameters of sessions and of the machine.
+r"""Fit the parameters of sessions and of the machine to set-up rows.
 
 ======  =============  =========  ====================================================
 symbol  code           shape      meaning
 ======  =============  =========  ====================================================
-x       ``x``          (k,)       parameters of every session, then u of the machine
-J       ``slopes``     (R,6,p+r)  derivative of the readings by a session's p
+x ``x`` (k,) parameters of all sessions, then u of the machine J ``slopes`` (R,6,p+r)
+derivative of the readings by a session's p
                                   values and of u
-C       ``covariance`` (k, k)     of x
+C ``covariance`` (k, k) covariance of x
 ======  =============  =========  ====================================================
 
-A session has parameters of its own (:mod:`.session_unknowns`), with a flat prior or a
-Gaussian one; u (:mod:`.machine_numbers`) is common to all sessions, with prior N(0, k).
-The diagnosis of the robot gives the ratio tau between the scatter of the readings about
-the saved robot and sigma, with 20 degrees of freedom.  Rows of one configuration carry
-the same information, so they are weighted as one row.
+The parameters of each session (:mod:`.session_unknowns`) have a flat or a Gaussian
+prior.  The parameters u of the machine (:mod:`.machine_numbers`) are common to all
+sessions, with the prior N(0, k).  The diagnosis of the robot provides tau, the ratio
+between the scatter of the readings about the saved robot and sigma.  Its prior has 20
+degrees of freedom.  Rows of one configuration contain the same information, so together
+they have the weight of one row.
 
 k is chosen by cross-validation: each configuration of the set-up rows is predicted by a
-fit to the others.  The smallest k is chosen from which no other k differs by more than
-a standard error and a relevant part of the noise.  The evidence of k is not used,
-because it assumes that the machine changed in the directions of the covariance.
+fit to the others.  A larger k replaces a smaller one only if its predictions are better
+by more than a standard error and by a relevant part of the noise.  The Bayesian
+evidence of k is not used, because the evidence assumes that the machine changed in the
+directions of the covariance.
 """
 
 from collections.abc import Sequence
@@ -45,16 +47,16 @@ from forcefit.validation.diagnosis.registration import coarse_frame
 from forcefit.validation.diagnosis.separability import orthonormal_basis
 
 _STEPS = 8
-_SETTLED = 1e-3  # [standard deviations] change of every parameter at convergence
-_WIDENED = 4.0 ** np.arange(8)  # values of k to choose from
+_SETTLED = 1e-3  # [standard deviations] largest change at convergence
+_WIDENED = 4.0 ** np.arange(8)  # candidate values of k
 _SURE = 1.0  # number of standard errors by which a larger k must predict better
-_MATTERS = 0.03  # relative to the noise's variance: smallest relevant improvement
-_AT_ONCE = 1000  # number of rows in a batch, which limits memory
+_MATTERS = 0.03  # [-] smallest relevant improvement / variance of the noise
+_AT_ONCE = 1000  # number of rows processed together, which limits memory
 
 
 @dataclass(frozen=True, eq=False)
 class SetUp:
-    """A session of R rows, some of which are set-up rows.
+    """One session of R rows, some of which are set-up rows.
 
     Attributes:
         campaign: the rows, with the saved robot.
@@ -68,7 +70,7 @@ class SetUp:
 
     @cached_property
     def own(self) -> Campaign:
-        """The campaign of the set-up rows."""
+        """Campaign of the set-up rows only."""
         return self.campaign.take(self.rows)
 
     @property
@@ -78,13 +80,13 @@ class SetUp:
 
     @property
     def told(self) -> float:
-        """Prior variance of a reading over sigma^2; larger if rows are repeated."""
+        """Prior variance of a reading over sigma^2; larger for repeated rows."""
         left = self.campaign.robot.diagnosis.get("normalised")
         level = max(1.0, left) if isinstance(left, float) else 1.0
         return level**2 * self.repeated
 
     def start(self) -> NDArray:
-        """Return the (p,) start values of a fit."""
+        """Return the (p,) start values of the session's parameters."""
         x = self.unknowns.mean.copy()
         if any(name in BASE for _, name in self.unknowns.names):
             conditions = self._still(self.campaign.robot, self.rows)
@@ -93,12 +95,12 @@ class SetUp:
         return x
 
     def _still(self, robot: Robot, rows: NDArray) -> Conditions:
-        """Return the conditions of selected rows without the session's effects."""
+        """Return the conditions of selected rows without effects of the session."""
         bare = replace(self.campaign, robot=without_session(robot))
         return finite_conditions(bare, rows)
 
     def read(self, robot: Robot, values: NDArray) -> NDArray:
-        """Return the (R, 6) [rad, m] readings of all rows."""
+        """Return the (R, 6) [rad, m] predicted readings of all rows."""
         still = self._still(robot, np.arange(len(self.campaign)))
         return predict(self.unknowns.applied(still, values)).deviation
 
@@ -111,10 +113,11 @@ class SetUp:
             machine: parameters of the robot.
             values: (p,) values of the session's parameters.
             u: (r,) changes of the machine.
-            rows: mask (R,) or numbers of N rows.
+            rows: mask (R,) or indices of N rows.
 
         Returns:
-            (N, 6) readings and (N, 6, p + r) derivatives.
+            (N, 6) [rad, m] readings, and (N, 6, p + r) derivatives by ``values`` and
+            ``u``.
         """
         robot, unknowns = machine.robot_at(u), self.unknowns
         still = self._still(robot, rows)
@@ -137,7 +140,7 @@ class SetUp:
     def whitened(
         self, machine: MachineNumbers, values: NDArray, u: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """Return (n,) residual and (n, p + r) slopes of set-up cells, over sigma."""
+        """Return (n,) residuals and (n, p + r) slopes of set-up rows, over sigma."""
         own = self.own
         read, slopes = self.tangent(machine, values, u, self.rows)
         A = (slopes / own.sigma[:, :, None])[own.cells]
@@ -146,15 +149,16 @@ class SetUp:
 
 @dataclass(frozen=True, eq=False)
 class SessionsFit:
-    """Fitted sessions and machine.
+    """Fitted parameters of sessions and of the machine.
 
     Attributes:
-        sessions: m of them.
+        sessions: the m sessions.
         machine: parameters of the robot.
-        x: (k,) parameters of every session, then u.
+        x: (k,) parameters of all sessions, followed by u of the machine.
         covariance: (k, k) covariance of x.
         widened: factor on the covariance of the machine's parameters.
-        held: parameters of every session, fitted with the machine's saved parameters.
+        held: parameters of every session if the machine's parameters are fixed at their
+            saved values.
     """
 
     sessions: tuple[SetUp, ...]
@@ -166,32 +170,33 @@ class SessionsFit:
 
     @property
     def u(self) -> NDArray:
-        """(r,) changes of the machine."""
+        """(r,) independent variables of the machine's changes."""
         return self.x[len(self.x) - len(self.machine) :]
 
     @property
     def robot(self) -> Robot:
-        """The saved robot with its parameters in these sessions."""
+        """Robot with the fitted parameters."""
         return self.machine.robot_at(self.u)
 
     def own(self, number: int) -> slice:
-        """Return the slice of a session's parameters in x."""
+        """Return the slice of ``x`` that contains the parameters of a session."""
         return _own(self.sessions, number)
 
     def values(self, number: int) -> NDArray:
-        """Return the (p,) parameters of a session."""
+        """Return the (p,) fitted parameters of a session."""
         return self.x[self.own(number)]
 
     def spread(self, number: int, cells: NDArray) -> tuple[float, NDArray]:
         """Return the uncertainty of a session's readings due to the uncertainty of x.
 
         Args:
-            number: number of the session.
-            cells: (R, 6) bool, the readings considered.
+            number: index of the session.
+            cells: (R, 6) bool, True for the readings over which the variance is
+                averaged.
 
         Returns:
-            Mean variance, and (p + 1,) the contributions of each parameter, and of all
-            of u together.
+            The mean variance, and (p + 1,) contributions of each parameter of the
+            session and of all of u together.
         """
         one, own = self.sessions[number], self.own(number)
         p, u = own.stop - own.start, slice(len(self.x) - len(self.machine), len(self.x))
@@ -209,7 +214,7 @@ class SessionsFit:
 
 
 def _own(sessions: Sequence[SetUp], number: int) -> slice:
-    """Return the slice of a session's parameters in x."""
+    """Return the slice of ``x`` that contains the parameters of a session."""
     begin = sum(len(one.unknowns) for one in sessions[:number])
     return slice(begin, begin + len(sessions[number].unknowns))
 
@@ -222,7 +227,7 @@ def fit_sessions(sessions: Sequence[SetUp], machine: MachineNumbers) -> Sessions
         machine: parameters of the robot.
 
     Returns:
-        The most probable values, found by Gauss-Newton's method.
+        The most probable values, computed by the Gauss-Newton method.
     """
     told = [one.told for one in sessions]
     x = np.concatenate([np.zeros(0), *(one.start() for one in sessions)])
@@ -239,7 +244,7 @@ def _settled(
     sessions: Sequence[SetUp], machine: MachineNumbers, x: NDArray,
     told: Sequence[float], widened: float,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the most probable x (k,), and its covariance (k, k)."""
+    """Return the most probable x (k,) and its covariance (k, k)."""
     begin = len(x) - len(machine)
     mean = np.concatenate([
         *(s.unknowns.mean for s in sessions),
@@ -264,7 +269,7 @@ def _settled(
 
 
 def _inverse(H: NDArray) -> NDArray:
-    """Return H^-1; directions without information stay finite."""
+    """Return the inverse of H; directions without information remain finite."""
     size = np.sqrt(np.diag(H))
     unit = np.where(size > 0, size, 1.0)
     scaled = H / np.outer(unit, unit) + 1e-14 * np.eye(len(H))
@@ -275,7 +280,7 @@ def _widened(
     sessions: Sequence[SetUp], machine: MachineNumbers, x: NDArray,
     told: Sequence[float],
 ) -> tuple[float, float]:  # fmt: skip
-    """Return the factor k on the covariance, and tau, by cross-validation."""
+    """Return the factor k on the covariance, and tau; both from cross-validation."""
     values = sum(len(one.unknowns) for one in sessions)
     zs, rows = [], []
     for k, one in enumerate(sessions):
@@ -293,7 +298,7 @@ def _widened(
     blocks = np.concatenate([_blocks(sessions, k) for k in range(len(sessions))])
 
     def predicted(k: float) -> tuple[NDArray, float]:
-        """Return the squared errors of every block, and tau."""
+        """Return the squared prediction errors of every block, and tau."""
         std = np.append(known, np.full(len(machine), np.sqrt(k)))
         marginal = marginalise(A, std, z, Q)
         errors, _ = leave_block_out(marginal, blocks)
@@ -311,13 +316,13 @@ def _widened(
 
 
 def _matters(more: NDArray, count: int) -> bool:
-    """Return whether blocks are predicted clearly worse than by chance."""
+    """Return whether the prediction errors of blocks are significantly larger."""
     error = float(more.std(ddof=1)) * np.sqrt(len(more)) if len(more) > 1 else 0.0
     return bool(more.sum() > max(_SURE * error, _MATTERS * count))
 
 
 def _blocks(sessions: Sequence[SetUp], number: int) -> NDArray:
-    """Return the (n,) configuration of every set-up cell, counted over all sessions."""
+    """Return (n,) configurations of set-up readings, counted over all sessions."""
     before = sum(len(np.unique(s.own.configuration)) for s in sessions[:number])
     own = sessions[number].own
     rows = np.nonzero(own.cells)[0]

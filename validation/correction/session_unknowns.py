@@ -1,12 +1,14 @@
-"""Parameters of a robot that belong to one session and are fitted again in the next.
+"""Define the parameters of a robot that are fitted again in every session.
 
-They are the pose of the device; if requested, the measured point and the zeros of the
-joints; and all changes with time, that is the effect ``drift`` and functions of time.
-A slow wave or a step of one day does not belong to the machine: in a new session its
-coefficients have mean zero, and their previous size as standard deviation.  A change
-that settled from a session's beginning may repeat: its coefficients have their previous
-values as mean.  Early readings determine a later drift poorly; the drift is then part
-of the uncertainty after the set-up rows.  A session without a clock has no drift.
+These parameters are the pose of the measuring device and all changes with time, that
+is, the effect ``drift`` and the functions of time.  If requested, the measured point
+and the zeros of the joints are fitted too.  A slow wave or a step that occurred on one
+day is not expected to repeat.  In a new session the prior mean of its coefficients is
+zero, and the prior standard deviation is their previous size.  A change that starts
+with every session (a lag or creep) may repeat, so the prior mean of its coefficients is
+their previous values.  Early readings determine a later drift poorly.  The drift then
+increases the uncertainty of predictions for later rows.  Without a column ``cov.time``
+no drift is fitted.
 """
 
 from collections.abc import Sequence
@@ -31,14 +33,14 @@ from forcefit.assembly.model.robot import Robot
 
 OF_A_SESSION = ("registration", "tool", "zeros")
 DRIFT = "drift"
-_ZERO = 1e-3  # [rad, m] standard deviation of a joint's zero that was set again
-_SETTLING = ("lag", "creep")  # functions of time that begin with the session
-_STEP = 1e-6  # [rad, m] step of the derivative by a parameter other than a drift
+_ZERO = 1e-3  # [rad, m] prior standard deviation of a joint's new zero
+_SETTLING = ("lag", "creep")  # functions of time that start with the session
+_STEP = 1e-6  # [rad, m] step of numerical derivatives except for drift
 _CONSTANT = "time_constant"
 
 
 def of_one_session(robot: Robot) -> tuple[dict[str, float], tuple[Function, ...]]:
-    """Return the parameters of the drift, and the functions of time of all sessions."""
+    """Return the drift's parameters, and the functions of time for all sessions."""
     functions = tuple(
         f for f in robot.functions
         if f.session is None and any(name in CLOCKS for name in f.variables)
@@ -47,7 +49,7 @@ def of_one_session(robot: Robot) -> tuple[dict[str, float], tuple[Function, ...]
 
 
 def without_session(robot: Robot) -> Robot:
-    """Return the robot without the device's pose and without changes with time."""
+    """Return the robot without the pose of the device and without changes with time."""
     effects = {name: dict(values) for name, values in robot.effects.items()}
     effects.pop(DRIFT, None)
     tool = {k: v for k, v in effects.pop("registration", {}).items() if k in TOOL}
@@ -60,13 +62,14 @@ def without_session(robot: Robot) -> Robot:
 
 @dataclass(frozen=True, eq=False)
 class SessionUnknowns:
-    """The k parameters that are fitted in a session.
+    """Prior of the k parameters that are fitted in a session.
 
     Attributes:
         names: pairs of the owner (an effect, or a function's title) and the parameter.
         mean: (k,) prior means.
         prior: (k,) prior precisions, 1 / variance; zero for a flat prior.
-        step: (k,) step of the derivative, which moves the readings by micrometres.
+        step: (k,) step of the numerical derivative, which changes the readings by
+            micrometres.
         constant: [s] time constant of the drift; None if no drift is fitted.
         functions: functions of time whose coefficients are fitted.
     """
@@ -83,11 +86,11 @@ class SessionUnknowns:
 
     @property
     def owners(self) -> list[str]:
-        """Owner of each function's coefficients, by title."""
+        """Title under which the coefficients of each function are listed."""
         return [_owner(i, function) for i, function in enumerate(self.functions)]
 
     def effects(self, x: NDArray) -> dict[str, dict[str, float]]:
-        """Return the library's effects with values (k,) of the parameters."""
+        """Return the effects of the library for the parameter values x (k,)."""
         values: dict[str, dict[str, float]] = {}
         for (effect, name), value in zip(self.names, x.tolist(), strict=True):
             if effect in LIBRARY:
@@ -97,7 +100,7 @@ class SessionUnknowns:
         return values
 
     def functions_with(self, x: NDArray, session: str | None) -> tuple[Function, ...]:
-        """Return the functions of time with values (k,), active in one session."""
+        """Return the functions of time for the values x (k,), active in one session."""
         known = dict(zip(self.names, x.tolist(), strict=True))
         return tuple(
             replace(
@@ -113,7 +116,7 @@ class SessionUnknowns:
         )
 
     def applied(self, conditions: Conditions, x: NDArray) -> Conditions:
-        """Return the conditions of the session's rows with values (k,)."""
+        """Return the conditions of the session's rows for the values x (k,)."""
         known = apply_effects(conditions, self.effects(x))
         return apply_functions(known, self.functions_with(x, None), conditions)
 
@@ -124,12 +127,12 @@ def session_unknowns(
     """Return the parameters that are fitted in a session.
 
     Args:
-        robot: saved robot, with the values of its original session.
+        robot: saved robot, including the parameters of its original session.
         fitted: names of parameters in :data:`OF_A_SESSION`.
-        clock: whether the session's rows have a time.
+        clock: whether the rows of the session contain a time.
 
     Returns:
-        The parameters; changes with time are included if there is a clock.
+        The parameters.  Changes with time are included only if ``clock`` is true.
     """
     names: list[tuple[str, str]] = []
     if "registration" in fitted:
@@ -145,7 +148,7 @@ def session_unknowns(
     step, mean = [_STEP] * len(names), [0.0] * len(names)
     drift, functions = of_one_session(robot) if clock else ({}, ())
     constant = drift.pop(_CONSTANT, None)
-    # a formula is not linear in its numbers, so it is left out
+    # A formula is not linear in its parameters, so it is not fitted.
     functions = tuple(f for f in functions if f.form != FORMULA)
     alone = {name: (name[-2], value) for name, value in drift.items()}
     owned = [(DRIFT, True, alone)]
@@ -172,12 +175,12 @@ def session_unknowns(
 
 
 def _owner(number: int, function: Function) -> str:
-    """Return the name of the owner of a function's coefficients."""
+    """Return the title under which a function's coefficients are listed."""
     return f"function of time {number + 1}: {function.title}"
 
 
 def _numbers(robot: Robot, function: Function) -> dict[str, tuple[str, float]]:
-    """Return the coefficients in which a function is linear: unit and value."""
+    """Return unit and value of each coefficient in which a function is linear."""
     numbers, units = {}, units_of(robot, function)
     for component in function.components:
         own = parameters_of(function, component)

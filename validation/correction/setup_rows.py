@@ -1,4 +1,4 @@
-"""Selection of the rows of a campaign by ``--setup``."""
+"""Select rows of a campaign with the option ``--setup``."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +12,14 @@ def setup_rows(campaign: Campaign, text: str) -> NDArray:
 
     Args:
         campaign: campaign with rows in the order of its file.
-        text: ``20`` for the first 20 rows of each session, numbers and ranges of rows
-            such as ``1-20,31``, or labels.
+        text: ``20`` for the first 20 rows of each session; or a list of row numbers,
+            ranges and labels, such as ``1-20,31``.
 
     Returns:
         (R,) bool; all points of one row of the file are selected together.
 
     Raises:
-        BadInput: the text is neither a number of rows nor a list of existing rows.
+        BadInput: the text is neither a count nor a list of existing rows.
     """
     labels = list(campaign.labels)
     order = list(dict.fromkeys(labels))
@@ -42,7 +42,7 @@ def _first(campaign: Campaign, labels: list[str], count: int) -> set[str]:
 
 
 def _range(part: str, order: list[str]) -> list[str]:
-    """Return the labels selected by a number, a range of numbers, or a label."""
+    """Return the labels that a number, a range of numbers, or a label selects."""
     if part in order:
         return [part]
     begin, dash, end = part.partition("-")

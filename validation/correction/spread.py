@@ -1,8 +1,8 @@
-"""Standard deviation of a robot's deviation due to the uncertainty in its file.
+"""Propagate the uncertainty in a robot file to the deviation of the platform.
 
-The covariance of the readings is J C J', where C is the covariance of the parameters in
-the file (:mod:`forcefit.validation.diagnosis.saved_covariance`) and J their
-derivatives.
+The covariance of the readings is J C J'.  C is the covariance of the parameters in the
+file (:mod:`forcefit.validation.diagnosis.saved_covariance`).  J contains the
+derivatives of the readings by these parameters.
 """
 
 from collections.abc import Callable
@@ -33,7 +33,7 @@ from forcefit.validation.diagnosis.saved_covariance import (
     known_covariance,
 )
 
-_STEP = 0.1  # [standard deviations of a parameter] step of the derivative
+_STEP = 0.1  # [standard deviations] step of the numerical derivative
 
 
 def deviation_spread(
@@ -43,10 +43,10 @@ def deviation_spread(
 
     Args:
         robot: robot with its effects.
-        conditions_for: function that returns R rows of conditions for a robot.
+        conditions_for: function that returns the conditions of R rows for a robot.
 
     Returns:
-        (R, 6) [rad, m]; zero if the file states no uncertainty.
+        (R, 6) [rad, m] standard deviations; zero if the file contains no uncertainty.
     """
     known = known_covariance(robot)
     conditions = conditions_for(robot)
@@ -61,17 +61,18 @@ def number_slopes(
     robot: Robot, conditions: Conditions, numbers: tuple[Number, ...], std: NDArray,
     conditions_for: Callable[[Robot], Conditions],
 ) -> NDArray:  # fmt: skip
-    """Return derivatives of the deviation by parameters of a robot's file.
+    """Return the derivatives of the deviation by parameters of a robot file.
 
     Args:
         robot: robot with its effects.
-        conditions: R rows of conditions of the robot.
+        conditions: conditions of R rows for the robot.
         numbers: k parameters of its file.
         std: (k,) standard deviations of the parameters, which determine the steps.
-        conditions_for: function that returns the same rows for another robot.
+        conditions_for: function that returns the conditions of the same rows for
+            another robot.
 
     Returns:
-        (R, 6, k) [rad, m] per unit of a parameter; zero without a solution.
+        (R, 6, k) [rad, m] per unit of a parameter; zero for rows without a solution.
     """
     J = np.zeros((len(conditions), 6, len(numbers)))
     response = responses(conditions)
@@ -92,7 +93,7 @@ def number_slopes(
 
 
 def _is_direct(robot: Robot, number: Number) -> bool:
-    """Return whether a function does not depend on the motion that it causes."""
+    """Return whether a function is independent of the motion that it causes."""
     function = robot.functions[int(number.owner)]
     wrench = any(name.startswith("wrench.") for name in function.variables)
     alone = function.where not in PLACES and function.kind == "compliance"
@@ -105,7 +106,7 @@ def _of_function(
     robot: Robot, conditions: Conditions, response: Responses, number: Number,
     sigma: float,
 ) -> NDArray:  # fmt: skip
-    """Return the (R, 6) derivatives of the deviation by a function's parameters."""
+    """Return the (R, 6) derivatives of the deviation by one parameter of a function."""
     one = robot.functions[int(number.owner)]
     step = _STEP * sigma if sigma > 0.0 else 1.0
     more = one.parameters[number.name] + step
@@ -123,7 +124,7 @@ def _of_function(
 def _answer(
     conditions: Conditions, response: Responses, function: Function, component: str
 ) -> NDArray:
-    """Return the (R, 6) derivatives of the deviation by a component of a function."""
+    """Return the (R, 6) derivatives of the deviation by one component of a function."""
     unit = unit_screw(conditions.robot, function.where, component)
     if function.where == "reading":
         return np.broadcast_to(unit, (len(conditions), 6))

@@ -1,5 +1,5 @@
-"""Comparison of model and simulation, quantity by quantity, at several scales.
+"""Compare model and simulation, quantity by quantity, at several scales.
 
-Begin at ``crosscheck.py``; ``pose_metric.py`` and ``clearance_metric.py`` define the
-compared quantities.
+Start with ``crosscheck.py``.  The compared quantities are defined in ``pose_metric.py``
+and ``clearance_metric.py``.
 """

@@ -1,13 +1,13 @@
-"""Comparison of two models with clearances, by energies and springs.
+"""Compare two models with clearances by their energies and spring deformations.
 
 If no load acts on a clearance, the pose of least energy is not unique, so poses are not
 compared.  The least energy and the deformations and wrenches of the springs are unique.
-The simulated clearance screws are also inserted into the linear model: the difference
-between their energy there and the least energy is the optimality gap.  With springs as
-links, the energy must also equal the energy of the exact virtual-joint model at full
-size.  Errors, clearances and load are scaled together by s; the linear energy is
-proportional to s^2.  The relative gap decreases as s^2 too, until the compliance of the
-contacts dominates.
+The clearance motions of the simulation are also inserted into the linear model.  The
+difference between the resulting energy and the least energy is the optimality gap.  If
+links are springs in the simulation, its energy must also equal the energy of the exact
+virtual-joint model at full scale.  Errors, clearances and load are multiplied by one
+scale s.  The linear energy is proportional to s^2.  The relative optimality gap is also
+proportional to s^2, until the compliance of the contacts dominates.
 """
 
 import math
@@ -31,18 +31,18 @@ from forcefit.validation.crosscheck.limits import (
 from forcefit.validation.crosscheck.pair import Pair
 from forcefit.validation.crosscheck.verdict import Check
 
-TOLERANCE = 0.02  # relative tolerance of limits: contacts are compliant and smoothed
-FLOOR_ENERGY = 1e-4  # [J] energy of the springs that centre clearances, at scale 1
+TOLERANCE = 0.02  # [-] bound of differences; contacts are compliant and smoothed
+FLOOR_ENERGY = 1e-4  # [J] energy of the centring springs of clearances, scale 1
 
 
 @dataclass(frozen=True, eq=False)
 class ClearanceMetric:
-    """Differences of energies and springs, and the optimality gap.
+    """Differences of energies and spring deformations, and the optimality gap.
 
     Attributes:
         robot: robot with its clearances.
         pairs: both solutions at each scale, largest first.
-        springs: whether the simulation models all links as springs too.
+        springs: whether all links are springs in the simulation too.
     """
 
     robot: Robot
@@ -51,20 +51,20 @@ class ClearanceMetric:
 
     @property
     def slope(self) -> float:
-        """NaN: poses are not unique, and not compared."""
+        """NaN, because poses are not unique and are not compared."""
         return math.nan
 
     @property
     def scales(self) -> NDArray:
-        """(k,) scales of the imperfections, largest first."""
+        """(k,) scales of the imperfections, the largest first."""
         return np.array([pair.scale for pair in self.pairs])
 
     @cached_property
     def gaps(self) -> NDArray:
         """(k,) relative optimality gaps of the simulated clearance screws.
 
-        The reference is the energy of closing without clearances or, if larger, the
-        energy stored under the load.
+        The gap is divided by the energy of closing the loops without clearances, or by
+        the energy stored under the load if that is larger.
         """
         return np.array([optimality_gap(pair) for pair in self.pairs])
 
@@ -72,8 +72,8 @@ class ClearanceMetric:
     def signal(self) -> bool:
         """Whether clearances or springs deform by more than the noise.
 
-        Inside an assembly zone both energies are zero, which is a result only if
-        closing without clearances would need energy.
+        Inside an assembly zone both energies are zero.  This agreement counts as a
+        result only if closing the loops without clearances would store energy.
         """
         linear, s = self.pairs[0].linear, self.pairs[0].scale
         return (
@@ -82,7 +82,7 @@ class ClearanceMetric:
 
     @cached_property
     def limits(self) -> dict[str, Check]:
-        """Relative difference of each quantity, extrapolated to zero imperfections."""
+        """Relative difference of each quantity, extrapolated to scale 0."""
         ours = np.array([pair.linear_energy for pair in self.pairs])
         theirs = np.array([pair.simulated.rigid_energy for pair in self.pairs])
         gap = limit_of(self.scales**2, self.gaps)
@@ -97,7 +97,7 @@ class ClearanceMetric:
         return {k: replace(check, signal=self.signal) for k, check in limits.items()}
 
     def _strain_limit(self) -> Check:
-        """Return difference of the deformations of all springs in the energy norm."""
+        """Return the difference of all spring deformations in the energy norm."""
         frames = self.robot.frames
         K = {"link_screws": np.zeros((len(frames), 6, 6))}
         K["joint_screws"] = np.zeros((len(frames), 6, 6))
@@ -132,9 +132,10 @@ class ClearanceMetric:
 
     @cached_property
     def energies(self) -> dict[str, NDArray]:
-        """(k,) relative difference of the energy from the linear or exact one.
+        """(k,) relative differences of the simulated energy, by reference model.
 
-        NaN where the exact model has no solution.
+        The references are the linear and the exact model.  The values are NaN if the
+        exact model has no solution.
         """
         relative: dict[str, list[float]] = {"linear": [], "exact": []}
         for pair in self.pairs:
@@ -158,7 +159,7 @@ class ClearanceMetric:
         return checks
 
     def table(self) -> dict[str, Any]:
-        """Return the entries of the public format that only this metric has."""
+        """Return the entries of the public format that exist only for this metric."""
         return {
             "clearances": "on both sides; poses are not unique and not judged",
             "slope": None,
@@ -193,26 +194,27 @@ class ClearanceMetric:
         ]
 
     def notes(self) -> list[str]:
-        """Return the lines of text before the table of scales."""
+        """Return the text lines that precede the table of scales."""
         return ["with clearances"]
 
 
 def optimality_gap(pair: Pair) -> float:
-    """Return energy of simulated clearance screws in the linear model, less the least.
+    """Return the relative energy excess of the simulated clearance motions.
 
     Args:
         pair: both solutions of a robot with clearances.
 
     Returns:
-        [-] energy minus the load's work at the simulated clearance screws, projected
-        onto their cones, minus the least value.  The reference is the largest of the
-        energy stored without clearances, the energy stored with them under the load,
-        and :data:`FLOOR_ENERGY`.
+        [-] potential energy (elastic energy minus work of the load) of the linear model
+        minus its least value, divided by a reference energy.  The linear model is
+        evaluated at the simulated clearance motions, projected onto their cones.  The
+        reference is the largest of three energies: stored without clearances, stored
+        with clearances under the load, and :data:`FLOOR_ENERGY`.
     """
     best = pair.linear
     small = reduce_problem(linearise(best.posture), best.joints, best.frame_loads)
     cones = best.joints.cones
-    # a column of cones has one entry: the inverse of its bound
+    # Each column of ``cones`` contains one nonzero entry, the inverse of its bound.
     u = cones.T @ pair.simulated.clearance_screws.ravel() / (cones**2).sum(axis=0)
     u = into_cones(u, best.joints.group)
     strain, least = small.G @ u + small.h, small.G @ best.clearances + small.h

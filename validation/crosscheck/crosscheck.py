@@ -1,9 +1,9 @@
-"""Comparison of the virtual-joint model with the multibody simulation of a robot.
+"""Compare the virtual-joint model of a robot with its multibody simulation.
 
-Both models are solved at several scales s of the load and all imperfections (geometric
-errors, clearances).  Without clearances, the platform's poses are compared
-(:mod:`forcefit.validation.crosscheck.pose_metric`).  With clearances, the pose of least
-energy is not unique, so energies and springs are compared
+Both models are solved at several scales.  A scale multiplies the load and all
+imperfections (geometric errors and clearances).  Without clearances, the platform's
+poses are compared (:mod:`forcefit.validation.crosscheck.pose_metric`).  With
+clearances, the pose of least energy is not unique, so energies and springs are compared
 (:mod:`forcefit.validation.crosscheck.clearance_metric`).
 """
 
@@ -67,7 +67,7 @@ ELEMENTS = 4  # number of elements of each beam in the simulation
 
 
 class Metric(Protocol):
-    """Comparison of two models at several scales."""
+    """Comparison of two models at several scales (protocol)."""
 
     @property
     def slope(self) -> float:
@@ -78,7 +78,7 @@ class Metric(Protocol):
         """Checks of the comparison, by name."""
 
     def notes(self) -> list[str]:
-        """Return lines of text before the table of scales."""
+        """Return the text lines that precede the table of scales."""
 
     def header(self) -> list[str]:
         """Return the column headings of :meth:`rows`."""
@@ -87,7 +87,7 @@ class Metric(Protocol):
         """Return one row of text for each scale."""
 
     def table(self) -> dict[str, Any]:
-        """Return the entries of the public format that only this metric has."""
+        """Return the entries of the public format that exist only for this metric."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,11 +96,12 @@ class Crosscheck:
 
     Attributes:
         posture: the nominal posture.
-        load: (6,) [N m, N] on the platform at scale 1, base axes.
+        load: (6,) [N m, N] load on the platform at scale 1, base axes.
         links: model of links in the simulation: ``"beam"``, ``"spring"``, ``"fem"``.
-        gravity: (3,) [m/s^2] at scale 1, base axes.
+        gravity: (3,) [m/s^2] gravity at scale 1, base axes.
         pairs: solutions at each scale, largest first.
-        asked: number of requested scales; smaller ones were added to reach a decision.
+        asked: number of requested scales.  The other, smaller scales were added because
+            a check was not decided.
         metric: comparison of the solutions.
     """
 
@@ -116,7 +117,7 @@ class Crosscheck:
 
     @property
     def scales(self) -> NDArray:
-        """(k,) scales of the imperfections, largest first."""
+        """(k,) scales of the imperfections, the largest first."""
         return np.array([pair.scale for pair in self.pairs])
 
     @property
@@ -131,7 +132,7 @@ class Crosscheck:
 
     @cached_property
     def resolutions(self) -> list[Resolution]:
-        """The smallest change of each parameter of the robot that the checks detect."""
+        """Smallest detectable change of each parameter of the robot."""
         assert isinstance(self.metric, PoseMetric | ClearanceMetric)
         return resolutions(
             self.posture, self.pairs, self.metric, self.load, self.gravity
@@ -139,14 +140,15 @@ class Crosscheck:
 
     @property
     def passed(self) -> bool:
-        """Whether every check holds."""
+        """Whether every check is satisfied."""
         return verdict(self) == PASSED
 
     def table(self) -> dict[str, Any]:
-        """Return all results of ``validation crosscheck`` by keys of the public format.
+        """Return all results of ``validation crosscheck`` by key of the public format.
 
         Returns:
-            ``scales`` has the requested scales, ``added_scales`` the others.
+            Mapping.  ``scales`` contains the requested scales, ``added_scales`` all
+            others.
         """
         robot = self.posture.robot
         tables = [pair.table(robot) for pair in self.pairs]
@@ -215,20 +217,21 @@ def crosscheck(
     time_limit: float = TIME_LIMIT,
     clearances: bool = False,
 ) -> Crosscheck:
-    """Solve a robot with both models at several scales of its imperfections.
+    """Solve both models of a robot at several scales of its imperfections.
 
     Args:
         posture: the robot's configuration.
-        scales: factors on errors, clearances and load, > 0, at least two different
-            ones; smaller ones are added if a check is undecided.
-        load: (6,) [N m, N] on the platform at its origin, base axes, or by component,
-            ``{"fz": -50}``.
-        links: ``"beam"``: beams are geometrically exact; ``"spring"``: every link is
-            its K_E in the simulation too, which checks everything but the beams;
-            ``"fem"``: meshed links are solids in floating frames.
-        gravity: (3,) [m/s^2] base axes; beams with a density and bodies with a mass
-            then have weight in all models.
-        time_limit: [s] for each simulation.
+        scales: factors on errors, clearances and load, positive, at least two different
+            values.  Smaller scales are added if a check is undecided.
+        load: (6,) [N m, N] load on the platform at its origin, in base axes, or a
+            mapping from component to value such as ``{"fz": -50}``.
+        links: model of the links in the simulation.  ``"beam"``: geometrically exact
+            beams.  ``"spring"``: every link is a spring with its K_E, which checks
+            everything except beam theory.  ``"fem"``: meshed links are solids in
+            floating frames.
+        gravity: (3,) [m/s^2] gravity in base axes.  Beams with a density and bodies
+            with a mass then have weight in all models.
+        time_limit: [s] time limit of each simulation.
         clearances: whether both models have clearances; poses are then not compared.
 
     Returns:
@@ -243,13 +246,13 @@ def crosscheck(
     robot = posture.robot if clearances else without_clearance(posture.robot)
     compared = replace(posture, robot=robot)
     wrench = np.zeros(6) if load is None else given_load(load)
-    force = wrench * [0, 0, 0, 1, 1, 1]  # the moment acts as a couple of dead forces
+    force = wrench * [0, 0, 0, 1, 1, 1]  # a moment is a couple of dead forces
     model = replace(link_models(robot, links), elements=ELEMENTS, clearances=clearances)
     g = np.zeros(3) if gravity is None else np.array(gravity, dtype=float)
     springs = links == "spring"
     between = 0.0 if springs else energy_between_ends(compared, g, ELEMENTS)
 
-    held: list[float] = []  # motions held at one scale are held at all smaller scales
+    held: list[float] = []  # held free motions stay held at smaller scales
 
     def solve(s: float) -> Pair:
         models = [compared] if clearances else [compared, hold_free_motions(compared)]
@@ -263,7 +266,8 @@ def crosscheck(
         )  # fmt: skip
         if simulated.held:
             held.append(s)
-        # the other models too have the springs that hold free motions in the simulation
+        # The other models also contain the springs that hold free motions in the
+        # simulation.
         if simulated.held and holding is not None:
             linear = holding
         exact = exact_solution(linear, s * g)
@@ -291,15 +295,15 @@ def crosscheck(
 def attempt(
     robot: str, check: Callable[[], Result]
 ) -> tuple[Result | None, dict[str, Any]]:
-    """Return a check's result or the reason of its failure.
+    """Run a check, and return its result or the reason of its failure.
 
     Args:
         robot: name of the robot.
         check: function without arguments that runs the check.
 
     Returns:
-        The result and None; or None and a table with ``status``, ``reason``, ``passed``
-        and a null ``slope``.
+        The pair (result, None) or, after a failure, the pair (None, table).  The table
+        contains ``status``, ``reason``, ``passed`` and a null ``slope``.
     """
     try:
         return check(), {}

@@ -1,4 +1,4 @@
-"""Limits and slopes of differences between two models, with uncertainties.
+"""Compute limits and slopes of differences between two models, with uncertainties.
 
 ======  ===================  ==========================================================
 symbol  code                 meaning
@@ -8,8 +8,8 @@ slope   ``difference_slope`` slope of log difference over log scale, as s goes t
 limit   ``limit_difference`` difference / s^p extrapolated to s = 0, relative
 ======  ===================  ==========================================================
 
-The uncertainty of a limit is twice its change when the largest scale is left out.
-Differences below :data:`FLOOR`, the resolution of simulations, count as noise.
+The uncertainty of a limit is twice its change when the largest scale is omitted.
+Differences below :data:`FLOOR`, the resolution of the simulation, count as noise.
 """
 
 import math
@@ -23,13 +23,13 @@ from forcefit.validation.crosscheck.link_models import link_stiffness
 from forcefit.validation.crosscheck.pair import Pair, sprung
 from forcefit.validation.crosscheck.verdict import Check
 
-# relative tolerance of every quantity extrapolated to zero imperfections
+# [-] Tolerance of every relative difference, extrapolated to scale 0.
 LIMIT_TOLERANCE = 1e-3
 FLOOR = {
     "rotation": 1e-10,
     "translation": 1e-11,
 }  # [rad], [m] resolution of a simulation
-# multiple of the effect of weak springs on free motions; smaller changes are noise
+# Changes below this multiple of the effect of weak springs on free motions are noise.
 _NOISE = 3.0
 HALVES = {"rotation": slice(0, 3), "translation": slice(3, 6)}
 
@@ -37,17 +37,17 @@ HALVES = {"rotation": slice(0, 3), "translation": slice(3, 6)}
 def spring_limits(
     robot: Robot, pairs: Sequence[Pair], spread: bool = False
 ) -> dict[str, Check]:
-    """Return the differences of springs and energy, extrapolated to zero imperfections.
+    """Return the relative differences of springs and energy, extrapolated to scale 0.
 
     Args:
         robot: robot with the compared links and joint springs.
         pairs: both solutions at several scales.
         spread: whether loads act between the ends of links.  The linear model does not
-            contain them, so links' wrenches are not compared.
+            contain such loads, so the wrenches of links are not compared.
 
     Returns:
-        Differences by name, relative to the largest value among all links or all
-        joints; see :func:`limit_difference`.
+        Mapping from name to difference, relative to the largest value of all links or
+        all joints; see :func:`limit_difference`.
     """
     scales = np.array([pair.scale for pair in pairs])
     stiff = _stiffest(robot)
@@ -80,7 +80,7 @@ def spring_limits(
 
 
 def energy_floor(robot: Robot) -> float:
-    """Return the energy [J] of the noise: :data:`FLOOR` in the stiffest spring."""
+    """Return the energy [J] of the stiffest spring deformed by :data:`FLOOR`."""
     return float((_stiffest(robot) * np.array(list(FLOOR.values())) ** 2).max())
 
 
@@ -92,17 +92,19 @@ def limit_difference(
 
     Args:
         scales: (k,) different scales, largest first.
-        ours: (k, ...) values of our model, which decrease as a power of the scale.
-        theirs: (k, ...) values of the other model.
-        power: power of the scale.
-        floor: differences below it, in the unit of the values, are noise.
+        ours: (k, ...) values of the virtual-joint model, which are proportional to a
+            power of the scale.
+        theirs: (k, ...) values of the simulation.
+        power: exponent of the scale.
+        floor: size below which differences are noise, in the unit of the values.
         bound: largest accepted relative difference.
-        least_size: smallest reference of the difference, in the unit of the values at
-            scale 1.
+        least_size: smallest value by which the difference is divided, in the unit of
+            the values at scale 1.
 
     Returns:
-        [-] the difference, at most the bound if only noise remains.  There is a signal
-        if the bound, times our largest value, is above the noise.
+        [-] the relative difference; at most the bound if only noise remains.  The check
+        has a signal if the bound times the largest value of ``ours`` is above the
+        noise.
     """
     weight = scales.reshape(-1, *[1] * (ours.ndim - 1)) ** -float(power)
     limit, change = limit_of(scales, (theirs - ours) * weight)
@@ -113,15 +115,15 @@ def limit_difference(
 
 
 def limit_of(scales: NDArray, values: NDArray) -> tuple[float, float]:
-    """Return the largest component at scale 0, and its uncertainty.
+    """Return the largest component extrapolated to scale 0, and its uncertainty.
 
     Args:
         scales: (k,) different scales, largest first.
         values: (k, ...) values at these scales.
 
     Returns:
-        The size of the component, and twice its largest change when the largest scale
-        is left out.
+        The absolute value of the component, and twice its largest change when the
+        largest scale is omitted.
     """
     limit = extrapolate(scales, values)
     change = limit - extrapolate(scales[1:], values[1:])
@@ -139,22 +141,22 @@ def _stiffest(robot: Robot) -> NDArray:
 
 
 def difference_slope(scales: ArrayLike, differences: ArrayLike, floor: float) -> float:
-    """Return the slope of log difference over log scale, from its first two orders.
+    """Return the slope of log difference over log scale as the scale goes to 0.
 
-    A difference of second order is ``c2 s^2 + c3 s^3 + ..``, with vectors that may
-    partly cancel.  A line through the logarithms of its size may then have any slope,
-    down to 1.3 at scales from 1 to 1/8.  So the first-order term ``c1 s`` is
-    extrapolated separately, from ``difference / s``, and compared with the terms of
-    higher order at the smallest scale.
+    A difference of second order is ``c2 s^2 + c3 s^3 + ..``, where the vectors c2 and
+    c3 may partly cancel.  A straight line through the logarithms of its norm may then
+    have almost any slope, for example 1.3 at scales from 1 to 1/8.  Therefore the
+    first-order term ``c1 s`` is extrapolated separately from ``difference / s``.  The
+    slope compares this term with the terms of higher order at the smallest scale.
 
     Args:
-        scales: (k,) > 0, largest first.
+        scales: (k,) positive scales, largest first.
         differences: (k, ...) components of the difference at these scales.
-        floor: differences of a smaller size are noise and are left out.
+        floor: size below which differences are noise and are omitted.
 
     Returns:
-        2 without a first-order term, 1 with this term alone; NaN with fewer than two
-        differences above the floor.
+        2 without a first-order term, and 1 with only this term.  NaN if fewer than two
+        differences are above the floor.
     """
     scales, parts = _clear(scales, differences, floor)
     if len(scales) < 2:
@@ -172,13 +174,13 @@ def slope_check(
     Args:
         scales: (k,) scales, largest first.
         differences: (k, ...) components of the difference at these scales.
-        floor: differences of a smaller size are noise and are left out.
+        floor: size below which differences are noise and are omitted.
         bound: largest accepted difference of the slope from 2.
 
     Returns:
-        The check.  Its uncertainty is the change when the largest scale is left out,
-        infinite for two scales.  The check has no signal with fewer than two
-        differences above the floor, or if noise alone can change the slope by more than
+        The check.  Its uncertainty is the change of the slope when the largest scale is
+        omitted, and infinite for two scales.  The check has no signal if fewer than two
+        differences are above the floor, or if noise can change the slope by more than
         the bound.
     """
     value = 2.0 - difference_slope(scales, differences, floor)
@@ -197,7 +199,7 @@ def slope_check(
 def _clear(
     scales: ArrayLike, differences: ArrayLike, floor: float
 ) -> tuple[NDArray, NDArray]:
-    """Return the scales and (k, components) differences above the noise."""
+    """Return the scales and the (k, components) differences that exceed the noise."""
     scales = np.asarray(scales, dtype=float)
     parts = np.asarray(differences, dtype=float).reshape(len(scales), -1)
     clear = np.linalg.norm(parts, axis=1) > floor
@@ -205,7 +207,7 @@ def _clear(
 
 
 def _slope_of_noise(scales: ArrayLike, differences: ArrayLike, floor: float) -> float:
-    """Return the change of the slope that noise of the floor may cause."""
+    """Return the largest change of the slope that noise of size ``floor`` can cause."""
     scales, parts = _clear(scales, differences, floor)
     weights = extrapolate(scales, np.diag(1.0 / scales))
     first = scales[-1] * floor * float(np.abs(weights).sum())
@@ -220,7 +222,7 @@ def extrapolate(scales: NDArray, values: NDArray) -> NDArray:
         values: (k, ...) values at these scales.
 
     Returns:
-        (...) value at scale 0; its error is of the order of the product of the scales.
+        (...) value at scale 0.  Its error is of the order of the product of all scales.
     """
     table = [np.asarray(v, dtype=float) for v in values]
     for step in range(1, len(table)):

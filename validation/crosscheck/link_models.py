@@ -1,4 +1,4 @@
-"""Models of a robot's links in a simulation: beams, springs or solids."""
+"""Select the model of a robot's links in a simulation: beams, springs or solids."""
 
 from collections.abc import Mapping
 
@@ -15,19 +15,19 @@ KINDS = ("beam", "spring", "fem")
 
 
 def link_models(robot: Robot, kind: str) -> SimulationModel:
-    """Return the model of a robot's links: spring stiffnesses, and solids.
+    """Return the model of a robot's links: stiffnesses of springs, and solids.
 
     Args:
         robot: robot of the virtual-joint model.
-        kind: ``"beam"``: beams as beams, other links as springs; ``"spring"``: all
-            links as springs; ``"fem"``: meshed links as solids, others as for
-            ``"beam"``.
+        kind: ``"beam"``: beams are beams and other links are springs.  ``"spring"``:
+            all links are springs.  ``"fem"``: meshed links are solids; other links are
+            modelled as for ``"beam"``.
 
     Returns:
-        The model; its joints have no clearance.
+        The model, whose joints have no clearance.
 
     Raises:
-        BadInput: the kind is unknown, or a mesh is not usable.
+        BadInput: the kind is unknown, or a mesh cannot be used.
     """
     if kind not in KINDS:
         raise BadInput(f"links: found {kind!r}, expected one of {', '.join(KINDS)}")
@@ -45,7 +45,7 @@ def link_stiffnesses(robot: Robot, links: str) -> Mapping[str, NDArray]:
 
     Args:
         robot: robot of the virtual-joint model.
-        links: ``"spring"`` for all links; for another kind, beams are left out.
+        links: ``"spring"`` for all links; for any other kind, beams are omitted.
 
     Returns:
         Mapping from the frame's name to K_E, (6, 6) [N m/rad .. N/m] in its axes.

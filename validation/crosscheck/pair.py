@@ -21,16 +21,17 @@ class Pair:
     """Solutions of two models at one scale.
 
     Attributes:
-        scale: factor on errors and load.
+        scale: factor on errors, clearances and load.
         linear: result of the virtual-joint model.
         simulated: result of the simulation.
-        exact: result of the virtual-joint model with finite rotations; None if it has
-            none.
-        between: [J] energy of distributed weights in the simulation's beams; the linear
-            model does not contain it.
+        exact: result of the virtual-joint model with finite rotations; None if no
+            solution was found.
+        between: [J] energy of distributed weights in the beams of the simulation, which
+            the linear model does not contain.
         holding: solution of the linear model with the springs of
-            :func:`hold_free_motions`, which estimates the effect of the simulation's
-            weaker springs; None if there are none.
+            :func:`hold_free_motions`, from which the effect of the weaker springs in
+            the simulation is estimated; None if the simulation contains no such
+            springs.
     """
 
     scale: float
@@ -43,15 +44,15 @@ class Pair:
     def noise_of(self, quantity: str) -> NDArray:
         """Return the effect of the simulation's springs on free motions, at scale 1.
 
-        They are so weak that their effect is proportional to their stiffness.
+        These springs are so weak that their effect is proportional to their stiffness.
 
         Args:
             quantity: name of a screw or of wrenches of an ``Assembly``, proportional to
                 the scale.
 
         Returns:
-            Sizes of the changes, shaped as the quantity; zero if both models have the
-            same springs.
+            Absolute values of the changes, in the shape of the quantity; zero if both
+            models contain the same springs.
         """
         value = np.asarray(getattr(self.linear, quantity))
         if self.holding is None or self.simulated.held:
@@ -64,7 +65,8 @@ class Pair:
     def linear_energy(self) -> float:
         """[J] energy of the linear model, with the energy of distributed weights.
 
-        It excludes the springs that hold free motions, as in the simulation.
+        The energy of the springs that hold free motions is excluded, as in the
+        simulation.
         """
         robot = self.linear.posture.robot
         held = holding_energy(robot, self.linear.joint_screws)
@@ -119,13 +121,13 @@ class Pair:
 
 
 def sprung(robot: Robot) -> NDArray:
-    """Return the components with joint springs; a rigid one has no simulated wrench.
+    """Mark the joint components with springs, which are compared.
 
     Args:
         robot: robot of n frames.
 
     Returns:
-        (n, 6) 1 where K_B is finite, 0 elsewhere.
+        (n, 6) array, 1 where K_B is finite and 0 elsewhere.
     """
     rows = np.zeros((len(robot.frames), 6))
     for row, frame in zip(rows, robot.frames, strict=True):
@@ -135,7 +137,7 @@ def sprung(robot: Robot) -> NDArray:
 
 
 def _named(robot: Robot, part: str, rows: NDArray) -> dict[str, NDArray]:
-    """Return the rows of the frames that have a part, by name of the frame."""
+    """Return the row of each frame with a link or joint (``part``), by frame name."""
     return {
         frame.name: row
         for frame, row in zip(robot.frames, rows, strict=True)
@@ -144,15 +146,15 @@ def _named(robot: Robot, part: str, rows: NDArray) -> dict[str, NDArray]:
 
 
 def hold_free_motions(posture: Posture) -> Posture:
-    """Return the posture with the simulation's springs on its free motions.
+    """Add the springs with which the simulation holds free motions.
 
     Args:
         posture: posture of a robot without clearances.
 
     Returns:
-        The posture of a robot whose passive joints have a spring of
-        :data:`~forcefit.validation.multibody.exudyn_model.HOLDING_STIFFNESS`, unless
-        they have a spring already.
+        The posture of a robot with a spring of
+        :data:`~forcefit.validation.multibody.exudyn_model.HOLDING_STIFFNESS` at each
+        passive joint that has no spring.
     """
 
     def hold(frame: Frame) -> Frame:
@@ -171,11 +173,12 @@ def holding_energy(robot: Robot, joint_screws: NDArray) -> float:
     """Return the energy of the springs that hold free motions; zero without them.
 
     Args:
-        robot: robot of the virtual-joint model, with or without such springs.
+        robot: robot of the virtual-joint model, with or without springs on free
+            motions.
         joint_screws: (n, 6) [rad, m] deformations of its joints.
 
     Returns:
-        [J].
+        [J] energy.
     """
     stored = 0.0
     for frame, screw in zip(robot.frames, joint_screws, strict=True):
@@ -194,8 +197,8 @@ def exact_solution(
         gravity: (3,) [m/s^2] base axes, as in the linear solution.
 
     Returns:
-        The exact solution or None.  The load's moment is a couple of dead forces on the
-        platform, as in the simulation.
+        The exact solution, or None if the iteration found none.  The moment of the load
+        is a couple of dead forces on the platform, as in the simulation.
     """
     joints, robot = linear.joints, linear.posture.robot
     if not any(A.shape[1] for A in (joints.elastic, joints.cones, joints.free)):
@@ -213,11 +216,11 @@ def scaled(posture: Posture, scale: float) -> Posture:
     """Return a posture with all imperfections multiplied by a factor.
 
     Args:
-        posture: nominal.
-        scale: on geometric errors, clearances and forces of drives.
+        posture: the posture at scale 1.
+        scale: factor on geometric errors, clearances and forces of drives.
 
     Returns:
-        A posture of another robot.
+        The posture of the scaled robot.
     """
 
     def smaller(frame: Frame) -> Frame:

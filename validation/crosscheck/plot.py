@@ -1,4 +1,4 @@
-"""Figures of cross-checks."""
+"""Plot cross-checks."""
 
 import math
 from typing import TYPE_CHECKING

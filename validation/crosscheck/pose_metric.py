@@ -1,12 +1,12 @@
-"""Comparison of the poses of two models without clearances: slopes and limits.
+"""Compare the poses of two models without clearances by slopes and limits.
 
-The virtual-joint model is linear in the errors, the simulation is not.  If the linear
-model is right, their difference is of second order.  If errors and load are scaled by
-s, the pose difference decreases as s^2, with a slope of 2 in a log-log plot.  Every
-quantity of the simulation, divided by its power of s and extrapolated to s = 0, then
-equals the quantity of the linear model.  A wrong term of first order, even of a
-thousandth, changes the slope and the limit.  Passive joints move freely about or along
-their z axis in both models.
+The virtual-joint model is linear in the errors, and the simulation is nonlinear.  If
+the linear model is correct, the difference between both models is of second order.  If
+errors and load are multiplied by s, the pose difference is proportional to s^2, so its
+slope is 2 in a log-log plot.  Each quantity of the simulation is divided by its power
+of s and extrapolated to s = 0.  The limit must equal the quantity of the linear model.
+Even a wrong first-order term of one thousandth changes the slope and the limit.
+Passive joints move freely about or along their z axis in both models.
 
 ======  ===============  =============================================================
 symbol  code             meaning
@@ -37,24 +37,25 @@ from forcefit.validation.crosscheck.limits import (
 from forcefit.validation.crosscheck.pair import Pair
 from forcefit.validation.crosscheck.verdict import Check
 
-# largest accepted difference between 2 and the slope of the pose difference
+# Largest accepted deviation of the slope of the pose difference from 2.
 SLOPE_TOLERANCE = 0.1
-# largest accepted share of the pose difference that remains with the exact model, if
-# links are springs
+# [-] Largest accepted fraction of the pose difference that remains with the exact model
+# if links are springs.
 EXPLAINED_TOLERANCE = 0.02
-# relative to the pose: first-order difference between a mesh's K_E and its solid due to
-# rounding, significant only where second-order terms are as small
+# [-] First-order difference between a mesh's K_E and its solid, relative to the pose.
+# Rounding causes this difference, which is significant only if second-order terms are
+# as small.
 _ROUNDING = 2e-5
 
 
 @dataclass(frozen=True, eq=False)
 class PoseMetric:
-    """Differences of the platform's pose, of springs and of energy.
+    """Differences of the platform's pose, of spring deformations and of energy.
 
     Attributes:
         robot: robot without clearances.
         pairs: both solutions at each scale, largest first.
-        springs: whether the simulation models all links as springs too.
+        springs: whether all links are springs in the simulation too.
         gravity: whether there is gravity.
     """
 
@@ -65,7 +66,7 @@ class PoseMetric:
 
     @property
     def scales(self) -> NDArray:
-        """(k,) scales of the imperfections, largest first."""
+        """(k,) scales of the imperfections, the largest first."""
         return np.array([pair.scale for pair in self.pairs])
 
     @cached_property
@@ -89,17 +90,18 @@ class PoseMetric:
 
     @property
     def slope(self) -> float:
-        """Slope that differs most from 2; NaN without a significant difference."""
+        """Slope that deviates most from 2; NaN without a significant difference."""
         known = [s for s in self.slopes.values() if not math.isnan(s)]
         return max(known, key=lambda s: abs(s - 2.0)) if known else math.nan
 
     @cached_property
     def unexplained(self) -> dict[str, float]:
-        """Share of the pose difference that remains with the exact virtual-joint model.
+        """Fraction of the pose difference that remains with the exact model.
 
-        It is taken at the largest scale.  With springs as links, only rounding remains;
-        with beams, the error of modelling a beam's finite bending by one spring.  NaN
-        without a difference.
+        The fraction is computed at the largest scale.  If links are springs, only
+        rounding errors remain.  If links are beams, the error of modelling the finite
+        bending of a beam by one spring remains.  The fraction is NaN without a pose
+        difference.
         """
         first = self.pairs[0]
         if first.exact is None:
@@ -114,12 +116,12 @@ class PoseMetric:
 
     @cached_property
     def limits(self) -> dict[str, Check]:
-        """Relative difference of each quantity, extrapolated to zero imperfections.
+        """Relative difference of each quantity, extrapolated to scale 0.
 
-        Screws and wrenches are compared by rotations and translations, each relative to
-        the largest value among all frames with such a spring.  Differences below
-        :data:`FLOOR`, and wrenches that such differences cause in the stiffest spring,
-        are noise.
+        The rotation and translation parts of screws and wrenches are compared
+        separately.  Each is divided by the largest value of all frames with such a
+        spring.  Differences below :data:`FLOOR` are noise, and so are the wrenches that
+        such differences cause in the stiffest spring.
         """
         ours = np.array([p.linear.platform_screw for p in self.pairs])
         theirs = np.array([p.simulated.platform_screw for p in self.pairs])
@@ -153,7 +155,7 @@ class PoseMetric:
         return slopes | limits | shares
 
     def table(self) -> dict[str, Any]:
-        """Return the entries of the public format that only this metric has."""
+        """Return the entries of the public format that exist only for this metric."""
         return {
             "clearances": "left out on both sides",
             "slope": self.slope,
@@ -187,7 +189,7 @@ class PoseMetric:
         ]
 
     def notes(self) -> list[str]:
-        """Return the lines of text before the table of scales."""
+        """Return the text lines that precede the table of scales."""
         lines = ["without clearances: simulation minus virtual-joint model"]
         known = {k: v for k, v in self.unexplained.items() if not math.isnan(v)}
         shares = [f"{100 * share:.2g} % of {half}" for half, share in known.items()]

@@ -1,4 +1,4 @@
-"""A cross-check at every pose of a grid; a failure at one pose is recorded."""
+"""Run a cross-check at every pose of a grid, and record failures."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -36,18 +36,20 @@ def check_poses(
 
     Args:
         robot: robot with its errors.
-        axes: values [m or rad] by pose component; components not named are free.
+        axes: mapping from pose component to its values [m or rad]; all other components
+            are free.
         check: function that runs a check at a posture.
-        progress: function called after each pose with the number done and the total.
+        progress: function called after each pose with the number of finished poses and
+            the total number.
 
     Returns:
-        For each pose a table with the requested pose as ``asked``, ``passed``,
-        ``status`` and the results of the check.  ``passed`` is None for unreachable
-        poses, with status ``"out of reach"``, and for poses beyond the joints' limits,
-        with status ``"beyond_limits"``.
+        For each pose a mapping with the requested pose ``asked``, ``passed``,
+        ``status`` and the results of the check.  ``passed`` is None if the pose is
+        unreachable (status ``"out of reach"``) or violates a joint limit (status
+        ``"beyond_limits"``).
 
     Raises:
-        BadInput: the robot's closures do not hold in its home pose.
+        BadInput: the kinematic loops of the robot are not closed in its home pose.
     """
     mesh = np.meshgrid(*axes.values(), indexing="ij")
     poses = np.full((mesh[0].size, 6), np.nan)
@@ -85,7 +87,7 @@ def poses_table(rows: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def outcome_text(row: Mapping[str, Any]) -> str:
-    """Return the outcome at one pose of :func:`check_poses` in words."""
+    """Return the outcome of :func:`check_poses` at one pose as text."""
     outcome = _VERDICTS.get(row.get("verdict", ""), "FAILED")
     if row["passed"] is None:
         outcome = "not checked"
@@ -93,7 +95,7 @@ def outcome_text(row: Mapping[str, Any]) -> str:
 
 
 def poses_text(rows: list[dict[str, Any]]) -> str:
-    """Return a line for each pose, and the verdict."""
+    """Return one text line for each pose, and the verdict."""
     lines = []
     for row in rows:
         where = ", ".join(f"{k}={v:.6g}" for k, v in row["asked"].items())

@@ -1,4 +1,4 @@
-"""Pages of cross-checks at one pose and at many poses."""
+"""Create report pages of cross-checks at one pose and at many poses."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -22,9 +22,9 @@ from forcefit.validation.crosscheck.pose_metric import PoseMetric
 from forcefit.validation.crosscheck.poses import outcome_text, poses_table
 from forcefit.validation.crosscheck.verdict import NOT_CHECKED, verdict, verdict_text
 
-# colour of the verdict by outcome
+# Colour of the verdict for each outcome.
 GOOD = {PASSED: True, NOT_DECIDED: None, NO_SIGNAL: None, FAILED: False}
-_LISTED = 30  # largest number of parameters of which the smallest change is listed
+_LISTED = 30  # largest number of parameters in the table of smallest changes
 ASSUMED = (
     "The simulation (Exudyn) has geometrically exact motions; the virtual-joint model "
     "is linear in errors and loads.",
@@ -39,10 +39,10 @@ def crosscheck_page(check: Crosscheck, provenance: Provenance) -> str:
 
     Args:
         check: result of :func:`forcefit.validation.crosscheck.crosscheck.crosscheck`.
-        provenance: command and files.
+        provenance: command and input files.
 
     Returns:
-        HTML, which needs no other file.
+        A self-contained HTML page.
     """
     return page(
         Page(
@@ -75,7 +75,7 @@ def _verdict(check: Crosscheck) -> str:
 
 
 def _tiles(check: Crosscheck) -> list[Tile]:
-    """Return tiles of the slope, the check nearest to its bound, and the scales."""
+    """Return tiles of the slope, the check closest to its bound, and the scales."""
     tiles = []
     if not np.isnan(check.slope):
         tiles.append(Tile("Slope of the difference", [Value(check.slope)],
@@ -90,13 +90,13 @@ def _tiles(check: Crosscheck) -> list[Tile]:
 
 
 def compared(check: Crosscheck) -> list[str]:
-    """Return sentence, table and chart of both models at every scale.
+    """Return a sentence, a table and a chart that compare both models at every scale.
 
     Args:
-        check: a cross-check, also of a study.
+        check: a cross-check, run alone or as part of a study.
 
     Returns:
-        Pieces of HTML; there is a chart only where poses are compared.
+        Pieces of HTML. A chart is included only if poses are compared.
     """
     pieces = [table(check.metric.header(), check.metric.rows(), "cross-check")]
     if not isinstance(check.metric, PoseMetric):
@@ -109,7 +109,7 @@ def compared(check: Crosscheck) -> list[str]:
 
 
 def _slope_text(slope: float) -> str:
-    """Return the measured slope as text, if there is one."""
+    """Return the slope as text, or another text if no slope was determined."""
     if np.isnan(slope):
         return "The two models do not differ here, so there is no slope."
     return f"Measured: {slope:.3f}."
@@ -137,7 +137,7 @@ def _slope_chart(check: Crosscheck, metric: PoseMetric) -> str:
 
 
 def _checks(check: Crosscheck) -> str:
-    """Return the value, the uncertainty, the bound and the outcome of every check."""
+    """Return a table of the value, uncertainty, bound and outcome of every check."""
     rows: Cells = [
         [name, one.value, one.uncertainty, one.bound,
          NOT_CHECKED if one.verdict == NO_SIGNAL else one.verdict]
@@ -151,7 +151,7 @@ def _checks(check: Crosscheck) -> str:
 
 
 def _platform(check: Crosscheck) -> str:
-    """Return the platform's displacement by both models at the largest scale."""
+    """Return a table of the platform's displacement at the largest scale."""
     first = check.pairs[0]
     rows = screw_table(first.linear.platform_screw, first.simulated.platform_screw)
     text = paragraph(
@@ -162,7 +162,7 @@ def _platform(check: Crosscheck) -> str:
 
 
 def screw_table(ours: Any, theirs: Any) -> str:
-    """Return the table of a screw (6,) [rad, m] by both models, rotations first."""
+    """Return a table of a screw (6,) [rad, m] in both models, rotations first."""
     rows: Cells = [
         [
             name,
@@ -176,7 +176,7 @@ def screw_table(ours: Any, theirs: Any) -> str:
 
 
 def _resolutions(check: Crosscheck) -> str:
-    """Return the parameters of the robot that the checks detect worst."""
+    """Return a table of the parameters whose changes are hardest to detect."""
     found = sorted(check.resolutions, key=lambda one: -one.smallest)
     unproved = sum(one.unproved for one in found)
     rows: Cells = [
@@ -194,15 +194,15 @@ def _resolutions(check: Crosscheck) -> str:
 
 
 def failure_page(failure: Mapping[str, Any], provenance: Provenance) -> str:
-    """Return the page of a cross-check without a result.
+    """Return the page of a cross-check that failed to run.
 
     Args:
-        failure: the failure of
+        failure: the failure returned by
             :func:`forcefit.validation.crosscheck.crosscheck.attempt`.
-        provenance: command and files.
+        provenance: command and input files.
 
     Returns:
-        HTML, which needs no other file.
+        A self-contained HTML page.
     """
     return page(
         Page(
@@ -227,10 +227,10 @@ def poses_page(
     Args:
         robot: name of the robot.
         rows: results of :func:`forcefit.validation.crosscheck.poses.check_poses`.
-        provenance: command and files.
+        provenance: command and input files.
 
     Returns:
-        HTML, which needs no other file.
+        A self-contained HTML page.
     """
     answer = poses_table([dict(row) for row in rows])
     passed = sum(row["passed"] is True for row in rows)
@@ -263,6 +263,6 @@ def poses_page(
 
 
 def _slope(row: Mapping[str, Any]) -> float:
-    """Return the slope at a pose; NaN without one."""
+    """Return the slope at a pose; NaN if there is none."""
     slope = row.get("slope")
     return np.nan if slope is None else float(slope)

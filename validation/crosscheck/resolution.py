@@ -1,10 +1,12 @@
-"""The smallest change of each parameter of a robot that a cross-check detects.
+"""Compute the smallest change of each robot parameter that a cross-check detects.
 
-A check detects a wrong parameter by its effect in the linear model.  Each parameter is
-changed by one hundredth and the model is solved again.  The result is compared with the
-unchanged one by the same metric, noise floors and bounds as the simulation's.  The
-relative change at which the first check reaches its bound follows in proportion.  A
-parameter is unproved if a change by its full value is not detected.
+The effect of a wrong parameter is computed with the linear model.  Each parameter is
+changed by one hundredth, and the model is solved again.  The changed solution is
+compared with the original one, as if it were the result of the simulation.  The metric,
+the noise floors and the bounds are the same as in the cross-check.  The smallest
+detected change follows by proportion: it is the relative change for which the first
+check reaches its bound.  A parameter is unproved if a change by its full value is not
+detected.
 """
 
 from collections.abc import Iterator, Sequence
@@ -39,12 +41,12 @@ from forcefit.validation.crosscheck.pair import (
 )
 from forcefit.validation.crosscheck.pose_metric import PoseMetric
 
-_CHANGE = 1e-2  # relative change of a parameter for the computation of its effect
-# name of the check that grows with the square of a change
+_CHANGE = 1e-2  # [-] relative change by which the effect of a parameter is computed
+# Name of the check with a value proportional to the square of a change.
 _QUADRATIC = "optimality gap"
-# relative change; a parameter is unproved if a change of this size is not detected
+# [-] A parameter is unproved if a relative change of this size is not detected.
 UNPROVED = 1.0
-_NAMED = 4  # largest number of parameters named in a line of text
+_NAMED = 4  # largest number of parameters in one line of text
 _KINDS = ("link", "joint stiffness", "clearance", "error")
 
 
@@ -55,11 +57,11 @@ class Resolution:
     Attributes:
         name: frame and quantity, such as ``leg1.elbow.radial``.
         kind: kind of the parameter: link, joint stiffness, clearance or error.
-        value: value of the parameter; 1 for a link, whose stiffness is multiplied by
-            it.
-        smallest: smallest relative change that a check detects; inf if none is
+        value: value of the parameter.  For a link it is 1, the factor on its stiffness
+            matrix.
+        smallest: smallest relative change that a check detects; inf if no change is
             detected.
-        by: name of the check that detects it first.
+        by: name of the check that detects this change.
     """
 
     name: str
@@ -70,7 +72,7 @@ class Resolution:
 
     @property
     def unproved(self) -> bool:
-        """Whether even a change by the full value is not detected."""
+        """Whether even a change by the full value of the parameter is not detected."""
         return not self.smallest < UNPROVED
 
 
@@ -84,12 +86,13 @@ def resolutions(
         posture: posture at which the models are compared.
         pairs: solutions at several scales, largest first.
         metric: comparison of the solutions.
-        load: (6,) [N m, N] at scale 1.
-        gravity: (3,) [m/s^2] at scale 1.
+        load: (6,) [N m, N] load at scale 1.
+        gravity: (3,) [m/s^2] gravity at scale 1.
 
     Returns:
-        One result for each link, finite entry of a joint's stiffness, clearance and
-        component of a geometric error that is not zero, in the robot's order.
+        One result for each link, each finite entry of a joint stiffness, each clearance
+        and each nonzero component of a geometric error, in the order of the robot's
+        frames.
     """
     found = []
     for name, kind, value, frame in _changes(posture, bool(gravity.any())):
@@ -131,7 +134,7 @@ def _changes(posture: Posture, weight: bool) -> Iterator[tuple[str, str, float, 
 def _joint_changes(
     frame: Frame, more: float
 ) -> Iterator[tuple[str, str, float, Frame]]:
-    """Yield the finite entries of a joint's stiffness; a full matrix is one entry."""
+    """Yield changes of a joint's finite stiffnesses; a matrix is one parameter."""
     K = frame.joint_stiffness
     if K is None:
         return
@@ -148,7 +151,7 @@ def _joint_changes(
 
 
 def _with_frame(posture: Posture, frame: Frame) -> Posture:
-    """Return the posture with one frame replaced by another of its name."""
+    """Return the posture with one frame replaced by a frame of the same name."""
     frames = [frame if f.name == frame.name else f for f in posture.robot.frames]
     return replace(posture, robot=replace(posture.robot, frames=tuple(frames)))
 
@@ -157,13 +160,13 @@ def _noticed(
     changed: Posture, pairs: Sequence[Pair], metric: PoseMetric | ClearanceMetric,
     load: NDArray, gravity: NDArray,
 ) -> tuple[float, str]:  # fmt: skip
-    """Return smallest relative change that a limit detects, and the limit's name."""
+    """Return the smallest detected relative change, and the name of the check."""
     first = pairs[0]
     if first.simulated.held:
         changed = hold_free_motions(changed)
     s = first.scale
     other = solve_assembly(scaled(changed, s), s * load, gravity=s * gravity)
-    # the linear model is homogeneous, so any second scale can be used
+    # Any second scale can be used, because the linear model is homogeneous.
     compared = tuple(
         replace(pair, simulated=_as_simulated(other, first, pair)) for pair in pairs[:2]
     )
@@ -180,7 +183,7 @@ def _noticed(
 
 
 def _as_simulated(other: Assembly, first: Pair, pair: Pair) -> Any:
-    """Return a linear solution as if it were the simulation's at another scale."""
+    """Return a linear solution in place of the simulation's result at another scale."""
     ratio = pair.scale / first.scale
     held = holding_energy(other.posture.robot, other.joint_screws)
     energy = (other.energy - held) * ratio**2 + pair.between
@@ -198,7 +201,7 @@ def _as_simulated(other: Assembly, first: Pair, pair: Pair) -> Any:
 
 
 def resolution_text(found: Sequence[Resolution]) -> list[str]:
-    """Return lines of text: detected changes of each kind, and unproved parameters."""
+    """Return text lines: detected changes of each kind, and unproved parameters."""
     lines = []
     for kind in _KINDS:
         proved = [r for r in found if r.kind == kind and not r.unproved]
@@ -219,5 +222,5 @@ def resolution_text(found: Sequence[Resolution]) -> list[str]:
 
 
 def _percent(share: float) -> str:
-    """Return a fraction in per cent, with two digits."""
+    """Return a fraction in per cent with two significant digits."""
     return f"{100 * share:.2g} %"

@@ -1,4 +1,4 @@
-"""Meshed links as solids for a simulation: the mesh of K_E and its matrix."""
+"""Select meshed links as solids for a simulation, with their stiffness matrices."""
 
 import numpy as np
 from scipy.sparse import csr_matrix, diags
@@ -11,18 +11,18 @@ from forcefit.validation.multibody.exudyn_parts import MeshBody, MeshedSolid
 
 
 def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:
-    """Return the solids of a robot's mesh links, for a simulation.
+    """Return the solids of a robot's meshed links, for a simulation.
 
     Args:
         robot: robot of the virtual-joint model.
 
     Returns:
-        Mapping from the frame's name to the finest mesh, from which the linear model's
-        K_E comes too; links of one shape and material share one solid.
+        Mapping from the frame's name to the finest mesh, which also determines K_E of
+        the linear model.  Links of the same shape and material share one solid.
 
     Raises:
         BadInput: a mesh was not solved when the robot was loaded, or an interface is
-            not rigid; only rigid interfaces are supported here.
+            not rigid.  Only rigid interfaces can be simulated.
     """
     known: dict[tuple[MeshedLink, float], MeshedSolid] = {}
     bodies = {}
@@ -45,7 +45,7 @@ def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:
 
 
 def _solid(solved: MeshedLink, factor: float) -> MeshedSolid:
-    """Return the finest mesh of a link, with its stiffness matrix times a factor."""
+    """Return the finest mesh of a link; its stiffness is multiplied by a factor."""
     from forcefit.stiffness.fem.elements import assemble
 
     mesh, constants = solved.level.mesh, solved.level.material

@@ -1,10 +1,11 @@
-"""Distributed weight of a beam, and the energy that weights at its ends neglect.
+"""Compute the energy of a beam's distributed weight that loads at its ends neglect.
 
-The virtual-joint model describes a link by its two ends.  If half of the weight acts at
-each end, with the moments of a beam clamped at both ends
-(:func:`forcefit.assembly.linear.load.weights`), the displacements of the ends are
-exact, but the energy between them is missing.  Without the moments, the displacements
-of the ends are wrong too: the tip of a cantilever moves by a third too far.
+The virtual-joint model contains only the displacements of a link's two ends.  The
+weight is replaced by half of its force at each end and by the fixed-end moments of a
+beam clamped at both ends (:func:`forcefit.assembly.linear.load.weights`).  The
+displacements of the ends are then exact, but the energy stored between the ends is
+missing.  Without these moments, the displacements of the ends would be wrong too: the
+deflection of a cantilever's tip would be one third too large.
 """
 
 from collections.abc import Iterator
@@ -21,15 +22,15 @@ from forcefit.stiffness.beam.sections import Section, declared_section
 
 @dataclass(frozen=True, eq=False)
 class HeavyBeam:
-    """A beam under its own weight.
+    """A beam loaded by its own weight.
 
     Attributes:
-        index: index of its frame.
+        index: index of the beam's frame.
         link: the beam, with its material.
         section: constants of its cross-section.
         length: [m] length of the beam.
         line: (3,) [m] vector from base to tip, base axes.
-        weight: (3,) [N/m] weight per length along the section's x, y, z.
+        weight: (3,) [N/m] weight per length, in the axes x, y, z of the cross-section.
         total: (3,) [N] weight of the beam, base axes.
     """
 
@@ -47,7 +48,7 @@ def heavy_beams(posture: Posture, gravity: ArrayLike) -> Iterator[HeavyBeam]:
 
     Args:
         posture: the robot's configuration.
-        gravity: (3,) [m/s^2] base axes.
+        gravity: (3,) [m/s^2] gravity in base axes.
 
     Yields:
         Each beam with its weight.
@@ -84,11 +85,11 @@ def energy_between_ends(
 
     Args:
         posture: the robot's configuration.
-        gravity: (3,) [m/s^2] base axes.
-        pieces: number of equal pieces with weights at their ends, and the moments of a
-            clamped piece.  The energy inside the pieces is left out; it is the share 1
-            / pieces^4 of the bending energy and 1 / pieces^2 of the energy of shear and
-            stretching.
+        gravity: (3,) [m/s^2] gravity in base axes.
+        pieces: number of equal pieces into which each beam is cut.  The weight of a
+            piece is replaced by forces and fixed-end moments at its ends.  The energy
+            inside the pieces is omitted: 1 / pieces^4 of the bending energy, and 1 /
+            pieces^2 of the energy of shear and stretching.
 
     Returns:
         [J] sum over all beams with a density.

@@ -1,15 +1,16 @@
-"""The platform's stiffness by two methods of the multibody simulation.
+"""Check the platform's stiffness by two methods of the multibody simulation.
 
-At the equilibrium with the robot's errors, its load and its weight, the residual of the
-simulation is differentiated.  In addition, the platform is loaded slightly along each
-axis, in both directions.  Each method has an estimated uncertainty
+Both methods start from the equilibrium with the robot's errors, load and weight.  The
+first method (linearised) differentiates the residual of the simulation.  The second
+method (load steps) applies small loads to the platform along each axis, in both
+directions.  The uncertainty of each method is estimated
 (:mod:`forcefit.validation.multibody.tangent`).  A method whose uncertainty exceeds the
 tolerance is not used for the verdict.
 
-Clearances are zero in both models unless requested.  If clearances are in contact, only
-the linearised method is used, with smoothed contacts.  The force of a load is dead, and
-its moment is a couple of dead forces, because a moment about fixed axes has no
-potential (``docs/exact.md``).
+Clearances are zero in both models unless they are requested.  With clearances, only the
+linearised method is used, with smoothed contacts.  The force of a load keeps its
+direction (dead force).  Its moment is a couple of dead forces, because a moment about
+fixed axes has no potential (``docs/exact.md``).
 """
 
 from dataclasses import dataclass, replace
@@ -38,26 +39,28 @@ from forcefit.validation.multibody.tangent import (
     simulated_tangent,
 )
 
-# tolerances of entries over sqrt(C_ii C_jj), by model of the links
+# [-] Tolerances of differences of entries over sqrt(C_ii C_jj), by model of the links.
 TOLERANCE = {"spring": 1e-6, "beam": 1e-3, "fem": 2e-2}
 CONTACT_TOLERANCE = 2e-2
-# [-] relative difference of the platforms' displacements from which the equilibria are
-# different; with beams as links the difference is 1e-3
+# [-] Equilibria are different if the displacements of the platform differ by more than
+# this fraction.  If links are beams, the displacements of one equilibrium differ by
+# about 1e-3.
 _ELSEWHERE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class StiffnessCheck:
-    """Compliance of the platform computed by three methods.
+    """Compliance of the platform by exact model, linear model and simulation.
 
     Attributes:
-        exact: tangent of the exact equilibrium, without clearances.
+        exact: tangent stiffness of the exact model at its equilibrium.
         linear: classical stiffness of the nominal robot.
-        simulated: stiffness in the simulation, for small motions at the platform's
+        simulated: stiffness of the simulation for small motions at the platform's
             origin.
         load: (6,) [N m, N] load at the equilibrium.
         links: model of the links in the simulation.
-        bent: whether springs are deformed, by errors, a load or weight.
+        bent: whether springs are deformed at the equilibrium, by errors, a load or
+            weight.
         clearances: whether clearances are included.
         moved: (6,) [rad, m] displacement of the platform from its nominal pose at the
             exact equilibrium.
@@ -110,11 +113,12 @@ class StiffnessCheck:
 
     @cached_property
     def mixed(self) -> tuple[str, ...]:
-        """Names of deformed joints for which finite motions have no unique law.
+        """Names of deformed joints whose finite motion differs between the models.
 
-        They are locked in some components and elastic in several others, at least one
-        of them a rotation.  A locked component is a component of the logarithm here,
-        but an angle between axes in the simulation; both are equal only to first order.
+        Such joints are locked in some components and elastic in several others, of
+        which at least one is a rotation.  In the exact model, a locked component is a
+        component of the logarithm of the rotation.  In the simulation, a locked
+        component is an angle between axes.  Both definitions agree only to first order.
         """
         names = []
         for frame in self.exact.posture.robot.frames:
@@ -133,9 +137,10 @@ class StiffnessCheck:
 
     @property
     def another_equilibrium(self) -> bool:
-        """Whether the tangents differ because the platforms have different poses.
+        """Whether exact model and simulation are at two different equilibria.
 
-        A robot loaded beyond buckling has several equilibria.
+        The tangents then differ.  A robot loaded beyond buckling has several
+        equilibria.
         """
         scale = np.repeat([self.exact.length, 1.0], 3)
         ours, theirs = scale * self.moved, scale * self.simulated_moved
@@ -145,7 +150,7 @@ class StiffnessCheck:
 
     @property
     def passed(self) -> bool:
-        """Whether there are sufficiently accurate methods, and all agree."""
+        """Whether a method is sufficiently accurate, and all such methods agree."""
         return not self.mixed and bool(self._decided) and all(self._decided)
 
     @property
@@ -166,7 +171,7 @@ class StiffnessCheck:
 
     @property
     def reason(self) -> str:
-        """Reason of the outcome in words."""
+        """Reason of the outcome as text."""
         if self.another_equilibrium:
             ours, theirs = (
                 f"{numbers(screw)} rad, m ({'' if stable else 'un'}stable)"
@@ -230,7 +235,7 @@ class StiffnessCheck:
             f"{own['linearised']:.2g}",
             f"linear minus linearised simulation: {off['linear']:.2g}",
         ]
-        if self.clearances:  # without load steps
+        if self.clearances:  # no load steps
             del rows["load steps"], texts[0]
         for name, C in rows.items():
             cells = "".join(f"{value:12.5g}" for value in np.diag(C))
@@ -254,21 +259,21 @@ def check_stiffness(
     time_limit: float = TIME_LIMIT,
     clearances: bool = False,
 ) -> StiffnessCheck:
-    """Compare the tangent of the exact equilibrium with load steps in Exudyn.
+    """Compare the exact model's tangent stiffness with a simulation in Exudyn.
 
     Args:
         posture: the robot's configuration, with its errors.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
+        load: (6,) [N m, N] load on the platform at its origin, in base axes.
         links: ``"spring"``, ``"beam"`` or ``"fem"``.
-        gravity: (3,) [m/s^2] base axes.
-        time_limit: [s] of the simulation.
+        gravity: (3,) [m/s^2] gravity in base axes.
+        time_limit: [s] time limit of the simulation.
         clearances: whether clearances are included.
 
     Returns:
         The compliances by all methods.
 
     Raises:
-        CannotAssemble: the closures cannot be closed with these errors.
+        CannotAssemble: the kinematic loops cannot be closed with these errors.
         FreeMotion: a motion of the platform has no stiffness.
         SolverFailed: no equilibrium was found.
         SimulationFailed: the simulation found no equilibrium either.

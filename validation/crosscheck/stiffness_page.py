@@ -1,4 +1,4 @@
-"""Page of the platform's stiffness compared with a multibody simulation."""
+"""Create the report page that compares the platform's stiffness with a simulation."""
 
 import numpy as np
 
@@ -18,10 +18,10 @@ def stiffness_check_page(check: StiffnessCheck, provenance: Provenance) -> str:
     Args:
         check: result of
             :func:`forcefit.validation.crosscheck.stiffness_check.check_stiffness`.
-        provenance: command and files.
+        provenance: command and input files.
 
     Returns:
-        HTML, which needs no other file.
+        A self-contained HTML page.
     """
     robot = check.exact.posture.robot.name
     words = {PASSED: "agrees with", FAILED: "differs from"}.get(
@@ -43,7 +43,7 @@ def stiffness_check_page(check: StiffnessCheck, provenance: Provenance) -> str:
 
 
 def _stiffness_tiles(check: StiffnessCheck) -> list[Tile]:
-    """Return tiles of the differences of the exact stiffness."""
+    """Return tiles of the differences between the exact stiffness and other methods."""
     return [
         Tile(words, [f"{100 * check.differences[name]:.2g} %"],
              [f"known to {100 * check.uncertainties[name]:.2g} %; at most "
@@ -55,7 +55,7 @@ def _stiffness_tiles(check: StiffnessCheck) -> list[Tile]:
 
 
 def _compliances(check: StiffnessCheck) -> str:
-    """Return the diagonals of the compliances by every method."""
+    """Return a table of the diagonals of the compliances by every method."""
     names = ["exact", "linear", "load steps", "linearised simulation"]
     matrices = [check.exact.compliance, check.linear.compliance,
                 check.simulated.stepped, check.simulated.linearised]  # fmt: skip
@@ -70,7 +70,7 @@ def _compliances(check: StiffnessCheck) -> str:
 
 
 def _methods(check: StiffnessCheck) -> str:
-    """Return the differences and the uncertainties of the methods."""
+    """Return a table of the differences and uncertainties of the methods."""
     words = {"exact": "exact minus load steps", "linearised": "exact minus linearised "
              "simulation", "linear": "linear minus linearised simulation"}  # fmt: skip
     rows: Cells = [
@@ -85,7 +85,7 @@ def _methods(check: StiffnessCheck) -> str:
 
 
 def _displacements(check: StiffnessCheck) -> str:
-    """Return the displacement of the platform at both equilibria."""
+    """Return a table of the platform's displacement at both equilibria."""
     return section(
         "The platform at the equilibrium",
         screw_table(check.moved, check.simulated_moved),

@@ -1,12 +1,13 @@
-"""Verdicts of comparisons, at as many scales as a decision needs.
+"""Decide whether two models agree, and add scales until every check is decided.
 
-At large errors and few scales, the uncertainty of a limit exceeds its bound: terms of
-higher order look like errors of first order, or cancel them.  Then smaller scales are
-added, each half of the last, until every check is decided: a wrong term of first order
-remains, all others vanish.  A check can fail only on four scales or more.
+At large errors and few scales, the uncertainty of a limit exceeds its bound, because
+terms of higher order can imitate or cancel errors of first order.  Smaller scales are
+then added, each half of the last, until every check is decided.  At small scales, terms
+of higher order vanish and a wrong term of first order remains.  A check can fail only
+if at least four scales were solved.
 
-If a quantity is below the noise of either model (a robot without errors and load),
-nothing is compared.  Such a check has no signal and does not count as passed.
+A quantity is not compared if it is below the noise of either model, for example for a
+robot without errors and load.  Such a check has no signal and does not count as passed.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -29,13 +30,13 @@ from forcefit.validation.crosscheck.pair import Pair
 
 SCALES = (1.0, 0.5, 0.25, 0.125)
 NOT_CHECKED = "not checked, nothing to compare"
-# smallest number of scales with which a check can fail, and largest number of scales
+# Smallest number of scales with which a check can fail, and largest number of scales.
 _FEWEST, _MOST = 4, 6
 
 
 @dataclass(frozen=True)
 class Check:
-    """A value that must not exceed a bound.
+    """Check that a value does not exceed a bound.
 
     Attributes:
         value: best estimate of the value, >= 0.
@@ -53,20 +54,20 @@ class Check:
     def verdict(self) -> str:
         """Outcome of the check.
 
-        ``"ok"``; ``"fails"``; ``"undecided"`` if its uncertainty is too large; ``"no
-        signal"`` if there is nothing to compare.
+        The outcome is ``"ok"``, ``"fails"``, ``"undecided"`` if the uncertainty is too
+        large, or ``"no signal"`` if the compared quantities are below the noise.
         """
         if self.value - self.uncertainty > self.bound:
             return FAILS
         if not self.signal and not max(self.value, self.uncertainty) > self.bound:
             return NO_SIGNAL
-        # a value that is not a number counts as unknown
+        # NaN counts as an unknown value.
         known = self.value <= self.bound and self.uncertainty <= self.bound
         return OK if known else UNDECIDED
 
 
 class Judged(Protocol):
-    """Checks on the solutions of two models at several scales."""
+    """Checks on the solutions of two models at several scales (protocol)."""
 
     @property
     def pairs(self) -> tuple[Pair, ...]:
@@ -103,16 +104,16 @@ def compare_scales(
     solve: Callable[[float], Pair],
     judge: Callable[[tuple[Pair, ...], int], Comparison],
 ) -> Comparison:
-    """Solve at several scales, and at smaller ones until the verdict is decided.
+    """Solve both models at several scales, and add scales until the verdict is decided.
 
     Args:
-        scales: factors on all imperfections, at least two different ones.
+        scales: factors on all imperfections, at least two different values.
         solve: function that solves both models at a scale.
-        judge: function that makes a comparison from pairs, largest scale first, and the
-            number of requested scales.
+        judge: function that returns a comparison; its arguments are the pairs of
+            solutions, largest scale first, and the number of requested scales.
 
     Returns:
-        The comparison: decided, or on six scales at least.
+        The comparison.  It is undecided only if at least six scales were solved.
 
     Raises:
         BadInput: fewer than two scales, or a scale that is not finite and > 0.
@@ -127,7 +128,7 @@ def compare_scales(
 
 
 def check_scales(scales: Sequence[float]) -> list[float]:
-    """Return the scales of a slope, largest first.
+    """Check the scales, and return them sorted, largest first.
 
     Args:
         scales: factors on errors, clearances and load.
@@ -147,7 +148,7 @@ def check_scales(scales: Sequence[float]) -> list[float]:
 
 
 def verdict_text(comparison: Judged) -> str:
-    """Return the verdict in a few words, with the number of checks without a signal."""
+    """Return the verdict as text, with the number of checks without a signal."""
     texts = {
         PASSED: "passed",
         FAILED: "FAILED",

@@ -1,5 +1,5 @@
-"""From measured deviations to the effect that a declared model lacks.
+"""Identify the effects that cause the difference between a machine and its model.
 
-Begin at ``diagnose.py``, which selects effects and learns functions.  ``judge.py``
-finds the verdict; ``diagnosis.py`` holds the result.
+Start with ``diagnose.py``, which selects effects and learns functions.  ``judge.py``
+determines the verdict.  ``diagnosis.py`` defines the result.
 """

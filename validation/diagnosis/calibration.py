@@ -1,4 +1,4 @@
-"""Error rates of a diagnosis on the design of a campaign, by simulation."""
+"""Estimate the error rates of a diagnosis by simulating campaigns of its design."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -17,16 +17,18 @@ from forcefit.validation.diagnosis.verdict import verdict
 
 @dataclass(frozen=True)
 class Calibration:
-    """Success and error rates of a diagnosis on the design of a campaign.
+    """Success and error rates of a diagnosis for the design of a campaign.
 
     Attributes:
         campaigns: number of simulated campaigns of each kind.
-        without: number of each verdict on campaigns with noise alone.
-        with_found: number of each verdict on campaigns with the effects found, at their
-            fitted sizes.
-        right: share of the campaigns with effects in which exactly these effects were
-            found.
-        false_claims: share of all verdicts that named absent effects.
+        without: for each verdict, the number of simulated campaigns of pure noise with
+            this verdict.
+        with_found: for each verdict, the number of simulated campaigns with this
+            verdict.  These campaigns contain the identified effects with their fitted
+            parameters.
+        right: fraction of the campaigns with effects in which exactly these effects
+            were identified.
+        false_claims: fraction of all verdicts that claimed absent effects.
     """
 
     campaigns: int
@@ -39,18 +41,19 @@ class Calibration:
 def calibrate(
     diagnosis: Diagnosis, count: int, update: Callable[[int, int], None]
 ) -> Calibration:
-    """Simulate campaigns on a design and diagnose them.
+    """Simulate campaigns with the design of a diagnosis, and diagnose them.
 
-    Simulated readings are linear in the effects of the machine found.  Search and
-    verdict are those of the diagnosis; the final fit is left out.
+    The simulated readings are linear in the effects of the machine that the diagnosis
+    identified.  The model search and the verdict are computed as in the diagnosis, but
+    the final fit is omitted.
 
     Args:
-        diagnosis: diagnosis that gives the design and the machine.
+        diagnosis: diagnosis whose design and identified machine are simulated.
         count: number of campaigns of each kind.
         update: function called with the number of finished campaigns.
 
     Returns:
-        The error rates.
+        The success and error rates.
     """
     traced = diagnosis.traced
     cells = traced.used[traced.columns.row]

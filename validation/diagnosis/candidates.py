@@ -1,7 +1,7 @@
-"""Functions that a machine may have in addition to the library's effects.
+"""Describe candidate functions of a diagnosis: effects outside the library.
 
-A candidate function is a small screw, or a compliance, at a place of the robot, and
-depends on a variable.
+A candidate function is a small screw or a compliance at a place of the robot.  Its
+value depends on one or two variables.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,20 +19,13 @@ from forcefit.assembly.model.robot import Frame, Robot
 from forcefit.validation.diagnosis.function_forms import CandidateShape
 
 TURN, SHIFT = AXES[:3], AXES[3:]
-# relative to the largest component of a vector; smaller changes are rounding
+# Changes below this fraction of a vector's largest component are rounding errors.
 _ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
 class CandidatePart:
-    """Place at which a candidate function acts, and its variables there.
-
-    Attributes:
-        where: a frame, ``"base"`` or ``"reading"``.
-        components: components of the screw at the place.
-        variable: public name of the variable.
-        beside: public name of a second variable; None if there is none.
-    """
+    """Place at which a candidate function acts, and the variables of the function."""
 
     where: str
     components: tuple[str, ...]
@@ -60,7 +53,7 @@ class Candidate:
     shape: CandidateShape
 
     def functions(self) -> list[Function]:
-        """Return the functions of a robot file, with unknown coefficients."""
+        """Return the functions in the form of a robot file, without coefficients."""
         numbers = dict.fromkeys(self.shape.names, 0.0) | dict(self.shape.given)
         return [
             Function(
@@ -81,15 +74,15 @@ def is_turn(component: str) -> bool:
 
 
 def own_component(frame: Frame) -> str:
-    """Return the component of a joint's own motion: along the thread if helical."""
+    """Return the component of a joint's own motion; a screw moves along its thread."""
     return THREAD if frame.pitch else AXES[frame.own_axis]
 
 
 def variables_of(conditions: Conditions) -> list[str]:
-    """Return the names of variables that vary and are known in a whole session.
+    """Return the names of variables that vary and are known throughout a session.
 
-    They are coordinates of drives, loads and their magnitudes, positions and
-    covariates.
+    The variables are coordinates of drives, components and magnitudes of loads,
+    positions and covariates.
     """
     names = [f"q.{name}" for name in drives(conditions.robot)]
     names += [f"load.{axis}" for axis in ("mx", "my", "mz", "fx", "fy", "fz")]
@@ -109,7 +102,7 @@ def variables_of(conditions: Conditions) -> list[str]:
 
 
 def _kind(name: str) -> str:
-    """Return the name of a component's vector, or the name itself without a vector."""
+    """Return the vector to which a component belongs, or the name of a scalar."""
     vectors = "position.", "load.m", "load.f"
     return next((v for v in vectors if name.startswith(v)), name)
 
@@ -117,7 +110,7 @@ def _kind(name: str) -> str:
 def is_known(conditions: Conditions, *names: str) -> NDArray:
     """Return (R,) bool: rows of sessions in which the variables are always known.
 
-    Without sessions all rows count as one session; wrenches are not checked.
+    Without sessions, all rows count as one session.  Wrenches are not checked.
     """
     known = np.ones(len(conditions), dtype=bool)
     for name in names:
@@ -131,12 +124,12 @@ def is_known(conditions: Conditions, *names: str) -> NDArray:
 def places_of(
     robot: Robot, variables: Sequence[str]
 ) -> Iterator[tuple[str, tuple[CandidatePart, ...]]]:
-    """Yield kinds and parts of all candidates, for one variable after another.
+    """Yield the places of all candidate functions, for one variable after another.
 
     Yields:
-        The kind, and the places with the variable: single components, groups of three
-        components, all drives together with their own coordinates, and all bodies
-        together along their axes.
+        The kind of the function, and the places with the variable.  The places are
+        single components, groups of three components, all drives with their own
+        coordinates, and all bodies along their axes.
     """
     single: list[tuple[str, tuple[str, ...]]]
     single = [(f.name, (axis,)) for f in robot.frames for axis in AXES]
@@ -161,6 +154,6 @@ def places_of(
 
 
 def _along(robot: Robot, name: str) -> tuple[str, ...]:
-    """Return the components in which a body becomes longer."""
+    """Return the components along which a body extends."""
     axis = np.abs(body_axis(robot.frame(name))[1])
     return tuple(a for a, part in zip(SHIFT, axis, strict=True) if part > 1e-9)

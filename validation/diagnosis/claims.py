@@ -1,8 +1,8 @@
-"""Effects of a fitted machine that the readings support.
+"""Decide which effects of a fitted machine the readings support.
 
-An effect is claimed on three conditions: its change of the readings exceeds the
-uncertainty of that change; a change of this size is improbable without the effect; and
-no unknown that defines the effect is at a bound.
+An effect is claimed under three conditions.  Its change of the readings exceeds the
+uncertainty of this change.  A change of this size is improbable without the effect.  No
+parameter that defines the effect is at a bound.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from forcefit.validation.diagnosis.lack_of_fit import UNLIKELY
 from forcefit.validation.diagnosis.separability import orthonormal_basis
 from forcefit.validation.diagnosis.unknowns import STEP, Acting, effects_in
 
-# relative to a bound: distance from which an unknown counts as at the bound
+# An unknown counts as at its bound if its distance is below this fraction of the bound.
 _AT_BOUND = 1e-3
 
 
@@ -25,7 +25,8 @@ def supported(fit: MachineFit, one: Acting) -> bool:
     """Return whether the readings support an effect of the fitted machine.
 
     Returns:
-        True for the pose of the measuring frame, which always exists.
+        True or False; always True for the pose of the measuring frame, because every
+        campaign has one.
     """
     slots = one.hypothesis.slots
     if one.device or not slots:
@@ -66,14 +67,15 @@ def _at_bound(bound: float, value: float) -> bool:
 
 @dataclass(frozen=True)
 class Parameter:
-    """Parameter of an effect of a machine, in the unit of the public format.
+    """Identified parameter of an effect, in the unit of the public format.
 
     Attributes:
         name: public name.
-        value: value in the machine found, with the declared value included.
-        std: its standard deviation.
-        declared: value in the robot's file; None if the file has none.
-        difference: difference between value and declared value.
+        value: identified value, including the declared value.
+        std: standard deviation of the value.
+        declared: value in the robot file; None if the file does not contain the
+            parameter.
+        difference: value minus declared value.
     """
 
     name: str
@@ -84,7 +86,7 @@ class Parameter:
 
 
 def parameters_of(fit: MachineFit, one: Acting) -> list[Parameter]:
-    """Return the parameters of an effect found, if any reading depends on them."""
+    """Return the parameters of an identified effect on which a reading depends."""
     h, robot = one.hypothesis, fit.unknowns.robot.without_effects()
     declared = effects_in(fit.unknowns.robot, one.session).get(h.effect, {})
     x, C, _ = fit.own(one)
@@ -109,7 +111,7 @@ def parameters_of(fit: MachineFit, one: Acting) -> list[Parameter]:
         around = np.remainder(change + np.pi, 2 * np.pi) - np.pi
         J[:, i] = np.where(phase, around, change) / (2 * step)
     std = np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", J, C, J), 0.0)).tolist()
-    # without components that were not measured
+    # Components that were not measured are omitted.
     shown = np.any(J[:, fit.seen(one)] != 0, axis=1).tolist()
     return [
         Parameter(name, v, s, declared.get(name), difference[name])

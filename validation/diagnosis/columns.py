@@ -1,4 +1,4 @@
-"""Columns of all candidates, computed from a campaign's design without its readings."""
+"""Compute the columns of all candidates from a campaign's design, without readings."""
 
 import math
 from collections import Counter
@@ -43,12 +43,13 @@ from forcefit.validation.diagnosis.whitening import (
 
 FUNCTION = "function"
 _CLOCK = 0.999  # correlation with time above which a variable is taken as the time
-# number of randomly drawn rows by which thousands of functions are scored
+# Number of randomly drawn rows by which functions are scored in the first step.
 _SAMPLE = 500
-# share of a column that no motion of the measuring frame imitates, below which the
-# column counts as imitated
+# A candidate counts as imitated by the measuring frame if the fraction of its column
+# that no motion of the frame can produce is smaller.
 _ALIKE = 1e-3
-# least visible squared whitened change of all readings: two standard deviations
+# Smallest visible change: sum of squares of the whitened readings, two standard
+# deviations.
 _VISIBLE = 4.0
 
 
@@ -59,18 +60,19 @@ class Columns:
         campaign, conditions: campaign of R rows and its conditions.
         row: (N,) row of every cell.
         block: (N,) configuration or time span of every cell.
-        visit: (N,) measurement of every cell: the row of the file, which may have
+        visit: (N,) row of the file to which every cell belongs; a row may contain
             several points.
         motions: (R, 6, 6) change of the readings by motions of the platform, see
-            :func:`.platform_motions`; None if no row reads several points.
-        device: hypothesis of an unknown measuring frame; None if its pose is known.
+            :func:`.platform_motions`; None if every row contains only one point.
+        device: hypothesis for the unknown pose of the measuring frame; None if this
+            pose is known.
         flat: (N, f) columns of the measuring frame, separate for each session.
         library: elements of the library's effects.
-        nuisance: geometric errors and springs.
+        nuisance: geometric errors and springs that every machine has.
         functions: candidate functions at single places.
-        sampled: (N,) cells of the rows by which functions are scored first.
-        explicit: elements of functions at several places, with columns of the sampled
-            cells.
+        sampled: (N,) bool, True for cells by which functions are scored in the first
+            step.
+        explicit: functions at several places, with their columns in the sampled cells.
     """
 
     def __init__(
@@ -78,11 +80,12 @@ class Columns:
         update: Callable[[str, int, int], None] = lambda what, done, total: None,
         odds: Mapping[str, float] = MappingProxyType({}),
     ) -> None:  # fmt: skip
-        """Compute all derivatives; of the readings only their presence is used.
+        """Compute the derivatives of the readings by all candidates.
 
-        Conditions are registered and include second-order terms.  ``odds`` are factors
-        on the prior odds of effects by name, of ``"function"``, ``"geometry"`` and
-        ``"springs"``; 0 excludes one of them.
+        Of the measured readings, only the information which of them exist is used.  The
+        conditions include the registration and second-order terms.  ``odds`` maps the
+        name of an effect, ``"function"``, ``"geometry"`` or ``"springs"`` to a factor
+        on its prior odds; 0 excludes it.
         """
         self.odds = odds
         self.campaign, self.conditions = campaign, derivatives.conditions
@@ -111,7 +114,7 @@ class Columns:
         self.explicit = joint_functions(self.functions, rows) if any_function else []
 
     def _library(self, update: Callable[[str, int, int], None]) -> list[Element]:
-        """Return the visible hypotheses with distinct columns."""
+        """Return the hypotheses that change the readings visibly and differently."""
         campaign = self.campaign
         shown: dict[object, Signature] = {}
         listed = hypotheses(self.conditions, loaded_components(campaign))
@@ -136,7 +139,7 @@ class Columns:
         return [e for e in made if e.columns.shape[1] or e.offset is not None]
 
     def without_clocks(self) -> "Columns":
-        """Return the columns without functions of time and effects of time alone."""
+        """Return the columns without functions of time and without effects of time."""
         other = copy(self)
         timed = {name for name, effect in LIBRARY.items() if effect.needs == ("time",)}
         other.library = [e for e in self.library if e.name not in timed]
@@ -148,11 +151,11 @@ class Columns:
 
     @property
     def candidates(self) -> bool:
-        """Whether there is any candidate effect or function."""
+        """Whether there is a candidate effect or a candidate function."""
         return bool(self.library or self.explicit or self.functions.variables)
 
     def loadings(self, cells: NDArray) -> NDArray | None:
-        """Return (n, 6) changes of cells over sigma per rotation and shift."""
+        """Return (n, 6) changes of cells over sigma per rotation and translation."""
         if self.motions is None:
             return None
         measured = self.campaign.cells
@@ -162,11 +165,11 @@ class Columns:
     def whitening(
         self, cells: NDArray, root: NDArray, common: tuple[float, float]
     ) -> Whitening:
-        """Return the map from cells (N,) bool to cells with independent noise.
+        """Return the transformation of cells (N,) bool to cells with independent noise.
 
-        ``root`` (n,) are the square roots of the relative precisions of the cells,
-        ``common`` [rad, m] the standard deviations of the platform's common motion,
-        over tau.
+        ``root`` (n,) contains the square roots of the relative precisions of the cells.
+        ``common`` [rad, m] contains the standard deviations of the platform's common
+        motion, divided by tau.
         """
         loadings = self.loadings(cells) if any(common) else None
         if loadings is not None:
@@ -175,7 +178,7 @@ class Columns:
 
     @property
     def has_clocks(self) -> bool:
-        """Whether rows are consecutive in time and a variable is the time."""
+        """Whether rows are ordered in time and one of the variables is the time."""
         successive = blocks_of(self.campaign)[1] == SPANS
         return successive and any(map(self._is_clock, self.functions.variables))
 
@@ -188,7 +191,7 @@ class Columns:
         return bool(abs(np.corrcoef(x, time)[0, 1]) > _CLOCK)
 
     def _named(self) -> NDArray:
-        """Return (N, c) columns of library effects with a single unknown."""
+        """Return (N, c) columns of library effects with only one unknown."""
         alone = [e.columns for e in self.library if e.columns.shape[1] == 1]
         return np.hstack([np.zeros((len(self.row), 0)), *alone])
 
@@ -202,7 +205,7 @@ class Columns:
         return np.hstack([columns * self.tangents.rows_of(s) for s in sessions])
 
     def _told(self, signature: Signature) -> Signature:
-        """Return a hypothesis by sessions without the part that devices can imitate."""
+        """Return a per-session hypothesis without the part that devices can imitate."""
         h = signature.hypothesis
         if not self.flat.shape[1] or sessions_of(h) == (None,):
             return signature
@@ -230,6 +233,6 @@ def _print(signature: Signature) -> object:
 
 
 def _moves_base(h: Hypothesis) -> bool:
-    """Return whether a hypothesis moves the measuring frame, included in ``flat``."""
+    """Return whether a hypothesis moves the measuring frame, as ``flat`` does."""
     device = LIBRARY[h.effect].device
     return any(name in device for slot in h.slots for name in slot.names)

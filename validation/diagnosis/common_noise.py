@@ -1,10 +1,11 @@
-"""Size of the noise that the points of one measurement share.
+"""Estimate the noise that the points of one measurement share.
 
-If a device reads several points of the platform together, all of them include the
-machine's repeatability and the motion of the device's frame.  This noise is modelled as
-a small motion of the platform, drawn once for each measurement.  It has one standard
-deviation of rotations, and one of translations of the points' centre.  Both maximise
-the evidence of a model of the readings, in which all other unknowns are marginalised.
+If a device measures several points of the platform together, the readings of all points
+contain the repeatability of the machine and the motion of the device's frame.  This
+shared noise is modelled as a small random motion of the platform in each measurement.
+One standard deviation describes its rotations, and one describes the translations of
+the points' centre.  Both standard deviations maximise the evidence of a model of the
+readings, in which all other unknowns are marginalised.
 """
 
 import math
@@ -17,23 +18,24 @@ from forcefit.validation.diagnosis.gaussian import size_penalty
 from forcefit.validation.diagnosis.states import IN_USE, Models, State
 from forcefit.validation.diagnosis.weighted_readings import NONE
 
-# first step of the logarithms of both standard deviations, which start at one sigma
+# First step of the logarithms of both standard deviations, which start at one sigma.
 _STEP = 1.0
-_CLOSE = 0.05  # relative change of a logarithm that ends the search
-# [sigma] contribution to the readings below which a standard deviation is set to 0
+_CLOSE = 0.05  # change of a logarithm at which the search ends
+# [sigma] A standard deviation with a smaller contribution to the readings is set to 0.
 _LEAST = 0.02
-# [sigma] contribution to the readings above which a standard deviation is needed
+# [sigma] A standard deviation with a larger contribution to the readings is required.
 _CLEAR = 1.0
 _EVALUATIONS = 40  # largest number of evaluations; each fits a model
-_STABLE = 0.1  # change of a logarithm that does not change any decision
+_STABLE = 0.1  # changes of a logarithm below this value change no decision
 
 
 def common_sizes(state: State) -> tuple[float, float]:
-    """Estimate the noise that points share, for the elements of a model.
+    """Estimate the noise that points share, for a model with given elements.
 
     Returns:
-        [rad, m] standard deviations of rotation and translation over the noise's scale;
-        zero if the gain in evidence is not above the cost of the parameter.
+        [rad, m] standard deviations of rotation and translation, divided by the scale
+        of the noise.  A standard deviation is zero if the gain in evidence does not
+        exceed the penalty of the parameter.
     """
     some = state.readings.sample(NONE)
     loadings = some.columns.loadings(some.cells)
@@ -60,7 +62,7 @@ def common_sizes(state: State) -> tuple[float, float]:
 def _largest(
     state: State, kinds: tuple[int, ...], units: list[float]
 ) -> tuple[tuple[float, float], float]:
-    """Return the standard deviations of largest evidence, and the evidence."""
+    """Return the standard deviations that maximise the evidence, and the evidence."""
 
     def sizes(logs: NDArray) -> tuple[float, float]:
         own = dict(zip(kinds, np.exp(logs).tolist(), strict=True))

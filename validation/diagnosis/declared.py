@@ -1,4 +1,4 @@
-"""Readings of a machine as declared in its file, common to all folds."""
+"""Predict the readings of the declared machine once for all folds."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -21,11 +21,11 @@ from forcefit.validation.diagnosis.signatures import conditions_of, whiten
 
 @dataclass(frozen=True, eq=False)
 class Declared:
-    """Predicted readings of the declared machine; measured readings are not used.
+    """Predictions of the declared machine, which do not depend on measured readings.
 
     Attributes:
-        conditions: conditions of all rows, before any registration.
-        finite: whether motions of the declared model are finite.
+        conditions: conditions of all rows, before the pose of the device is fitted.
+        finite: whether the declared model computes finite motions.
     """
 
     conditions: Conditions
@@ -33,7 +33,7 @@ class Declared:
 
     @cached_property
     def derivatives(self) -> Derivatives:
-        """Derivatives of the declared readings, with clearances at rest."""
+        """Derivatives of the declared readings with clearances at rest."""
         return Derivatives(at_rest(self.conditions))
 
     def bent(
@@ -41,7 +41,8 @@ class Declared:
     ) -> Conditions | None:
         """Return conditions with finite motions' effect on geometric errors (n, 6).
 
-        None if this effect changes no reading of the campaign by ``least`` [sigma].
+        The result is None if this effect changes every reading of the campaign by less
+        than ``least`` [sigma].
         """
         if not errors.any():
             return None
@@ -61,11 +62,11 @@ def declared(campaign: Campaign, *, finite: bool = False) -> Declared:
 
     Args:
         campaign: campaign of R rows.
-        finite: whether motions of the declared model are finite; they are too if the
-            robot's file says so.
+        finite: whether the declared model computes finite motions.  Finite motions are
+            also computed if the robot file requests them.
 
     Returns:
-        The declared model; it does not depend on the campaign's readings.
+        The declared model, which does not depend on the readings of the campaign.
     """
     conditions = conditions_of(campaign)
     finite = finite or conditions.exact
@@ -74,7 +75,7 @@ def declared(campaign: Campaign, *, finite: bool = False) -> Declared:
 
 
 def at_rest(conditions: Conditions) -> Conditions:
-    """Return conditions with clearances of closed chains at rest; cached."""
+    """Return conditions with clearances of closed chains at rest (cached)."""
     if conditions.robot.closures and virtual_joints(conditions.robot).cones.shape[1]:
         return with_rest_positions(conditions)
     return conditions

@@ -1,7 +1,8 @@
-"""Readings of a machine under declared conditions, and derivatives by effects.
+"""Compute the readings of a machine and their derivatives by effects.
 
-They depend on the design of a campaign and not on its readings.  Searches with equal
-conditions therefore share them, for example the folds of a diagnosis.
+The derivatives depend on the design of a campaign and not on its readings.  Therefore
+searches with equal conditions, such as the folds of a diagnosis, use the same
+derivatives.
 """
 
 from collections.abc import Mapping
@@ -19,19 +20,20 @@ from forcefit.validation.diagnosis.hypotheses import Slot
 from forcefit.validation.diagnosis.responses import Responses, responses
 from forcefit.validation.diagnosis.sensitivities import Sensitivities
 
-# relative to an unknown's plausible size: step that limits both rounding and curvature
+# Step relative to an unknown's plausible size; it limits both rounding and truncation
+# errors.
 STEP = 1e-3
 
 
 class Derivatives:
-    """Readings of R rows near the declared model; each is computed once.
+    """Readings of R rows near the declared model, and their derivatives.
 
     Attributes:
-        conditions: declared conditions; they include the registration if it was fitted.
+        conditions: declared conditions, including the registration if it was fitted.
     """
 
     def __init__(self, conditions: Conditions) -> None:
-        """Store the conditions; derivatives are computed on first use."""
+        """Store the conditions; derivatives are computed when they are first used."""
         self.conditions = conditions
         self._begun: dict[object, NDArray] = {}
 
@@ -47,15 +49,15 @@ class Derivatives:
 
     @cached_property
     def sensitivities(self) -> Sensitivities:
-        """Response of the readings to functions at all places."""
+        """Response of the readings to functions at all possible places."""
         return Sensitivities(self.conditions, self.response)
 
     def model(self, effects: Mapping[str, Values], *, finite: bool = False) -> NDArray:
         """Return the (R, 6) [rad, m] readings with effects, linear in clearances.
 
-        ``effects`` has parameters by public name; readings are NaN without a solution.
-        Finite motions are computed for the declared machine or, if ``finite``, for the
-        changed machine.
+        ``effects`` maps the name of each effect to its parameters by public name.
+        Readings of rows without a solution are NaN. Finite motions are computed for the
+        changed machine if ``finite`` is true, otherwise for the declared machine.
         """
         changed = apply_effects(self.conditions, effects)
         if any(LIBRARY[name].clearance for name in effects):
@@ -66,10 +68,9 @@ class Derivatives:
         return predict(changed).deviation
 
     def begun(self, effect: str, slot: Slot, shapes: Mapping[str, float]) -> NDArray:
-        """Return the (R, 6) [rad, m] readings with one unknown of an effect changed.
+        """Return the (R, 6) [rad, m] readings after a step of one unknown of an effect.
 
-        The unknown is changed by one step.  ``shapes`` are values of the effect's shape
-        parameters.
+        ``shapes`` contains the values of the effect's shape parameters.
         """
         key = (effect, slot.names, tuple(sorted(set(shapes.values()))))
         if key not in self._begun:

@@ -1,4 +1,4 @@
-"""The diagnosis of a campaign: effects that its model lacks, with probabilities.
+"""Diagnose a campaign: find the effects that are missing in its declared model.
 
 Steps:
 
@@ -37,7 +37,7 @@ Update = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """Result of search and fit without the held-out rows.
+    """Result of the search and of the fit, without the held-out rows.
 
     Attributes:
         traced: result of the search.
@@ -61,17 +61,21 @@ def diagnose(
 
     Args:
         campaign: measured deviations.
-        finite: whether motions of the declared model are finite in the search; they are
-            too if the robot's file has the effect ``geometric_stiffening``.
-        odds: factors on the prior odds of effects by name, of ``"function"`` (any
-            function), ``"geometry"`` and ``"springs"``; 0 excludes one.
-        update: function called with the step, its progress and its total.
+        finite: whether the declared model computes finite motions in the search.
+            Finite motions are always computed if the robot file contains the effect
+            ``geometric_stiffening``.
+        odds: mapping from the name of an effect, ``"function"`` (any function),
+            ``"geometry"`` or ``"springs"`` to a factor on its prior odds; 0 excludes
+            it.
+        update: function called with the name of the step, the finished count and the
+            total.
 
     Returns:
         The diagnosis.
 
     Raises:
-        BadInput: the measuring frame is unknown and cannot be estimated.
+        BadInput: the pose of the measuring frame is unknown, and the readings do not
+            determine it.
     """
     held = hold_out(campaign)
     design = declared(campaign, finite=finite)  # common to all folds
@@ -80,8 +84,8 @@ def diagnose(
         part = hidden(campaign, ~rows)
         seen = part.cells.any(axis=1)
         setup = setup_blunders(part.take(seen), conditions_of(part).take(seen))
-        # if there are blunders, no effect is searched, because effects would imitate
-        # the blunders
+        # If there are set-up blunders, no effects are searched, because effects would
+        # imitate the blunders.
         nothing = dict.fromkeys((*LIBRARY, FUNCTION, GEOMETRY, SPRINGS), 0.0)
         own = nothing if setup else odds
         return _Found(*trace(part, rows, design, update, odds=own), setup)
@@ -104,5 +108,5 @@ def diagnose(
 
 
 def _fitted_rows(held: HeldOut, rows: NDArray) -> NDArray:
-    """Return (R,) bool: rows to fit, which are not held out; all if none can be."""
+    """Return (R,) bool: rows that are not held out, or all if none can be held out."""
     return np.ones(len(rows), dtype=bool) if held.how == "none" else ~rows

@@ -1,7 +1,8 @@
-"""Result of a diagnosis: the verdict and the evidence for it.
+"""Define the result of a diagnosis: the verdict and the evidence for it.
 
-Other modules format the result as text, figures and files.  ``wording`` is the function
-that makes the text, so that this module does not import them.
+Other modules convert the result to text, figures and files.  The attribute ``wording``
+is the function that creates the text.  It is stored so that this module does not import
+the module of the text.
 """
 
 from collections.abc import Callable
@@ -37,47 +38,53 @@ class Diagnosis:
     """Result of the diagnosis of a campaign.
 
     Attributes:
-        campaign: the measurements, with the stated sigma.
+        campaign: the measurements with the declared sigma.
         verdict: ``"explained"``, ``"learned"``, ``"none_needed"``, ``"ambiguous"``,
             ``"outside_library"`` or ``"not_enough_rows"``.
-        fit: the machine found, with all parameters fitted together; its robot is saved.
+        fit: the identified machine, with all parameters fitted together.  Its robot is
+            saved.
         traced: result of the search.
         claimed: names of the claimed effects.
-        effects: names of all effects of the machine found, claimed or not.
+        effects: names of all effects of the identified machine, including effects that
+            are not claimed.
         probability: probability of every effect of the library that the design can
             detect.
-        alternatives: sets of effects by name, with their probabilities, most probable
+        alternatives: sets of effect names with their probabilities, most probable
             first.
-        lack: result of the test whether the residual of the fitted rows is noise.
+        lack: lack-of-fit test of the fitted rows, that is, whether their residual is
+            noise.
         before: errors of the declared model on the held-out rows, without outliers.
-        after: errors on the same rows of machines fitted without these rows.
-        saved: errors of the saved robot on all rows without outliers; it was fitted to
-            these rows.
-        noise: errors due to sigma, and due to the noise that points of a measurement
-            share.
-        with_outliers: errors before and after with the held-out outliers included.
+        after: errors on the same rows of machines that were fitted without these rows.
+        saved: errors of the saved robot on all rows without outliers, to which it was
+            fitted.
+        noise: expected errors due to sigma, and due to the noise that the points of a
+            measurement share.
+        with_outliers: the errors ``before`` and ``after`` on all held-out rows,
+            including outliers.
         uncertainty: [-] standard error of ``after.normalised``, from the scatter of
             blocks.
         noise_scale: ratio of true to stated sigma, and the standard deviation of the
             ratio.
-        noise_in_time: correlation of the noise in time, which widens the intervals of
-            the effects; None if there is none.
-        sequence: models from the declared one to the machine found, with their errors.
+        noise_in_time: correlation of the noise in time, which increases the uncertainty
+            of the effects; None if there is no correlation.
+        sequence: models from the declared to the identified machine, with their errors.
         held: the held-out rows, and the method of holding out.
         outliers: (R,) bool, rows that no computation uses.
-        conditions: declared conditions of the campaign, registered.
-        open: (R,) bool, rows in which clearances leave the pose undetermined, in the
-            declared model or with the effects found; see
+        conditions: declared conditions of the campaign, including the registration.
+        open: (R,) bool, True for rows in which clearances leave the pose undetermined,
+            in the declared model or with the identified effects; see
             :class:`forcefit.assembly.measurement.predict.Prediction`.
-        residual_before: (R, 6) [rad, m] reading minus declared model; NaN if not
-            measured.
-        residual_after: (R, 6) [rad, m] reading minus reading of the saved robot.
-        trends: variables with which the residual varies, if it is more than noise.
-        next: the measurement that would decide an ambiguous verdict.
-        needed: description of the rows that would decide, if there are too few.
+        residual_before: (R, 6) [rad, m] reading minus prediction of the declared model;
+            NaN if not measured.
+        residual_after: (R, 6) [rad, m] reading minus prediction of the saved robot.
+        trends: variables on which the residual depends, if the residual exceeds the
+            noise.
+        next: the measurement that would resolve an ambiguous verdict.
+        needed: description of the additional rows that a verdict requires, if there are
+            too few rows.
         remarks: implausible parameters of the machine, and impossible readings.
-        setup: errors of the campaign's set-up; if there are any, no effects were
-            searched.
+        setup: blunders in the set-up of the campaign.  If there are any, no effects
+            were searched.
         wording: function that returns a diagnosis as text.
     """
 
@@ -126,17 +133,17 @@ class Diagnosis:
 
     @property
     def better(self) -> bool:
-        """Whether the machine found has smaller held-out errors than the declared."""
+        """Whether held-out errors are smaller than those of the declared machine."""
         found = bool(len(self.fit.unknowns)) or bool(self.effects)
         return found and self.after.normalised < self.before.normalised
 
     @property
     def findings(self) -> tuple[str, ...]:
-        """Sentences on the noise: its scale, its repeatability, its memory."""
+        """Sentences about the noise: its scale, repeatability and memory."""
         return self.traced.selected.noise.findings
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return a data set over ``row``: residuals, held-out rows, outliers."""
+        """Return a data set over ``row``: residuals, held-out rows and outliers."""
         return row_dataset(
             self.campaign,
             {
@@ -149,16 +156,16 @@ class Diagnosis:
         )
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a row for each measurement, columns (variable, component)."""
+        """Return a pandas table of the measurements, columns (variable, component)."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "row")
 
     def save(self, path: Path | str) -> None:
-        """Write the machine found as a robot file, and its covariance.
+        """Write the identified machine to a robot file, and its covariance next to it.
 
         Args:
-            path: path of the robot file; the covariance is written to the same name
+            path: path of the robot file.  The file of the covariance has the same name
                 with the suffix ``.npz``.
 
         Raises:
@@ -173,7 +180,7 @@ class Diagnosis:
         return self.wording(self)
 
     def _figures(self) -> Figures:
-        """Return lines with the verdict and its main numbers."""
+        """Return text lines with the verdict and its main numbers."""
         likely = sorted(self.probability.items(), key=lambda one: -one[1])[:3]
         return {
             "campaign": f"{self.campaign.name}, {len(self.campaign)} rows",

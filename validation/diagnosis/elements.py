@@ -1,8 +1,8 @@
-"""Elements of a model: effects of the library, and functions.
+"""Describe effects of the library and functions as elements of a linear model.
 
-An element adds ``offset + columns d`` to the whitened readings.  Its unknowns d are
-scaled so that the columns of unknowns of one unit have norm one; they share a prior
-standard deviation.
+An element adds ``offset + columns d`` to the whitened readings.  The unknowns d of one
+unit share a prior standard deviation.  They are scaled so that the root mean square
+norm of their columns is one.
 """
 
 from collections.abc import Iterable
@@ -20,7 +20,7 @@ from forcefit.validation.diagnosis.signatures import Signature
 from forcefit.validation.diagnosis.whitening import Whitening
 
 _PLAUSIBLE = 1e3  # largest ratio of an unknown to its plausible size
-_NO_OFFSET = 1e-9  # [sigma] smaller offsets are rounding
+_NO_OFFSET = 1e-9  # [sigma] smaller offsets are rounding errors
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,16 +30,18 @@ class Element:
     Attributes:
         name: name of the effect; ``""`` for a function.
         columns: (N, m) whitened change of the readings per scaled unknown.
-        scale: (m,) value of an unknown per scaled unknown.
+        scale: (m,) factor from a scaled unknown to its value.
         offset: (N,) whitened contribution at d = 0; None if it is zero.
         lower, upper: (m,) bounds of the scaled unknowns.
-        given: (m,) fixed prior standard deviation; NaN where it is optimised.
+        given: (m,) fixed prior standard deviation; NaN if it is optimised.
         most: largest plausible prior standard deviation.
         log_prior: logarithm of the prior probability.
-        what: the hypothesis or the candidate.
-        slots: (m,) indices of the hypothesis' slots, or of the candidate's unknowns.
+        what: the hypothesis of a library effect, or the candidate function.
+        slots: (m,) indices of the slots of the hypothesis, or of the unknowns of the
+            candidate.
         begin: values of all slots at d = 0.
-        first: the element linearised at its start values; None if this element is.
+        first: the element linearised at its start values; None if this element itself
+            is linearised there.
     """
 
     name: str
@@ -79,7 +81,7 @@ class Element:
         return np.abs(self.lower) < 1e-12
 
     def values(self, d: NDArray) -> NDArray:
-        """Return values of all slots, or of a function's unknowns, within bounds."""
+        """Return the values of all slots or unknowns of a function, within bounds."""
         x = self.begin.copy()
         x[self.slots] += np.clip(d, self.lower, self.upper) * self.scale
         return x
@@ -90,8 +92,9 @@ def effect_element(
 ) -> Element:
     """Return the element of a library effect.
 
-    ``shapes`` (k,) are the shape parameters at which it is linearised; None for the
-    start values.  Unknowns without influence keep their start values.
+    The element is linearised at the shape parameters ``shapes`` (k,), or at their start
+    values if ``shapes`` is None.  Unknowns without influence on the readings keep their
+    start values.
     """
     h = signature.hypothesis
     shape = np.array([slot.shape for slot in h.slots], dtype=bool)
@@ -100,13 +103,14 @@ def effect_element(
     used = shown if shapes is not None else shown & ~shape
     slots = np.flatnonzero(used)
     plausible = np.array([h.slots[k].unknown.scale for k in slots])
-    # the prior standard deviation of a nonlinear parameter is half its value
+    # The prior standard deviation of a nonlinear (shape) parameter is half its value.
     plausible = np.where(shape[slots], 0.5 * np.abs(begin[slots]), plausible)
     columns = signature.columns[:, slots] * plausible
     kinds = [_kind(robot, h, k) for k in slots.tolist()]
     norm = _norms(columns, kinds)
     norm = np.where(shape[slots], 1.0, norm)
-    # at the start values the shape parameters of an effect have no columns
+    # If an effect is linearised at its start values, its shape parameters have no
+    # columns.
     held = np.where(shape & (shapes is None), 0.0, begin)
     offset = signature.offset + signature.columns @ held
     scale = plausible / norm
@@ -137,7 +141,7 @@ def _kind(robot: Robot, h: Hypothesis, slot: int) -> tuple[object, ...]:
 
 
 def _norms(columns: NDArray, kinds: Iterable[object]) -> NDArray:
-    """Return, for each of m columns, the rms norm of all columns of its kind."""
+    """Return, for each of m columns, the rms norm of all columns of the same kind."""
     names = list(kinds)
     squares = (columns**2).sum(axis=0)
     own = [[k for k, other in enumerate(names) if other == kind] for kind in names]
@@ -150,9 +154,9 @@ def function_element(
 ) -> Element | None:  # fmt: skip
     """Return the element of a function of m unknowns; None if it is not visible.
 
-    ``columns`` (N, m) are the whitened changes of the readings per unknown, ``axes``
-    (m,) the component of each unknown, ``falling`` (m,) the relative prior standard
-    deviations, and ``most`` is the largest plausible value.
+    ``columns`` (N, m) are the whitened changes of the readings per unknown.  ``axes``
+    (m,) is the screw component of each unknown.  ``falling`` (m,) are the relative
+    prior standard deviations.  ``most`` is the largest plausible value.
     """
     scaled = columns * falling
     norm = _norms(scaled, axes // 3)
@@ -167,7 +171,7 @@ def function_element(
 
 
 class Dense:
-    """Elements with stored columns, which are scored in batches."""
+    """Elements with stored columns, which are scored together in batches."""
 
     def __init__(
         self, elements: list[Element], cells: NDArray, whiten: Whitening

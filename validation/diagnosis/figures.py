@@ -1,6 +1,6 @@
-"""Charts of a diagnosis, and a three-dimensional view of the robot.
+"""Create the charts of a diagnosis and a three-dimensional view of the robot.
 
-The functions take a diagnosis and return HTML for a page.
+Each function returns HTML for a report page.
 """
 
 from dataclasses import replace
@@ -25,7 +25,7 @@ _COLOURS = {"before": RED, "after": BLUE}
 
 
 def error_chart(diagnosis: Diagnosis) -> str:
-    """Return bars of the errors before and after and of the noise, on held-out rows."""
+    """Return a bar chart of held-out errors before and after, and of the noise."""
     charts = []
     for kind, unit in (("rotation", "rad"), ("position", "m")):
         names = ("before", "after", "noise")
@@ -39,7 +39,7 @@ def error_chart(diagnosis: Diagnosis) -> str:
 
 
 def sequence_chart(diagnosis: Diagnosis) -> str:
-    """Return bars of the error of each model of the sequence, in sigma."""
+    """Return a bar chart of the error [sigma] of each model of the sequence."""
     values: dict[str, float] = {}
     for step in diagnosis.sequence:
         again = step.term in values  # several functions may be learned
@@ -50,7 +50,7 @@ def sequence_chart(diagnosis: Diagnosis) -> str:
 
 
 def vector_charts(diagnosis: Diagnosis) -> str:
-    """Return residual displacements of the measured points, from top and side."""
+    """Return charts of residual displacements of measured points, from top and side."""
     platform = diagnosis.conditions.postures.platform
     where = platform[:, :3, 3] + platform[:, :3, :3] @ diagnosis.conditions.point
     known = ~diagnosis.outliers
@@ -81,7 +81,7 @@ def vector_charts(diagnosis: Diagnosis) -> str:
 
 
 def covariate_charts(diagnosis: Diagnosis) -> str:
-    """Return charts of the residual before and after, against load and variables."""
+    """Return charts of the residual before and after, over load and other variables."""
     kept, rows = ~diagnosis.outliers, _labels(diagnosis)
     sizes = {
         name: np.sqrt(np.nanmean((left / diagnosis.campaign.sigma) ** 2, axis=1))[kept]
@@ -122,7 +122,7 @@ def _labels(diagnosis: Diagnosis) -> list[str]:
 
 
 def _varied(diagnosis: Diagnosis) -> dict[tuple[str, str], NDArray]:
-    """Return the variables of the charts, with name and unit."""
+    """Return the variables of the charts with their names and units."""
     campaign = diagnosis.campaign
     varied = {("load size", "N"): np.linalg.norm(campaign.loads[:, 3:], axis=1)}
     for i, frame in enumerate(campaign.robot.frames):
@@ -136,7 +136,7 @@ def _varied(diagnosis: Diagnosis) -> dict[tuple[str, str], NDArray]:
 
 
 def probability_chart(diagnosis: Diagnosis) -> str:
-    """Return bars of the probability of every effect, the most probable on top."""
+    """Return a bar chart of the probabilities of all effects, the largest on top."""
     ranked = sorted(diagnosis.probability.items(), key=lambda item: -item[1])
     axis = Axis(f"probability (claimed from {CLAIM}, a rival from {RIVAL})",
                 options={"range": [0, 1]})  # fmt: skip
@@ -146,9 +146,9 @@ def probability_chart(diagnosis: Diagnosis) -> str:
 
 
 def confounding_chart(diagnosis: Diagnosis) -> str:
-    """Return the matrix of the share of a row's effect that a column's can imitate."""
+    """Return the matrix chart of how well effects can imitate each other."""
     columns: dict[str, NDArray] = {}
-    for element in diagnosis.traced.columns.library:  # the most general form is first
+    for element in diagnosis.traced.columns.library:  # most general first
         if np.any(element.columns):
             columns.setdefault(element.name, element.columns)
     angles = compare_signatures(columns)
@@ -156,10 +156,11 @@ def confounding_chart(diagnosis: Diagnosis) -> str:
 
 
 def imitation_chart(shared: NDArray, names: tuple[str, ...]) -> str:
-    """Return the chart of the share of each effect that another one can imitate.
+    """Return a chart of the fraction of each effect that another effect can imitate.
 
     Args:
-        shared: (m, m) share of the row's effect that the column's effect can imitate.
+        shared: (m, m) fraction of the row's effect that the column's effect can
+            imitate.
         names: names of the m effects.
 
     Returns:
@@ -175,8 +176,9 @@ def worst_row(diagnosis: Diagnosis) -> tuple[int, str]:
     """Return the held-out row with the largest error of the declared model.
 
     Returns:
-        The row, and the larger part of its error: ``"position"``, or ``"rotation"`` if
-        no position was measured; -1 and an empty text if there is no such row.
+        The index of the row, and the kind of the error: ``"position"``, or
+        ``"rotation"`` if no position was measured.  The result is -1 and an empty text
+        if there is no such row.
     """
     aside = diagnosis.held.rows & ~diagnosis.outliers
     for name, part in (("position", slice(3, 6)), ("rotation", slice(0, 3))):
@@ -189,7 +191,7 @@ def worst_row(diagnosis: Diagnosis) -> tuple[int, str]:
 
 
 def assembled(diagnosis: Diagnosis, row: int) -> Assembly | None:
-    """Return machine found, assembled at a row under its load; None if impossible."""
+    """Return the identified machine, assembled at a row under its load, or None."""
     campaign = replace(diagnosis.campaign, robot=diagnosis.robot)
     try:
         forced = assemble_row(replace(conditions_of(campaign), exact=False), row)
@@ -199,7 +201,7 @@ def assembled(diagnosis: Diagnosis, row: int) -> Assembly | None:
 
 
 def worst_robot(diagnosis: Diagnosis) -> str:
-    """Return the scene of the robot at the row of largest error; empty without one."""
+    """Return a 3-D scene of the robot at the row of largest error, or nothing."""
     row, name = worst_row(diagnosis)
     forced = assembled(diagnosis, row) if row >= 0 else None
     if forced is None:

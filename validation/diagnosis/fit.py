@@ -1,19 +1,19 @@
-r"""Fit of all unknown parameters of a robot together, the last step of a diagnosis.
+r"""Fit all unknown parameters of a robot together, the last step of a diagnosis.
 
 The most probable x minimises
 
     F(x) = |W (y - f(x)) / sigma|^2 + |(x - m) / s|^2    within the bounds of x,
 
-Here f are the readings of the robot to be saved, computed by the function that predicts
-with the saved file (:mod:`forcefit.validation.diagnosis.prediction`).  Steps are
-Gauss-Newton steps, with the slopes of the linear model at the present robot; a step
-that increases F is halved.
+f(x) are the predicted readings of the fitted robot, computed by the function that
+predicts with a saved file (:mod:`forcefit.validation.diagnosis.prediction`).  The
+minimum is computed by Gauss-Newton steps with the derivatives of the linear model at
+the current robot.  A step that increases F is halved.
 
 ======  ==============  =========  ===================================================
 symbol  code            shape      meaning
 ======  ==============  =========  ===================================================
 y       ``measured``    (n,)       readings of the fitted cells
-W       ``whiten``      (n, n)     makes their noise independent (:mod:`.whitening`)
+W       ``whiten``      (n, n)     transformation to independent noise
 A       ``A``           (n, k)     slopes over sigma, whitened
 P       ``precision``   (k,)       1 / s^2
 C       ``covariance``  (k, k)     (A'A + P)^-1
@@ -39,12 +39,12 @@ from forcefit.validation.diagnosis.separability import ROUNDING
 from forcefit.validation.diagnosis.unknowns import Acting, Unknowns
 from forcefit.validation.diagnosis.whitening import whitening_of
 
-_STEPS = 20  # largest number of Gauss-Newton steps; most fits converge within ten
-_SLOPES = 6  # number of steps in which the slopes are recomputed
+_STEPS = 20  # largest number of Gauss-Newton steps; usually ten suffice
+_SLOPES = 6  # number of steps in which the derivatives are recomputed
 _SHORTEST = 1 / 64  # smallest fraction of a step that is tried
-# decrease of F at convergence; F is a sum of squared standard deviations
+# Decrease of F at convergence; F is a sum of squares in standard deviations.
 _SETTLED = 1e-3
-# [sigma] residual assigned to a reading for which the robot has no solution
+# [sigma] Residual assigned to a reading if the robot has no solution there.
 _NO_ANSWER = 1e3
 
 
@@ -57,8 +57,9 @@ class MachineFit:
         x: (k,) most probable values of the parameters.
         covariance: (k, k) posterior covariance of x, at fixed prior standard deviations
             and sigma.
-        slopes: (n, k) change of the fitted cells per unknown, over sigma, whitened.
-        residual: (n,) residual of the fitted cells, over sigma, whitened.
+        slopes: (n, k) derivatives of the fitted readings by the parameters, over sigma,
+            whitened.
+        residual: (n,) residual of the fitted readings, over sigma, whitened.
     """
 
     unknowns: Unknowns
@@ -69,7 +70,7 @@ class MachineFit:
 
     @cached_property
     def robot(self) -> Robot:
-        """The fitted robot, which is saved."""
+        """The fitted robot that is saved."""
         return self.unknowns.robot_at(self.x)
 
     @property
@@ -79,13 +80,13 @@ class MachineFit:
 
     @property
     def determined(self) -> NDArray:
-        """(k,) share of each unknown that the readings determine, not the prior."""
+        """(k,) fraction of each parameter that is determined by the readings."""
         prior = self.unknowns.std**2
         return 1.0 - np.clip(np.diag(self.covariance) / prior, 0.0, 1.0)
 
     @property
     def effects(self) -> tuple[Acting, ...]:
-        """Effects of the library in the robot, except the measuring frame's pose."""
+        """Library effects of the robot, except the pose of the measuring frame."""
         return tuple(one for one in self.unknowns.effects if not one.device)
 
     def own(self, part: Acting) -> tuple[NDArray, NDArray, NDArray]:
@@ -94,7 +95,7 @@ class MachineFit:
         return self.x[own], self.covariance[own, own], self.slopes[:, own]
 
     def seen(self, part: Acting) -> NDArray:
-        """Return (k,) bool: unknowns of an effect on which a reading depends."""
+        """Return (k,) bool: unknowns of an effect on which any reading depends."""
         return self.determined[self.unknowns.place(part)] > ROUNDING
 
 
@@ -105,14 +106,16 @@ def fit_machine(
 
     Args:
         campaign: campaign of R rows; its sigma and shared noise are used.
-        unknowns: unknown parameters of its robot.
-        rows: (R,) bool, rows to be fitted; readings of other rows are not used.
-        start: (k,) start values; the mean of the prior if absent.
+        unknowns: unknown parameters of the campaign's robot.
+        rows: (R,) bool, True for rows to be fitted; readings of other rows are not
+            used.
+        start: (k,) start values; None for the mean of the prior.
 
     Returns:
         The fit.
     """
-    # all rows are predicted, because a row may depend on earlier commands
+    # All rows are predicted, because the readings of a row can depend on earlier
+    # commands.
     cells = campaign.cells & rows[:, None]
     sigma, whiten = campaign.sigma[cells], whitening_of(campaign, cells)
 
@@ -133,7 +136,7 @@ def _minimum(
     unknowns: Unknowns, residual: Callable[[NDArray], NDArray],
     slopes: Callable[[NDArray], NDArray], start: NDArray | None,
 ) -> tuple[NDArray, NDArray, NDArray]:  # fmt: skip
-    """Return the (k,) most probable x, and (n, k) slopes and (n,) residual at it."""
+    """Return (k,) most probable x, and the (n, k) slopes and (n,) residual there."""
     mean, std = unknowns.mean, unknowns.std
     lower, upper = unknowns.bounds
     x = np.clip(mean if start is None else start, lower, upper)
@@ -173,7 +176,7 @@ def _step(unknowns: Unknowns, A: NDArray, left: NDArray, x: NDArray) -> NDArray:
     step = solve_triangular(L, y, lower=True, trans=1, check_finite=False)
     low, high = ((bound - x) / std for bound in unknowns.bounds)
     if np.any(step < low) or np.any(step > high):
-        # |L' step - y| has the same minimum, and allows bounds
+        # |L' step - y| has the same minimiser, and its solver accepts bounds.
         wide = high - low > 0.0
         step = np.zeros(len(x))
         free = lsq_linear(L.T[:, wide], y, (low[wide], high[wide]), method="bvls")
@@ -182,7 +185,7 @@ def _step(unknowns: Unknowns, A: NDArray, left: NDArray, x: NDArray) -> NDArray:
 
 
 def _information(B: NDArray) -> NDArray:
-    """Return (k, k) B'B + 1, the inverse of C for unknowns in units of their prior."""
+    """Return (k, k) B'B + 1, the inverse of C if unknowns are scaled by their prior."""
     M = B.T @ B
     M[np.diag_indices(len(M))] += 1.0
     return np.asarray(M)

@@ -1,7 +1,7 @@
-"""Forms of functions of one or two variables, and their prior probabilities.
+"""List the forms of functions of one or two variables, and their prior probabilities.
 
-All families of forms of a variable have the same prior probability.  The forms of a
-family share it; the share of a wave decreases with its order.
+All families of forms of a variable have equal prior probability.  This probability is
+divided among the forms of the family.  The part of a wave decreases with its order.
 """
 
 import math
@@ -15,25 +15,25 @@ from forcefit.assembly.measurement.conditions import Conditions
 from forcefit.assembly.measurement.variables import variable
 from forcefit.assembly.model.robot import Robot
 
-KNOTS = 7  # number of knots of a spline; powers up to three fit simpler shapes
-MANY = 150  # number of rows above which waves of high order are searched
-# time constants relative to the campaign's duration
+KNOTS = 7  # number of knots of a spline; powers up to three fit simpler curves
+MANY = 150  # number of rows from which waves of high order are searched
+# Time constants relative to the duration of the campaign.
 LAGS = 0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2, 0.3, 0.5
 _CYCLES = 0.5, 1, 1.5, 2, 3, 4, 6  # cycles of a slow wave in the campaign's duration
 _DEPTHS = 0.03, 0.1, 0.3, 1.0  # depths of slip, relative to the variable's range
-# depths of slip near the best one, in a refined search
+# Depths of slip near the best depth, for the refined search.
 _ALL_DEPTHS = tuple(0.01 * 1.4**k for k in range(15))
-# step of the search for the number of turns of a screw over its slide's range; larger
-# steps miss waves
+# Step of the search for the number of screw turns over the travel of a slide; a larger
+# step would miss waves.
 _TURNS = 0.5
-# largest number of turns over that range; also at most two turns for each position
+# Largest number of turns over the travel; in addition, at most two turns per position.
 _MOST_TURNS = 200.0
 _FINER = 1.2  # first factor in the refinement of a shape parameter
-# relative to the largest load: a smaller load does not take up backlash
+# Smaller loads, relative to the largest load, do not close backlash.
 _NO_LOAD = 1e-3
-_HIGH = 12  # highest order of waves that is tried alone
+_HIGH = 12  # highest order of waves that is tried separately
 _CLOCKS = "time", "cov.time"
-# number of instants at which a step is tried, in short and long campaigns
+# Number of times at which a step is tried, in short and in long campaigns.
 _JUMPS, _MANY_JUMPS = 10, 91
 _INNER = np.linspace(0.1, 0.9, 9)  # quantiles at which other shape parameters are tried
 
@@ -45,7 +45,8 @@ class CandidateShape:
     Attributes:
         form: a name of :data:`forcefit.assembly.effects.forms.FORMS`.
         names: names of the columns, which are linear in the coefficients.
-        given: names and values of the shape parameters, in which the form is nonlinear.
+        given: names and values of the shape parameters, on which the form depends
+            nonlinearly.
     """
 
     form: str
@@ -54,12 +55,12 @@ class CandidateShape:
 
     @property
     def bends(self) -> NDArray:
-        """(0,) or (1,) value of the shape parameter, if it is fitted."""
+        """Value of the shape parameter as (1,) if it is fitted, otherwise (0,)."""
         one = len(self.given) == 1 and self.form != "step"
         return np.array([value for _, value in self.given] if one else [])
 
     def bent(self, by: float) -> "CandidateShape":
-        """Return the form with a larger shape parameter."""
+        """Return the form with its shape parameter multiplied by a factor."""
         ((key, value),) = self.given
         return replace(self, given=((key, value + by),))
 
@@ -69,7 +70,7 @@ def _powers(*powers: int) -> CandidateShape:
 
 
 def _waves(*orders: int, form: str = "waves") -> CandidateShape:
-    """Return the sines and cosines of an angle, of the given orders."""
+    """Return the sines and cosines of an angle for the given orders."""
     names = tuple(f"{k}.{w}" for k in orders for w in ("sine", "cosine"))
     return CandidateShape(form, names)
 
@@ -93,7 +94,7 @@ def is_angle(robot: Robot, name: str) -> bool:
 
 
 def first(conditions: Conditions, name: str) -> list[CandidateShape]:
-    """Return general forms by which to test whether a variable has an influence."""
+    """Return general forms that test whether a variable influences the readings."""
     if name == "approach":
         return [STRAIGHT]
     cubic, memory = _powers(0, 1, 2, 3), _reversals(conditions, name, _DEPTHS)
@@ -134,7 +135,7 @@ def every(conditions: Conditions, name: str) -> list[CandidateShape]:
 
 
 def uneven(conditions: Conditions, name: str) -> list[CandidateShape]:
-    """Return forms of a compliance that varies over a turn."""
+    """Return the forms of a compliance that varies over a turn."""
     if not is_angle(conditions.robot, name):
         return []
     names = [("0.cosine", f"{k}.sine", f"{k}.cosine") for k in range(1, 5)]
@@ -169,9 +170,9 @@ def of_direction(conditions: Conditions, name: str) -> list[CandidateShape]:
 def of_two(
     conditions: Conditions, first: str, second: str
 ) -> tuple[tuple[str, str], list[CandidateShape]] | None:
-    """Return forms of a product of two variables, and the variables in their order.
+    """Return forms of products of two variables, and the variables in their order.
 
-    None if the product is not considered.
+    The result is None if this product is not considered.
     """
     angles = [is_angle(conditions.robot, name) for name in (first, second)]
     if {first, second} == set(_CLOCKS):
@@ -194,7 +195,7 @@ def of_two(
 
 
 def knees(load: NDArray, *, jump: bool) -> list[CandidateShape]:
-    """Return laws with a knee at some of the loads; also with a jump at load zero."""
+    """Return spring laws with a knee at some loads, also with a jump at load zero."""
     least = _NO_LOAD * float(load.max(initial=0.0))
     levels = np.unique(np.quantile(load, _INNER))
     levels = levels[levels > least]
@@ -209,8 +210,8 @@ def near(
 ) -> list[CandidateShape]:
     """Return a form with its shape parameter slightly smaller and slightly larger.
 
-    ``part`` is relative to half the step of the first search.  The result is empty for
-    a step and for a form without shape parameter.
+    The change is ``part`` times half the step of the first search.  The result is empty
+    for a step function and for a form without shape parameter.
     """
     if not len(shape.bends):
         return []
@@ -233,7 +234,7 @@ def _steps(conditions: Conditions, name: str, count: int) -> list[CandidateShape
 def _reversals(
     conditions: Conditions, name: str, depths: Sequence[float]
 ) -> list[CandidateShape]:
-    """Return forms with memory: reversal and slip."""
+    """Return forms with memory: reversal of the motion, and slip."""
     if not name.startswith(("q.", "load.")) or name == "load.force":
         return []
     size = float(np.ptp(variable(conditions, name)))
@@ -258,7 +259,7 @@ def _weight(shape: CandidateShape) -> float:
 
 
 def falling(shape: CandidateShape, count: int) -> NDArray:
-    """Return (count,) relative prior standard deviations of a form's columns."""
+    """Return (count,) relative prior standard deviations of the columns of a form."""
     if shape.form != "waves" or count != len(shape.names):
         return np.ones(count)
     order = np.array(_orders(shape))
@@ -266,6 +267,6 @@ def falling(shape: CandidateShape, count: int) -> NDArray:
 
 
 def _orders(shape: CandidateShape) -> list[int]:
-    """Return the order of each column of waves; of two orders the larger one."""
+    """Return the order of each column of waves; for two orders, the larger one."""
     parts = [name.split(".")[:-1] for name in shape.names]
     return [max(abs(int(part)) for part in orders) for orders in parts]

@@ -1,7 +1,8 @@
-"""Candidate functions, scored in batches: places times forms of variables.
+"""Score candidate functions (all combinations of places and forms) in batches.
 
-A column of a function is the response of a row's readings to a component, times a value
-for that row: B_(rc)q = a_rc P_rq.  Inner products therefore factor:
+A column of a function is a product: B_(rc)q = a_rc P_rq. a_rc is the response of
+reading c of row r to a screw component.  P_rq is the value of column q of the form in
+row r.  Inner products of columns therefore factor:
 
 ======  ===============  ===========  ================================================
 symbol  code             shape        meaning
@@ -40,24 +41,18 @@ from forcefit.validation.diagnosis.places import Places, Weighted, Where
 from forcefit.validation.diagnosis.sensitivities import Sensitivities, in_cells
 
 Variables = tuple[str, ...]
-# the variables of a function, and the forms to be scored
+# The variables of a function, and the forms to be scored.
 Request = tuple[Variables, tuple[CandidateShape, ...]]
-# largest number of columns of several components: six columns each of six components
+# Largest number of columns of a function: six columns for each of six components.
 _WIDEST = 36
-# number of best functions among which the best of each request are selected
+# Number of best functions from which the best functions of each request are selected.
 _LISTED = 2000
-_BATCH = 2_000_000  # number of values in a batch: 16 MB
+_BATCH = 2_000_000  # number of values in a batch, 16 MB
 
 
 @dataclass(frozen=True)
 class ScoredFunction:
-    """A function that may be added to a model.
-
-    Attributes:
-        score: log evidence ratio plus log prior.
-        candidate: the function.
-        log_prior: ln of its prior probability.
-    """
+    """A function that may be added to a model, and its score."""
 
     score: float
     candidate: Candidate
@@ -75,39 +70,39 @@ def _by_kind(turns: NDArray, gram: NDArray) -> NDArray:
 
 
 class Functions:
-    """Candidate functions of a campaign at single places."""
+    """Candidate functions of a campaign, each at one place."""
 
     def __init__(
         self, campaign: Campaign, sensitivities: Sensitivities, variables: list[str]
     ) -> None:
-        """List the places of a design; no measured value is used."""
+        """List the places of a design; measured values are not used."""
         self.campaign, self.sensitivities = campaign, sensitivities
         self.conditions = sensitivities.conditions
         self.places = Places(campaign, sensitivities)
         self._depend_on(variables)
 
     def _depend_on(self, variables: list[str]) -> None:
-        """Set the variables, and compute each response once."""
+        """Set the variables on which functions depend; compute each response once."""
         self.variables = variables
         self.shapes_of = cache(self._shapes_of)
         self.prior = cache(self._prior)
         self._numbers = cache(self._columns)
 
     def of(self, variables: list[str]) -> "Functions":
-        """Return the functions that depend on given variables."""
+        """Return the functions that depend on the given variables."""
         other = copy(self)
         other._depend_on(variables)
         return other
 
     def at_rows(self, rows: NDArray) -> "Functions":
-        """Return the functions with columns of selected rows only."""
+        """Return the functions with the columns of selected rows only."""
         other = copy(self)
         other.campaign = self.campaign.take(rows)
         other.sensitivities = self.sensitivities.take(rows)
         return other
 
     def known(self, *names: str) -> Conditions:
-        """Return the conditions of the rows in which variables are known."""
+        """Return the conditions of the rows in which all given variables are known."""
         rows = is_known(self.conditions, *names)
         return self.conditions if rows.all() else self.conditions.take(rows)
 
@@ -125,7 +120,7 @@ class Functions:
             prior -= math.log(2.0 * max(count - 1, 1))
         logs = forms.log_priors(shapes)
         if variables[0].removeprefix("cov.") in self.campaign.motion_units:
-            # a measured motion probably causes a proportional motion
+            # A measured motion probably causes a proportional motion of the platform.
             straight = np.array([shape == forms.STRAIGHT for shape in shapes])
             logs = np.log((np.exp(logs) + straight) / 2)
         return {s: prior + float(p) for s, p in zip(shapes, logs, strict=True)}
@@ -136,7 +131,7 @@ class Functions:
         return known.get(shape, min(known.values(), default=-math.inf))
 
     def first_look(self) -> list[Request]:
-        """Return the requests scored first: general forms of every variable."""
+        """Return the requests to score first: general forms of every variable."""
         requests: list[Request] = []
         for name in self.variables:
             shapes = forms.first(self.known(name), name)
@@ -145,7 +140,7 @@ class Functions:
         return requests
 
     def products(self, names: Iterable[str]) -> list[Request]:
-        """Return the requests for products of given variables with all others."""
+        """Return the requests for products of the given variables with all others."""
         requests: dict[Variables, tuple[CandidateShape, ...]] = {}
         for name in names:
             for other in self.variables:
@@ -163,10 +158,10 @@ class Functions:
         self, marginal: Marginal, weighted: Weighted,
         requests: Sequence[Request], most: int,
     ) -> list[ScoredFunction]:  # fmt: skip
-        """Return the functions that improve a model most, best first.
+        """Return the functions that improve a model most, the best first.
 
-        The model is fitted to the cells of ``weighted``; ``most`` functions of each
-        request are returned.
+        The model was fitted to the cells of ``weighted``.  At most ``most`` functions
+        of each request are returned.
         """
         if not len(self.places):
             return []
@@ -200,7 +195,7 @@ class Functions:
     def _by_width(
         self, requests: Sequence[Request], size: int
     ) -> Iterator[list[tuple[int, int]]]:
-        """Yield requests and forms of functions with equally many columns, in batches.
+        """Yield batches of requests and forms of functions with equally many columns.
 
         One column of one function occupies ``size`` values in memory.
         """
@@ -263,7 +258,7 @@ class Functions:
         return columns * forms.falling(shape, columns.shape[1])
 
     def equivalents(self, one: Candidate) -> list[tuple[CandidatePart, ...]]:
-        """Return the parts of candidates at other places that have equal columns."""
+        """Return the other places at which a candidate function has equal columns."""
         if len(one.parts) > 1:
             return []
         part = one.parts[0]

@@ -1,7 +1,7 @@
-r"""Gaussian linear models with their unknowns marginalised.
+r"""Score Gaussian linear models whose unknowns are marginalised.
 
-Readings are z = X u + noise with u ~ N(0, s^2) and noise ~ N(0, 1), both in units of
-the noise's scale tau.  With S = diag(s) and C = 1 + X S^2 X':
+The readings are z = X u + noise with u ~ N(0, s^2) and noise ~ N(0, 1).  Both are in
+units of the noise scale tau.  With S = diag(s) and C = 1 + X S^2 X':
 
 ======  ==================  =======  =================================================
 symbol  code                shape    meaning
@@ -11,7 +11,8 @@ U       ``factor_columns``  (n, p)   X S L^-T with L L' = M, so that C^-1 = 1 - 
 Q       ``squares``                  z' C^-1 z
 ======  ==================  =======  =================================================
 
-tau^2 has a scaled inverse chi-square prior about 1, which makes z multivariate t.
+The prior of tau^2 is a scaled inverse chi-square distribution about 1.  Therefore z has
+a multivariate t distribution.
 
 Sources:
     Gelman et al., Bayesian Data Analysis, sections 3.3, 14.8 (scale, prior as rows).
@@ -26,13 +27,13 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.special import log_ndtr
 
-# degrees of freedom of the prior of tau^2, which allows a true sigma of 1/2 to 3 times
-# the stated sigma
+# Degrees of freedom of the prior of tau^2; the prior allows a true sigma between 1/2
+# and 3 times the declared sigma.
 FREEDOM = 20.0
-# [sigma] prior contributions to the readings over which the evidence is averaged
+# [sigma] Prior contributions to the readings, over which the evidence is averaged.
 SIZES = 10.0 ** np.arange(-0.5, 4.1, 0.5)
 SPAN = math.log(SIZES[-1] / SIZES[0])
-_SEEN = 1e-8  # smallest eigenvalue of a scaled candidate that is above rounding
+_SEEN = 1e-8  # smaller eigenvalues of a scaled candidate are rounding errors
 
 
 def deviance(squares: NDArray | float, count: int) -> NDArray | float:
@@ -49,13 +50,7 @@ def scale(squares: float, count: int) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class Marginal:
-    """A model with its unknowns marginalised, for scoring of many candidates.
-
-    Attributes:
-        factor_columns: (n, p) U, so that B'C^-1 B = B'B - (U'B)'(U'B).
-        held: (n,) value of C^-1 z.
-        squares: value of z' C^-1 z.
-    """
+    """A model with marginalised unknowns, to which many candidates can be added."""
 
     factor_columns: NDArray
     held: NDArray
@@ -63,7 +58,7 @@ class Marginal:
 
 
 def marginalise(columns: NDArray, std: NDArray, z: NDArray, flat: NDArray) -> Marginal:
-    """Marginalise columns (n, k) of prior std (k,); flat: (n, f), orthonormal."""
+    """Marginalise columns (n, k) of prior std (k,); ``flat`` (n, f) is orthonormal."""
     X = columns * std
     M = X.T @ X
     M[np.diag_indices(len(M))] += 1.0
@@ -88,7 +83,7 @@ def leave_block_out(
         if len(U) <= U.shape[1]:
             left = np.eye(len(U)) - U @ U.T
             errors[own] = np.linalg.lstsq(left, held, rcond=None)[0]
-        else:  # Woodbury's identity has as many equations as there are columns
+        else:  # Woodbury: one equation per column
             left = np.eye(U.shape[1]) - U.T @ U
             errors[own] = held + U @ np.linalg.lstsq(left, U.T @ held, rcond=None)[0]
         size = np.linalg.slogdet(left)[1] - len(U) * math.log(2 * math.pi * tau**2)
@@ -103,14 +98,15 @@ def evidence_gains(
     """Return log evidence ratios of candidates, averaged over prior sizes.
 
     Args:
-        gram: (c, m, m) B'C^-1 B of c candidates, with columns scaled to norm about 1.
-        along: (c, m) B'C^-1 z.
-        most: (c,) largest plausible prior standard deviation, in that scale.
+        gram: (c, m, m) matrices B'C^-1 B of c candidates, with columns scaled to a norm
+            of about 1.
+        along: (c, m) vectors B'C^-1 z.
+        most: (c,) largest plausible prior standard deviation of the scaled unknowns.
         bounded: (c,) bool, True if the single unknown cannot be negative.
         marginal: model to which the candidates are added.
 
     Returns:
-        (c,) log evidence ratios; -inf where no plausible size is visible.
+        (c,) log evidence ratios; -inf if no plausible size is visible.
     """
     count = len(marginal.held)
     if gram.shape[1] == 1:
@@ -143,8 +139,8 @@ def evidence_gains(
 def size_penalty(determined: float) -> float:
     """Return the penalty of an optimised prior standard deviation (Laplace).
 
-    It is the logarithm of the ratio of the maximum to the average over the range of
-    standard deviations; ``determined`` is the number of well-determined unknowns that
-    share it.
+    The penalty is the logarithm of the ratio between the maximum of the evidence and
+    its average over all standard deviations.  ``determined`` is the number of
+    well-determined unknowns with this standard deviation.
     """
     return math.log(SPAN) + 0.5 * math.log(max(determined, 1.0) / math.pi)

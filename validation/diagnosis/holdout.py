@@ -1,9 +1,10 @@
-"""Held-out rows: whole configurations or time spans, which are never split.
+"""Choose the held-out rows: whole configurations or time spans.
 
-A campaign of 60 configurations or more is split once.  A smaller one is tested by
-nested cross-validation, because a quarter of few configurations is too small a sample:
-in each fold the whole diagnosis is repeated without the fold's rows.  No reading of a
-held-out row is used before the verdict.
+A campaign of at least 60 configurations is split once into fitted and held-out rows.  A
+smaller campaign is tested by nested cross-validation, because a quarter of few
+configurations is too small a sample.  In each fold, the whole diagnosis is repeated
+without the held-out rows of this fold.  No reading of a held-out row is used before the
+verdict.
 """
 
 from dataclasses import dataclass, replace
@@ -13,13 +14,14 @@ from numpy.typing import NDArray
 
 from forcefit.validation.campaign.campaign import Campaign
 
-FEWEST = 8  # smallest number of blocks of rows for a test on held-out rows
-# number of configurations from which on a single part of the rows is held out
+FEWEST = 8  # smallest number of blocks (configurations or time spans) for a test
+# Number of configurations from which a single part of the rows is held out.
 _SPLIT = 60
-# share of held-out blocks if there are 60 blocks, and if there are many blocks
+# Fraction of held-out blocks for 60 blocks, and for many blocks.
 _SHARES = (1 / 4, 1 / 10)
-_ENOUGH = 60  # number of held-out blocks that is sufficient for any campaign
-# number of folds (Hastie, Tibshirani, Friedman, Elements of Statistical Learning, 7.10)
+_ENOUGH = 60  # number of held-out blocks that suffices for any campaign
+# Number of folds (Hastie, Tibshirani, Friedman, Elements of Statistical Learning,
+# 7.10).
 _FOLDS = 5
 SPANS = "spans of time"
 
@@ -30,8 +32,8 @@ class HeldOut:
 
     Attributes:
         how: ``"split"``, ``"folds"`` or ``"none"``.
-        folds: (R,) bool for each fold, True for its held-out rows; a split has one
-            fold.
+        folds: for each fold (R,) bool, True for its held-out rows.  A split consists of
+            one fold.
         words: description of the method.
     """
 
@@ -49,8 +51,8 @@ def hold_out(campaign: Campaign) -> HeldOut:
     """Choose the held-out rows of a diagnosis.
 
     Returns:
-        The held-out rows, always the same for the same campaign.  The method is
-        ``"none"`` for fewer than two blocks; all rows are then tested by their own fit.
+        The held-out rows, which are reproducible.  The method is ``"none"`` for fewer
+        than two blocks.  All rows are then both fitted and tested.
     """
     blocks, kind = blocks_of(campaign)
     names = np.random.default_rng(0).permutation(np.unique(blocks))
@@ -76,13 +78,13 @@ def hold_out(campaign: Campaign) -> HeldOut:
 
 
 def hidden(campaign: Campaign, rows: NDArray) -> Campaign:
-    """Return campaign with readings of rows (R,) bool set to NaN; commands remain."""
+    """Return a campaign without the readings of rows (R,) bool, which are NaN."""
     readings = np.where(rows[:, None], np.nan, campaign.measured)
     return replace(campaign, measured=readings)
 
 
 def drawn(visit: NDArray, most: int) -> NDArray:
-    """Return (R,) bool: about ``most`` random rows, rows of a visit together."""
+    """Return (R,) bool: about ``most`` random rows; rows of one visit stay together."""
     listed = np.unique(visit)
     count = most * len(listed) // max(len(visit), 1)
     return np.isin(visit, np.random.default_rng(0).permutation(listed)[:count])
@@ -92,14 +94,14 @@ def blocks_of(campaign: Campaign) -> tuple[NDArray, str]:
     """Return the blocks that are either fitted or predicted as a whole.
 
     Returns:
-        (R,) number of the configuration, or of a time span if there are too few
-        configurations; and which of the two, as text.
+        (R,) number of the configuration, or of the time span if there are too few
+        configurations; and the kind of block as text.
     """
     blocks = campaign.configuration
     if len(np.unique(blocks)) >= FEWEST:
         return blocks, "configurations"
     time = campaign.covariates.get("time", np.arange(len(campaign)))
-    # points that are measured together are in one time span
+    # Points that are measured together belong to one time span.
     _, first, visit = np.unique(
         campaign.measured_at_once, return_index=True, return_inverse=True
     )

@@ -1,13 +1,14 @@
-"""Hypotheses: an effect of the library, at certain frames, with certain unknowns.
+"""List hypotheses: an effect of the library at certain frames, with its unknowns.
 
-An effect may act at one frame, at each frame with a separate parameter, or at several
-frames that share one parameter (all frames, or those of one kind: ``leg1.rod``,
-``leg2.rod``).  Each of these is a separate hypothesis, with as many unknowns as it has
-slots.
+An effect may act at one frame, at several frames with separate parameters, or at
+several frames with a common parameter.  Such groups are all frames, or all frames of
+one kind (``leg1.rod``, ``leg2.rod``).  Each case is a separate hypothesis.  Each fitted
+parameter of a hypothesis is called a slot.
 
-Between sessions a machine may be homed again, its tool changed or its device moved, so
-an effect may have different parameters in each session.  Such a hypothesis has every
-slot once for each session; the slots of a session act in its rows only.
+Between sessions a machine may be homed again, its tool may be changed or its device may
+be moved.  Therefore an effect may have different parameters in each session.  Such a
+hypothesis contains a copy of every slot for each session, and each copy acts only in
+the rows of its session.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,21 +23,23 @@ from forcefit.assembly.measurement.conditions import Conditions
 from forcefit.assembly.model.robot import Robot
 
 PER_SESSION = ("registration", "encoder_offset", "drift")
-# largest number of unknowns of one effect; if more are needed, frames of the same kind
-# have one unknown in common
+# Largest number of unknowns of one effect; if an effect requires more, frames of the
+# same kind share one unknown.
 _MOST_UNKNOWNS = 24
 
 
 @dataclass(frozen=True)
 class Slot:
-    """A parameter to be fitted, which several unknowns of an effect may share.
+    """A fitted parameter, which is the value of one or several unknowns of an effect.
 
     Attributes:
-        names: names of the unknowns that have this value.
+        names: names of the unknowns with this value.
         unknown: scale and bounds of the unknowns.
         start: start value of a fit.
-        shape: whether the model is strongly nonlinear in it; screening then fixes it.
-        session: name of the only session in which it acts; None for all sessions.
+        shape: whether the model is strongly nonlinear in the parameter, which is then
+            fixed during screening.
+        session: name of the only session in which the parameter acts; None for all
+            sessions.
     """
 
     names: tuple[str, ...]
@@ -48,11 +51,11 @@ class Slot:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """An effect, the frames at which it acts, and its parameters.
+    """Assumption that an effect acts at certain frames, with parameters to be fitted.
 
     Attributes:
         effect: name of the effect.
-        where: frames at which it acts; empty for effects of the whole machine.
+        where: frames at which the effect acts; empty for effects of the whole machine.
         slots: the parameters to be fitted.
     """
 
@@ -61,7 +64,7 @@ class Hypothesis:
     slots: tuple[Slot, ...]
 
     def public(self, robot: Robot, x: Sequence[float] | NDArray) -> dict[str, float]:
-        """Return parameters by public name, in SI units, for values x of the slots."""
+        """Return the parameters by public name in SI units, for slot values x."""
         values = {
             name: float(value)
             for slot, value in zip(self.slots, x, strict=True)
@@ -84,10 +87,10 @@ class Hypothesis:
 
 
 def hypotheses(conditions: Conditions, loads: Sequence[str]) -> list[Hypothesis]:
-    """Return all hypotheses that declared conditions can test.
+    """Return all hypotheses that the declared conditions can test, ordered by effect.
 
-    They are ordered by effect.  ``loads`` are the load components that the campaign
-    records, such as ``["fx"]``.
+    ``loads`` contains the load components that the campaign records, such as
+    ``["fx"]``.
     """
     return [h for effect in LIBRARY.values() for h in _of(effect, conditions, loads)]
 
@@ -125,10 +128,10 @@ def _of(
 def _choices(
     effect: Effect, unknowns: tuple[Unknown, ...], loads: Sequence[str]
 ) -> Iterator[list[Unknown]]:
-    """Yield subsets of an effect's unknowns if it has no frames; all of them first."""
+    """Yield subsets of the unknowns of an effect without frames; all of them first."""
     if effect.follows_load:
-        # an offset in a direction without recorded load belongs to another candidate
-        # model
+        # An offset in a direction without recorded load belongs to a different
+        # candidate model.
         kept = {f"offset.{name}" for name in loads}
         unknowns = tuple(
             u for u in unknowns if u.name in kept or "offset." not in u.name
@@ -146,7 +149,7 @@ def _choices(
 def _groupings(
     places: tuple[str, ...], each: int
 ) -> Iterator[tuple[tuple[str, ...], ...]]:
-    """Yield ways to divide frames into groups that have their unknowns in common."""
+    """Yield all partitions of frames into groups with common unknowns."""
     if not places:
         return
     kinds: dict[str, list[str]] = {}
@@ -167,7 +170,7 @@ def _scanned(
     effect: Effect, where: tuple[str, ...],
     slots: list[tuple[tuple[str, ...], Unknown]], conditions: Conditions,
 ) -> Iterator[Hypothesis]:  # fmt: skip
-    """Yield one hypothesis, or one for each start value of a shape parameter."""
+    """Yield one hypothesis for each start value of a shape parameter, or only one."""
     scan: tuple[float, ...] = next((u.scan for _, u in slots if u.scan), (0.0,))
     by = next((u.scan_by for _, u in slots if u.scan_by), "")
     size = float(np.ptp(getattr(conditions, by))) if by else 1.0
@@ -185,10 +188,11 @@ def _scanned(
 
 
 def with_declared(listed: Sequence[Hypothesis], robot: Robot) -> list[Hypothesis]:
-    """Return the hypotheses that combine with a declared effect to a single effect.
+    """Return the hypotheses that can be added to the declared effects.
 
-    Contact laws and delays are left out if one is declared.  A drift has the declared
-    time constant, and springs may be stiffer than declared.
+    A declared effect and a hypothesis of the same effect must combine to a single
+    effect.  Contact laws and delays are omitted if one is declared.  The time constant
+    of a drift equals the declared one.  Springs may be stiffer than declared.
     """
     curved = {
         (name, key.removesuffix(".coefficient").removesuffix(".time_constant"))
@@ -209,13 +213,13 @@ def with_declared(listed: Sequence[Hypothesis], robot: Robot) -> list[Hypothesis
     return list(kept)
 
 
-# effects of which two do not combine to one
+# Two instances of such an effect do not combine to one effect.
 _CURVED = ("contact_stiffening", "delayed_expansion")
 _SPRINGS = ("drive_compliance", "base_compliance")
 
 
 def _stiffer(slot: Slot, soft: Mapping[str, float]) -> Slot:
-    """Return a slot of compliances, which may cancel the declared ones."""
+    """Return a slot of compliances that may compensate declared compliances."""
     names = [
         n.removesuffix(".compliance").replace("compliance.", "stiffness.")
         for n in slot.names
@@ -225,7 +229,7 @@ def _stiffer(slot: Slot, soft: Mapping[str, float]) -> Slot:
 
 
 def _held(slot: Slot, constant: float) -> Slot:
-    """Return a slot of a drift with its time constant fixed."""
+    """Return a slot of a drift with a fixed time constant."""
     if slot.names != ("time_constant",):
         return slot
     unknown = replace(slot.unknown, lower=constant, upper=constant, scan=())
@@ -237,9 +241,8 @@ def with_sessions(
 ) -> list[Hypothesis]:
     """Return the hypotheses, and additional ones with parameters for each session.
 
-    If there are several sessions, each effect of :data:`PER_SESSION` and ``further``
-    that shares no parameter among frames is listed a second time, with parameters for
-    every session.
+    The additional hypotheses exist only for several sessions.  They cover each effect
+    of :data:`PER_SESSION` and ``further`` whose parameters are not shared among frames.
     """
     if len(sessions) < 2:
         return list(listed)
@@ -259,12 +262,12 @@ def _each(h: Hypothesis, sessions: Sequence[str]) -> Hypothesis:
 
 
 def sessions_of(h: Hypothesis) -> tuple[str | None, ...]:
-    """Return sessions for which a hypothesis has separate parameters, or (None,)."""
+    """Return the sessions of the parameters; (None,) if they apply to all rows."""
     return tuple(dict.fromkeys(slot.session for slot in h.slots)) or (None,)
 
 
 def in_one_session(h: Hypothesis, session: str | None) -> tuple[Hypothesis, NDArray]:
-    """Return a hypothesis of one session as if it were of all, and its slots."""
+    """Return a hypothesis restricted to one session, and its slots."""
     own = [k for k, s in enumerate(h.slots) if s.session in (None, session)]
     slots = tuple(replace(h.slots[k], session=None) for k in own)
     return replace(h, slots=slots), np.array(own, dtype=int)

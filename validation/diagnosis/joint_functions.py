@@ -1,7 +1,7 @@
-"""Functions that act at several places, and cubic springs.
+"""List functions that act at several places, and cubic springs.
 
-Examples: all bodies swell with humidity; all drives have backlash.  The form is the
-same at all places; each place has separate coefficients.
+For example, all bodies swell with humidity, or all drives have backlash.  All places
+have the same form with separate coefficients.
 """
 
 import math
@@ -26,7 +26,7 @@ from forcefit.validation.diagnosis.function_forms import CandidateShape, is_angl
 from forcefit.validation.diagnosis.functions import Functions
 from forcefit.validation.diagnosis.gaussian import SIZES
 
-# compliance proportional to the squared wrench
+# A compliance that is proportional to the square of the wrench.
 _CUBIC = CandidateShape("powers", ("2",))
 Parts = tuple[CandidatePart, ...]
 
@@ -34,7 +34,7 @@ Parts = tuple[CandidatePart, ...]
 def joint_functions(functions: Functions, rows: NDArray) -> list[Element]:
     """Return functions at several places, and cubic springs, that affect the readings.
 
-    Their columns are computed for the cells of the given rows.
+    The columns of these functions contain the cells of the given rows.
     """
     some = functions.at_rows(rows)
     listed: list[tuple[Candidate, float]] = []
@@ -47,13 +47,13 @@ def joint_functions(functions: Functions, rows: NDArray) -> list[Element]:
 
 
 def _of_wrench(functions: Functions) -> list[tuple[Candidate, float]]:
-    """Return backlash, and springs at all joints that are cubic or have a knee."""
+    """Return backlash, and cubic springs or springs with a knee at all joints."""
     names = functions.places.names
     joints = [p[0] for p in names if len(p) == 1 and p[0][2] == "compliance"]
     prior = -math.log(4.0 * max(len(functions.variables), 1) * max(len(joints), 1))
     listed = []
     for name, component, kind in joints:
-        if component == THREAD:  # no variable is the wrench along a thread
+        if component == THREAD:  # the wrench along a thread is not a variable
             continue
         wrench = f"wrench.{name}.{'mf'[component[0] == 't']}{component[1]}"
         part = CandidatePart(name, (component,), wrench)
@@ -69,17 +69,17 @@ def _knees(functions: Functions, name: str, component: str) -> list[CandidateSha
     """Return laws with a knee for the load of a drive or spring along its motion."""
     robot = functions.conditions.robot
     frame, axis = robot.frame(name), AXES.index(component)
-    if frame.pitch:  # no variable is the wrench along a thread
+    if frame.pitch:  # the wrench along a thread is not a variable
         return []
     if axis != frame.own_axis or name not in (*drives(robot), *elastic_joints(robot)):
         return []
     load = functions.sensitivities.wrenches[:, robot.index(name), axis]
-    # clearance of a slide along its own axis is an effect of the library
+    # The library contains the clearance of a slide along its own axis.
     return forms.knees(np.abs(load), jump=frame.turns)
 
 
 def _by_kind(functions: Functions) -> Iterator[tuple[str, Parts, list[CandidateShape]]]:
-    """Return functions of all bodies, and of the coordinates of all drives."""
+    """Return functions at all bodies, and of the coordinates of all drives."""
     for kind, parts in places_of(functions.campaign.robot, functions.variables):
         if len(parts) > 1:
             known = functions.known(parts[0].variable)
@@ -92,7 +92,7 @@ def _by_kind(functions: Functions) -> Iterator[tuple[str, Parts, list[CandidateS
 def _at_drives(
     functions: Functions,
 ) -> Iterator[tuple[str, Parts, list[CandidateShape]]]:
-    """Return functions of all drives: common variables, and backlash over a turn."""
+    """Return functions at all drives: of common variables, and backlash over a turn."""
     conditions, robot = functions.conditions, functions.campaign.robot
     own = [(f.name, (own_component(f),)) for f in robot.frames if f.actuated]
     if len(own) < 2:

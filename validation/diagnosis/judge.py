@@ -1,4 +1,4 @@
-"""The verdict of a diagnosis, and the errors on the held-out rows."""
+"""Compute the verdict of a diagnosis and the errors on the held-out rows."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -47,16 +47,15 @@ from forcefit.validation.diagnosis.whitening import (
     whitening_of,
 )
 
-# [sigma] rms of held-out rows below which a residual counts as noise, for any
-# probability
+# [sigma] A held-out residual with a smaller rms counts as noise, whatever its p-value.
 _LOOSE = 1.25
-# largest number of determined unknowns, relative to the number of readings
+# Largest ratio of the number of determined unknowns to the number of readings.
 _SHARE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """A machine fitted without the rows on which it is tested.
+    """A machine and the held-out rows on which it is tested.
 
     Attributes:
         fit: the machine.
@@ -119,7 +118,7 @@ def judge(
     if FINITE in names:
         conditions = replace(conditions, second_order=0.0)
     declared = np.asarray(campaign.measured - predict(conditions).deviation)
-    if held.how == "split":  # after the test, the saved machine is fitted to all rows
+    if held.how == "split":  # after the test, all rows are fitted
         fit, correlated = _of_all_rows(believed, traced, fit, used | rows)
         left = residual_of(campaign, fit.robot)
     varies, following = [], None
@@ -166,8 +165,8 @@ def judge(
 
 
 def _noisy(campaign: Campaign, traced: Traced) -> Campaign:
-    """Return the campaign with the noise by which residuals are judged."""
-    # the stated sigma, unless a part of it is the shared noise
+    """Return the campaign with the noise level that residuals are compared with."""
+    # Sigma is the declared one, unless a part of it is the noise shared by points.
     common = traced.campaign.common
     if common is None:
         return campaign
@@ -190,7 +189,7 @@ def _outlying_held(
 def _of_all_rows(
     believed: Campaign, traced: Traced, fit: MachineFit, rows: NDArray
 ) -> tuple[MachineFit, NoiseInTime | None]:
-    """Return the fit of the same unknowns to more rows, with the estimated noise."""
+    """Return a fit of the same unknowns to more rows, with the estimated noise."""
     more = believed.cells & ~traced.campaign.cells
     sigma = np.where(more, traced.selected.noise.tau, 1.0) * believed.sigma
     believed = replace(believed, sigma=sigma)
@@ -201,7 +200,7 @@ def _of_all_rows(
 def _with_noise_in_time(
     fitting: Campaign, fit: MachineFit
 ) -> tuple[MachineFit, NoiseInTime | None]:
-    """Return the fit with the larger covariance if noise is correlated in time."""
+    """Return the fit with a larger covariance if its noise is correlated in time."""
     noise = noise_in_time(fitting, fit.residual)
     if noise is None or not len(fit.x):
         return fit, noise
@@ -213,7 +212,7 @@ def _fails(
     campaign: Campaign, folds: Sequence[Judged], residual: NDArray, rows: NDArray,
     lack: LackOfFit,
 ) -> bool:  # fmt: skip
-    """Return whether held-out residuals exceed noise and the fit's uncertainty."""
+    """Return whether held-out residuals exceed the noise and the fit's uncertainty."""
     squares, count = 0.0, 0
     for one in folds:
         own = campaign.cells & (one.held & rows)[:, None] & np.isfinite(residual)
@@ -234,14 +233,14 @@ def _fails(
 
 
 def _too_few(campaign: Campaign, used: NDArray, determined: float, fails: bool) -> bool:
-    """Return whether the verdict is undecided because there are too few rows."""
+    """Return whether there are too few rows for a verdict."""
     blocks = len(np.unique(blocks_of(campaign)[0][used]))
     many = determined > _SHARE * int(campaign.cells[used].sum())
     return many or (fails and blocks <= FEWEST)
 
 
 def _needed(campaign: Campaign, fit: MachineFit) -> str:
-    """Return a description of the rows that would decide."""
+    """Return a description of the additional rows that a verdict requires."""
     components = max(1, int(campaign.cells.any(axis=0).sum()))
     wanted = float(fit.determined.sum()) / _SHARE / components
     blocks = len(np.unique(campaign.configuration))
@@ -254,7 +253,7 @@ def _needed(campaign: Campaign, fit: MachineFit) -> str:
 
 
 def _uncertainty(campaign: Campaign, residual: NDArray, rows: NDArray) -> float:
-    """Return the standard error of the held-out rms in sigma, from block scatter."""
+    """Return the standard error of the held-out rms [sigma], from scatter of blocks."""
     z = np.where(campaign.cells, residual / campaign.sigma, np.nan)[rows]
     _, block = np.unique(blocks_of(campaign)[0][rows], return_inverse=True)
     sums = np.bincount(block, np.nansum(z**2, axis=1))
@@ -266,7 +265,7 @@ def _uncertainty(campaign: Campaign, residual: NDArray, rows: NDArray) -> float:
 
 
 def _impossible(campaign: Campaign) -> tuple[str, ...]:
-    """Return a remark on rows with impossible readings; empty if there are none."""
+    """Return a remark about rows with impossible readings; empty if there are none."""
     ids = [campaign.ids[i] for i in np.flatnonzero(impossible_rows(campaign))]
     if not ids:
         return ()

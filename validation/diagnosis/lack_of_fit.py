@@ -1,8 +1,9 @@
-"""Tests whether a residual is noise, and its outliers and trends.
+"""Test whether a residual is noise, and find its outliers and trends.
 
-The residual is compared with the stated sigma and with repeats.  A trend is a group of
-functions of one variable (a component of the pose, the load, a covariate).  All six
-components of the reading follow it, each with separate coefficients.
+The residual is compared with the declared sigma and with the scatter of repeats.  A
+trend is a dependence of the residual on one variable, such as a component of the pose,
+a load or a covariate.  The trend is fitted to all six components of the reading with
+separate coefficients.
 
 Sources:
     Draper, Smith, Applied Regression Analysis, 3rd ed., section 2.1 (lack of fit and
@@ -24,10 +25,10 @@ from forcefit.validation.diagnosis.separability import orthonormal_basis
 
 SIGNIFICANT = 1e-4  # probability below which a residual is not noise
 UNLIKELY = 1e-3  # probability below which one of many tested residuals is unlikely
-OUTLIERS = 20  # number of rows for each accepted outlier
-# number of bins over a covariate's range; rows of one bin count as replicates
+OUTLIERS = 20  # one outlier is accepted per this number of rows
+# Number of bins of a covariate's range; rows in one bin count as replicates.
 _LEVELS = 30
-_OUTLYING = 5.5  # rms of an outlying row, relative to the median of all rows
+_OUTLYING = 5.5  # rms of an outlying row / median of all rows
 _MOST = 6  # largest number of trends that are reported
 
 
@@ -36,16 +37,16 @@ class LackOfFit:
     """Result of the test of a residual.
 
     Attributes:
-        rms: [-] rms of the whitened residual, with degrees of freedom.
-        probability: probability that noise of the stated sigma causes a residual as
-            large.
-        repeats: [-] rms scatter between repeats, whitened; NaN without repeats.
+        rms: [-] rms of the whitened residual, computed with its degrees of freedom.
+        probability: p-value, the probability that noise with the declared sigma causes
+            a residual at least as large.
+        repeats: [-] rms of the whitened scatter between repeats; NaN without repeats.
         repeats_freedom: [-] degrees of freedom of this scatter.
         against_repeats: probability that noise with the scatter of the repeats causes a
-            residual as large.
+            residual at least as large.
         common: whether the noise that points of one measurement share was estimated
-            from the residual itself; the residual is then significant only if repeats
-            show it too.
+            from the residual itself.  The residual is then significant only if it also
+            exceeds the scatter of repeats.
     """
 
     rms: float
@@ -57,7 +58,7 @@ class LackOfFit:
 
     @property
     def significant(self) -> bool:
-        """Whether the residual exceeds the noise, by sigma and by repeats."""
+        """Whether the residual exceeds both sigma and the scatter of repeats."""
         by_repeats = self.against_repeats < SIGNIFICANT
         if self.sigma_too_small:
             return by_repeats
@@ -65,7 +66,7 @@ class LackOfFit:
 
     @property
     def sigma_too_small(self) -> bool:
-        """Whether repeats scatter more than sigma states."""
+        """Whether the scatter of repeats exceeds the declared sigma."""
         if not self.repeats_freedom:
             return False
         squares = self.repeats**2 * self.repeats_freedom
@@ -73,11 +74,11 @@ class LackOfFit:
 
 
 def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfFit:
-    """Test a residual.
+    """Test whether a residual is noise.
 
     Args:
         campaign: campaign of R rows with N measured cells.
-        residual: (N,) whitened residual; if it is noise, its cells are independent.
+        residual: (N,) whitened residual, whose values are independent if it is noise.
         unknowns: number of fitted unknowns.
 
     Returns:
@@ -92,8 +93,8 @@ def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfF
     repeats, between = repeat_scatter(residual, group)
     against = 1.0
     if between and freedom > between:
-        # scatter beyond repeats, that is lack of fit over pure error; repeats scatter
-        # by zero where a device rounds to equal readings
+        # Lack of fit over pure error.  The scatter of repeats is zero if the device
+        # rounds its readings to equal values.
         excess = (rss - between * repeats**2) / (freedom - between)
         ratio = excess / repeats**2 if repeats else (np.inf if excess > 0 else 0.0)
         against = float(f.sf(ratio, freedom - between, between))
@@ -105,9 +106,9 @@ def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfF
 
 
 def _alike(campaign: Campaign) -> NDArray:
-    """Return (R,) numbers of conditions: command, load, covariates except time."""
-    # conditions are alike if no covariate differs by more than a thirtieth of its
-    # range, so that an effect that is not modelled does not count as noise
+    """Return (R,) numbers, equal for equal command, load and covariates except time."""
+    # Covariates are alike if they differ by at most a thirtieth of their range.  Then
+    # an effect that is not modelled does not count as noise.
     parts = [campaign.repeat]
     for name, values in campaign.covariates.items():
         span = float(np.ptp(values))
@@ -135,8 +136,8 @@ def outlying(campaign: Campaign, residual: NDArray, most: int | None = None) -> 
     squares = np.bincount(rows, residual**2, minlength=len(campaign))
     cells = np.bincount(rows, minlength=len(campaign))
     rms = np.sqrt(squares / np.maximum(cells, 1))
-    # a row with few cells scatters more, so it is compared with the largest noise of
-    # its size
+    # A row with few cells scatters more, so its rms is compared with the largest rms
+    # that noise causes in as many cells.
     far = rms > _OUTLYING * max(float(np.median(rms)), 1.0)
     most = len(campaign) // OUTLIERS if most is None else most
     if far.sum() > most:
@@ -146,12 +147,13 @@ def outlying(campaign: Campaign, residual: NDArray, most: int | None = None) -> 
 
 @dataclass(frozen=True)
 class Trend:
-    """A variable with which a residual varies.
+    """A variable on which a residual depends.
 
     Attributes:
         against: description of the variable.
-        share: [-] share of the squared whitened residual that the variable explains.
-        probability: probability that noise causes a share as large in any tested trend.
+        share: [-] fraction of the squared whitened residual that the variable explains.
+        probability: probability that noise causes a fraction at least as large in any
+            of the tested trends.
     """
 
     against: str
@@ -162,12 +164,12 @@ class Trend:
 def trends(
     campaign: Campaign, conditions: Conditions, residual: NDArray
 ) -> list[Trend]:
-    """Return the variables with which a residual varies, the strongest first.
+    """Return the variables on which a residual depends, the strongest first.
 
     Args:
         campaign: campaign of R rows.
         conditions: conditions of the campaign.
-        residual: (R, 6) [rad, m] residual; NaN where not measured.
+        residual: (R, 6) [rad, m] residual; NaN for components that were not measured.
 
     Returns:
         At most six trends that noise is unlikely to cause.
@@ -182,7 +184,7 @@ def trends(
 def _candidates(
     campaign: Campaign, conditions: Conditions
 ) -> Iterator[tuple[str, NDArray]]:
-    """Yield names of variables, and functions (R, p) without the constant."""
+    """Yield the name of each variable, and functions (R, p) without the constant."""
     loads = campaign.loads
     force = loads[:, 3:]
     size = np.linalg.norm(force, axis=1)
@@ -214,13 +216,13 @@ def _candidates(
 
 
 def _powers(x: NDArray) -> NDArray:
-    """Return (R, 2): a quantity minus its mean, and the square of this."""
+    """Return (R, 2): a variable minus its mean, and the square of this difference."""
     centred = x - x.mean()
     return np.column_stack([centred, centred**2])
 
 
 def _test(name: str, X: NDArray, z: NDArray, tried: int) -> Trend | None:
-    """Return the F test of functions, with a constant, in all components."""
+    """Return the F test of functions with a constant, fitted to all components."""
     before = after = 0.0
     extra = freedom = 0
     for column in z.T:

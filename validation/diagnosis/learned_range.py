@@ -1,8 +1,8 @@
 """Range of the data a model was identified on, and rows that extrapolate beyond it.
 
-A function of a covariate, and any other effect, is known only in the covariate's range.
-If a joint has made a full turn, its angle is compared modulo a turn, unless the file
-has a function of the angle that does not repeat after a turn.
+An identified effect is known only in the range of the covariates on which it was
+identified.  If a joint made a full turn, its angle is compared modulo a turn, unless
+the robot file contains a function of the angle that does not repeat after a turn.
 """
 
 from collections.abc import Iterator
@@ -17,10 +17,10 @@ from forcefit.assembly.model.function import Function
 from forcefit.assembly.model.robot import Robot
 from forcefit.validation.campaign.campaign import LOAD, Campaign
 
-_MARGIN = 0.05  # relative to the width of a range: accepted extrapolation
-_SAME = 1e-3  # relative to a value: accepted difference if the variable never varied
-# forms that repeat after a turn of any variable, then forms that repeat only after a
-# turn of the first variable
+_MARGIN = 0.05  # accepted extrapolation / width of the range
+_SAME = 1e-3  # accepted relative difference if the variable never varied
+# Forms that repeat after a turn of any variable, then forms that repeat only after a
+# turn of the first variable.
 _PERIODIC = ("waves", "reversal_waves", "scaled_waves", "reversal", "slip")
 
 
@@ -30,8 +30,8 @@ class Beyond:
 
     Attributes:
         variable: public name of the variable.
-        learned: smallest and largest value of the range.
-        now: smallest and largest value in the rows.
+        learned: smallest and largest value in the identification.
+        now: smallest and largest value in the present rows.
         rows: number of rows outside the range.
         count: number of all rows.
     """
@@ -58,10 +58,10 @@ class Beyond:
 
 
 def learned_range(campaign: Campaign, rows: NDArray) -> dict[str, tuple[float, float]]:
-    """Return the smallest and largest value of every variable in some rows.
+    """Return the smallest and largest value of every variable in selected rows.
 
-    The variables are drives, components of the load and covariates except time, by
-    public name.
+    The variables are drives, load components and all covariates except time.  The
+    result maps their public names to the values.
     """
     ranges = {}
     for name, values in _variables(campaign).items():
@@ -75,7 +75,7 @@ def beyond(robot: Robot, campaign: Campaign) -> tuple[Beyond, ...]:
     """Return the variables outside the range in which a robot was identified.
 
     A variable is listed if it exceeds its range by more than a twentieth of the width.
-    The list is empty if the robot's file states no range.
+    The list is empty if the robot file contains no range.
     """
     left = []
     for name, values, outside in _outside(robot, campaign):
@@ -86,7 +86,7 @@ def beyond(robot: Robot, campaign: Campaign) -> tuple[Beyond, ...]:
 
 
 def beyond_by_row(robot: Robot, campaign: Campaign) -> NDArray:
-    """Return (R,) texts: the variables outside the range in each row, or empty."""
+    """Return (R,) texts: the names of variables outside their range; empty if none."""
     names = np.full(len(campaign), "", dtype=object)
     for name, _, outside in _outside(robot, campaign):
         names[outside] = [f"{before} {name}".strip() for before in names[outside]]
@@ -96,7 +96,7 @@ def beyond_by_row(robot: Robot, campaign: Campaign) -> NDArray:
 def _outside(
     robot: Robot, campaign: Campaign
 ) -> Iterator[tuple[str, NDArray, NDArray]]:
-    """Yield name, (R,) values and (R,) bool of each variable outside its range."""
+    """Yield the name, (R,) values and (R,) bool of each variable outside its range."""
     variables = _variables(campaign)
     for name, (low, high) in robot.learned_range.items():
         values = variables.get(name, np.zeros(0))
@@ -110,7 +110,7 @@ def _outside(
 
 
 def _repeats(robot: Robot, name: str) -> bool:
-    """Return whether the robot is unchanged after a full turn of a variable."""
+    """Return whether the robot's functions repeat after a full turn of a variable."""
     turning = [f"q.{f.name}" for f in robot.frames if f.joint == "revolute"]
     return name in turning and all(
         _turns_over(function, name)
@@ -134,6 +134,6 @@ def _variables(campaign: Campaign) -> dict[str, NDArray]:
     }
     variables |= {f"load.{a}": w for a, w in zip(LOAD, campaign.loads.T, strict=True)}
     for name, values in campaign.covariates.items():
-        if name != "time":  # time is counted separately in each session
+        if name != "time":  # time starts again in each session
             variables["approach" if name == "approach" else f"cov.{name}"] = values
     return variables

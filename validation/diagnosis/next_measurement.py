@@ -1,14 +1,14 @@
-"""The measurement that would decide between two candidate models.
+"""Find the measurement that best discriminates between two candidate models.
 
 If model A is true, a further measurement differs by d from the prediction of model B,
-fitted to the same readings.  J C J' is the covariance by which B could still adapt.
-The measurement with the largest non-centrality
-the greatest non-centrality
+which was fitted to the same readings.  J C J' is the covariance of the prediction of B
+due to the uncertainty of its parameters.  The measurement with the largest
+non-centrality
 
     d' (I + J C J')^-1 d     (whitened)
 
-distinguishes the models best.  The smaller one of the values for A against B and for B
-against A is used.
+discriminates best between the models.  The non-centrality is computed with A as the
+true model and with B as the true model, and the smaller value is used.
 
 Sources:
     Atkinson, Fedorov (1975), The design of experiments for discriminating between two
@@ -33,26 +33,26 @@ from forcefit.validation.campaign.campaign import LOAD, Campaign
 from forcefit.validation.diagnosis.fit import MachineFit
 
 _TRIED = 240  # number of conditions that are tried
-# factor by which the tried range of loads and covariates exceeds the measured range
+# Ratio of the tried range of loads and covariates to the measured range.
 _FURTHER = 1.5
-_STEP = 1e-3  # relative to a standard deviation: step of the derivatives
-# relative to the largest non-centrality; conditions above it are considered equally
-# good
+_STEP = 1e-3  # step of derivatives / standard deviation
+# Conditions whose non-centrality exceeds this fraction of the largest one count as
+# equally good.
 _AS_GOOD = 0.97
-_DECIDES = 1.0  # [-] smallest non-centrality that justifies a measurement
+_DECIDES = 1.0  # [-] smallest non-centrality of a useful measurement
 
 
 @dataclass(frozen=True)
 class NextMeasurement:
-    """A measurement that would decide between models.
+    """A measurement that discriminates between models.
 
     Attributes:
         why: the reason as text.
         configuration: commanded coordinates or pose by column name.
         load: (6,) [N m, N] at the reference point, base axes.
         covariates: values of covariates to be set, such as a temperature.
-        power: [-] non-centrality of one reading under these conditions; 10 decides
-            nearly always.
+        power: [-] non-centrality of one reading under these conditions.  A measurement
+            with a value of 10 nearly always decides between the models.
     """
 
     why: str
@@ -68,7 +68,7 @@ def next_measurement(
     fit: MachineFit,
     rivals: Sequence[MachineFit],
 ) -> NextMeasurement | None:
-    """Return the measurement that decides between a fit and its most probable rival.
+    """Return the measurement that discriminates between a fit and a rival model.
 
     The search covers the measured configurations, and reachable configurations between
     any two of them.  Loads and covariates may exceed their measured ranges by half.  If
@@ -77,7 +77,7 @@ def next_measurement(
 
     Args:
         campaign: the measurements.
-        conditions: declared conditions of the campaign, registered.
+        conditions: declared conditions of the campaign, including the registration.
         fit: the best model.
         rivals: other models, most probable first.
 
@@ -92,8 +92,8 @@ def next_measurement(
     for rival in rivals:
         b, Jb, Cb = _model(tried, rival, sigma)
         powers = np.minimum(_power(a - b, Jb, Cb), _power(b - a, Ja, Ca))
-        # among conditions nearly as good as the best one, the one with the smallest
-        # load
+        # Choose the condition with the smallest load among those nearly as good as the
+        # best one.
         good = powers >= _AS_GOOD * powers.max()
         best = int(np.argmin(np.where(good, size, np.inf)))
         if powers[best] >= _DECIDES:
@@ -106,7 +106,7 @@ def _measurement(
     campaign: Campaign, tried: Conditions, best: int, power: float,
     fits: Sequence[MachineFit],
 ) -> NextMeasurement:  # fmt: skip
-    """Return one of the tried conditions as text and numbers."""
+    """Return one of the tried conditions as text and as numbers."""
     sets = [sorted({e.hypothesis.effect for e in one.effects}) for one in fits]
     names = [" + ".join(effects) or "nothing" for effects in sets]
     why = (
@@ -121,7 +121,7 @@ def _measurement(
 
 
 def _conditions_tried(conditions: Conditions) -> Conditions:
-    """Return reachable conditions to try, with wider ranges of loads and covariates."""
+    """Return reachable conditions with wider ranges of loads and covariates."""
     rng = np.random.default_rng(0)
     tried = _between(conditions.take(rng.integers(0, len(conditions), _TRIED)), rng)
     largest = np.abs(conditions.load).max(axis=0)
@@ -129,8 +129,8 @@ def _conditions_tried(conditions: Conditions) -> Conditions:
     temperature = tried.temperature
     if np.isfinite(temperature).all():
         low, high = conditions.temperature.min(), conditions.temperature.max()
-        # if a campaign has one temperature, a change by ten kelvin is assumed to be
-        # possible
+        # If a campaign was measured at one temperature, a change by ten kelvin is
+        # assumed to be possible.
         span = max(_FURTHER * (high - low), 10.0)
         temperature = rng.choice([low, (low + high) / 2, low + span], _TRIED)
     approach = tried.approach
@@ -146,7 +146,7 @@ def _conditions_tried(conditions: Conditions) -> Conditions:
 
 def _between(measured: Conditions, rng: np.random.Generator) -> Conditions:
     """Return conditions with half of the configurations moved towards other ones."""
-    # rest positions are known only for measured configurations
+    # Rest positions are known only for the measured configurations.
     if measured.rest is not None:
         return measured
     actuated = np.array([frame.actuated for frame in measured.robot.frames])
@@ -159,8 +159,8 @@ def _between(measured: Conditions, rng: np.random.Generator) -> Conditions:
     for i, posture in enumerate(postures):
         if posture is not None:
             coordinates[i], transforms[i] = posture.coordinates, posture.transforms
-    # second-order terms of the declared errors are equal in both models; unknown
-    # elsewhere
+    # Second-order terms of the declared errors cancel in the difference of both models,
+    # and are not known for other configurations.
     return replace(
         measured, coordinates=coordinates, transforms=transforms, second_order=0.0
     )
@@ -170,7 +170,7 @@ def _model(
     tried: Conditions, fit: MachineFit, sigma: NDArray
 ) -> tuple[NDArray, NDArray, NDArray]:
     """Return (S, 6) whitened predictions with a machine's effects, and derivatives."""
-    # parameters of one session do not apply to another measurement
+    # Parameters of one session do not apply to another measurement.
     parts = [one for one in fit.effects if one.session is None]
     places = [fit.unknowns.place(one) for one in parts]
     chosen = np.concatenate([np.arange(len(fit.x))[own] for own in [slice(0), *places]])
@@ -186,7 +186,8 @@ def _model(
         return predict(conditions).deviation / sigma
 
     model = read(fit.x, finite)
-    # finite motions hardly change the slopes, but take a hundred times longer
+    # Finite motions hardly change the derivatives, but their computation takes a
+    # hundred times longer.
     middle = read(fit.x, False) if finite else model
     J = np.zeros((*middle.shape, len(chosen)))
     for k, place in enumerate(chosen):
@@ -200,11 +201,12 @@ def _model(
 
 
 def _power(d: NDArray, J: NDArray, C: NDArray) -> NDArray:
-    """Return (S,) non-centrality of d if J C J' is not determined; 0 if not finite."""
+    """Return (S,) non-centrality of d for covariance J C J'; 0 if it is not finite."""
     S = np.eye(d.shape[1]) + np.einsum("sik,kl,sjl->sij", J, C, J)
     good = np.isfinite(d).all(axis=1) & np.isfinite(S).all(axis=(1, 2))
     powers = np.zeros(len(d))
-    # S is 1 plus a matrix that is semidefinite except for rounding, which may be large
+    # S is 1 plus a positive semidefinite matrix, apart from rounding errors, which may
+    # be large.
     values, vectors = np.linalg.eigh(S[good])
     along = np.einsum("sij,si->sj", vectors, d[good])
     powers[good] = np.sum(along**2 / np.maximum(values, 1.0), axis=1)
@@ -212,7 +214,7 @@ def _power(d: NDArray, J: NDArray, C: NDArray) -> NDArray:
 
 
 def _configuration(campaign: Campaign, tried: Conditions, row: int) -> dict[str, float]:
-    """Return the command of a tried condition, by the columns of the campaign."""
+    """Return the command of a tried condition in the columns of the campaign."""
     if campaign.commanded == "joints":
         return {
             f"q.{frame.name}": float(tried.coordinates[row, i])
@@ -227,6 +229,6 @@ def _configuration(campaign: Campaign, tried: Conditions, row: int) -> dict[str,
 
 
 def load_text(load: Sequence[float]) -> str:
-    """Return a load in the format of the command line."""
+    """Return a load in the format of command-line options."""
     parts = [f"{name}={w:g}" for name, w in zip(LOAD, load, strict=True) if w]
     return ",".join(parts) or "none"

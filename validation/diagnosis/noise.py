@@ -1,7 +1,7 @@
-"""Noise: its scale relative to the stated sigma, and blunders.
+"""Estimate the scale of the noise relative to the declared sigma, and blunders.
 
-A reading is good, with distribution N(0, tau^2).  With a probability of one in five
-thousand it is a blunder, with a standard deviation thirty times as large.
+The noise of a good reading is distributed as N(0, tau^2).  One reading in five thousand
+is expected to be a blunder, whose standard deviation is thirty times larger.
 
 Sources:
     Box, Tiao (1968), A Bayesian approach to some outlier problems, Biometrika 55, 119.
@@ -16,14 +16,14 @@ from scipy.stats import chi2
 from forcefit.results.text import readings_text
 
 _BLUNDERS = 2e-4  # prior probability of a blunder
-_WIDTH = 30.0  # standard deviation of a blunder, relative to tau
+_WIDTH = 30.0  # standard deviation of a blunder / tau
 _LEFT_OUT = 1e-12  # relative precision assigned to a blunder
-_CLEAR = 10.0  # smallest residual over tau of a blunder, before a model is fitted
-# largest share of blunders, as in the final test; a larger share indicates an effect
+_CLEAR = 10.0  # smallest residual / tau of a blunder before a model is fitted
+# Largest fraction of blunders, as in the final test; more outliers indicate an effect.
 _MANY = 0.05
 _UNLIKE = 4.0  # standard deviations by which tau must differ from 1 to be reported
-_CLOSE = 0.2  # smallest reported abs(ln tau): accuracy of a stated sigma
-_CHANCE = 1e-4  # p-value below which repeats are called not repeatable
+_CLOSE = 0.2  # smallest reported abs(ln tau)
+_CHANCE = 1e-4  # p-value below which the readings count as not repeatable
 _MEDIAN = 0.4549  # median of chi-square with one degree of freedom
 
 
@@ -32,9 +32,9 @@ class Noise:
     """Estimated noise of a campaign.
 
     Attributes:
-        tau: ratio of true to stated sigma.
+        tau: ratio of true to declared sigma.
         tau_std: standard deviation of tau.
-        findings: sentences on the noise for the user.
+        findings: sentences about the noise for the user.
         common: [rad, m] standard deviations of rotation and translation of the motion
             that the points of one measurement share.
     """
@@ -48,9 +48,9 @@ class Noise:
 def probability_good(squares: NDArray, *, clearly: bool = False) -> NDArray:
     """Return (n,) probabilities that readings are good, from expected squares.
 
-    The result is 1 for a reading that is more probably good than not, and for all
-    readings if there are too many outliers.  With ``clearly``, only large residuals
-    count as outliers, because effects are not fitted yet.
+    The probability is set to 1 for a reading that is more probably good than not, and
+    for all readings if there are too many outliers.  If ``clearly`` is true, only large
+    residuals count as outliers, because effects have not been fitted yet.
     """
     v = max(float(np.median(squares)) / _MEDIAN, 1e-12)
     with np.errstate(over="ignore", under="ignore"):
@@ -69,7 +69,7 @@ def cell_weights(good: NDArray) -> NDArray:
 
 
 def repeat_scatter(z: NDArray, group: NDArray) -> tuple[float, int]:
-    """Return [sigma] rms of residuals within groups of repeats, and its freedom."""
+    """Return the rms [sigma] of residuals within groups of repeats, and its freedom."""
     _, number, count = np.unique(group, return_inverse=True, return_counts=True)
     mean = np.bincount(number, weights=z) / count
     freedom = len(z) - len(count)
@@ -81,10 +81,10 @@ def findings(
     tau: float, tau_std: float, repeats: tuple[float, int], *, memory: bool,
     common: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[str, ...]:  # fmt: skip
-    """Return sentences on the noise; none if the noise is as stated.
+    """Return sentences about the noise; none if it agrees with the declared sigma.
 
     Args:
-        tau: ratio of true to stated sigma.
+        tau: ratio of true to declared sigma.
         tau_std: standard deviation of tau.
         repeats: result of :func:`repeat_scatter` for the residual.
         memory: whether the model depends on earlier rows.

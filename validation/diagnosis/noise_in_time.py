@@ -1,4 +1,4 @@
-r"""Noise correlated in time: its size, and the wider intervals that it causes.
+r"""Estimate noise that is correlated in time, and its effect on uncertainties.
 
 Within a session, the noise of each component of a reading is partly white and partly an
 Ornstein-Uhlenbeck process.  Its correlation between times t_i and t_j is
@@ -8,14 +8,14 @@ Ornstein-Uhlenbeck process.  Its correlation between times t_i and t_j is
 ======  =============  =========  ====================================================
 symbol  code           shape      meaning
 ======  =============  =========  ====================================================
-a       ``share``                 share of the variance that is correlated
-tau     ``constant``              [s] correlation time
-G       ``slopes``     (N, k)     change of the whitened readings per unknown
-H       ``covariance`` (k, k)     (G'G)^-1, covariance of the unknowns for white noise
+a ``share`` fraction of the variance that is correlated tau ``constant`` [s] correlation
+time G ``slopes`` (N, k) change of the whitened readings per unknown H ``covariance``
+(k, k) (G'G)^-1, covariance of the unknowns for white noise
 ======  =============  =========  ====================================================
 
-Fits assume white noise.  If the correlation is R instead of 1, their covariance is H
-G'R G H. The likelihood of a and tau is computed by a Kalman filter on a grid of both.
+Fits assume white noise.  If the correlation matrix is R instead of 1, the covariance of
+the fitted unknowns is H G'R G H. The likelihood of a and tau is computed by a Kalman
+filter on a grid of values.
 
 Sources:
     Uhlenbeck, Ornstein (1930), On the theory of the Brownian motion, Phys. Rev. 36.
@@ -33,9 +33,9 @@ from forcefit.validation.campaign.campaign import Campaign
 from forcefit.validation.diagnosis.lack_of_fit import SIGNIFICANT
 
 _SHARES = np.array([0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95])
-# number of time constants between the usual time step and the longest session
+# Number of time constants between the typical time step and the longest session.
 _CONSTANTS = 12
-_FEWEST = 30  # smallest number of rows with a time
+_FEWEST = 30  # smallest number of rows with a known time
 
 
 @dataclass(frozen=True)
@@ -43,9 +43,9 @@ class NoiseInTime:
     """Noise that is partly an Ornstein-Uhlenbeck process.
 
     Attributes:
-        share: [-] share of the variance that is correlated.
+        share: [-] fraction of the variance that is correlated.
         constant: [s] correlation time.
-        probability: probability that white noise shows a correlation as large.
+        probability: probability that white noise shows a correlation at least as large.
     """
 
     share: float
@@ -61,9 +61,9 @@ def noise_in_time(campaign: Campaign, residual: NDArray) -> NoiseInTime | None:
         residual: (N,) whitened residual.
 
     Returns:
-        Share and time constant of the largest likelihood.  None if the rows have no
-        time or are few, or if white noise shows this correlation more often than once
-        in 10^4 cases.
+        The fraction and the time constant of maximum likelihood.  None if there are too
+        few rows with a time, or if white noise shows this correlation more often than
+        once in 10^4 cases.
     """
     if "time" not in campaign.covariates or len(campaign) < _FEWEST:
         return None
@@ -77,8 +77,8 @@ def noise_in_time(campaign: Campaign, residual: NDArray) -> NoiseInTime | None:
     for times, z in series:
         more = _innovations(times, z, constants)
         squares, logs = squares + more[0], logs + more[1]
-    # the variance of the noise is estimated too, because with a too large sigma the
-    # residual does not look white
+    # The variance of the noise is estimated too, because white noise with an
+    # overestimated sigma does not appear white.
     count = len(residual)
     gain = count * np.log(residual @ residual / squares) - logs
     best = np.unravel_index(np.argmax(gain), gain.shape)
@@ -95,8 +95,8 @@ def widened(
 
     Args:
         covariance: (k, k) covariance for white noise.
-        slopes: (N, k) weights: the estimates are the covariance times the products of
-            the weights with the whitened readings.
+        slopes: (N, k) derivatives G of the whitened readings.  The estimate of the
+            unknowns is the covariance times G' times the whitened readings.
         campaign: campaign of R rows with N measured cells.
         noise: the correlated noise.
 
@@ -115,7 +115,7 @@ def widened(
 
 
 def _series(campaign: Campaign) -> Iterator[tuple[NDArray, NDArray]]:
-    """Yield the times and cells of each component, point and session."""
+    """Yield the times and cells of each time series: component, point and session."""
     rows, columns = np.nonzero(campaign.cells)
     time = campaign.covariates["time"][rows]
     own = [
@@ -132,7 +132,7 @@ def _series(campaign: Campaign) -> Iterator[tuple[NDArray, NDArray]]:
 def _innovations(
     times: NDArray, z: NDArray, constants: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return the sums over a series of v^2/S and of ln S, (shares, constants)."""
+    """Return (shares, constants) sums over a series of v^2/S and of ln S."""
     share = _SHARES[:, None]
     fading = np.exp(-np.diff(times)[:, None] / constants)
     mean = np.zeros((len(_SHARES), len(constants)))

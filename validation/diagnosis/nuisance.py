@@ -1,8 +1,9 @@
-"""Nuisance parameters: geometric errors and compliances that every machine has.
+"""Describe nuisance parameters: geometric errors and compliances of every machine.
 
 No frame is manufactured exactly as drawn, and no part is rigid.  Each of these unknowns
-has a Gaussian prior about its declared value.  Its standard deviation is the frame's
-``tolerance``, or is common to a group and determined by the readings.
+has a Gaussian prior about its declared value.  The prior standard deviation is the
+``tolerance`` of the frame, or it is common to a group of unknowns and determined by the
+readings.
 """
 
 from collections.abc import Container
@@ -22,22 +23,23 @@ from forcefit.validation.diagnosis.signatures import UNSEEN, whiten
 GEOMETRY, SPRINGS = "geometry", "springs"
 KINDS = ("rotation", "translation")
 LARGEST_TURN = 0.2  # [rad] largest error of a drive, a frame or a device
-# relative to the robot's size: largest plausible translation of a frame
+# Largest plausible translation of a frame, relative to the size of the robot.
 LARGEST_SHIFT = 0.1
-# relative to the largest column of a group; smaller columns change no reading
+# A column that is smaller than this fraction of the largest column of its group changes
+# no reading.
 _ROUNDING = 1e-9
 _SAME = 1 - 1e-6  # cosine above which two columns are equal
 
 
 @dataclass(frozen=True, eq=False)
 class Nuisance:
-    """k unknown geometric errors and spring compliances.
+    """Columns and priors of k unknown geometric errors and spring compliances.
 
     Attributes:
         columns: (N, k) change of the whitened readings per unknown.
         spring: (k,) bool, True for a spring, whose compliance cannot be negative.
-        frame, axis: (k,) row of the frame in the campaign's robot, and component of the
-            screw at the frame, 0 to 5.
+        frame, axis: (k,) index of the frame in the campaign's robot, and component of
+            the screw at the frame, 0 to 5.
         given: (k,) declared standard deviation; NaN where none is declared.
         most: (k,) largest plausible standard deviation.
     """
@@ -51,12 +53,12 @@ class Nuisance:
 
     @property
     def group(self) -> NDArray:
-        """(k,) 0 and 1 for rotations and translations of frames, 2 and 3 of springs."""
+        """(k,) 0, 1: rotations, translations of frames; 2, 3: of springs."""
         return 2 * self.spring + self.axis // 3
 
     @property
     def declared(self) -> bool:
-        """Whether the robot declares tolerances; geometric errors are then in use."""
+        """Whether the robot declares tolerances; geometric errors are then fitted."""
         return bool(np.isfinite(self.given).any())
 
     def take(self, unknowns: NDArray) -> "Nuisance":
@@ -73,14 +75,15 @@ def nuisance(
 ) -> Nuisance:  # fmt: skip
     """Return the geometric errors and springs that affect a campaign's readings.
 
-    The springs describe compliance distributed over many joints.  A spring is left out
-    if its column equals the column of a single unknown of a library effect (N, c)
-    ``named``. ``response`` is the response under declared conditions.
+    The springs describe compliance that is distributed over many joints.  A spring is
+    omitted if its column is parallel to a column of ``named`` (N, c), which belongs to
+    a library effect with a single unknown.  ``response`` is the response under declared
+    conditions.
     """
     robot, n = campaign.robot, len(campaign.robot.frames)
     own = [conditions.robot.index(frame.name) for frame in robot.frames]
     screws, carried = response.screws[:, :, own], response.wrenches[:, own]
-    # frames of closures and of the platform cannot have a joint spring
+    # Frames of closures and of the platform cannot have a joint spring.
     carried[:, [not _may_give(robot, f.name) for f in robot.frames]] = 0.0
     changes = np.concatenate([screws, screws * carried[:, None]], axis=2)
     given = np.full((2 * n, 6), np.nan)
@@ -104,22 +107,22 @@ def nuisance(
 
 
 def _may_give(robot: Robot, name: str) -> bool:
-    """Return whether a frame may have a joint stiffness."""
+    """Return whether a joint stiffness can be defined for a frame."""
     return name != robot.platform and all(name not in pair for pair in robot.closures)
 
 
 def visible(small: Nuisance) -> NDArray:
-    """Return (k,) bool: unknowns that are visible within their group, and at all."""
+    """Return (k,) bool, True for unknowns that visibly change a reading."""
     size = np.linalg.norm(small.columns, axis=0)
     largest = np.zeros(4)
     np.maximum.at(largest, small.group, size)
-    # a tolerance of zero declares a direction as exact
+    # A tolerance of zero declares that a direction is exact.
     shown = (size > _ROUNDING * largest[small.group]) & ~(small.given == 0.0)
     return np.asarray(shown & (size > UNSEEN / small.most))
 
 
 def _is_among(columns: NDArray, named: NDArray) -> NDArray:
-    """Return (k,) bool: columns (N, k) that equal named ones except for their size."""
+    """Return (k,) bool, True for columns (N, k) that are parallel to a named column."""
     unit = [c / np.maximum(np.linalg.norm(c, axis=0), 1e-300) for c in (named, columns)]
     return np.asarray((np.abs(unit[0].T @ unit[1]) > _SAME).any(axis=0))
 
@@ -127,7 +130,8 @@ def _is_among(columns: NDArray, named: NDArray) -> NDArray:
 def with_error(robot: Robot, frame: NDArray, axis: NDArray, x: NDArray) -> Robot:
     """Return a robot with geometric errors increased by x (k,) [rad, m].
 
-    x acts at frames (k,), given as rows, in components (k,) of the screw, 0 to 5.
+    x acts at the frames with indices ``frame`` (k,), in the screw components ``axis``
+    (k,), 0 to 5.
     """
     errors = robot.errors.copy()
     np.add.at(errors, (frame, axis), x)
@@ -137,8 +141,8 @@ def with_error(robot: Robot, frame: NDArray, axis: NDArray, x: NDArray) -> Robot
 def with_compliance(robot: Robot, frame: NDArray, axis: NDArray, x: NDArray) -> Robot:
     """Return a robot with x (k,) [rad/(N m), m/N] in series with its joints.
 
-    x acts at frames (k,), given as rows, in components (k,) of the screw, 0 to 5; a
-    value of 0 changes nothing.
+    x acts at the frames with indices ``frame`` (k,), in the screw components ``axis``
+    (k,), 0 to 5.  A value of 0 changes nothing.
     """
     frames = list(robot.frames)
     for i, a, c in zip(frame.tolist(), axis.tolist(), x.tolist(), strict=True):

@@ -1,8 +1,8 @@
-"""Places at which a function can act, with the responses of the readings.
+"""List the places at which a function can act, with the responses of the readings.
 
-A place is a component of a screw at a frame, at the base or in the reading; a component
-of the load; or several components at the same frame.  Places with equal responses are
-listed once.
+A place is a screw component at a frame, at the base or in the reading, a component of
+the load, or several components at the same frame.  Places with equal responses are
+listed only once.
 """
 
 from dataclasses import dataclass, field
@@ -23,11 +23,12 @@ from forcefit.validation.diagnosis.signatures import fingerprints
 from forcefit.validation.diagnosis.whitening import Whitening
 
 Where = tuple[str, str, str]  # place, component, kind of candidate
-# ratio of the largest unrecorded force, such as a cable's, to the largest recorded
-# force
+# Ratio of the largest unrecorded force (for example of a cable) to the largest recorded
+# force.
 _HEAVY = 10.0
-_FORCE = 1000.0  # [N] largest unrecorded force where no load is recorded
-# largest number of columns of a form whose products are cached, which limits memory
+_FORCE = 1000.0  # [N] largest unrecorded force if no load is recorded
+# Products are cached only for forms with at most this number of columns, to limit
+# memory.
 _REMEMBERED = 8
 
 
@@ -36,12 +37,13 @@ class Weighted:
     """Weighted responses at all places, in selected cells.
 
     Attributes:
-        rows: (R,) rows that have a selected cell.
+        rows: (R,) rows that contain a selected cell.
         answers: (S, R, 6) responses, zero in cells that are not selected.
         squares: (S, R) sums of squares over the cells of a row.
-        beside: (pairs, R) sums of products of two components of a combination.
+        beside: (pairs, R) sums of products of two components that act at the same
+            place.
         cells: row and component of the selected cells.
-        known: cache of inner products by form.
+        known: cache of inner products of each form.
     """
 
     rows: NDArray
@@ -65,7 +67,7 @@ class Weighted:
 
 
 class Places:
-    """Places of a campaign's robot that the readings depend on.
+    """Places at which a function would change the readings of a campaign.
 
     Attributes:
         names: components of each place.
@@ -76,7 +78,7 @@ class Places:
     """
 
     def __init__(self, campaign: Campaign, sensitivities: Sensitivities) -> None:
-        """List the places of a design; no measured value is used."""
+        """List the places of a design; measured values are not used."""
         self._campaign, self._sensitivities = campaign, sensitivities
         self._plausible = LARGEST_TURN, LARGEST_SHIFT * size_of(campaign.robot)
         singles, combined = self._listed()
@@ -134,7 +136,7 @@ class Places:
         self.number = {own[0]: k for k, each in enumerate(same) for own in each}
 
     def _list_combinations(self, combined: list[tuple[Where, ...]]) -> None:
-        """List the combinations of components of one frame."""
+        """List the places that combine several components of one frame."""
         known = {frozenset(members) for members in self.members}
         for own in combined:
             shown = [w for w in own if w in self.number]
@@ -146,7 +148,7 @@ class Places:
                 self.equal.append([])
 
     def _preference(self, where: Where) -> tuple[bool, bool, bool]:
-        """Return sort key: motions of drives, then other frames, then other places."""
+        """Return a sort key: motions of drives, other frames, other places."""
         name, component, kind = where
         frames = {f.name: f for f in self._campaign.robot.frames}
         frame = frames.get(name)
@@ -154,7 +156,7 @@ class Places:
         return kind != "screw", not own, frame is None
 
     def plausible(self, where: Where) -> float:
-        """Return the largest plausible unknown: a displacement, compliance or force."""
+        """Return the largest plausible displacement, compliance or force at a place."""
         name, component, kind = where
         conditions = self._sensitivities.conditions
         if name == "load":
@@ -172,8 +174,8 @@ class Places:
     def weighted(self, cells: NDArray, whiten: Whitening) -> Weighted:
         """Return the weighted responses at all places in cells (N,) bool.
 
-        Rows of one measurement have equal variables, so a response times a function is
-        whitened like the response alone.
+        Rows of one measurement have equal variables.  Therefore the product of a
+        response and a function is whitened like the response itself.
         """
         row, component = (axis[cells] for axis in np.nonzero(self._campaign.cells))
         rows, row = np.unique(row, return_inverse=True)

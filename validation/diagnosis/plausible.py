@@ -1,9 +1,9 @@
-"""Implausible parameters of a machine, and impossible readings of a sensor.
+"""Find implausible parameters of a machine, and impossible readings of a sensor.
 
-A fit may explain readings by a base that is 29 m away, on a foundation as soft as
-rubber. The plausible ranges are wide, relative to the robot's size and the largest
-load.  A parameter beyond its range probably has another cause, and no effect is
-claimed.
+A fit may explain readings by absurd parameters, such as a base at a distance of 29 m on
+a foundation as soft as rubber.  The plausible ranges are wide and depend on the size of
+the robot and on the largest load.  If a parameter is outside its range, the deviation
+probably has another cause, and no effect is claimed.
 
 Sources:
     Ashby, Materials Selection in Mechanical Design, 4th ed., figure 4.11 (expansion of
@@ -26,17 +26,17 @@ from forcefit.validation.diagnosis.nuisance import (
     LARGEST_TURN,
 )
 
-_GIVES = 0.2  # [rad, robot sizes] largest plausible deformation under the largest load
+_GIVES = 0.2  # [rad, robot sizes] largest deformation by the largest load
 # [rad, robot sizes] largest plausible geometric error of a manufactured frame
 _MADE = (0.1, 0.02)
-_HOT = 150.0  # [K] largest plausible distance from the calibration temperature
+_HOT = 150.0  # [K] largest plausible difference from the calibration temperature
 _G = 9.81  # [m/s^2] acceleration of gravity
 _FACTORS = {"load_gain": (0.3, 3.0), "modulus_scale": (0.2, 5.0)}
 _LIKELY = "check the declared stiffness, the units and the registration"
 
 
 def impossible_rows(campaign: Campaign) -> NDArray:
-    """Return (R,) bool: rows with a temperature that no machine can have."""
+    """Return (R,) bool, True for rows with an impossible temperature."""
     wrong = np.zeros(len(campaign), dtype=bool)
     for name, values in campaign.covariates.items():
         if "temperature" in name:
@@ -57,7 +57,8 @@ def _implausible(campaign: Campaign, fit: MachineFit) -> Iterator[str]:
     moment = float(np.abs(campaign.loads[:, :3]).max()) + force * size
     reach = ", so compliant that the loads move the platform out of its workspace"
     shift = LARGEST_SHIFT * size
-    # by unit: smallest and largest plausible value, and the statement beyond them
+    # For each unit: smallest and largest plausible value, and the statement outside
+    # this range.
     ranges = {
         "rad": (-LARGEST_TURN, LARGEST_TURN, f", larger than {LARGEST_TURN:.2g}"),
         "m": (-shift, shift, f", larger than {shift:.2g}"),
@@ -86,11 +87,11 @@ def _implausible(campaign: Campaign, fit: MachineFit) -> Iterator[str]:
 def _parameters(
     campaign: Campaign, fit: MachineFit
 ) -> Iterator[tuple[str, str, float]]:
-    """Yield effect, parameter and value; for a drift its value at the end."""
+    """Yield effect, parameter and value; the value of a drift is that at its end."""
     bare = campaign.robot.without_effects()
     for one in fit.effects:
         values = one.hypothesis.public(bare, fit.own(one)[0])
-        if one.session is None:  # in one session, values are added to those of the file
+        if one.session is None:  # values of one session are added to those of the file
             machine = fit.robot.effects.get(one.hypothesis.effect, {})
             values = {k: machine.get(k, v) for k, v in values.items()}
         went = 1.0

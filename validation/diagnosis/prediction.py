@@ -1,6 +1,6 @@
-"""Readings of a saved robot, by the one function that fits and tests use.
+"""Predict the readings of a saved robot, with the function that fits and tests use.
 
-A diagnosis fits a robot and computes the robot's errors with this function, and
+A diagnosis fits a robot and computes its errors with this function.  The command
 ``forcefit validation predict`` computes the readings of the saved file with it.
 """
 
@@ -26,12 +26,13 @@ def finite_conditions(campaign: Campaign, rows: NDArray | None = None) -> Condit
 
     Args:
         campaign: campaign of R rows.
-        rows: numbers or mask of the rows to return; their readings may depend on
+        rows: indices or mask of the rows to return.  Their readings may depend on
             earlier rows.
 
     Returns:
-        The conditions of these rows.  For a robot with clearance they are those of the
-        linear model, because its rest position without a load is undetermined.
+        The conditions of these rows.  For a robot with clearance, the conditions of the
+        linear model are returned, because the rest position without a load is
+        undetermined.
     """
     conditions = conditions_of(campaign)
     if rows is not None:
@@ -47,12 +48,12 @@ def predicted(
     """Return the readings of a robot for the commands of a campaign.
 
     Args:
-        campaign: campaign of R rows; its readings are not used.
+        campaign: campaign of R rows, whose readings are not used.
         robot: robot with the same frames and closures as the campaign's.
-        linear: whether motions are small, as in a model without finite motions.
+        linear: whether motions are linearised.
 
     Returns:
-        The predicted readings, with the robot's registration.
+        The predicted readings, including the registration of the robot.
     """
     campaign = replace(campaign, robot=campaign.robot if robot is None else robot)
     return predict((conditions_of if linear else finite_conditions)(campaign))

@@ -1,12 +1,12 @@
-"""Prior standard deviations of groups of unknowns by maximum evidence.
+"""Estimate prior standard deviations of groups of unknowns by maximum evidence.
 
 With posterior mean mu and covariance V of the unknowns of a group, and their prior
 standard deviation s,
 
     d ln p(z) / d ln s = sum of [(mu^2 + V)/s^2 - 1],
 
-which is zero for s^2 = sum mu^2 / sum (1 - V/s^2).  This is MacKay's step, with a
-limit.
+which is zero for s^2 = sum mu^2 / sum (1 - V/s^2).  MacKay's iteration repeats this
+formula; here the change of s in a step is limited.
 
 Sources:
     MacKay (1992), Bayesian interpolation, Neural Computation 4, 415.
@@ -24,11 +24,11 @@ from forcefit.validation.diagnosis.gaussian import FREEDOM, deviance, size_penal
 
 Eigen = tuple[NDArray, NDArray]
 _STEPS = 25  # largest number of steps; about ten are needed
-# change of ln s that ends the iteration, because the evidence is flat there
+# Change of ln s at which the iteration ends, because the evidence hardly changes there.
 _SETTLED = 0.03
-_LEAP = 4.0  # largest factor by which s changes in a step
-_BEGIN = 4.0  # [sigma] contribution of a group to the readings at the start values
-# [sigma] contribution to the readings below which a standard deviation is set to 0
+_LEAP = 4.0  # largest factor on s in one step
+_BEGIN = 4.0  # [sigma] start value of a group's contribution to the readings
+# [sigma] A standard deviation with a smaller contribution to the readings is set to 0.
 _LEAST = 1e-2
 
 
@@ -37,10 +37,11 @@ class Sizes:
     """Optimised prior standard deviations, and the posterior.
 
     Attributes:
-        std: (k,) prior standard deviation of every unknown, over the noise's scale tau.
+        std: (k,) prior standard deviation of every unknown, divided by the noise scale
+            tau.
         of_group: prior standard deviation of each group.
         mean: (k,) posterior mean.
-        covariance: (k, k) posterior covariance, over tau^2.
+        covariance: (k, k) posterior covariance, divided by tau^2.
         squares: value of z' C^-1 z.
         log_det: value of ln det C.
         cost: penalty of the optimisation, see :func:`.gaussian.size_penalty`.
@@ -64,7 +65,7 @@ class Sizes:
 
 @dataclass(frozen=True, eq=False)
 class Grouped:
-    """k unknowns of readings, in groups that share a prior standard deviation.
+    """Linear model with k unknowns, in groups that share a prior standard deviation.
 
     Attributes:
         gram: (k, k) inner products of columns.
@@ -72,7 +73,7 @@ class Grouped:
         squares: sum of squares of the readings.
         count: n, number of readings.
         group: (k,) group of each unknown.
-        given: (k,) fixed standard deviation; NaN where it is optimised.
+        given: (k,) fixed standard deviation; NaN if it is optimised.
         most: (k,) largest plausible standard deviation.
     """
 
@@ -85,7 +86,7 @@ class Grouped:
     most: NDArray
 
     def without(self, unknowns: NDArray) -> "Grouped":
-        """Return the unknowns without those of the given indices."""
+        """Return the model without the unknowns of the given indices."""
         kept = np.delete(np.arange(len(self.along)), unknowns)
         return replace(
             self, gram=self.gram[np.ix_(kept, kept)], along=self.along[kept],
@@ -97,10 +98,11 @@ def best_sizes(
     model: Grouped, start: Mapping[int, float] = MappingProxyType({}),
     eigen: Mapping[int, Eigen] = MappingProxyType({}),
 ) -> Sizes:  # fmt: skip
-    """Return the prior standard deviations of all groups with the largest evidence.
+    """Return the prior standard deviations of all groups that maximise the evidence.
 
-    The iteration starts at ``start``; ``eigen`` has the eigenvalues and eigenvectors of
-    the blocks of some groups in the inner products.
+    The iteration starts at ``start``, which maps groups to standard deviations.
+    ``eigen`` maps some groups to the eigenvalues and eigenvectors of their block of the
+    inner products.
     """
     given, group, count = model.given, model.group, model.count
     free = np.isnan(given)
@@ -155,9 +157,8 @@ class _Posterior:
 
     Attributes:
         std: (k,) prior standard deviations.
-        x: (k,) posterior means over the standard deviations.
-        determined: (k,) 1 minus relative variances; for the largest group only their
-            sum.
+        x: (k,) posterior means divided by the prior standard deviations.
+        determined: (k,) 1 minus relative variances; for the largest group only the sum.
         left: value of z' C^-1 z.
         log_det: value of ln det C.
         D, E, L: 1 + s^2 times eigenvalues, C D^-1, and L L' = A - C D^-1 C'.
@@ -175,19 +176,21 @@ class _Posterior:
 
 @dataclass(frozen=True, eq=False)
 class _Turned:
-    """Inner products, with the unknowns of the largest group rotated.
+    """Inner products of the columns after a rotation of the largest group's unknowns.
 
-    Their block of the inner products is then diagonal, and so is D in
+    The block of these unknowns in the inner products is then diagonal, and so is D in
 
         M = 1 + S G S = [A  C; C' D],
 
-    because these unknowns share one standard deviation.  M is factored by A - C D^-1
-    C', which is small although a group may have hundreds of unknowns.
+    because these unknowns share one standard deviation.  M is factored by means of A -
+    C D^-1 C'.  This matrix is small even if the largest group contains hundreds of
+    unknowns.
 
     Attributes:
         values, V: eigenvalues and eigenvectors of the group's block.
         group, rest: indices of the unknowns in this group and of all others.
-        inner, across: inner products among the others, and between them and the group.
+        inner, across: inner products among the others, and between the others and the
+            group.
         along: (k,) inner products with the readings.
     """
 
@@ -224,7 +227,7 @@ class _Turned:
         )  # fmt: skip
 
     def back(self, x: NDArray) -> NDArray:
-        """Return unknowns, along the last axis, in their original axes."""
+        """Transform unknowns (last axis) back to their original axes."""
         turned = x.copy()
         turned[..., self.group] = x[..., self.group] @ self.V.T
         return turned

@@ -1,9 +1,9 @@
-"""Errors of functions outside the range of their variable.
+"""Estimate the errors of functions outside the range of their variable.
 
-Each fifth of the range of a function's variable is predicted by a fit to the other
-fifths.  The fit uses the prior standard deviations of the model and the leave-block-out
-identity (:mod:`.gaussian`), without iteration.  Random held-out rows are surrounded by
-fitted rows, so they do not test a function, such as a wave, outside its range.
+The range of a function's variable is divided into five parts.  Each part is predicted
+by a fit to the other four parts.  The fit uses the prior standard deviations of the
+model and the leave-block-out identity (:mod:`.gaussian`) without iteration.  Random
+held-out rows do not test extrapolation, because they are surrounded by fitted rows.
 """
 
 from dataclasses import dataclass
@@ -17,18 +17,18 @@ from forcefit.validation.diagnosis.gaussian import leave_block_out
 from forcefit.validation.diagnosis.states import State
 
 PARTS = 5  # number of parts of a range, equal to the number of folds
-_DISTINCT = 4  # smallest number of different values of a variable in each part
+_DISTINCT = 4  # smallest number of different values in each part
 
 
 @dataclass(frozen=True)
 class RangeError:
-    """Errors of a function on parts of its variable's range, each left out in turn.
+    """Errors of a function on parts of its variable's range that were not fitted.
 
     Attributes:
         variable: public name of the variable.
         without: [sigma] rms of all readings, predicted by the model without the
             function.
-        after: [sigma] the same rms with the function.
+        after: [sigma] rms of all readings, predicted by the model with the function.
     """
 
     variable: str
@@ -39,11 +39,11 @@ class RangeError:
 def range_error(
     candidate: Candidate, best: State, without: State, rows: NDArray
 ) -> RangeError | None:
-    """Return the error of a function of a model in extrapolation.
+    """Return the extrapolation error of a function in a model.
 
-    For several variables the largest error is returned; None if no variable has enough
-    values.  ``without`` is the model without the function, ``rows`` (n,) are the rows
-    of the fitted cells.
+    For several variables, the largest error is returned.  The result is None if no
+    variable has enough values.  ``without`` is the model without the function.
+    ``rows`` (n,) are the rows of the fitted cells.
     """
     conditions = best.readings.columns.conditions
     names = dict.fromkeys(v for part in candidate.parts for v in part.variables)

@@ -1,4 +1,4 @@
-"""Pose of the measuring device, estimated first if it is unknown."""
+"""Estimate the pose of the measuring device if it is unknown."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,29 +17,30 @@ from forcefit.validation.diagnosis.hypotheses import Hypothesis, Slot
 from forcefit.validation.diagnosis.signatures import conditions_of
 from forcefit.validation.diagnosis.unknowns import Acting, Unknowns
 
-_FEWEST_POINTS = 3  # smallest number of points that determine a frame
+_FEWEST_POINTS = 3  # smallest number of points that determine a pose
 
 
 def device_frame(declared: Conditions) -> Hypothesis:
-    """Return hypothesis of a measuring frame with unknown rotation and translation."""
+    """Return the hypothesis of an unknown rotation and translation of the device."""
     unknowns = LIBRARY["registration"].unknowns(declared.robot)
     slots = (Slot((u.name,), u, u.start) for u in unknowns if u.name in BASE)
     return Hypothesis("registration", (), tuple(slots))
 
 
 def register(campaign: Campaign, conditions: Conditions) -> Conditions:
-    """Return conditions with the measuring frame fitted to the declared model.
+    """Fit the pose of the measuring device to the declared model.
 
     Args:
-        campaign: rows for the estimate.
-        conditions: conditions to be registered, of these rows or of more rows.
+        campaign: rows from which the pose is estimated.
+        conditions: conditions to which the pose is added, of these rows or of more
+            rows.
 
     Returns:
-        The same conditions, with a registration for each session.
+        The conditions with the pose of the device (registration) in each session.
 
     Raises:
-        BadInput: too few complete positions and rotations for the estimate, or a
-            session without any row.
+        BadInput: there are too few complete positions and rotations, or a session
+            contains no usable row.
     """
     own = with_second_order(conditions_of(campaign))
     if campaign.session is None or conditions.session is None:
@@ -58,7 +59,7 @@ def register(campaign: Campaign, conditions: Conditions) -> Conditions:
 
 
 def _device(campaign: Campaign, own: Conditions) -> dict[str, dict[str, float]]:
-    """Return the measuring frame that fits the declared model best, as an effect."""
+    """Return the pose of the device that fits the declared model best, as an effect."""
     start, frame = coarse_frame(campaign, own), device_frame(own)
     begin = np.array([start[name] for name in BASE])
     unknowns = Unknowns(campaign.robot, (Acting(frame, begin, None, True),))
@@ -67,7 +68,7 @@ def _device(campaign: Campaign, own: Conditions) -> dict[str, dict[str, float]]:
 
 
 def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]:
-    """Return start values: Kabsch's rotation of points, or the mean of rotations."""
+    """Return a start value of the pose: Kabsch's rotation, or the mean of rotations."""
     model = predict(conditions).deviation
     nominal = conditions.measured_points
     answered = np.isfinite(model).all(axis=1)
@@ -77,8 +78,8 @@ def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]
     thought = (nominal + model[:, 3:])[full]
     if not turned.any() and not off_one_line(thought):
         raise BadInput(
-            f"{campaign.name}: registration is unknown, and there are neither "
-            f"rotations nor {_FEWEST_POINTS} measured points off one line; "
+            f"{campaign.name}: found an unknown registration, but neither rotations "
+            f"nor {_FEWEST_POINTS} measured points that are not on one line; "
             "expected one of the two"
         )
     parts = campaign.measured[turned, :3], model[turned, :3]
@@ -92,14 +93,14 @@ def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]
 def device_rotation(
     points: NDArray, seen: NDArray, turns: NDArray, seen_turns: NDArray
 ) -> NDArray:
-    """Return device's rotation: the mean of rotations, or Kabsch's rotation of points.
+    """Return the rotation of the device, fitted to rotations or else to points.
 
     Args:
-        points: (P, 3) [m] in the base's axes; not on one line if there are no
-            rotations.
-        seen: (P, 3) [m] the same points in the device's axes.
-        turns: (T, 3, 3) orientations in the base's axes.
-        seen_turns: (T, 3, 3) the same orientations in the device's axes.
+        points: (P, 3) [m] points in the axes of the base.  Without rotations, the
+            points must not be on one line.
+        seen: (P, 3) [m] the same points in the axes of the device.
+        turns: (T, 3, 3) orientations in the axes of the base.
+        seen_turns: (T, 3, 3) the same orientations in the axes of the device.
 
     Returns:
         (3, 3) rotation from the base's axes to the device's axes.
@@ -107,7 +108,7 @@ def device_rotation(
     if len(turns):
         gap = seen_turns @ np.swapaxes(turns, 1, 2)
         return Rotation.from_matrix(gap).mean().as_matrix()
-    # it is sufficient to centre one of the two sets of points
+    # Centring one of the two sets of points suffices.
     centred = points - points.mean(axis=0)
     return Rotation.align_vectors(seen, centred)[0].as_matrix()
 

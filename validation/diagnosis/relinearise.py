@@ -1,8 +1,8 @@
-"""Repeated linearisation of the effects of a model at their estimates.
+"""Linearise the effects of a model repeatedly at their estimates.
 
-Derivatives at the start values lack three things: products of two effects, nonlinear
-parameters (a time constant, an exponent), and finite motions.  So the prediction with
-all effects of a model is compared with the sum of their linear contributions.  If they
+Derivatives at the start values neglect products of two effects, nonlinear parameters (a
+time constant, an exponent) and finite motions.  Therefore the prediction with all
+effects of a model is compared with the sum of their linear contributions.  If they
 differ, all derivatives are computed again at the estimates.
 """
 
@@ -17,23 +17,23 @@ from forcefit.validation.diagnosis.hypotheses import in_one_session, sessions_of
 from forcefit.validation.diagnosis.signatures import Signature, Tangents
 from forcefit.validation.diagnosis.states import Models, State
 
-_ROUNDS = 3  # largest number of linearisations, because they may oscillate
-MOVED = 0.3  # change of the log posterior that does not alter any decision
-_LINEAR = 0.5  # largest accepted squared whitened error of a linearisation
-# largest factor by which a nonlinear parameter changes in one linearisation
+_ROUNDS = 3  # largest number of linearisations; they may oscillate
+MOVED = 0.3  # change of the log posterior that changes no decision
+_LINEAR = 0.5  # largest squared whitened linearisation error
+# Largest factor on a nonlinear parameter in one linearisation.
 _SHIFT = 3.0
 
 
 class Relinearisation:
-    """Linearisations of models at their estimates, with a cache."""
+    """Linearise models at their estimates; results are cached."""
 
     def __init__(self, tangents: Tangents, models: Models) -> None:
-        """Start with an empty cache; ``tangents`` are those of all cells."""
+        """Start with an empty cache; ``tangents`` are the derivatives of all cells."""
         self.tangents, self.models = tangents, models
         self._about: dict[object, list[Element] | None] = {}
 
     def relinearised(self, state: State) -> State:
-        """Return model linearised until its linearisation is valid at its estimates."""
+        """Linearise a model until the linearisation is valid at its estimates."""
         for _ in range(_ROUNDS):
             elements = self._again(state)
             if elements is None:
@@ -44,7 +44,7 @@ class Relinearisation:
         return state
 
     def _again(self, state: State) -> tuple[Element, ...] | None:
-        """Return elements linearised at the estimates; None if nothing changes."""
+        """Return the elements linearised at the estimates, or None without a change."""
         own = [
             (k, e)
             for k, e in enumerate(state.elements)
@@ -87,8 +87,8 @@ class Relinearisation:
     ) -> list[Element]:
         """Return effects that act together, linearised at given values of their slots.
 
-        The sum of the returned elements is exact at these values.  The given elements
-        are returned if the model has no solution there.
+        The sum of the returned elements is exact at these values.  If the model has no
+        solution there, the given elements are returned.
         """
         robot = self.tangents.campaign.robot
         middle = self.combined(elements, xs)
@@ -99,7 +99,7 @@ class Relinearisation:
                 return list(elements)
             middle = middle - signature.columns @ x
             made.append(replace(signature, offset=np.zeros_like(middle)))
-        # the joint offset of all elements is stored with the first one
+        # The offset of all elements together is stored in the first element.
         made[0] = replace(made[0], offset=middle)
         return [
             replace(effect_element(s, robot, e.log_prior, x), first=e.origin)
@@ -109,7 +109,7 @@ class Relinearisation:
     def _one(
         self, elements: Sequence[Element], xs: Sequence[NDArray], k: int
     ) -> Signature:
-        """Return the k-th effect linearised about values, while the others act."""
+        """Return the k-th effect, linearised at given values while the others act."""
         h, offset = elements[k].hypothesis, np.zeros_like(self.tangents.declared)
         columns = np.zeros((len(offset), len(h.slots)))
         for session in _sessions(elements):
@@ -123,7 +123,7 @@ class Relinearisation:
         return Signature(h, offset, columns)
 
     def combined(self, elements: Sequence[Element], xs: Sequence[NDArray]) -> NDArray:
-        """Return the (N,) whitened contribution of effects acting together."""
+        """Return the (N,) whitened contribution of effects that act together."""
         total = np.zeros_like(self.tangents.declared)
         for session in _sessions(elements):
             effects = self._public(elements, xs, session)
@@ -134,7 +134,7 @@ class Relinearisation:
     def _public(
         self, elements: Sequence[Element], xs: Sequence[NDArray], session: str | None
     ) -> dict[str, dict[str, float]]:
-        """Return parameters by public name, as they act in a session."""
+        """Return the parameters by public name for one session."""
         robot, values = self.tangents.derivatives.conditions.robot, {}
         for e, x in zip(elements, xs, strict=True):
             there, own = in_one_session(e.hypothesis, session)
@@ -143,18 +143,18 @@ class Relinearisation:
 
 
 def _sessions(elements: Sequence[Element]) -> tuple[str | None, ...]:
-    """Return the sessions that the effects distinguish, or (None,)."""
+    """Return the sessions in which the effects differ, or (None,)."""
     every = [name for e in elements for name in sessions_of(e.hypothesis)]
     return tuple(dict.fromkeys(name for name in every if name is not None)) or (None,)
 
 
 def _has_shapes(e: Element) -> bool:
-    """Return whether the nonlinear parameters are among an element's unknowns."""
+    """Return whether nonlinear parameters are among the unknowns of an element."""
     return all(j in e.slots for j, slot in enumerate(e.hypothesis.slots) if slot.shape)
 
 
 def _within(e: Element, x: NDArray) -> NDArray:
-    """Return values, with nonlinear parameters limited to the change of one round."""
+    """Return values; nonlinear parameters change at most by the allowed factor."""
     for j, slot in enumerate(e.hypothesis.slots):
         if slot.shape:
             x[j] = np.clip(x[j], e.begin[j] / _SHIFT, e.begin[j] * _SHIFT)

@@ -1,4 +1,4 @@
-"""A diagnosis as one self-contained page."""
+"""Create the report page of a diagnosis, which is self-contained."""
 
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,7 @@ _ASSUMED = (
     "An effect that the library lacks is found as a learned function, or as outside "
     "the library; effects that the design cannot distinguish are named together.",
 )
-# verdicts that are not favourable; None if more rows could decide
+# Unfavourable verdicts; None if more rows could decide.
 _GOOD = {AMBIGUOUS: None, NOT_ENOUGH_ROWS: None, OUTSIDE_LIBRARY: False}
 NOWHERE = Provenance()
 Table = dict[str, Any]
@@ -40,13 +40,13 @@ def write_report(
     tally: Calibration | None = None,
     provenance: Provenance = NOWHERE,
 ) -> None:
-    """Write the page of a diagnosis; an incomplete page is never left behind.
+    """Write the report page of a diagnosis; a failed write leaves no incomplete file.
 
     Args:
         diagnosis: the diagnosis.
         path: path of the page.
-        tally: simulated error rates on this design, if they were computed.
-        provenance: the command and the files.
+        tally: error rates from simulated campaigns, or None.
+        provenance: the command and its input files.
 
     Raises:
         BadInput: the page cannot be written.
@@ -59,7 +59,7 @@ def report_page(
     tally: Calibration | None = None,
     provenance: Provenance = NOWHERE,
 ) -> str:
-    """Return the page as HTML with its charts inside; see :func:`write_report`."""
+    """Return the page as HTML that includes its charts; see :func:`write_report`."""
     campaign, answer = diagnosis.campaign, results.table(diagnosis, tally)
     body = [
         section("Errors before and after", figures.error_chart(diagnosis)),
@@ -109,12 +109,12 @@ def report_page(
 
 
 def _section(title: str, content: str) -> list[str]:
-    """Return a section, or nothing if its content is empty."""
+    """Return a section, or an empty text if its content is empty."""
     return [section(title, content)] if content else []
 
 
 def _tiles(diagnosis: Diagnosis) -> list[Tile]:
-    """Return tiles: verdict, errors, most probable effect, next measurement."""
+    """Return tiles: verdict, errors, most probable effect and next measurement."""
     before, after = diagnosis.before, diagnosis.after
     tiles = [Tile("Verdict", [diagnosis.verdict.replace("_", " ")])]
     for kind, unit in (("rotation", "rad"), ("position", "m")):
@@ -180,7 +180,7 @@ def _parameters(answer: Table) -> tuple[str, str]:
 
 
 def _structure(answer: Table) -> list[str]:
-    """Return the table of the variables with which the residual varies."""
+    """Return the table of the variables on which the residual depends."""
     rows: list[list[Cell]] = [
         [t["against"], f"{100 * t['share']:.0f} %", f"{t['probability']:.1g}"]
         for t in answer["structure"]
@@ -208,7 +208,7 @@ def _next(answer: Table) -> list[str]:
 
 
 def _noise(diagnosis: Diagnosis) -> list[str]:
-    """Return sentences on the noise and on outliers."""
+    """Return sentences about the noise and the outliers."""
     lack = diagnosis.lack
     far = np.array(diagnosis.campaign.ids)[diagnosis.outliers]
     repeats = "there are no repeats"

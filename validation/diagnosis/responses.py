@@ -1,8 +1,9 @@
-"""Response of the readings to small screws at any frame, and joint wrenches.
+"""Compute the response of the readings to small screws at frames, and joint wrenches.
 
-Both are computed with the linear model at the declared state, for all rows together. A
-small geometric error changes the readings by its screw times the response; a spring
-changes them by its compliance times its wrench times the response.
+Both are computed with the linear model at the declared state, for all rows together.
+The change of the readings by a small geometric error is the response times the screw of
+the error.  The change by a spring is the response times the compliance times the wrench
+of the spring.
 
 ======  =============  ============  =================================================
 symbol  code           shape         meaning
@@ -30,21 +31,15 @@ from forcefit.assembly.measurement.settled_clearance import (
 )
 from forcefit.assembly.measurement.without_clearance import flexibility
 
-_STEP = 1e-5  # [rad, m] step of a central difference, exact to 1e-10
-# relative to the largest moment or force: smaller ones are rounding
+_STEP = 1e-5  # [rad, m] step of a central difference with error 1e-10
+# Wrenches below this fraction of the largest moment or force are rounding errors.
 _ROUNDING = 1e-9
-_AT_ONCE = 50  # number of postures in a batch, which limits memory
+_AT_ONCE = 50  # number of postures computed together, which limits memory
 
 
 @dataclass(frozen=True, eq=False)
 class Responses:
-    """Responses of R readings of a robot with n frames; symbols as in the module.
-
-    Attributes:
-        reading: (R, 6, 6) change per unit platform screw [rad, m].
-        screws: (R, 6, n, 6) change per unit screw at a frame, in its axes.
-        wrenches: (R, n, 6) [N m, N] declared wrench through every joint, in its axes.
-    """
+    """Responses of R readings of a robot with n frames; symbols as in this module."""
 
     reading: NDArray
     screws: NDArray
@@ -54,7 +49,7 @@ class Responses:
 def responses(conditions: Conditions) -> Responses:
     """Return the responses of R rows to small screws, with clearances at rest.
 
-    Rows without a solution are zero.
+    The responses are zero in rows without a solution.
     """
     tight = _without_clearance(conditions)
     distinct, which = tight.postures.distinct
@@ -75,13 +70,14 @@ def responses(conditions: Conditions) -> Responses:
     screws = np.einsum("rij,rjk->rik", D, platform[which])
     good = np.isfinite(screws).all(axis=(1, 2)) & np.isfinite(wrenches).all(axis=1)
     screws[~good], wrenches[~good] = 0.0, 0.0
-    # struts between ball joints transmit no moment: smaller values are rounding
+    # Struts between ball joints transmit no moment; small computed moments are rounding
+    # errors.
     wrenches[np.abs(wrenches) < _ROUNDING * np.abs(wrenches).max(initial=0.0)] = 0.0
     return Responses(D, screws.reshape(R, 6, n, 6), wrenches.reshape(R, n, 6))
 
 
 def _without_clearance(conditions: Conditions) -> Conditions:
-    """Return the same rows with clearances at rest."""
+    """Return the rows with clearances at rest."""
     if not virtual_joints(conditions.robot).cones.shape[1]:
         return conditions
     if conditions.rest is not None:

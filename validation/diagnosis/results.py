@@ -1,4 +1,4 @@
-"""A diagnosis as plain values, in the public format."""
+"""Convert a diagnosis to plain values in the public format."""
 
 import math
 from dataclasses import asdict
@@ -17,16 +17,17 @@ from forcefit.validation.diagnosis.saving import functions_of
 from forcefit.validation.diagnosis.sentence import WORDS, formula, sentence
 from forcefit.validation.diagnosis.sequence import LEARNED
 
-# verdicts that list effects
+# Verdicts for which effects are listed.
 LISTED = {statuses.EXPLAINED, statuses.AMBIGUOUS, statuses.LEARNED}
 _HARDLY = 0.05  # number of determined combinations below which a frame is not listed
-# number of standard deviations of a normal distribution between which 90 % lie
+# Half width of the interval that contains 90 % of a normal distribution [standard
+# deviations].
 _INTERVAL = 1.645
 _UNITS = {GEOMETRY: ("rad", "m"), SPRINGS: ("rad/(N m)", "m/N")}
 
 
 def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, Any]:
-    """Return the diagnosis in the public format, with error rates if simulated."""
+    """Return the diagnosis in the public format, with simulated error rates if any."""
     listed = diagnosis.verdict in LISTED
     ids = np.array(diagnosis.campaign.ids)
     noise, held = diagnosis.traced.selected.noise, diagnosis.held
@@ -91,12 +92,12 @@ def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, A
 
 
 def _plain(one: Any) -> dict[str, Any] | None:
-    """Return a dataclass as plain values; None stays None."""
+    """Return a dataclass as plain values; None is returned unchanged."""
     return None if one is None else asdict(one)
 
 
 def steps(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Return the model sequence, with rms in m or, without positions, in rad."""
+    """Return the model sequence; its rms is in m, or in rad without positions."""
     rows = []
     for step in diagnosis.sequence:
         error = step.error
@@ -121,8 +122,8 @@ def small(diagnosis: Diagnosis, name: str) -> dict[str, Any] | None:
 
     Returns:
         Prior standard deviations, the number of combinations that the readings
-        determine, and every unknown with its determined share; None if the machine is
-        as declared.
+        determine, and for every unknown the fraction that they determine.  None if the
+        machine is as declared.
     """
     fit = diagnosis.fit
     part = next((part for part in fit.unknowns.small if part.name == name), None)
@@ -158,11 +159,11 @@ def small(diagnosis: Diagnosis, name: str) -> dict[str, Any] | None:
 
 
 def effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Return the effects found with their parameters, in the public format.
+    """Return the identified effects with their parameters, in the public format.
 
     Returns:
-        The effects; for an effect that the robot's file declares, the saved value, the
-        declared value and the difference.
+        The effects.  An effect that the robot file declares is listed with the saved
+        value, the declared value and the difference.
     """
     bare, shown = diagnosis.campaign.robot.without_effects(), []
     for one in diagnosis.fit.effects:
@@ -172,7 +173,7 @@ def effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         shown.append({
             "name": name,
             **({} if one.session is None else {"session": one.session}),
-            # frames found to be rigid or without clearance have no parameter
+            # A frame without an identified compliance or clearance is not listed.
             "where": [frame for frame in one.hypothesis.where if frame in acting],
             "probability": diagnosis.probability.get(name, 0.0),
             "parameters": [
@@ -183,7 +184,7 @@ def effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 
 def _parameter(p: Parameter, unit: str) -> dict[str, Any]:
-    """Return a parameter of the machine, with its declared value if any."""
+    """Return a parameter of the machine, with its declared value if there is one."""
     found = {"declared": p.declared, "difference": p.difference, "corrected": p.value}
     return {
         "name": p.name, "value": p.value, "std": p.std,
@@ -194,7 +195,7 @@ def _parameter(p: Parameter, unit: str) -> dict[str, Any]:
 
 
 def _unnamed(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Return geometric errors and springs, if no effect of the library is named."""
+    """Return geometric errors and springs if no library effect is claimed."""
     if diagnosis.effects or diagnosis.fit.unknowns.functions:
         return []
     found = [(words, small(diagnosis, name)) for name, words in WORDS.items()]
@@ -214,7 +215,7 @@ def learned(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     places = places or [len(sequence) - 1]
     shown = []
     for k, functions in enumerate(functions_of(diagnosis)):
-        # with folds, some fits may have found fewer functions
+        # With folds, some fits may contain fewer functions.
         at = places[min(k, len(places) - 1)]
         found = diagnosis.traced.selected.functions[k]
         same = [

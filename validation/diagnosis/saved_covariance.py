@@ -1,9 +1,8 @@
-"""Covariance of the parameters in a saved robot file, stored in a separate file.
+"""Store the covariance of the parameters in a robot file in a separate file.
 
-A parameter of the file is a geometric error, a compliance in series with a joint, a
-parameter of an effect or a coefficient of a function.  The covariance file holds the
-joint posterior covariance of all of them, so that readings can be predicted with an
-interval:
+A parameter is a geometric error, a compliance in series with a joint, a parameter of an
+effect or a coefficient of a function.  The covariance file contains the joint posterior
+covariance of all parameters.  Predicted readings therefore have a known uncertainty:
 
     covariance of the readings = J C J',  where J are their derivatives by the
     parameters.
@@ -36,19 +35,19 @@ from forcefit.validation.diagnosis.unknowns import (
 ERROR, COMPLIANCE, EFFECT, FUNCTION = (
     "geometric_error", "joint_compliance", "effect", "function",
 )  # fmt: skip
-# relative to the declared compliance: smallest compliance after a correction
+# Smallest compliance after a correction, relative to the declared compliance.
 _STAYS = 1e-3
 
 
 @dataclass(frozen=True)
 class Number:
-    """A parameter of a robot file.
+    """Name of a parameter in a robot file.
 
     Attributes:
         kind: one of the four kinds in the module's docstring.
         owner: the frame, the effect, or the index of the function in the file.
-        name: the component, or the parameter.
-        session: name of the session of an effect that acts in one session only.
+        name: name of the screw component or of the parameter.
+        session: session of an effect that acts in only one session, otherwise None.
     """
 
     kind: str
@@ -57,7 +56,7 @@ class Number:
     session: str = ""
 
     def of(self, robot: Robot) -> float:
-        """Return the parameter's value; 0 for a change of a compliance in the file."""
+        """Return the value of the parameter; 0 for a change of a compliance."""
         if self.kind == ERROR:
             return float(
                 robot.errors[robot.index(self.owner), READING.index(self.name)]
@@ -70,7 +69,7 @@ class Number:
         return 0.0
 
     def moved(self, robot: Robot, by: float) -> Robot:
-        """Return the robot with the parameter increased; compliances stay positive."""
+        """Return the robot with a larger parameter value; compliances stay positive."""
         if self.kind == ERROR:
             row, axis = robot.index(self.owner), READING.index(self.name)
             return with_error(robot, *map(np.atleast_1d, (row, axis, by)))
@@ -89,7 +88,7 @@ class Number:
         )
 
     def _softened(self, robot: Robot, by: float) -> Robot:
-        """Return the robot with the compliance of a joint changed in one direction."""
+        """Return the robot after changing the compliance of a joint component."""
         row, axis = robot.index(self.owner), READING.index(self.name)
         K = robot.frames[row].resistance
         stiffness = np.inf if K is None else float(K[axis, axis])
@@ -108,7 +107,7 @@ class SavedCovariance:
 
     Attributes:
         numbers: the k parameters.
-        covariance: (k, k) in SI units.
+        covariance: (k, k) covariance in SI units.
     """
 
     numbers: tuple[Number, ...]
@@ -121,7 +120,7 @@ class SavedCovariance:
 
 
 def covariance_of(fit: MachineFit, robot: Robot) -> SavedCovariance:
-    """Return covariance of the parameters of a fitted robot's file, to first order."""
+    """Return the first-order covariance of the parameters in a fitted robot's file."""
     numbers = _numbers(fit, robot)
     J = np.zeros((len(numbers), len(fit.x)))
     middle = np.array([n.of(robot) for n in numbers])
@@ -142,11 +141,11 @@ def covariance_of(fit: MachineFit, robot: Robot) -> SavedCovariance:
 
 
 def _value(number: Number, robot: Robot, saved: Robot) -> float:
-    """Return a parameter's value in a robot near the saved one; 0 if it is absent."""
+    """Return the value of a parameter in a robot near the saved one; 0 if absent."""
     if number.kind != FUNCTION:
         return number.of(robot)
-    # the nearby robot may have an additional function, whose coefficients are 0 in the
-    # saved one
+    # The nearby robot may contain an additional function, whose coefficients are 0 in
+    # the saved robot.
     own = saved.functions[int(number.owner)]
     alike = [f for f in saved.functions if _names(f) == _names(own)]
     there = [f for f in robot.functions if _names(f) == _names(own)]
@@ -157,12 +156,12 @@ def _value(number: Number, robot: Robot, saved: Robot) -> float:
 
 
 def _names(function: Function) -> tuple[object, ...]:
-    """Return the properties that distinguish the functions of a file."""
+    """Return the properties by which the functions of a file are distinguished."""
     return function.where, function.variables, function.form, function.kind
 
 
 def _numbers(fit: MachineFit, robot: Robot) -> list[Number]:
-    """Return the parameters of a saved robot that the unknowns change."""
+    """Return the parameters of a saved robot that depend on the unknowns."""
     numbers = [n for part in fit.unknowns.small for n in _of_frames(part, robot)]
     for one in fit.unknowns.effects:
         effect = one.hypothesis.effect
@@ -177,7 +176,7 @@ def _numbers(fit: MachineFit, robot: Robot) -> list[Number]:
 
 
 def _of_frames(part: Small, robot: Robot) -> list[Number]:
-    """Return parameters of geometric errors or compliances, in the unknowns' order."""
+    """Return parameters of geometric errors or compliances in the order of unknowns."""
     kind = ERROR if part.name == GEOMETRY else COMPLIANCE
     return [
         Number(kind, robot.frames[row].name, READING[axis])
@@ -200,13 +199,14 @@ def write_covariance(saved: SavedCovariance, path: Path | str) -> None:
 
 
 def read_covariance(robot: Robot) -> SavedCovariance | None:
-    """Return the covariance from the file that a robot names.
+    """Read the covariance from the file that a robot file names.
 
     Returns:
-        The covariance; None if the robot names no file.
+        The covariance; None if the robot file names no file.
 
     Raises:
-        BadInput: the named file does not exist, or is not a covariance of this robot.
+        BadInput: the file does not exist, or its covariance does not belong to this
+            robot.
     """
     path = robot.diagnosis.get("covariance")
     if not path:
@@ -231,11 +231,12 @@ def read_covariance(robot: Robot) -> SavedCovariance | None:
 
 
 def known_covariance(robot: Robot) -> SavedCovariance:
-    """Return all information on the uncertainty of the parameters in a robot's file.
+    """Return the uncertainty of all parameters in a robot file.
 
     Returns:
-        The covariance that the file names.  Parameters that it lacks are independent,
-        with the ``tolerance`` of frames and the ``std`` of functions.
+        The covariance from the file that the robot file names.  Parameters that this
+        covariance does not contain are independent.  Their standard deviations are
+        ``tolerance`` of frames and ``std`` of functions.
 
     Raises:
         BadInput: for the same reasons as in :func:`read_covariance`.

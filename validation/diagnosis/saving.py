@@ -1,8 +1,8 @@
-"""The robot saved by a diagnosis: parameters, uncertainty, and range of validity.
+"""Save the robot of a diagnosis: parameters, uncertainty, and range of validity.
 
 The posterior covariance of all parameters is written to a separate file.  In the robot
-file, ``tolerance`` is the standard deviation of geometric errors, ``std`` that of
-functions.
+file, ``tolerance`` is the standard deviation of geometric errors, and ``std`` is the
+standard deviation of a function's coefficients.
 """
 
 import hashlib
@@ -54,8 +54,7 @@ def functions_of(diagnosis: "Diagnosis") -> list[list[Function]]:
     """Return the learned functions, with coefficients and standard deviations.
 
     Returns:
-        For every learned function, one function of a robot file, or several of one
-        kind.
+        One or several functions of a robot file for every learned function.
     """
     fit, units = diagnosis.fit, diagnosis.campaign.motion_units
     learned = []
@@ -70,7 +69,7 @@ def functions_of(diagnosis: "Diagnosis") -> list[list[Function]]:
 
 
 def _named(one: Function, units: Mapping[str, str]) -> Function:
-    """Return a function, with a label if a frame moves in proportion to a variable."""
+    """Return a function; add a label if a frame moves in proportion to a variable."""
     name = one.variables[0].removeprefix("cov.")
     kinds = {"rad" if component[0] == "r" else "m" for component in one.components}
     straight = one.form == "powers" and one.kind == "screw" and one.where != "load"
@@ -86,13 +85,13 @@ def _named(one: Function, units: Mapping[str, str]) -> Function:
 
 
 def _with_tolerances(fit: MachineFit) -> Robot:
-    """Return the robot with the uncertainty of its geometric errors as tolerance."""
+    """Return the robot with standard deviations of geometric errors as tolerances."""
     robot = fit.robot
     for part, own in fit.unknowns.places:
         if not isinstance(part, Small) or part.name != GEOMETRY:
             continue
-        # a component on which no reading depends is as uncertain as its prior, which is
-        # the prior of the other components of its kind
+        # If no reading depends on a component, its standard deviation is the prior one
+        # of the other components of its kind.
         unseen = np.repeat(
             [part.std[part.axis // 3 == kind].max(initial=0.0) for kind in (0, 1)], 3
         )
@@ -107,7 +106,7 @@ def _with_tolerances(fit: MachineFit) -> Robot:
 
 
 def _record(diagnosis: "Diagnosis") -> dict[str, Any]:
-    """Return the record of the diagnosis for the file."""
+    """Return the record of the diagnosis that the robot file contains."""
     campaign, noise = diagnosis.campaign, asdict(diagnosis.noise)
     record: dict[str, Any] = {
         "campaign": campaign.name,
@@ -128,7 +127,7 @@ def _record(diagnosis: "Diagnosis") -> dict[str, Any]:
 
 
 def _digest(campaign: Campaign) -> str:
-    """Return a digest of a campaign's commands and readings, to identify it."""
+    """Return a digest of a campaign's commands and readings, which identifies it."""
     text = hashlib.sha256()
     for values in (campaign.coordinates, campaign.loads, campaign.measured):
         text.update(np.round(values, 12).tobytes())
@@ -136,11 +135,11 @@ def _digest(campaign: Campaign) -> str:
 
 
 def save(diagnosis: "Diagnosis", path: Path | str) -> None:
-    """Write the machine found as a robot file, and its covariance to another file.
+    """Write the identified machine to a robot file, and its covariance next to it.
 
     Args:
         diagnosis: the diagnosis.
-        path: path of the robot file; the covariance is written to the same name with
+        path: path of the robot file.  The file of the covariance has the same name with
             the suffix ``.npz``.
 
     Raises:

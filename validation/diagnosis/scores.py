@@ -1,4 +1,4 @@
-"""Scores of candidate elements, at given prior standard deviations."""
+"""Score candidate elements at given prior standard deviations."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -20,9 +20,9 @@ from forcefit.validation.diagnosis.whitening import Whitening
 BEAM = 6  # largest number of elements that are tried in a model
 OF_NAME = 2  # largest number of tried elements with the same name
 _VARIABLES = 4  # number of variables whose products with other variables are scored
-# largest number of columns of a function at several places, which limits memory
+# Largest number of columns of a function at several places, which limits memory.
 _WIDEST = 600
-# number of halvings of a shape parameter's step; the fit refines the parameter further
+# Number of halvings of a shape parameter's step; the final fit refines the parameter.
 _HALVINGS = 6
 
 
@@ -37,7 +37,7 @@ class Scores:
 
     @cached_property
     def _whiten_sample(self) -> tuple[NDArray, Whitening]:
-        """(N,) mask of the sampled cells, and their map to independent noise."""
+        """(N,) mask of the sampled cells, and the map to independent noise."""
         cells, some = self.readings.cells.copy(), self.readings.sampled
         cells[cells] = some
         root, common = self.readings.root[some], self.readings.common
@@ -101,7 +101,7 @@ class Scores:
         return [(begin + w, e) for w, e in best[: BEAM + 2]]
 
     def _products(self, found: Sequence[ScoredFunction]) -> list[Request]:
-        """Return requests for products of the best functions' variables."""
+        """Return requests for products of the variables of the best functions."""
         names = list(dict.fromkeys(f.candidate.parts[0].variable for f in found))
         names = names[:_VARIABLES]
         if "approach" in self.functions.variables:
@@ -111,7 +111,7 @@ class Scores:
     def look(
         self, state: State, requests: Sequence[Request], most: int = 3
     ) -> list[ScoredFunction]:
-        """Return the best functions to add; scores are scaled to all rows."""
+        """Return the best functions to add; scores refer to all rows."""
         found = self.functions.look(
             state.sample_marginal, self.weighted, requests, most
         )
@@ -147,7 +147,7 @@ class Scores:
             if len(shape.names) * count <= _WIDEST and not forms.is_screw(shape)
         ]
         best: list[tuple[float, Element]] = []
-        for candidate in tried:  # one by one, because each may have hundreds of columns
+        for candidate in tried:  # one at a time to limit memory
             e = self._made.get(candidate)
             e = e or self.functions.element(candidate, priors[candidate.shape])
             if e is not None:
@@ -158,7 +158,7 @@ class Scores:
         return [e for _, e in best]
 
     def sharper(self, e: Element, base: State) -> Element:
-        """Return a function with its shape parameter refined."""
+        """Return a function with a refined shape parameter."""
         one = e.candidate
         if not len(one.shape.bends):
             return e

@@ -1,9 +1,9 @@
-"""Search for the best model: a beam search with exchange of elements.
+"""Search for the best model by a beam search with exchange of elements.
 
 Steps:
 
-1. Score every effect of the library and every function, given each model of the beam.
-2. Add the best ones, and optimise the prior standard deviations.
+1. Score adding every library effect and function to each model of the beam.
+2. Add the best candidates, and optimise the prior standard deviations.
 3. Try all forms of an added function; linearise effects again at their estimates.
 4. Repeat until no added element increases the log posterior.
 5. Exchange each element of the best model for any other until the model is stable.
@@ -18,23 +18,23 @@ from forcefit.validation.diagnosis.states import Models, State
 from forcefit.validation.diagnosis.weighted_readings import WeightedReadings
 
 Update = Callable[[str, int, int], None]
-# elements to fit, and the model that gives start values
+# Elements to fit, and the model whose estimates are the start values.
 Tried = tuple[tuple[Element, ...], State]
-_MOST = 5  # largest number of elements of a model, as stated in docs/diagnosis.md
+_MOST = 5  # largest number of elements (docs/diagnosis.md)
 _KEPT = 3  # width of the beam: number of models that are kept
-_LOOKED = 2  # number of models of the beam for which functions are scored
+_LOOKED = 2  # number of models to which functions are added
 _FORMS = 4  # number of models whose last function is tried in all forms
-# accepted decrease of the log posterior for a larger model, in case two elements are
-# needed together
+# Accepted decrease of the log posterior for a larger model, because two elements may be
+# effective only together.
 _DROP = 1.0
-# number of rounds of exchanges; they do not end if the machine has a memory that no
-# model has
+# Largest number of rounds of exchanges.  They may not converge if no model describes
+# the memory of the machine.
 _ROUNDS = 3
-_NEAR = 15.0  # error of an estimated log posterior at fixed standard deviations
+_NEAR = 15.0  # error of log posteriors with fixed standard deviations
 
 
 class Search:
-    """Models for one set of readings and weights, and the search among them."""
+    """Search among models for one set of readings and weights."""
 
     def __init__(self, readings: WeightedReadings) -> None:
         """Fit the models without elements."""
@@ -100,7 +100,7 @@ class Search:
         return kept
 
     def _without_nuisance(self, states: Sequence[State]) -> list[State]:
-        """Return models, and each of them with fewer groups of nuisance parameters."""
+        """Return the models, and each model with fewer nuisance groups."""
         less = [
             self.models.state(s.elements, mode, s)
             for s in states
@@ -131,7 +131,7 @@ class Search:
         return [self._fitted(_without(own, out), state) for out in own]
 
     def _fitted(self, elements: tuple[Element, ...], start: State) -> State:
-        """Return a model in its best mode, linearised at its estimates."""
+        """Return a model with its best nuisance groups, linearised at its estimates."""
         return self.relinearisation.relinearised(self.models.best(elements, start))
 
     def _best(self) -> State:
@@ -139,7 +139,7 @@ class Search:
         return max(self.seen.values(), key=lambda s: s.score)
 
     def _exchange(self, best: State) -> None:
-        """Remove each element of a model, or exchange it for another."""
+        """Improve a model by removing each element or exchanging it for another."""
         own = origins(best.elements)
         self._keep(self._with_one_removed(best))
         curved = any(e.first for e in best.elements)
@@ -151,8 +151,8 @@ class Search:
             for less in self._without_nuisance([base])[1:]:
                 listed += self.scores.best_to_add(less, functions=False)
             listed.sort(key=lambda one: -one[0])
-            # other forms of the same effect are always tried, because their estimates
-            # have similar errors
+            # Other forms of the same effect are always tried, because the errors of
+            # their estimates are similar.
             near = {
                 e.origin: e
                 for w, e in listed
@@ -165,7 +165,7 @@ class Search:
             self._keep(self._refined((elements, base) for elements in tried))
 
     def _refined(self, tried: Iterable[Tried]) -> list[State]:
-        """Fit models; for the best ones optimise the mode and linearise again."""
+        """Fit models; optimise the nuisance groups of the best and relinearise."""
         new = [self.models.state(elements, s.mode, s) for elements, s in tried]
         new.sort(key=lambda s: -s.score)
         best = [self._fitted(s.elements, s) for s in new[:_KEPT]]
@@ -173,7 +173,7 @@ class Search:
 
 
 def origins(elements: Iterable[Element]) -> tuple[Element, ...]:
-    """Return the elements as linearised at their start values."""
+    """Return the elements, linearised at their start values."""
     return tuple(e.origin for e in elements)
 
 

@@ -1,9 +1,9 @@
-"""Selection of a model of the deviations: effects of the library and functions.
+"""Select a model of the deviations from library effects and functions.
 
 A model is a set of elements, with or without geometric errors and springs
-(:mod:`.states`).  The search (:mod:`.search`) visits many models, and each has a
-posterior weight.  The result describes the best model; the probability of a name is the
-sum of the weights of the models that contain it.
+(:mod:`.states`).  The search (:mod:`.search`) computes the posterior weight of many
+models.  The result describes the best model.  The probability of an effect is the sum
+of the weights of all models that contain this effect.
 """
 
 from collections.abc import Sequence
@@ -34,18 +34,20 @@ from forcefit.validation.diagnosis.states import State, prediction_gain
 from forcefit.validation.diagnosis.unknowns import Small
 from forcefit.validation.diagnosis.weighted_readings import NONE, WeightedReadings
 
-# difference of the log posterior (odds of 20) below which neither model is preferred
+# Models are equally good if their log posteriors differ by less (odds of 20).
 _EQUAL = 3.0
-# probability of functions from which on the best model must contain them
+# The best model must contain functions if their probability is larger.
 _CLAIMED = 0.9
-# squared whitened difference of predictions that is too small to be visible
+# Predictions are equal if their squared whitened difference is smaller.
 _SAME = 1.0
-_LISTED = 20  # number of models in the result; the others have negligible weight
+_LISTED = 20  # number of listed models; others have negligible weight
 _COMPARED = 60  # number of models whose predictions are compared
 _FEWEST = 5  # smallest number of blocks for cross-validation of functions
-# number of searches with updated shared noise, which hardly changes after the first
+# Number of searches with updated shared noise, which hardly changes after the first
+# search.
 _AGAIN = 3
-# standard errors of the gain; false functions reached 1.8, true ones at least 6.9
+# Required gain in standard errors; in tests, false functions reached 1.8 and true ones
+# at least 6.9.
 _SURE = 2.0
 
 
@@ -54,16 +56,16 @@ def select(
     update: Update = lambda what, done, total: None,
     common: tuple[float, float] | None = None,
 ) -> Selected:  # fmt: skip
-    """Find the effects and functions that the declared model lacks.
+    """Find the effects and functions that are missing in the declared model.
 
     Args:
         columns: columns of all N measured cells.
         z: (n,) whitened residual of the fitted cells.
-        cells: (N,) mask of the fitted cells; no other reading is used.
+        cells: (N,) mask of the fitted cells; readings of other cells are not used.
         update: function called with the stage, the finished steps and the number of
             steps.
-        common: [rad, m] noise that cells of a measurement share, over tau; None if
-            unknown.
+        common: [rad, m] standard deviations of the noise that the cells of a
+            measurement share, divided by tau; None if they are unknown.
 
     Returns:
         The best model, and the posterior probabilities.
@@ -100,7 +102,7 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
     weights = np.exp(weights - logsumexp(weights))
     learned = np.array([_functions(s) > 0 for s in states])
     if learned[0] and not learned.all() and weights[learned].sum() < _CLAIMED:
-        # functions are dropped if the model without them predicts equally well
+        # Functions are dropped if the model without them predicts equally well.
         first = int(np.argmin(learned))
         order = [first, *(k for k in range(len(states)) if k != first)]
         states, weights = [states[k] for k in order], weights[order]
@@ -132,7 +134,7 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
 
 
 def _small(search: Search, best: State, tau: float) -> tuple[Small, ...]:
-    """Return the nuisance parameters in use, with their prior."""
+    """Return the fitted nuisance parameters with their priors."""
     small = search.columns.nuisance.take(best.used)
     std = best.sizes.std[: len(small.frame)] * tau
     return tuple(
@@ -143,7 +145,7 @@ def _small(search: Search, best: State, tau: float) -> tuple[Small, ...]:
 
 
 def _findings(search: Search, best: State, good: NDArray) -> tuple[str, ...]:
-    """Return sentences on the noise: scale, repeatability, memory."""
+    """Return sentences about the noise: scale, repeatability and memory."""
     campaign, readings = search.columns.campaign, search.readings
     row, component = (axis[readings.cells] for axis in np.nonzero(campaign.cells))
     point = np.zeros(len(row), dtype=int)
@@ -160,7 +162,7 @@ def _findings(search: Search, best: State, good: NDArray) -> tuple[str, ...]:
 
 
 def _probability(name: str, states: Sequence[State], weights: NDArray) -> float:
-    """Return the probability of an effect; finite motions count only if alone."""
+    """Return the probability of an effect; finite motions count only in sole use."""
     has = [
         any(e.name == name for e in s.elements)
         and (len(s.elements) == 1 or not LIBRARY[name].finite)
@@ -170,13 +172,13 @@ def _probability(name: str, states: Sequence[State], weights: NDArray) -> float:
 
 
 def _confirmed(search: Search, states: list[State]) -> list[State]:
-    """Return the models without the best ones whose functions fail cross-validation."""
+    """Remove the best models with functions that fail cross-validation."""
     blocks, models = search.columns.block[search.readings.cells], search.models
     while len(np.unique(blocks)) >= _FEWEST and len(states) > 1:
         best = states[0]
         learned = [e for e in best.elements if not e.name]
-        # each function, and all functions together, because two functions can
-        # compensate each other
+        # Each function and all functions together are tested, because two functions can
+        # compensate each other.
         rests = [best.without([e]) for e in learned]
         sure = [
             prediction_gain(best, models.state(rest, best.mode, best), blocks)
@@ -193,15 +195,15 @@ def _confirmed(search: Search, states: list[State]) -> list[State]:
 
 
 def _merged(states: Sequence[State]) -> list[State]:
-    """Return models with distinct predictions, best first.
+    """Return models with distinct predictions, the best first.
 
-    Among models with equal predictions, the one with fewer functions is kept: a
-    function with the same columns as an effect of the library is that effect.  Errors
-    of the measuring device are an exception, because the machine may have the same
-    error.
+    Of several models with equal predictions, the one with the fewest functions is
+    returned, because a function with the columns of a library effect is the same
+    effect.  Errors of the measuring device are an exception, because the machine may
+    have the same error.
     """
     every = _best_first(states)
-    # models without functions are kept in case that no function is confirmed
+    # Models without functions are included in case no function is confirmed.
     bare = [s for s in every if not _functions(s)][:_LISTED]
     compared = every[:_COMPARED]
     kept: list[State] = []
@@ -217,7 +219,7 @@ def _merged(states: Sequence[State]) -> list[State]:
 
 
 def _without_refinements(states: Sequence[State]) -> list[State]:
-    """Merge models with an effect's refinement that is not clearly better than it."""
+    """Merge models with a refined effect into those with the simple one if similar."""
     kept: list[State] = []
     for state in sorted(_best_first(states), key=_is_refined):
         plain = sorted(_refined(e) or e.name for e in state.elements)
@@ -238,7 +240,7 @@ def _best_first(states: Sequence[State]) -> list[State]:
 
 
 def _joined(one: State, other: State) -> State:
-    """Return a model with the added weight of another one."""
+    """Add the weight of another model to the weight of a model."""
     return replace(one, score=float(np.logaddexp(one.score, other.score)))
 
 
@@ -247,12 +249,12 @@ def _is_refined(state: State) -> bool:
 
 
 def _refined(e: Element) -> str:
-    """Return the effect that an element's effect refines, or nothing."""
+    """Return the simpler effect that an element's effect refines, or nothing."""
     return LIBRARY[e.name].refines if e.name else ""
 
 
 def _rank(state: State) -> int:
-    """Return the order in which models with equal predictions are preferred."""
+    """Return the sort key by which models with equal predictions are preferred."""
     own = [e.name for e in state.elements if e.name]
     return _functions(state) + 2 * sum(LIBRARY[name].device_alone for name in own)
 
@@ -283,7 +285,7 @@ def _models(states: Sequence[State], weights: NDArray) -> tuple[Model, ...]:
 def _learned(
     search: Search, states: Sequence[State], weights: NDArray, k: int
 ) -> Learned:
-    """Return a function of the best model with its equivalents."""
+    """Return a function of the best model, and equivalent functions."""
     best, e = states[0], states[0].elements[k]
     rest = best.without([e])
     equal = list(search.columns.functions.equivalents(e.candidate))

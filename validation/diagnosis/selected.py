@@ -14,13 +14,13 @@ from forcefit.validation.diagnosis.unknowns import Small
 
 @dataclass(frozen=True, eq=False)
 class Learned:
-    """A learned function.
+    """A learned function and its probability.
 
     Attributes:
         candidate: places, variables and form.
         equivalent: other places and variables with the same predictions.
         std: (m,) prior standard deviations of the unknowns of :class:`.Sensitivities`.
-        probability: probability that a model has a function of these variables.
+        probability: probability that a model contains a function of these variables.
         range_error: error in extrapolation; None if it cannot be estimated.
     """
 
@@ -51,11 +51,12 @@ class Selected:
     """Result of :func:`.select.select`.
 
     Attributes:
-        hypotheses: hypotheses of the best model; an unknown measuring frame is first.
-        values: (k,) estimates of their unknowns, in the order of the hypotheses.
+        hypotheses: hypotheses of the best model; that of an unknown measuring frame is
+            first.
+        values: (k,) estimates of the unknowns, in the order of the hypotheses.
         functions: functions of the best model.
-        small: geometric errors and springs in use.
-        noise: scale of the noise, and sentences on it.
+        small: geometric errors and springs that the best model contains.
+        noise: scale of the noise, and sentences about the noise.
         weights: (n,) probability that a cell is good.
         models: models by the names of their effects, best first.
         probability: probability of each effect of the library in any visited model.

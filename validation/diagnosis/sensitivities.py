@@ -1,4 +1,4 @@
-"""Responses of the readings to candidate functions.
+"""Compute the responses of the readings to candidate functions.
 
 ======  ===============  =========  ==================================================
 symbol  code             shape      meaning
@@ -8,7 +8,8 @@ P       ``basis``        (R, p)     columns of a form in a variable
 T       ``mixed``        (p, q)     coefficients of the form per unknown of the search
 ======  ===============  =========  ==================================================
 
-A component of a candidate adds a times P T, times its unknowns, to the readings.
+The contribution of a candidate's component to the readings of a row is a times the row
+of P T times the unknowns.
 """
 
 from collections.abc import Iterator
@@ -35,23 +36,23 @@ from forcefit.validation.diagnosis.candidates import (
 from forcefit.validation.diagnosis.function_forms import CandidateShape
 from forcefit.validation.diagnosis.responses import Responses
 
-# relative to a spline's size: prior size of its linear part, per step between knots
+# Prior size of the linear part of a spline per step between knots, relative to the size
+# of the spline.
 _STIFF = 0.1
-# relative size of a power, after removal of lower powers, that is above rounding
+# A power is dropped if its size after removing lower powers falls below this fraction.
 _RANK = 1e-8
-# relative to the largest load: step of the derivative of a model that is linear in the
-# load
+# Step of the derivative relative to the largest load; the model is linear in the load.
 _STEP = 1e-3
-_BENT = 64  # number of cached columns of forms whose shape parameter is being fitted
-# relative to the largest unknown: smaller unknowns do not affect the readings
+_BENT = 64  # number of cached columns of forms with a fitted shape parameter
+# Unknowns below this fraction of the largest one do not affect the readings.
 _NOTHING = 1e-9
 
 
 class Sensitivities:
-    """Derivatives of readings by a component at any place; variables of the rows."""
+    """Derivatives of readings by components at any place, and values of variables."""
 
     def __init__(self, conditions: Conditions, response: Responses) -> None:
-        """Store R rows of declared conditions, and their responses."""
+        """Store the declared conditions of R rows, and their responses."""
         self.conditions, self._response = conditions, response
         self.rows = np.arange(len(conditions))
         self._origin = conditions.postures.platform[:, :3, 3]
@@ -59,7 +60,7 @@ class Sensitivities:
         self._raw = lru_cache(maxsize=_BENT)(self._unmixed)
 
     def take(self, rows: NDArray) -> "Sensitivities":
-        """Return the sensitivities of selected rows; forms keep their normalisation."""
+        """Return the sensitivities of selected rows; forms are not renormalised."""
         other = copy(self)
         other.rows, other._origin = self.rows[rows], self._origin[rows]
         r = self._response
@@ -69,7 +70,7 @@ class Sensitivities:
     def about(self, conditions: Conditions, response: Responses) -> "Sensitivities":
         """Return the sensitivities for conditions that effects have changed.
 
-        Forms are normalised as before the change.
+        The normalisation of the forms is not changed.
         """
         other = copy(self)
         other.conditions, other._response = conditions, response
@@ -93,7 +94,7 @@ class Sensitivities:
         return change
 
     def sensitivity(self, where: str, component: str, kind: str) -> NDArray:
-        """Return (R, 6) change of the reading per unit of a component at a place."""
+        """Return (R, 6) changes of the reading per unit of a component at a place."""
         if where == "load":
             return self.under_load[self.rows, :, LOADS.index(component)]
         unit = unit_screw(self.conditions.robot, where, component)
@@ -119,14 +120,14 @@ class Sensitivities:
         size = np.sqrt(np.mean(raw**2, axis=0))
         mixed = np.diag(1 / np.where(size > 0, size, 1.0))
         if shape.form == "powers" and len(shape.names) > 1:
-            # removes the lower powers from each power
+            # QR decomposition removes the lower powers from each power.
             Q, R = np.linalg.qr(raw * np.diag(mixed))
-            # at most as many powers as rows can be determined
+            # The rows determine at most as many powers as there are rows.
             good = np.flatnonzero(np.abs(np.diag(R)) > _RANK * np.sqrt(len(raw)))
             mixed = mixed[:, good] @ np.linalg.inv(R[np.ix_(good, good)])
             mixed *= np.sqrt(len(raw))
         elif shape.form == "spline":
-            # the prior of a spline's values makes rough splines improbable
+            # The prior of a spline's values makes rough splines improbable.
             stiff = roughness(len(shape.names)) + _STIFF * np.eye(len(shape.names))
             mixed = np.linalg.inv(np.linalg.cholesky(stiff)).T
             mixed /= np.sqrt(np.mean((raw @ mixed) ** 2) * mixed.shape[1])
@@ -152,15 +153,15 @@ class Sensitivities:
         return self._response.wrenches[:, row, LOADS.index(component)]
 
     def changes(self, one: Candidate, x: NDArray | None = None) -> NDArray:
-        """Return the (R, 6, m) [rad, m] contribution of a candidate, per unknown.
+        """Return the (R, 6, m) [rad, m] contribution of a candidate per unknown.
 
-        ``x`` (m,) are the values of the unknowns at which it is linearised.  If ``x``
-        is (m + 1,), the last value is the change of the shape parameter, which then has
-        a column too.
+        The contribution is linearised at the values ``x`` (m,) of the unknowns.  If
+        ``x`` is (m + 1,), its last value is the change of the shape parameter, and the
+        result contains a column for this parameter.
         """
         m = len(self.axes(one))
         by = 0.0 if x is None or len(x) == m else float(x[-1])
-        # memory is ordered unknown by unknown, as it is used in the computation
+        # Values of one unknown are adjacent in memory, because they are read together.
         blocks = [columns.T[:, :, None] * s for s, columns in self._factors(one, by)]
         if x is not None and len(x) > m:
             step = _STEP * float(one.shape.bends[0])
@@ -171,7 +172,7 @@ class Sensitivities:
     def moved(self, one: Candidate, x: NDArray, by: float = 0.0) -> NDArray:
         """Return the (R, 6) [rad, m] contribution of a candidate with unknowns x (m,).
 
-        The shape parameter is changed by ``by``.
+        The shape parameter is increased by ``by``.
         """
         total, at = np.zeros((len(self.rows), 6)), 0
         for sensitivity, columns in self._factors(one, by):
@@ -181,7 +182,7 @@ class Sensitivities:
         return total
 
     def axes(self, one: Candidate) -> NDArray:
-        """Return the (m,) component in which each unknown of a candidate acts."""
+        """Return the (m,) screw component in which each unknown of a candidate acts."""
         counts = [columns.shape[1] for _, columns in self._factors(one)]
         components = [c for part in one.parts for c in part.components]
         kinds = [0 if is_turn(c) else 3 for c in components]
@@ -194,7 +195,7 @@ class Sensitivities:
     def _factors(
         self, one: Candidate, by: float = 0.0
     ) -> Iterator[tuple[NDArray, NDArray]]:
-        """Yield the factors of each component: (R, 6), and (R, q) of its unknowns."""
+        """Yield two factors for each component: (R, 6), and (R, q) of its unknowns."""
         for part in one.parts:
             columns, mixed = self.basis(part.variables, one.shape)
             if by:
@@ -204,12 +205,13 @@ class Sensitivities:
                 yield self.sensitivity(part.where, component, one.kind), columns
 
     def fitted(self, one: Candidate, x: NDArray, std: NDArray) -> list[Function]:
-        """Return functions of a robot file with fitted coefficients.
+        """Return the functions of a robot file with fitted coefficients.
 
-        There is one function for each part of a candidate on which the readings depend,
-        and for each session if some sessions lack one of its variables.  ``x`` is (m,)
-        or (m + 1,), see :meth:`changes`; ``std`` has the standard deviations, taken as
-        independent.
+        A candidate may act at several places, called parts.  There is one function for
+        each part on which the readings depend.  If a variable is unknown in some
+        sessions, there is one function for each session.  ``x`` is (m,) or (m + 1,),
+        see :meth:`changes`.  ``std`` contains the standard deviations, which are
+        treated as independent.
         """
         functions, at = [], 0
         m, given, sure = len(self.axes(one)), dict(one.shape.given), {}
@@ -249,7 +251,7 @@ class Sensitivities:
         return functions
 
     def _sessions(self, variables: tuple[str, ...]) -> tuple[str | None, ...]:
-        """Return sessions in which variables are known; None stands for all rows."""
+        """Return the sessions in which variables are known; (None,) for all rows."""
         conditions = self.conditions
         if variables[0].startswith("wrench.") or conditions.session is None:
             return (None,)

@@ -1,4 +1,4 @@
-"""Result of a diagnosis as sentences."""
+"""Describe the result of a diagnosis in sentences."""
 
 import math
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ def sentence(diagnosis: Diagnosis) -> str:
     if diagnosis.setup:
         faults = "; ".join(one.sentence for one in diagnosis.setup)
         return f"The campaign is set up wrongly: {faults}"
-    where = {  # rows of the errors before and after, by method
+    where = {  # rows of the errors, by hold-out method
         "split": "held-out rows",
         "folds": f"rows held out in {len(diagnosis.held.folds)} folds",
         "none": "the fitted rows (too few to hold any out)",
@@ -90,7 +90,7 @@ def calibration_text(tally: Calibration) -> str:
 
 
 def open_text(open_: NDArray) -> str:
-    """Return line with the number of rows whose pose clearances leave undetermined."""
+    """Return a line with the number of rows in which the pose is undetermined."""
     return (
         f"clearances leave the pose undetermined in {int(open_.sum())} of "
         f"{len(open_)} rows (marked open): there one of the poses of least "

@@ -1,9 +1,10 @@
-"""Effects that a campaign's design can distinguish, computed before any fit.
+"""Find the effects that a campaign's design can distinguish, before any fit.
 
-An effect changes the readings by a combination of the columns A of its signature.
-Nuisance parameters (such as an unknown registration) can imitate a part of it, so they
-are projected out first.  With P_f the projection on the signature of effect f, |P_f
-A_e| / |A_e| is the share of effect e that f can imitate.
+The change of the readings by an effect is a linear combination of the columns A of its
+signature.  Nuisance parameters, such as an unknown registration, can imitate a part of
+this change.  Therefore their columns are projected out first.  P_f denotes the
+projection on the signature of effect f.  Then |P_f A_e| / |A_e| is the fraction of
+effect e that f can imitate.
 
 Sources:
     Bjoerck, Golub (1973), Numerical methods for computing angles between linear
@@ -20,10 +21,12 @@ from numpy.typing import ArrayLike, NDArray
 from forcefit.validation.diagnosis.signatures import UNSEEN
 
 LIKE = 0.98  # cosine above which a design cannot distinguish two signatures
-SEEN = 3.0  # [sigma] norm from which on a signature is detectable
-# relative size of a direction that other columns imitate except for rounding
+SEEN = 3.0  # [sigma] smallest norm of a detectable signature
+# A direction with a smaller relative size is imitated by other columns, apart from
+# rounding errors.
 ROUNDING = 1e-9
-# relative size that counts as zero for signatures, because they are secants
+# Relative size that counts as zero for signatures, which are secants and not exact
+# derivatives.
 _RANK = 1e-3
 
 
@@ -35,12 +38,14 @@ class Separability:
         names: names of the m effects.
         strength: (m,) [sigma] norm of an effect's signature at plausible sizes of its
             unknowns, over all rows, before nuisance parameters are projected out.
-        left: (m,) share of the norm that remains after the projection.
+        left: (m,) fraction of the norm that remains after nuisance parameters are
+            projected out.
         unknowns: (m,) number of unknowns.
         rank: (m,) number of unknowns that the design can distinguish.
-        cosine: (m, m) cosine of the smallest angle between two signatures; 1 if a
-            combination of one equals a combination of the other.
-        shared: (m, m) share of the row's effect that the column's effect can imitate.
+        cosine: (m, m) cosine of the smallest angle between the spans of two signatures;
+            1 if the spans have a direction in common.
+        shared: (m, m) fraction of the row's effect that the column's effect can
+            imitate.
     """
 
     names: tuple[str, ...]
@@ -53,17 +58,17 @@ class Separability:
 
     @property
     def visible(self) -> NDArray:
-        """(m,) bool, True if an effect of plausible size exceeds the noise."""
+        """(m,) bool, True if an effect with plausible parameters exceeds the noise."""
         return self.strength * self.left >= SEEN
 
     @property
     def traced(self) -> NDArray:
-        """(m,) bool, True if an effect of sufficient size would exceed the noise."""
+        """(m,) bool, True if a sufficiently large effect can be detected."""
         return (self.strength * self.left >= UNSEEN) & (self.rank > 0)
 
     @property
     def shows_at(self) -> NDArray:
-        """(m,) factor on plausible sizes that exceeds the noise; inf without one."""
+        """(m,) factor on plausible sizes at which effects exceed the noise, or inf."""
         size = np.where(self.traced, self.strength * self.left, 0.0)
         return np.divide(SEEN, size, out=np.full(len(size), np.inf), where=size > 0)
 
@@ -71,7 +76,8 @@ class Separability:
         """Return the classes of effects that imitate each other completely.
 
         Returns:
-            Classes of two and more effects; a verdict can only name the class.
+            Classes of at least two effects.  A verdict can name only the class, not one
+            of its effects.
         """
         alike = (self.shared > LIKE) & (self.shared.T > LIKE)
         alike &= np.outer(self.traced, self.traced)
@@ -89,13 +95,13 @@ class Separability:
         return groups
 
     def imitated(self) -> list[tuple[str, str]]:
-        """Return pairs (a, b) with the span of a inside the span of b, not reverse."""
+        """Return pairs (a, b) in which the span of b contains the span of a."""
         one_way = (self.shared > LIKE) & (self.shared.T <= LIKE)
         one_way &= np.outer(self.traced, self.traced)
         return [(self.names[i], self.names[j]) for i, j in np.argwhere(one_way)]
 
     def overlapping(self) -> list[tuple[str, str]]:
-        """Return pairs of effects that imitate each other only in part."""
+        """Return pairs of effects that can imitate each other only in part."""
         part = (self.cosine > LIKE) & (self.shared <= LIKE) & (self.shared.T <= LIKE)
         part &= np.outer(self.visible, self.visible)
         return [(self.names[i], self.names[j]) for i, j in np.argwhere(part) if i < j]
@@ -104,15 +110,15 @@ class Separability:
 def compare_signatures(
     columns: Mapping[str, NDArray], nuisance: NDArray | None = None
 ) -> Separability:
-    """Return the comparison of the signatures of effects.
+    """Compare the signatures of effects.
 
     Args:
-        columns: for each effect (N, k), changes of the readings over sigma at plausible
-            sizes.
-        nuisance: (N, p) columns of nuisance parameters, over sigma.
+        columns: for each effect (N, k) changes of the readings by unknowns of plausible
+            size, divided by sigma.
+        nuisance: (N, p) columns of nuisance parameters, divided by sigma.
 
     Returns:
-        Strengths, shares and angles of all signatures.
+        Norms, fractions and angles of all signatures.
     """
     names, left = tuple(columns), dict(columns)
     if nuisance is not None:
@@ -138,7 +144,7 @@ def compare_signatures(
 
 
 def _basis(columns: NDArray, whole: float) -> NDArray:
-    """Return an (N, r) orthonormal basis; ``whole`` is the size of a large column."""
+    """Return an (N, r) orthonormal basis; ``whole`` is the norm of a large column."""
     return orthonormal_basis(columns, _RANK, _RANK * whole)
 
 

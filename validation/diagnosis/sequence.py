@@ -1,8 +1,8 @@
-"""The sequence of models that leads to a fitted robot, tested on held-out rows.
+"""Test the sequence of models that leads to a fitted robot on held-out rows.
 
 The models are in a fixed order: declared, pose of the device, geometric errors,
-springs, effects of the library, learned functions.  Each model has the unknowns of the
-models before it and is fitted as a whole; the last one is the fitted robot.
+springs, effects of the library, learned functions.  Each model contains the unknowns of
+all preceding models and is fitted as a whole.  The last model is the fitted robot.
 """
 
 from collections.abc import Sequence
@@ -22,10 +22,10 @@ LEARNED = "learned effects"
 _TERMS = (
     "declared", "registration", GEOMETRY, SPRINGS, "library effects", LEARNED,
 )  # fmt: skip
-# indices of terms of the sequence
+# Indices of terms of the sequence.
 _DECLARED, _REGISTRATION, _LIBRARY, _LEARNED = 0, 1, 4, 5
-# position of a model in the sequence: its last term, and its number of learned
-# functions
+# Position of a model in the sequence: its last term, and its number of learned
+# functions.
 Place = tuple[int, int]
 
 
@@ -63,11 +63,11 @@ class Step:
     """A model of the sequence and its errors.
 
     Attributes:
-        term: term that it adds: ``"declared"``, ``"registration"``, ``"geometry"``,
-            ``"springs"``, ``"library effects"`` or, for each function, ``"learned
-            effects"``.
-        unknowns: [-] number of added unknowns; for unknowns with a prior, the number
-            that the readings determine.
+        term: term that this model adds: ``"declared"``, ``"registration"``,
+            ``"geometry"``, ``"springs"``, ``"library effects"`` or, for each function,
+            ``"learned effects"``.
+        unknowns: [-] number of added unknowns; for unknowns with a prior, the effective
+            number that the readings determine.
         error: error on the held-out rows.
     """
 
@@ -78,11 +78,11 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """A model of the sequence on the rows of one fold.
+    """A model of the sequence, tested on the held-out rows of one fold.
 
     Attributes:
         unknowns: number of added unknowns, as in :class:`Step`.
-        residual: (R, 6) [rad, m] residual of the fold's rows, NaN elsewhere.
+        residual: (R, 6) [rad, m] residual of the held-out rows, NaN elsewhere.
     """
 
     unknowns: float
@@ -92,7 +92,7 @@ class Stage:
 def stages(
     campaign: Campaign, fit: MachineFit, rows: NDArray, held: NDArray
 ) -> dict[Place, Stage]:
-    """Fit the models that lead to a fitted robot; test each on held-out rows.
+    """Fit the models that lead to a fitted robot, and test each on held-out rows.
 
     Args:
         campaign: campaign of R rows.
@@ -101,7 +101,7 @@ def stages(
         held: (R,) bool, True for held-out rows.
 
     Returns:
-        One stage for each step of the fitted robot, in order; the last is ``fit``.
+        One stage for each model, in order.  The last model is ``fit``.
     """
     shown, known = dict[Place, Stage](), 0.0
     finite = _has_finite_motions(fit.unknowns)
@@ -126,7 +126,7 @@ def _has_finite_motions(unknowns: Unknowns) -> bool:
 
 
 def _models(unknowns: Unknowns) -> dict[Place, Unknowns]:
-    """Yield unknowns of the models that precede a robot; absent steps are omitted."""
+    """Yield the unknowns of the preceding models; absent terms are omitted."""
     device = tuple(one for one in unknowns.effects if one.device)
     now = replace(unknowns, effects=(), small=(), functions=())
     models = {(_DECLARED, 0): now}
@@ -143,7 +143,7 @@ def _models(unknowns: Unknowns) -> dict[Place, Unknowns]:
 
 
 def _start(unknowns: Unknowns, fit: MachineFit) -> NDArray:
-    """Return (k,) start values of a smaller model: fitted effects, else the mean."""
+    """Return (k,) start values of a smaller model: fitted effects or prior means."""
     start = unknowns.mean
     for one in unknowns.effects:
         start[unknowns.place(one)] = fit.x[fit.unknowns.place(one)]
@@ -156,8 +156,8 @@ def pooled(
     """Return the sequence tested on rows (R,) bool of all folds together.
 
     Returns:
-        The steps, in order; the last has the error of the diagnosis.  If a fold lacks a
-        step, the step before it is used.
+        The steps in order.  The error of the last step is the error of the diagnosis.
+        If a step is missing in a fold, the preceding step is used.
     """
     steps = []
     for place in sorted(set().union(*folds)):
@@ -173,7 +173,7 @@ def pooled(
 
 
 def joined(reached: Sequence[Stage]) -> NDArray:
-    """Return the (R, 6) [rad, m] residual of one stage of all folds, on their rows."""
+    """Return the (R, 6) [rad, m] residual of one step, joined from all folds."""
     residual = reached[0].residual
     for stage in reached[1:]:
         residual = np.where(np.isnan(stage.residual), residual, stage.residual)

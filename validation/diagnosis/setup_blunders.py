@@ -1,8 +1,8 @@
-"""Set-up blunders: signs, quarter turns, units, exchanged columns.
+"""Detect set-up blunders: wrong signs, quarter turns, wrong units, exchanged columns.
 
-They are tested before any search.  They change readings by decimetres, while effects
-change them by micrometres, so rigid motions and the declared springs suffice to
-identify them.  Several may act together.
+Blunders are tested before any search for effects.  Blunders change readings by
+decimetres, and effects change them by micrometres.  Therefore rigid motions and the
+declared springs suffice to identify blunders.  Several blunders may occur together.
 """
 
 from collections.abc import Sequence
@@ -26,19 +26,20 @@ from forcefit.validation.diagnosis.setup_corrections import (
 )
 
 _ROWS = 40  # number of rows by which corrections are compared
-# share of the cells with the smallest residuals, so that single blunders do not count
+# Fraction of cells with the smallest residuals that is used, so that single outliers do
+# not count.
 _TRIMMED = 0.9
 _MOST = 3  # largest number of simultaneous blunders
-_BEAM = 4  # number of sets of corrections that are followed
-# relative to the residual at the start: below it, only this set is followed further
+_BEAM = 4  # number of sets of corrections that are extended
+# If a residual falls below this fraction of the initial one, only its set is extended.
 _CLEAR = 0.1
-# relative to the residual before it: below it, a further correction is followed
+# A further correction is tried only if it reduces the residual below this fraction.
 _LESS = 0.9
-# relative to the residual at the start: below it, blunders are reported
+# Blunders are reported if the residual falls below this fraction of the initial one.
 _DECISIVE = 0.5
-# ratio of the residual without a correction to that with it, above which it is needed
+# A correction is necessary if the residual without it is larger by this factor.
 _NEEDED = 1.5
-# relative to the spread of the readings: larger distances are not due to units
+# Distances above this multiple of the spread of the readings are not caused by units.
 _FAR = 10.0
 _NOISE = 3.0  # [sigma] residual below which the search for blunders ends
 _LEAST = 100.0  # smallest decrease of chi-square for each reported blunder
@@ -69,16 +70,16 @@ class SetupBlunder:
 def setup_blunders(
     campaign: Campaign, conditions: Conditions
 ) -> tuple[SetupBlunder, ...]:
-    """Return the set-up blunders whose correction reduces the residual decisively.
+    """Return set-up blunders; correcting them reduces the residual decisively.
 
     Args:
         campaign: measured deviations.
         conditions: conditions of its R rows, as declared in the robot file.
 
     Returns:
-        The blunders; none if the residual does not decrease to half.  A residual is the
-        root mean square over the smaller nine tenths of the cells, in sigma, after the
-        pose of the device is fitted if it is unknown.
+        The blunders; none if the residual does not decrease to half.  The residual is
+        the root mean square, in sigma, of the nine tenths of the cells with the
+        smallest residuals.  An unknown pose of the device is fitted before.
     """
     rows = _sample(campaign)
     if not len(rows):
@@ -111,7 +112,7 @@ def _blunder(correction: Correction, before: float, after: float) -> SetupBlunde
 
 
 def _search(judge: "_Judge", start: float) -> tuple[Corrections, float]:
-    """Return the corrections with the least residual, found by a beam search."""
+    """Return the corrections with the smallest residual, from a beam search."""
     tried = corrections(judge.campaign)
     best: tuple[Corrections, float] = ((), start)
     beam = [best]
@@ -136,13 +137,13 @@ def _search(judge: "_Judge", start: float) -> tuple[Corrections, float]:
 def _needed(
     judge: "_Judge", chosen: Corrections, left: float
 ) -> tuple[Corrections, float]:
-    """Return the corrections without those that hardly change the residual."""
+    """Return only the corrections that reduce the residual substantially."""
     for one in chosen:
         fewer = _without(chosen, one)
         without = judge.residual(fewer)
         rivals = [without]
-        # if the springs hardly respond to the load, small loads fit no better than zero
-        # loads
+        # If the springs hardly respond to the load, scaled-down loads fit no better
+        # than zero loads.
 
         if one.array == "loads":
             rivals.append(judge.residual(fewer, loads=0.0))
@@ -157,7 +158,7 @@ def _without(chosen: Sequence[Correction], one: Correction) -> Corrections:
 
 
 def _sample(campaign: Campaign) -> NDArray:
-    """Return rows, evenly spaced among those by which a set-up can be tested."""
+    """Return evenly spaced rows from those by which a set-up can be tested."""
     cells = campaign.cells
     enough = np.any if campaign.registration == "known" else np.all
     usable = cells[:, :3].all(axis=1) | enough(cells[:, 3:], axis=1)
@@ -166,7 +167,7 @@ def _sample(campaign: Campaign) -> NDArray:
 
 
 class _Judge:
-    """Residuals of assumed set-ups on a sample of rows."""
+    """Compute residuals of assumed set-ups on a sample of rows."""
 
     def __init__(self, campaign: Campaign, conditions: Conditions) -> None:
         self.campaign, self.given = campaign, as_given(campaign)
@@ -181,9 +182,9 @@ class _Judge:
         """Return the trimmed rms of the residual with given corrections.
 
         Args:
-            made: corrections that are applied to the campaign as given.
+            made: corrections that are applied to the campaign.
             loads: factor on all loads.
-            stated: whether the stated sigma is used even if a correction scales
+            stated: whether the declared sigma is used even if a correction scales
                 lengths.
 
         Returns:
@@ -216,12 +217,12 @@ class _Judge:
         return float(np.sqrt(np.mean(kept**2)))
 
     def _moved(self, setup: SetUp) -> Conditions | None:
-        """Return the conditions of a set-up; None if a command cannot be reached."""
+        """Return the conditions of a set-up; None if a command is unreachable."""
         moved, given = replace(self.conditions, load=setup.loads), self.given
         if setup.places is not given.places or setup.axes is not given.axes:
             wide = np.nanstd(setup.points, axis=0).max()
             if np.std(setup.places, axis=0).max() > _FAR * wide:
-                return None  # a target that is out of reach may take long
+                return None  # unreachable targets take long
             poses = np.hstack([setup.places, rotation_vector(setup.axes)])
             postures, _ = place_many(moved.robot, poses)
         elif setup.coordinates is not given.coordinates:

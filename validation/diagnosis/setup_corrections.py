@@ -1,8 +1,9 @@
-"""Corrections of set-up blunders: a sign, a unit, an exchanged column.
+"""Define corrections of set-up blunders, such as a sign, a unit or exchanged columns.
 
-A campaign gives readings as deviations from the commanded pose.  A correction acts on
-the absolute readings (commanded pose and deviation combined), since the device measured
-these, or on the deviations themselves if it says so.
+The readings of a campaign are deviations from the commanded pose.  Most corrections
+change the absolute readings, that is, the commanded poses combined with the deviations,
+because the device measured absolute poses.  Corrections with ``deviation`` set change
+only the deviations.
 """
 
 from collections.abc import Callable, Iterator
@@ -26,22 +27,22 @@ _UNITS = {  # factors between units that are often confused
 
 
 def _rolled(turns: Rotation, by: int) -> Rotation:
-    """Return rotations whose quaternion components are shifted cyclically."""
+    """Return rotations after a cyclic shift of the quaternion components."""
     return Rotation.from_quat(np.roll(turns.as_quat(), by, axis=-1))
 
 
 _MISREAD = (
     ("transposed", "transposed", Rotation.inv),
-    # if (x, y, z, w) is read in the order w x y z, the result has the components y z w
-    # x
+    # If a quaternion (x, y, z, w) is read in the order w x y z, the components of the
+    # result are y z w x.
 
     ("quaternion", "with the quaternion's w taken last, not first",
      partial(_rolled, by=1)),
     ("quaternion", "with the quaternion's w taken first, not last",
      partial(_rolled, by=-1)),
 )  # fmt: skip
-# columns, the array of a SetUp with these columns, the correction in words, and whether
-# only the deviation changes
+# Columns, the array of a SetUp with these columns, the correction as text, and whether
+# only the deviation changes.
 _LENGTHS = (
     ("pose.t", "places", "", False),
     ("meas.t", "points", ", as positions", False),
@@ -56,7 +57,7 @@ _ROTATIONS = (
 
 @dataclass(frozen=True, eq=False)
 class SetUp:
-    """Assumed commands and readings.
+    """Commands and readings of a campaign under an assumed set-up.
 
     Attributes:
         coordinates: (R, n) [rad or m] commanded coordinates of all joints.
@@ -88,10 +89,10 @@ class Correction:
         columns: columns of the campaign's table that the correction changes.
         what: the correction in words, for a sentence.
         array: name of the array of :class:`SetUp` that it changes.
-        change: function of that array, or of its deviation from the command.
-        deviation: whether the correction changes the deviation, not the absolute
+        change: function that changes this array, or its deviation from the command.
+        deviation: whether the correction changes the deviation instead of the absolute
             readings.
-        sigma: factor on the sigma of positions.
+        sigma: factor on the standard deviations of positions.
     """
 
     kind: str
@@ -103,7 +104,7 @@ class Correction:
     sigma: float = 1.0
 
     def apply(self, given: SetUp) -> SetUp:
-        """Return a set-up with this correction."""
+        """Return the set-up after this correction."""
         values, about = getattr(given, self.array), given.nominal.get(self.array)
         if not self.deviation or about is None:
             values = self.change(values)
@@ -116,7 +117,7 @@ class Correction:
 
 
 def as_given(campaign: Campaign) -> SetUp:
-    """Return the set-up of a campaign of R rows as given in its files."""
+    """Return the set-up of a campaign of R rows as declared in its files."""
     T = campaign.transforms[:, campaign.robot.index(campaign.robot.platform)]
     axes = T[:, :3, :3]
     points = T[:, :3, 3] + np.einsum("rij,rj->ri", axes, campaign.targets)
@@ -133,7 +134,7 @@ def as_given(campaign: Campaign) -> SetUp:
 
 
 def corrections(campaign: Campaign) -> list[Correction]:
-    """Return all corrections that a campaign's columns allow."""
+    """Return all corrections that the columns of a campaign allow."""
     read = np.isfinite(campaign.measured)
     there = {
         "pose.t": campaign.commanded == "pose",
@@ -145,8 +146,8 @@ def corrections(campaign: Campaign) -> list[Correction]:
     tried += _of_loads(campaign)
     for stem, array, how, deviation in _LENGTHS:
         for factor, what in _factors("length") if there[stem] else ():
-            # otherwise sigma would increase with the lengths, and any division would
-            # fit
+            # Otherwise sigma would increase with the lengths, and division by any
+            # factor would improve the fit.
 
             sigma = min(factor, 1.0) if array == "points" else 1.0
             tried.append(Correction(
@@ -201,18 +202,18 @@ def _of_loads(campaign: Campaign) -> Iterator[Correction]:
 
 
 def _xyz(stem: str) -> tuple[str, ...]:
-    """Return the names of three columns of a campaign's table."""
+    """Return the column names of three components, such as x, y, z."""
     return tuple(f"{stem}{axis}" for axis in "xyz")
 
 
 def _factors(quantity: str) -> list[tuple[float, str]]:
-    """Yield factors between units in both directions, with their description."""
+    """Yield factors between two units in both directions, with descriptions."""
     both = (f for one in _UNITS[quantity] for f in (one, 1 / one))
     return [(factor, f"times {factor:.4g}") for factor in both]
 
 
 def _turned(turns: NDArray, change: Callable[[Rotation], Rotation]) -> NDArray:
-    """Return (R, 3, 3) changed rotations; NaN is not changed."""
+    """Return (R, 3, 3) changed rotations; NaN stays NaN."""
     read = np.isfinite(turns).all(axis=(1, 2))
     changed = turns.copy()
     changed[read] = change(Rotation.from_matrix(turns[read])).as_matrix()

@@ -1,11 +1,11 @@
-"""Signatures: the first-order change of the readings by each hypothesis.
+"""Compute signatures: the first-order change of the readings by each hypothesis.
 
 ======  =============  =========  ================================================
 symbol  code           shape      meaning
 ======  =============  =========  ================================================
-z       ``residual``   (N,)       (reading - model) / sigma, measured cells only
-A       ``columns``    (N, k)     change of the model per unknown, / sigma
-o       ``offset``     (N,)       change of the model that no unknown scales
+z ``residual`` (N,) (reading - model) / sigma, measured cells only A ``columns`` (N, k)
+derivative of the model by each unknown / sigma o ``offset`` (N,) change of the model at
+zero unknowns / sigma
 ======  =============  =========  ================================================
 """
 
@@ -32,13 +32,14 @@ from forcefit.validation.diagnosis.hypotheses import (
     sessions_of,
 )
 
-_PROBES = 3  # number of random projections that identify equal columns
+_PROBES = 3  # number of random projections that detect equal columns
 _DIGITS = 6  # number of digits of a projection that must agree
-# number of rows with the largest loads, and with the largest rotations, that are tested
+# Number of tested rows with the largest loads, and with the largest rotations.
 _PROBED = 4
-# squared whitened change of all readings together, below which it is not visible
+# Smallest visible change: sum of squares of all whitened readings.
 _HARDLY = 2.0
-# [sigma] norm of the change of all readings by a plausible unknown; below it, it is 0
+# [sigma] A plausible unknown is invisible if the norm of its change of all readings is
+# smaller.
 UNSEEN = 1e-3
 
 
@@ -48,8 +49,8 @@ class Signature:
 
     Attributes:
         hypothesis: the hypothesis that contributes.
-        offset: (N,) contribution on the tangent, with all unknowns zero.
-        columns: (N, k) contribution for each unit of an unknown.
+        offset: (N,) contribution of the linearised hypothesis if all unknowns are zero.
+        columns: (N, k) contribution per unit of each unknown.
     """
 
     hypothesis: Hypothesis
@@ -63,18 +64,18 @@ class Signature:
 
 
 def conditions_of(campaign: Campaign) -> Conditions:
-    """Return the conditions of a campaign, as its robot file declares the machine.
+    """Return the conditions of a campaign for the machine that its robot file declares.
 
     Args:
         campaign: campaign of R rows.
 
     Returns:
-        R conditions.  A covariate that some sessions lack is NaN in these sessions. The
-        covariates ``gravity.x``, ``.y``, ``.z`` [m/s^2] are the known direction of the
-        weight in each row.
+        Conditions of R rows.  A covariate that was not recorded in a session is NaN
+        there.  The covariates ``gravity.x``, ``.y``, ``.z`` [m/s^2] contain the known
+        gravity in each row.
 
     Raises:
-        BadInput: a function of the robot depends on an absent covariate.
+        BadInput: a function of the robot depends on a covariate that is missing.
     """
     session, whole = campaign.session, campaign.covariates
     known = {**whole, **campaign.partial}
@@ -107,13 +108,13 @@ def loaded_components(campaign: Campaign) -> list[str]:
 
 
 def whiten(campaign: Campaign, deviation: NDArray) -> NDArray:
-    """Return (N, ..) deviations of the measured cells, divided by sigma."""
+    """Return (N, ...) deviations of the measured cells, divided by sigma."""
     some = deviation[campaign.cells]
     return some / campaign.sigma[campaign.cells].reshape(-1, *[1] * (some.ndim - 1))
 
 
 def fingerprints(columns: NDArray) -> list[tuple[float, ...]]:
-    """Return keys of columns (n, k); columns of the same direction have equal keys."""
+    """Return keys of columns (n, k); parallel columns have equal keys."""
     probes = np.random.default_rng(0).normal(size=(_PROBES, len(columns)))
     seen = probes @ columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     seen *= np.sign(seen[0])
@@ -139,7 +140,7 @@ class Tangents:
         return whiten(self.campaign, self.derivatives.model(effects, finite=finite))
 
     def rows_of(self, session: str | None) -> NDArray:
-        """Return (N, 1), 1 in the cells of a session and 0 elsewhere; None: all 1."""
+        """Return (N, 1): 1 in the cells of a session, 0 elsewhere; all 1 for None."""
         row = np.nonzero(self.campaign.cells)[0]
         if session is None or self.campaign.session is None:
             return np.ones((len(row), 1))
@@ -148,7 +149,8 @@ class Tangents:
     def at_start(self, hypothesis: Hypothesis) -> Signature:
         """Return the first-order contribution of a hypothesis at its start values.
 
-        The unknowns apply to all rows, or to one session each.  NaN without a solution.
+        Each unknown applies to all rows or to one session.  The values are NaN without
+        a solution.
         """
         sessions = sessions_of(hypothesis)
         one = self._at_start(in_one_session(hypothesis, sessions[0])[0])
@@ -175,7 +177,7 @@ class Tangents:
 
     def _invisible(self, hypothesis: Hypothesis) -> bool:
         """Return whether an effect without unknowns is invisible at large loads."""
-        # the exact model is a hundred times slower than the linear one
+        # The exact model is a hundred times slower than the linear model.
         conditions = self.derivatives.conditions
         load = np.linalg.norm(conditions.load, axis=1)
         size = np.linalg.norm(self.derivatives.declared[:, :3], axis=1)
@@ -199,7 +201,7 @@ class Tangents:
     def about(
         self, hypothesis: Hypothesis, x: NDArray, others: Mapping[str, Values]
     ) -> Signature:
-        """Return the contribution of a hypothesis about x (k,), with other effects."""
+        """Return the contribution of a hypothesis at x (k,), with other effects."""
         robot = self.derivatives.conditions.robot
 
         def model(values: NDArray) -> NDArray:
@@ -219,6 +221,6 @@ class Tangents:
 
 
 def _seen(column: NDArray, slot: Slot) -> NDArray:
-    """Return an (N,) derivative; zero if a plausible unknown is not visible."""
+    """Return an (N,) derivative, or zero if a plausible unknown is not visible."""
     size = np.linalg.norm(column) * slot.unknown.scale
     return np.zeros_like(column) if size < UNSEEN else column

@@ -1,7 +1,7 @@
-"""Models of the search and their log posterior.
+"""Define the models of the search and compute their log posterior.
 
-A model has elements (effects and functions) and, in use or not, geometric errors and
-springs:
+A model consists of elements (effects and functions).  Geometric errors and springs are
+included or not:
 
     score = ln p(z) - cost of optimised standard deviations + bounds + ln prior
 """
@@ -27,10 +27,10 @@ from forcefit.validation.diagnosis.gaussian import (
 from forcefit.validation.diagnosis.prior_sizes import Grouped, Sizes, best_sizes
 from forcefit.validation.diagnosis.weighted_readings import NARROW, WeightedReadings
 
-# whether geometric errors are in use, whether springs are in use
+# Whether geometric errors are included, and whether springs are included.
 Mode = tuple[bool, bool]
-MORE = math.log(2.0)  # each further element halves the prior probability
-# prior odds of 10 against geometric errors, and against springs
+MORE = math.log(2.0)  # each additional element halves the prior probability
+# Prior odds of 10 against including geometric errors, and against including springs.
 IN_USE = math.log(10.0)
 _GROUPS = 4  # number of groups of nuisance parameters
 
@@ -41,11 +41,11 @@ class State:
 
     Attributes:
         elements: effects and functions.
-        mode: whether geometric errors are in use, and whether springs are in use.
-        used: (k,) mask of the nuisance parameters in use.
+        mode: whether geometric errors are included, and whether springs are included.
+        used: (k,) mask of the included nuisance parameters.
         sizes: standard deviations and posterior of all unknowns.
         score: log posterior, up to a constant.
-        tau: ratio of the true to the stated sigma.
+        tau: ratio of the true to the declared sigma.
         readings: readings that the model describes.
     """
 
@@ -58,7 +58,7 @@ class State:
     readings: WeightedReadings
 
     def _columns(self) -> NDArray:
-        """Return (n, k) columns of all unknowns; they are too large for a cache."""
+        """Return (n, k) columns of all unknowns, which are too large to be cached."""
         r = self.readings
         return np.hstack([r.small[:, self.used], *(r.own(e) for e in self.elements)])
 
@@ -68,13 +68,13 @@ class State:
 
     @cached_property
     def marginal(self) -> Marginal:
-        """Model with marginalised unknowns, in the fitted cells."""
+        """Model with marginalised unknowns for the fitted cells."""
         flat = self.readings.flat
         return marginalise(self._columns(), self.sizes.std, self._z(), flat)
 
     @cached_property
     def sample_marginal(self) -> Marginal:
-        """Model with marginalised unknowns, in the cells of the sampled rows."""
+        """Model with marginalised unknowns for the cells of the sampled rows."""
         some = self.readings.sampled
         if some.all():
             return self.marginal
@@ -84,7 +84,7 @@ class State:
         return marginalise(X, self.sizes.std, z, flat)
 
     def forget(self) -> None:
-        """Release the memory of the marginal model; it is recomputed if needed."""
+        """Release the memory of the marginal model, which is recomputed when needed."""
         for name in ("marginal", "sample_marginal"):
             self.__dict__.pop(name, None)
 
@@ -95,11 +95,11 @@ class State:
 
     @cached_property
     def left(self) -> NDArray:
-        """(n,) residual, whitened so that its noise is independent, without weights."""
+        """(n,) residual, whitened to independent noise, without weights."""
         return (self.readings.z - self.fitted) / self.readings.root
 
     def own(self, k: int) -> slice:
-        """Return the slice of the k-th element's unknowns."""
+        """Return the slice of the unknowns of the k-th element."""
         counts = [e.columns.shape[1] for e in self.elements]
         begin = int(self.used.sum()) + sum(counts[:k])
         return slice(begin, begin + counts[k])
@@ -115,7 +115,7 @@ class State:
         return errors
 
     def without(self, some: Sequence[Element]) -> tuple[Element, ...]:
-        """Return the elements without some of them."""
+        """Return the elements without the given ones."""
         return tuple(e for e in self.elements if e not in some)
 
     @property
@@ -129,12 +129,12 @@ class State:
 
     @property
     def supported(self) -> bool:
-        """Whether no effect has its values at the bounds."""
+        """Whether no effect is at its bounds."""
         means = [self.sizes.mean[self.own(k)] for k in range(len(self.elements))]
         return not any(map(_at_bounds, self.elements, means))
 
     def sizes_for(self, elements: Sequence[Element]) -> dict[int, float]:
-        """Return standard deviations of the groups, for another model with elements."""
+        """Return the groups' standard deviations for a model with other elements."""
         own = self.sizes.of_group
         found = {g: s for g, s in own.items() if g < _GROUPS}
         for k, e in enumerate(self.elements):
@@ -143,7 +143,7 @@ class State:
         return found
 
     def expected_squares(self) -> NDArray:
-        """Return (n,) expected squared residuals, without weights."""
+        """Return the (n,) expected squares of the unweighted residuals."""
         X = self._columns()
         spread = np.einsum("ij,ij->i", X @ self.sizes.covariance, X)
         return self.left**2 + spread * self.tau**2 / self.readings.weights
@@ -166,10 +166,12 @@ def _at_bounds(e: Element, mean: NDArray) -> bool:
 def prediction_gain(one: State, other: State, blocks: NDArray) -> float:
     """Return how much better one model predicts than another, in standard errors.
 
-    Each block (n,) of readings is predicted by a fit to the others.  The gain is that
-    of the log predictive densities on average or, if larger, of signed ranks (Wilcoxon
-    1945): a few blocks often make up most of a gain and of its scatter, while nearly
-    all others gain too.  It is 0 for a single block, whose gain has no known error.
+    Each block (n,) of readings is predicted by a fit to the others.  Two gains are
+    computed, and the larger one is returned.  The first is the mean difference of the
+    log predictive densities.  The second is Wilcoxon's signed-rank statistic (1945),
+    because a few blocks often dominate the mean and its scatter although nearly all
+    other blocks improve too.  The gain is 0 for a single block, because its standard
+    error is unknown.
     """
     densities = []
     for state in (one, other):
@@ -186,7 +188,7 @@ def prediction_gain(one: State, other: State, blocks: NDArray) -> float:
 
 
 class Models:
-    """Models of weighted readings, each fitted only once."""
+    """Models of weighted readings; each model is fitted only once."""
 
     def __init__(self, readings: WeightedReadings) -> None:
         """Start with an empty cache."""
@@ -194,14 +196,14 @@ class Models:
         self._states: dict[object, State] = {}
 
     def forget(self) -> None:
-        """Release cached models and products of columns."""
+        """Release the cached models and products of columns."""
         for state in self._states.values():
             state.forget()
         self._states.clear()
         self.readings.forget()
 
     def modes(self) -> list[Mode]:
-        """Return combinations of groups of nuisance parameters that may be in use."""
+        """Return the groups of nuisance parameters that a model may include."""
         small = self._small
         springs = [False, True] if small.spring.any() else [False]
         geometry = [False, True] if (~small.spring).any() else [False]
@@ -221,7 +223,7 @@ class Models:
         return self._states[key]
 
     def best(self, elements: tuple[Element, ...], start: State) -> State:
-        """Return the best model among modes that differ in at most one group."""
+        """Return the best model whose nuisance groups differ by at most one group."""
         g, s = start.mode
         near = [m for m in self.modes() if m in {(g, s), (not g, s), (g, not s)}]
         states = [self.state(elements, m, start) for m in near]
@@ -230,7 +232,7 @@ class Models:
     def _fitted(
         self, elements: tuple[Element, ...], mode: Mode, start: State | None
     ) -> State:
-        """Optimise standard deviations; remove springs of negative compliance."""
+        """Optimise standard deviations, and remove springs of negative compliance."""
         spring, begin = self._small.spring, dict[int, float]()
         used = np.where(spring, mode[1], mode[0])
         if start is not None:
@@ -255,7 +257,7 @@ class Models:
         return State(elements, mode, used, sizes, score, tau, self.readings)
 
     def _linear(self, elements: tuple[Element, ...], used: NDArray) -> Grouped:
-        """Return the columns of the nuisance parameters in use and of the elements."""
+        """Return the columns of included nuisance parameters and of the elements."""
         readings, small = self.readings, self._small
         z = readings.without_offsets(elements)
         with_small, inner = readings.products(elements)

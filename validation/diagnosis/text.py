@@ -1,4 +1,4 @@
-"""A diagnosis as text for a terminal, from its table in the public format."""
+"""Format a diagnosis as text for a terminal, from its table in the public format."""
 
 import math
 from typing import Any
@@ -65,7 +65,7 @@ def text(diagnosis: Diagnosis, tally: Calibration | None = None) -> str:
 
 
 def _effect_lines(effect: Table) -> list[str]:
-    """Return lines on an effect; geometric errors and springs have separate lines."""
+    """Return lines about an effect other than geometric errors and springs."""
     if "combinations" in effect:
         return []
     there = f" in session {effect['session']}" if "session" in effect else ""
@@ -81,7 +81,7 @@ def _effect_lines(effect: Table) -> list[str]:
 
 
 def _small_lines(one: Table | None, name: str) -> list[str]:
-    """Return lines on the geometric errors or the springs."""
+    """Return lines about the geometric errors or the springs."""
     if one is None:
         return []
     sizes = ", ".join(
@@ -96,7 +96,7 @@ def _small_lines(one: Table | None, name: str) -> list[str]:
 
 
 def _function_lines(one: Table) -> list[str]:
-    """Return two to four lines on a learned function."""
+    """Return two to four lines about a learned function."""
     formula, parts = one["formula"], one["parts_of_range"]
     short = formula if len(formula) < 160 else f"{formula[:157]}..."
     lines = [f"learned: {one['label']}", f"  {short}"]
@@ -111,7 +111,7 @@ def _function_lines(one: Table) -> list[str]:
 
 
 def _error_lines(answer: Table) -> list[str]:
-    """Return a table of the errors of the declared, the found and the saved robot."""
+    """Return a table of errors of the declared, the identified and the saved robot."""
     error, held = answer["error"], answer["held_out"]
     noise = {**error["noise"], "normalised": answer["noise_scale"]["normalised"]}
     columns = error["before"], error["after"], noise, error["saved"]
@@ -131,7 +131,7 @@ def _error_lines(answer: Table) -> list[str]:
 
 
 def _sequence_lines(answer: Table) -> list[str]:
-    """Return lines on the model sequence, with errors on the held-out rows."""
+    """Return lines about the model sequence, with errors on the held-out rows."""
     rows, last = answer["ladder"], math.nan
     unit = rows[-1]["unit"]
     lines = [f"{'model':<20}{'unknowns':>10}{unit:>12}{'sigma':>10}{'reduction':>11}"]
@@ -146,7 +146,7 @@ def _sequence_lines(answer: Table) -> list[str]:
 
 
 def _next_lines(one: Table) -> list[str]:
-    """Return a line on the measurement that would distinguish the models."""
+    """Return a line about the measurement that discriminates between the models."""
     where = ", ".join(f"{k}={v:.4g}" for k, v in one["configuration"].items())
     covariates = "".join(f", {k} {v:g}" for k, v in one["covariates"].items())
     return [

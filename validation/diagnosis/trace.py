@@ -1,11 +1,11 @@
-"""Search of a diagnosis, from readings to the unknown parameters of a machine.
+"""Run the search of a diagnosis, from readings to the parameters of a machine.
 
 Steps:
 
-1. the measuring frame is estimated if it is unknown;
+1. the pose of the measuring frame is estimated if it is unknown;
 2. effects and functions are searched for together (:mod:`.select`);
-3. the machine with them is fitted (:mod:`.fit`); second-order terms of its geometric
-   errors are added to the model, and 2 is repeated until they do not change.
+3. the machine with these effects is fitted (:mod:`.fit`); second-order terms of its
+   geometric errors are added to the model, and step 2 is repeated until they converge.
 
 The search reads only the rows to be fitted.
 """
@@ -47,15 +47,16 @@ from forcefit.validation.diagnosis.weighted_readings import NONE
 
 Update = Callable[[str, int, int], None]
 FINITE = next(name for name, effect in LIBRARY.items() if effect.finite)
-# number of rows by which models are selected; the selected model is fitted to all rows
+# Number of rows for selecting models; the selected model is fitted to all rows.
 _SEARCHED = 2000
-# largest number of repetitions of the search, each without the gross blunders found
+# Largest number of searches; each excludes the gross blunders that were found before.
 _TURNS = 6
 _BENDS = 1  # number of repetitions with second-order terms of geometric errors
-_GROSS = 30.0  # relative to the median rms of all rows: smallest rms of a gross blunder
-# number of standard errors by which functions of time must predict other rows better
+_GROSS = 30.0  # smallest rms of a gross blunder / median rms of all rows
+# Functions of time must improve the prediction of other rows by this number of standard
+# errors.
 _CLEARLY = 2.0
-# [sigma] change of a reading by finite geometric errors above which terms are added
+# [sigma] Second-order terms are added if they change a reading by more.
 _BENT = 0.3
 
 
@@ -64,12 +65,13 @@ class Traced:
     """Result of the search for effects and functions.
 
     Attributes:
-        campaign: campaign of R rows, with the estimated sigma and noise in common; the
+        campaign: campaign of R rows with the estimated sigma and shared noise.  The
             sigma of a blunder is many times larger.
-        conditions: registered conditions of all rows, with the second-order terms of
-            geometric errors.
-        used: (R,) bool, whether a row was fitted.
-        outliers: (R,) bool, whether a row has a blunder and is excluded.
+        conditions: conditions of all rows, including the registration and the
+            second-order terms of geometric errors.
+        used: (R,) bool, True for rows that were fitted.
+        outliers: (R,) bool, True for rows that are excluded because they contain a
+            blunder.
         selected: models with their probabilities.
         columns: columns of the campaign's cells.
     """
@@ -83,7 +85,7 @@ class Traced:
 
     @property
     def fitting(self) -> Campaign:
-        """The rows that were fitted."""
+        """Campaign of the fitted rows."""
         return self.campaign.take(self.used)
 
     @cached_property
@@ -105,13 +107,13 @@ class Traced:
 
     @property
     def _alone(self) -> bool:
-        """Whether the best model has one element; finite motions are then a claim."""
+        """Whether the best model contains only one element."""
         found = self.selected
         device = self.campaign.registration == "unknown"
         return len(found.hypotheses) - device + len(found.functions) == 1
 
     def rivals(self, most: int = 3) -> list[Unknowns]:
-        """Return machines with other effects than the best, the most probable first."""
+        """Return machines with effects other than the best, the most probable first."""
         states = self.selected.states
         own = frozenset(e.name for e in states[0].elements if e.name)
         found: dict[frozenset[str], Unknowns] = {}
@@ -134,7 +136,7 @@ class Traced:
         return list(found.values())
 
     def _device_frames(self, hypothesis: Hypothesis) -> list[Acting]:
-        """Return the estimated measuring frame, one hypothesis for each session."""
+        """Return the estimated pose of the device, one hypothesis for each session."""
         base = np.broadcast_to(self.conditions.base, (len(self.campaign), 6))
         own = {}
         for session in self.campaign.sessions or (None,):
@@ -146,7 +148,7 @@ class Traced:
 
 
 def _acting(hypothesis: Hypothesis, values: NDArray) -> list[Acting]:
-    """Return a hypothesis with its values, in each session with parameters."""
+    """Return a hypothesis with its values, once for each session with parameters."""
     own = [(in_one_session(hypothesis, s), s) for s in sessions_of(hypothesis)]
     return [Acting(there, values[places], s) for (there, places), s in own]
 
@@ -155,11 +157,11 @@ def trace(
     campaign: Campaign, fitted: NDArray, declared: Declared, update: Update, *,
     odds: Mapping[str, float] = MappingProxyType({}),
 ) -> tuple[Traced, MachineFit]:  # fmt: skip
-    """Search for the effects and functions that a declared model lacks.
+    """Search for the effects and functions that are missing in a declared model.
 
     Args:
         campaign: campaign of R rows.
-        fitted: (R,) bool, rows that the search may read.
+        fitted: (R,) bool, True for rows whose readings the search may use.
         declared: declared model, for all rows.
         update: function called with the name of the step, the number of finished parts,
             and the number of all parts.
@@ -167,10 +169,11 @@ def trace(
             :class:`.columns.Columns`.
 
     Returns:
-        The effects that were found, and the fitted machine with these effects.
+        The identified effects, and the fitted machine with these effects.
 
     Raises:
-        BadInput: the measuring frame is unknown and cannot be estimated.
+        BadInput: the pose of the measuring frame is unknown, and the readings do not
+            determine it.
     """
     fitted = fitted & ~impossible_rows(campaign) & campaign.cells.any(axis=1)
     if campaign.registration == "unknown":
@@ -206,14 +209,14 @@ def trace(
 
 
 def _searched_rows(campaign: Campaign, fitted: NDArray) -> NDArray:
-    """Return (R,) bool, rows for the selection of models: all, or a random sample."""
+    """Return (R,) bool: rows used to select models, either all or a random sample."""
     chosen = np.zeros(len(campaign), dtype=bool)
     chosen[fitted] = drawn(campaign.measured_at_once[fitted], _SEARCHED)
     return chosen
 
 
 def _without_outlying(traced: Traced, fit: MachineFit) -> tuple[Traced, MachineFit]:
-    """Return the fitted machine without blunders among the rows outside the sample."""
+    """Return the fitted machine without blunders in rows outside the sample."""
     others = traced.used & ~np.isin(np.arange(len(traced.used)), traced.columns.row)
     if not others.any():
         return traced, fit
@@ -238,7 +241,7 @@ def _with_its_errors(
         z = whiten(campaign, campaign.measured - predict(conditions).deviation)
         known = cells & np.isfinite(z)
         selected = select(columns, z[known], known, common=NONE)
-        # a fit takes long, so the errors of the linear estimate are tested first
+        # A fit takes long, so the errors of the linear estimate are tested first.
         near = selected.states[0].errors
         if declared.bent(seen, conditions, near, _BENT / 3) is None:
             break
@@ -253,12 +256,12 @@ def _with_its_errors(
 
 
 def _errors(fit: MachineFit) -> NDArray:
-    """Return (n, 6) [rad, m] the estimated minus the declared geometric errors."""
+    """Return (n, 6) [rad, m] estimated minus declared geometric errors."""
     return np.asarray(fit.robot.errors - fit.unknowns.robot.errors)
 
 
 def _gross(campaign: Campaign, fit: MachineFit, used: NDArray) -> NDArray:
-    """Return (R,) bool, fitted rows that are outliers; a search excludes them."""
+    """Return (R,) bool: fitted rows that are outliers, which a search excludes."""
     left = residual_of(campaign, fit.robot) / campaign.sigma
     left = np.where(campaign.cells & used[:, None], left, 0.0)
     count = np.maximum((campaign.cells & used[:, None]).sum(axis=1), 1)
@@ -267,14 +270,15 @@ def _gross(campaign: Campaign, fit: MachineFit, used: NDArray) -> NDArray:
 
 
 def _searched(columns: Columns, z: NDArray, cells: NDArray, update: Update) -> Selected:
-    """Return result of the search; functions of time must improve the prediction."""
-    # time is correlated with all slow changes and does not repeat on another day: it is
-    # accepted only if it predicts other periods clearly better; without candidates
-    # their effects must not be estimated as noise
+    """Return the search result; functions of time must improve the prediction."""
+    # Time is correlated with all slow changes and does not repeat on another day.  A
+    # function of time is accepted only if it predicts other periods clearly better.
+    # Without candidates, shared noise is not estimated, because it would absorb the
+    # effects.
     whole = select(columns, z, cells, update, None if columns.candidates else NONE)
     if not columns.has_clocks:
         return whole
-    common = whole.states[0].readings.common  # models need the same noise
+    common = whole.states[0].readings.common  # the models must have equal noise
     timeless = select(columns.without_clocks(), z, cells, update, common)
     blocks = columns.block[cells]
     sure = prediction_gain(whole.states[0], timeless.states[0], blocks)
@@ -285,7 +289,7 @@ def _traced(
     campaign: Campaign, conditions: Conditions, fitted: NDArray, cells: NDArray,
     selected: Selected, columns: Columns,
 ) -> Traced:  # fmt: skip
-    """Return the found effects, the estimated sigma, and the rows with blunders."""
+    """Return the identified effects, the estimated sigma and rows with blunders."""
     weights = np.ones(len(columns.row))
     weights[cells] = cell_weights(selected.weights)
     sigma = campaign.sigma.copy()
@@ -296,8 +300,8 @@ def _traced(
         common = columns.motions * np.repeat(selected.noise.common, 3)
     good = np.ones(len(columns.row))
     good[cells] = selected.weights
-    # the whole row of a blunder is excluded: its other readings are doubtful, and
-    # errors and verdicts are by row
+    # The whole row of a blunder is excluded, because its other readings are doubtful
+    # and errors are computed by row.
     blunders = np.bincount(columns.row, good < 0.5, minlength=len(campaign))
     outliers = (blunders > 0) | impossible_rows(campaign)
     return Traced(
@@ -317,14 +321,14 @@ def _fitted(traced: Traced) -> MachineFit:
         weak = [one for one in fit.unknowns.effects if not supported(fit, one)]
         if not weak:
             return fit
-        # the weakest effect first: of two equivalent effects, both have a large
-        # uncertainty
+        # The weakest effect is removed first, because the uncertainties of two
+        # equivalent effects are both large.
 
         one = min(weak, key=lambda e: _size(fit, e))
         fit = fit_machine(traced.campaign, fit.unknowns.without(one), traced.used)
 
 
 def _size(fit: MachineFit, one: Acting) -> float:
-    """Return the squared change [sigma^2] of the fitted readings due to an effect."""
+    """Return the squared change [sigma^2] that an effect causes in fitted readings."""
     x, _, slopes = fit.own(one)
     return float(np.sum((slopes @ x) ** 2))

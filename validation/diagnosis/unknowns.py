@@ -1,8 +1,8 @@
-"""The unknown parameters of a machine, and the robot that has them.
+"""Define the unknown parameters of a machine, and the robot with given parameters.
 
-A diagnosis determines the numbers that a robot file lacks: effects of the library,
-geometric errors, compliances of joints, functions.  Together they are a vector x, and
-every x defines a robot that can be saved.
+A diagnosis determines numbers that are missing in a robot file: library effects,
+geometric errors, compliances of joints and functions.  Together they form a vector x.
+Each x defines a robot that can be saved.
 """
 
 from collections.abc import Mapping
@@ -26,13 +26,13 @@ from forcefit.validation.diagnosis.responses import responses
 from forcefit.validation.diagnosis.sensitivities import Sensitivities
 from forcefit.validation.diagnosis.signatures import conditions_of
 
-_WIDE = 1e3  # prior standard deviation of an effect's unknown, in plausible sizes
-# largest change, and prior standard deviation, of a function's shape parameter,
-# relative to its value
+_WIDE = 1e3  # prior standard deviation / plausible size of an effect's unknown
+# Largest change of a function's shape parameter, and its prior standard deviation,
+# relative to its value.
 _BEND = 0.5
-# standard deviation of an unknown with a declared value, in plausible sizes
+# Standard deviation of an unknown fixed at its declared value, in plausible sizes.
 _HELD = 1e-12
-STEP = 1e-4  # relative to a parameter's size: step of the derivative
+STEP = 1e-4  # step of derivatives / size of a parameter
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,8 +41,8 @@ class Small:
 
     Attributes:
         name: ``"geometry"`` or ``"springs"``.
-        frame: (k,) row of the frame in the robot.
-        axis: (k,) component of the screw there, 0 to 5.
+        frame: (k,) index of the frame in the robot.
+        axis: (k,) component of the screw at the frame, 0 to 5.
         std: (k,) [rad, m] or [rad/(N m), m/N] prior standard deviations about the
             declared values.
     """
@@ -57,7 +57,7 @@ class Small:
 
     @property
     def bounds(self) -> tuple[NDArray, NDArray]:
-        """(k,) lower and upper bounds; a spring can only add compliance."""
+        """(k,) lower and upper bounds; a joint can only become more compliant."""
         least = -np.inf if self.name == GEOMETRY else 0.0
         return np.full(len(self), least), np.full(len(self), np.inf)
 
@@ -84,7 +84,7 @@ class Acting:
 
     @property
     def std(self) -> NDArray:
-        """(k,) prior standard deviations, so large that the prior is flat."""
+        """(k,) prior standard deviations, so large that the prior is nearly flat."""
         unknowns = [slot.unknown for slot in self.hypothesis.slots]
         wide = [(_HELD if u.upper == u.lower else _WIDE) * u.scale for u in unknowns]
         return np.array(wide)
@@ -112,12 +112,12 @@ class LearnedFunction:
 
     @property
     def std(self) -> NDArray:
-        """(m,) or (m + 1,) prior standard deviations; the last is of the shape."""
+        """(m,) or (m + 1,) prior standard deviations; the last belongs to the shape."""
         return np.concatenate([self.coefficients, _BEND * self.candidate.shape.bends])
 
     @property
     def bounds(self) -> tuple[NDArray, NDArray]:
-        """(m,) or (m + 1,) lower and upper bounds; the last are of the shape."""
+        """(m,) or (m + 1,) lower and upper bounds; the last belong to the shape."""
         upper = np.full(len(self), np.inf)
         upper[len(self.coefficients) :] = self.std[len(self.coefficients) :]
         return -upper, upper
@@ -135,8 +135,8 @@ class Unknowns:
         effects: effects of the library, including the registration.
         small: geometric errors and joint compliances.
         functions: learned functions.
-        sensitivities: sensitivities that contain the normalisation of functions; None
-            without functions.
+        sensitivities: derivatives by which functions are normalised; None without
+            functions.
     """
 
     robot: Robot
@@ -180,7 +180,7 @@ class Unknowns:
         return lower, upper
 
     def robot_at(self, x: NDArray) -> Robot:
-        """Return the robot with parameters x (k,), which is tested and saved."""
+        """Return the robot with parameters x (k,)."""
         robot, functions = self.robot, list(self.robot.functions)
         for part, own in self.places:
             if isinstance(part, Small):
@@ -198,7 +198,7 @@ class Unknowns:
         return robot
 
     def _effects_at(self, x: NDArray) -> dict[str | None, dict[str, dict[str, float]]]:
-        """Return the effects to add to those of the file, for all rows or a session."""
+        """Return the effects that are added to the file, for all rows or a session."""
         found: dict[str | None, dict[str, dict[str, float]]] = {}
         for one in self.effects:
             values = one.hypothesis.public(
@@ -210,10 +210,10 @@ class Unknowns:
         return found
 
     def slopes(self, campaign: Campaign, x: NDArray) -> NDArray:
-        """Return the derivatives of the readings by x (k,), by the linear model.
+        """Return the derivatives of the readings by x (k,) in the linear model.
 
         Returns:
-            (R, 6, k) [rad, m] for each unit of x; zero in rows without a solution.
+            (R, 6, k) [rad, m] per unit of x; zero in rows without a solution.
         """
         robot = self.robot_at(x)
         conditions = _linear(conditions_of(replace(campaign, robot=robot)))
@@ -248,13 +248,13 @@ class Unknowns:
         return np.nan_to_num(J, nan=0.0, posinf=0.0, neginf=0.0)
 
     def without(self, effect: Acting) -> "Unknowns":
-        """Return the unknowns without those of one effect."""
+        """Return the unknowns after removing the unknowns of one effect."""
         kept = tuple(one for one in self.effects if one is not effect)
         return replace(self, effects=kept)
 
 
 def effects_in(robot: Robot, session: str | None) -> Mapping[str, Values]:
-    """Return effects of a robot's file in all rows, or those of one session only."""
+    """Return the effects in a robot's file for all rows, or for one session only."""
     if session is None:
         return robot.effects
     return robot.session_effects.get(session, {})
@@ -263,7 +263,7 @@ def effects_in(robot: Robot, session: str | None) -> Mapping[str, Values]:
 def with_effects_in(
     robot: Robot, session: str | None, effects: Mapping[str, Values]
 ) -> Robot:
-    """Return a robot with other effects in all rows, or in one session only."""
+    """Return a robot with different effects for all rows, or for one session only."""
     if session is None:
         return replace(robot, effects=effects)
     sessions = {**robot.session_effects, session: effects}
@@ -271,7 +271,7 @@ def with_effects_in(
 
 
 def _linear(conditions: Conditions) -> Conditions:
-    """Return the linear model, in which the clearances of closed chains are fixed."""
+    """Return the linear model, in which clearances of closed chains are fixed."""
     conditions = replace(conditions, exact=False)
     loose = virtual_joints(conditions.robot).cones.shape[1]
     if loose and conditions.robot.closures and conditions.rest is None:
@@ -280,7 +280,7 @@ def _linear(conditions: Conditions) -> Conditions:
 
 
 def _resting_as(conditions: Conditions, held: Conditions) -> Conditions:
-    """Return conditions with other rest positions; a base compliance has none."""
+    """Return conditions with the rest positions of others, without base compliance."""
     assert held.rest is not None
     rest = np.zeros_like(conditions.errors)
     for row, frame in enumerate(conditions.robot.frames):

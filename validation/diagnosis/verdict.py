@@ -1,4 +1,4 @@
-"""The verdict of a diagnosis, from the probabilities of models."""
+"""Determine the verdict of a diagnosis from the probabilities of models."""
 
 from forcefit.assembly.model.statuses import (
     AMBIGUOUS,
@@ -21,8 +21,8 @@ def by_names(selected: Selected) -> Sets:
     """Return the probabilities of sets of effects, the most probable first.
 
     Returns:
-        Names of the effects and the probability of each set; for a model with a
-        function, ``"function"`` is the last name.
+        The names of the effects, and the probability, of each set.  If a model contains
+        a function, its last name is ``"function"``.
     """
     weights: dict[tuple[str, ...], float] = {}
     for model in selected.models:
@@ -41,8 +41,8 @@ def verdict(
     Args:
         selected: models with their probabilities.
         names: names of the library effects of the fitted machine.
-        functions: whether the model has functions.
-        small: whether the model has geometric errors or springs.
+        functions: whether the model contains functions.
+        small: whether the model contains geometric errors or springs.
         more_than_noise: whether the residual of the model exceeds the noise.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Weighted readings and columns of the fitted cells, with cached inner products."""
+"""Store weighted readings and columns of the fitted cells, and cache inner products."""
 
 from collections.abc import Sequence
 
@@ -11,11 +11,11 @@ from forcefit.validation.diagnosis.prior_sizes import Eigen
 
 NARROW = 50  # largest number of columns of an element whose fitted cells are cached
 _RANK = 1e-9  # relative singular value below which a column depends on others
-NONE = (0.0, 0.0)  # standard deviations of the shared noise if there is no such noise
+NONE = (0.0, 0.0)  # standard deviations if there is no shared noise
 
 
 class WeightedReadings:
-    """Readings of the fitted cells, weighted; the device's frame is projected out.
+    """Weighted readings of the fitted cells, after projecting out the device's pose.
 
     Attributes:
         columns: columns of all N cells.
@@ -24,11 +24,13 @@ class WeightedReadings:
         weights: (n,) relative precisions, 1 for a reading that is not a blunder.
         common: [rad, m] standard deviations, divided by tau, of the platform's rotation
             and translation that all cells of a measurement share.
-        sampled: (n,) bool, cells of the rows by which functions are scored first.
-        whiten: map from the fitted cells to cells of independent noise.
+        sampled: (n,) bool, True for cells by which functions are scored in the first
+            step.
+        whiten: transformation of the fitted cells to independent noise.
         flat: (n, f) orthonormal columns of the measuring frame, which has a flat prior.
-        z: (n,) whitened residual without the measuring frame.
-        small: (n, k) columns of the nuisance parameters without the measuring frame.
+        z: (n,) whitened residual after projecting out the measuring frame.
+        small: (n, k) columns of the nuisance parameters after projecting out the
+            measuring frame.
         gram: (k, k) inner products of the columns ``small``.
         count: number of independent readings.
     """
@@ -47,8 +49,8 @@ class WeightedReadings:
         norm = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
         left, size, _ = np.linalg.svd(flat / norm, full_matrices=False)
         self.flat = left[:, size > _RANK * size.max(initial=0.0)]
-        # log determinants of the noise's covariance, and of the likelihood without the
-        # frame
+        # Log determinants of the covariance of the noise, and of the likelihood after
+        # projecting out the frame.
 
         seen = np.append(norm, size[: self.flat.shape[1]])
         self.log_det = self.whiten.log_det + 2 * float(np.log(seen).sum())
@@ -64,7 +66,7 @@ class WeightedReadings:
         return columns - self.flat @ (self.flat.T @ columns)
 
     def sample(self, common: tuple[float, float]) -> "WeightedReadings":
-        """Return the readings of the sampled rows only, for a given shared noise."""
+        """Return the readings of the sampled rows for a given shared noise."""
         cells, some = self.cells.copy(), self.sampled
         cells[cells] = some
         return WeightedReadings(
@@ -81,7 +83,7 @@ class WeightedReadings:
         return B
 
     def products(self, elements: Sequence[Element]) -> tuple[NDArray, NDArray]:
-        """Return inner products of m columns: with nuisance columns (k, m); (m, m)."""
+        """Return products of m columns with nuisance columns, (k, m), and (m, m)."""
         for i, e in enumerate(elements):
             missing = [o for o in (None, *elements[: i + 1])
                        if (e, o) not in self._inner]  # fmt: skip
@@ -97,7 +99,7 @@ class WeightedReadings:
         return np.hstack(with_small), np.block(blocks or [[np.zeros((0, 0))]])
 
     def eigen(self, e: Element) -> Eigen:
-        """Return eigenvalues and eigenvectors of an element's inner products."""
+        """Return eigenvalues and eigenvectors of the inner products of an element."""
         if e not in self._eigen:
             self._eigen[e] = np.linalg.eigh(self._inner[e, e])
         return self._eigen[e]

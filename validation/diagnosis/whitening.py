@@ -1,15 +1,15 @@
-r"""Transformation of noise that the points of a measurement share to independent noise.
+r"""Transform the noise that points of a measurement share to independent noise.
 
-A measurement reads several points of the platform together.  The noise of its cells,
-divided by the stated sigma, is e + L n.  Here e is independent noise of variance 1/w,
-and n are k independent standard normal numbers that all cells of the measurement share.
+One measurement may contain several points of the platform.  The noise of its cells,
+divided by the declared sigma, is e + L n.  Here e is independent noise of variance 1/w.
+The k independent standard normal variables n are common to all cells of the
+measurement.
 
 ======  ==============  =======  =====================================================
 symbol  code            shape    meaning
 ======  ==============  =======  =====================================================
-w       ``root`` ** 2   (n,)     relative precisions
-L       ``loadings``    (n, k)   change of the cells over sigma per number in common
-W       ``matrix``      (n, n)   block-diagonal, W (w^-1 + L L') W' = 1
+w ``root`` ** 2 (n,) relative precisions L ``loadings`` (n, k) change of the cells over
+sigma per shared variable W ``matrix`` (n, n) block-diagonal, W (w^-1 + L L') W' = 1
 ======  ==============  =======  =====================================================
 
 Among all such W, this W is the nearest to w^1/2: W = (1 + K K')^-1/2 w^1/2 with K =
@@ -48,18 +48,19 @@ class Whitening:
         return values * (self.root if values.ndim == 1 else self.root[:, None])
 
     def inverse(self, values: NDArray) -> NDArray:
-        """Return the (n,) values over sigma that the map transforms to given values."""
+        """Return the (n,) values over sigma before this transformation."""
         if self.matrix is not None:
             return np.asarray(spsolve(self.matrix, values))
         return values / self.root
 
 
 def whitening(root: NDArray, loadings: NDArray | None, visit: NDArray) -> Whitening:
-    """Return the map of n cells; it is diagonal without loadings.
+    """Return the transformation of n cells to independent noise.
 
-    ``root`` (n,) are square roots of the relative precisions.  ``loadings`` (n, k) are
-    changes of the cells, divided by sigma, for each shared number.  ``visit`` (n,) is
-    equal for all cells of a measurement.
+    ``root`` (n,) are the square roots of the relative precisions.  ``loadings`` (n, k)
+    are the changes of the cells, divided by sigma, per shared variable.  ``visit`` (n,)
+    is equal for all cells of a measurement.  The transformation is diagonal if
+    ``loadings`` is None.
     """
     if loadings is None or not loadings.any():
         return Whitening(root)
@@ -80,7 +81,7 @@ def whitening(root: NDArray, loadings: NDArray | None, visit: NDArray) -> Whiten
 
 
 def _of_one_size(visit: NDArray) -> Iterator[NDArray]:
-    """Yield (V, m) cells of all measurements that have m cells, for every m."""
+    """Yield (V, m) cells of all measurements that contain m cells, for every m."""
     order = np.argsort(visit, kind="stable")
     _, start, count = np.unique(visit[order], return_index=True, return_counts=True)
     for size in np.unique(count).tolist():
@@ -89,7 +90,7 @@ def _of_one_size(visit: NDArray) -> Iterator[NDArray]:
 
 
 def whitening_of(campaign: Campaign, cells: NDArray) -> Whitening:
-    """Return the map of cells (R, 6) bool for the noise of a campaign."""
+    """Return the transformation of cells (R, 6) bool for the noise of a campaign."""
     row, _ = np.nonzero(cells)
     loadings = None
     if campaign.common is not None:
@@ -99,10 +100,10 @@ def whitening_of(campaign: Campaign, cells: NDArray) -> Whitening:
 
 
 def independent(campaign: Campaign, residual: NDArray) -> NDArray:
-    """Return residual (R, 6) [rad, m] of the N cells, transformed to independent noise.
+    """Return the N cells of a residual (R, 6) [rad, m] with independent noise.
 
-    The result (N,) has unit variance if the residual is noise.  Values that are not
-    finite count as zero.
+    If the residual is noise, the result (N,) has unit variance.  Values that are
+    not finite count as zero.
     """
     cells = campaign.cells
     z = np.nan_to_num(residual[cells] / campaign.sigma[cells])
@@ -110,7 +111,7 @@ def independent(campaign: Campaign, residual: NDArray) -> NDArray:
 
 
 def size_of_noise(campaign: Campaign) -> NDArray:
-    """Return (R, 6) [rad, m] standard deviations of the readings, with shared noise."""
+    """Return (R, 6) [rad, m] standard deviations of the readings and shared noise."""
     if campaign.common is None:
         return campaign.sigma
     return np.sqrt(campaign.sigma**2 + np.sum(campaign.common**2, axis=2))
@@ -121,19 +122,20 @@ def platform_motions(campaign: Campaign, reading: NDArray) -> NDArray | None:
 
     Args:
         campaign: campaign of R rows.
-        reading: (R, 6, 6) change of the readings for each screw of the platform at its
+        reading: (R, 6, 6) change of the readings per unit screw of the platform at its
             origin, base axes.
 
     Returns:
-        (R, 6, 6) [rad, m] change for each rotation about the centre of the measured
-        points, and for each translation; None if no measurement reads several points.
+        (R, 6, 6) [rad, m] change per unit rotation about the centre of the measured
+        points, and per unit translation.  None if no measurement contains several
+        points.
     """
     visit = campaign.measured_at_once[campaign.cells.any(axis=1)]
     if len(np.unique(visit)) == len(visit):
         return None
     centre = np.unique(campaign.targets, axis=0).mean(axis=0)
     place = campaign.transforms[:, campaign.robot.index(campaign.robot.platform)]
-    # row of a screw, column of a motion
+    # Rows are screws and columns are motions.
     screws = np.tile(np.eye(6), (len(campaign), 1, 1))
     arm = place[:, :3, :3] @ centre
     screws[:, 3:, :3] = np.swapaxes(np.cross(np.eye(3), -arm[:, None]), 1, 2)

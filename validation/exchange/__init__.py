@@ -1,4 +1,4 @@
-"""Import of measuring devices' files as campaigns.
+"""Import files of measuring devices as campaigns.
 
-Begin at ``tracker.py``.
+Start with ``tracker.py``.
 """

@@ -1,7 +1,8 @@
-"""Import of ROS bags: points, poses and transforms, read by ``rosbags``.
+"""Read points, poses and transforms from ROS bags with the package ``rosbags``.
 
-A bag is a rosbag2 folder (SQLite or MCAP) or a ROS 1 ``.bag``.  A reading is named by
-its topic and its frame; its time is the stamp of the message; lengths are in metres.
+A bag is a rosbag2 folder (SQLite or MCAP) or a ROS 1 ``.bag``.  The name of a reading
+consists of its topic and its frame.  Its time is the stamp of the message.  Lengths are
+in metres.
 """
 
 import os
@@ -39,8 +40,8 @@ def read_bag(path: Path | str, oriented: bool = False) -> list[Reading]:
         The readings in the recorded order.
 
     Raises:
-        BadInput: ``rosbags`` is not installed, the bag cannot be read, or it has no
-            messages of these kinds.
+        BadInput: ``rosbags`` is not installed, the bag cannot be read, or it contains
+            no messages of these kinds.
     """
     with naming_packages(f"{path}: a bag", "export its points as a table"):
         from rosbags.highlevel import AnyReader
@@ -62,7 +63,7 @@ def read_bag(path: Path | str, oriented: bool = False) -> list[Reading]:
                     )
     except BadInput:
         raise
-    except Exception as error:  # a third-party reader may raise any exception
+    except Exception as error:  # third-party readers may raise any exception
         reason = one_line(str(error), 120) or type(error).__name__
         raise BadInput(f"{path}: not a readable bag: {reason}") from None
     if not readings:
@@ -87,7 +88,7 @@ def _places(message: Any) -> Iterator[tuple[str, Any, Any, Any]]:
 def _reading(
     path: str, number: int, names: tuple[str, ...], header: Any, place: Any, turn: Any
 ) -> Reading:
-    """Return one point of a bag; ``line`` of the reading is the message's number."""
+    """Return one point of a bag; its ``line`` is the number of the message."""
     position = np.array([place.x, place.y, place.z], dtype=float)
     if np.isnan(position).any():
         position[:] = np.nan  # the device saw no target

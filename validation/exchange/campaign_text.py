@@ -1,4 +1,4 @@
-"""Texts of an imported campaign: its table, and ``campaign.toml``."""
+"""Write the texts of an imported campaign: its table and ``campaign.toml``."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -13,7 +13,7 @@ from forcefit.validation.exchange.device_frame import DeviceFrame
 from forcefit.validation.exchange.reading import Reading
 from forcefit.validation.exchange.targets_file import TargetsFile
 
-# number of the command, and readings by target
+# Index of the command, and readings by target.
 Rows = Sequence[tuple[int, Mapping[str, Reading]]]
 
 
@@ -25,14 +25,16 @@ def columns_of(
 
     Args:
         commands: the commands.
-        rows: rows of the campaign: number of the command, and readings by target.
-        gaps: (R, T, 3) [m] deviation of each target; NaN if it was not read.
-        turns: (R, 3) [rad] rotation of the platform; NaN if it was not read.
+        rows: rows of the campaign: index of the command, and readings by target.
+        gaps: (R, T, 3) [m] deviation of each target; NaN if the target was not
+            measured.
+        turns: (R, 3) [rad] rotation of the platform; NaN if the rotation was not
+            measured.
         frame: pose of the device.
         names: names of the targets.
 
     Returns:
-        The columns by name.
+        Mapping from the name of each column to its values.
     """
     at = [command for command, _ in rows]
     columns = {name: values[at] for name, values in commands.columns.items()}
@@ -57,7 +59,7 @@ def columns_of(
 
 
 def spreads(rows: Rows, frame: DeviceFrame, names: Sequence[str]) -> NDArray:
-    """Return the standard deviations of readings along the base's axes.
+    """Return the standard deviations of readings along the axes of the base.
 
     Args:
         rows: rows of the campaign.
@@ -76,7 +78,7 @@ def spreads(rows: Rows, frame: DeviceFrame, names: Sequence[str]) -> NDArray:
 
 
 def labels_of(commands: Commands, rows: Rows) -> list[str]:
-    """Return the ids of the rows: the command's id, numbered if it occurs again.
+    """Return the labels of the rows: the id of the command, numbered if it is repeated.
 
     Args:
         commands: the commands.
@@ -95,7 +97,7 @@ def labels_of(commands: Commands, rows: Rows) -> list[str]:
 
 
 def cell(value: float) -> str:
-    """Return a number as text with all its digits, empty for NaN."""
+    """Return a number as text with all digits; an empty text for NaN."""
     return repr(float(value)) if np.isfinite(value) else ""
 
 
@@ -107,15 +109,16 @@ def declaration(
     Args:
         declared: content of the targets file.
         folder: folder of the campaign.
-        spread: (..., 3) [m] standard deviations stated with the readings; NaN if not
-            stated.
-        turned: whether orientations were read.
+        spread: (..., 3) [m] standard deviations from the files of the readings; NaN if
+            they are absent.
+        turned: whether orientations were measured.
 
     Returns:
         The text of the file.
 
     Raises:
-        BadInput: neither a reading nor the targets file states a standard deviation.
+        BadInput: the standard deviation of a reading is given neither with the reading
+            nor in the targets file.
     """
     name = declared.robot_name
     path = declared.file.parent / name

@@ -1,4 +1,4 @@
-"""Numbers of a device's table: lengths in metres, and cells without a reading."""
+"""Convert numbers of a device's table to metres, and detect cells without a reading."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ _NO_READING = {"", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---"}
 
 
 def missing(cell: str) -> bool:
-    """Return whether a cell states that there is no reading."""
+    """Return whether the text of a cell means that there is no reading."""
     return cell.lower() in _NO_READING
 
 
@@ -25,7 +25,7 @@ class CellValues:
     Attributes:
         sheet: the table.
         header: columns of the table.
-        writing: declared format, used where the table does not state one.
+        writing: declared format, for properties that the table does not state.
     """
 
     sheet: Sheet
@@ -33,12 +33,12 @@ class CellValues:
     writing: Writing
 
     def length(self, line: int, k: int, cell: str) -> float:
-        """Return the length [m] of a cell of column k."""
+        """Return the length [m] in a cell of column k."""
         name = self.header.cells[k]
         return self.number(line, name, cell) * self.unit(self.header.columns[k].unit)
 
     def unit(self, stated: str) -> float:
-        """Return column's unit [m]: its own, else the declared one, else the file's."""
+        """Return the unit of a column: its own, the declared one, or the file's."""
         path, declared, found = self.sheet.file, self.writing.unit, self.header.unit
         if not stated and declared and found:
             if LENGTHS[found] != LENGTHS[declared]:

@@ -1,8 +1,4 @@
-"""Text and cells of a device's table, in the encodings of common programs.
-
-Excel and Leica write UTF-16 or Latin-1, other programs UTF-8.  A cell that begins with
-an apostrophe is text in Excel.
-"""
+"""Read the text and cells of a device's table, in the encodings of common programs."""
 
 import codecs
 import csv
@@ -17,20 +13,20 @@ from forcefit.inputs.table import read_bytes
 
 _MARKS = (";", "\t", ",")  # separators between cells, the most probable first
 _BLANK = " "
-# largest number of characters of a cell; the search for units in it is quadratic
+# Largest number of characters in a cell; the search for units takes quadratic time.
 _LONGEST = 1000
-_SAMPLE = 2000  # number of lines by which the separator between cells is found
+_SAMPLE = 2000  # number of lines from which the separator is determined
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """A table as cells.
+    """Cells of a table.
 
     Attributes:
         file: path of the file, for messages.
         decimal: decimal mark of the table.
         rows: for each line its number and its cells, without quotes and surrounding
-            blanks; comments and blank lines are left out.
+            blanks.  Comments and blank lines are omitted.
     """
 
     file: str
@@ -39,17 +35,18 @@ class Sheet:
 
 
 def read_sheet(path: Path | str, decimal: str = ".") -> Sheet:
-    """Return the cells of a table.
+    """Read the cells of a table.
 
     Args:
         path: a text file in UTF-8, UTF-16 or Latin-1.
-        decimal: the declared decimal mark; a comma-separated table has points.
+        decimal: the declared decimal mark; in a comma-separated table the mark is a
+            point.
 
     Returns:
         The table.
 
     Raises:
-        BadInput: the file cannot be read, is not text, or has no rows.
+        BadInput: the file cannot be read, is not text, or contains no rows.
     """
     lines = [
         (number, line.strip(" \r\n"))
@@ -74,7 +71,7 @@ def read_sheet(path: Path | str, decimal: str = ".") -> Sheet:
 def _with_names_of_words(
     lines: Sequence[tuple[int, str]], rows: Sequence[tuple[int, list[str]]]
 ) -> list[tuple[int, list[str]]]:
-    """Return rows with the words of each heading joined, if blanks separate cells."""
+    """Join the words of each heading if blanks separate the cells of a table."""
     usual = Counter(len(cells) for _, cells in rows).most_common(1)[0][0]
     return [
         (number, wide)
@@ -90,7 +87,7 @@ def _text(path: Path | str) -> str:
     content = read_bytes(path)
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         encodings = ["utf-16"]
-    elif content[1:40:2].count(0) > 10:  # ASCII in UTF-16 without its mark
+    elif content[1:40:2].count(0) > 10:  # ASCII in UTF-16 without byte order mark
         encodings = ["utf-16-le"]
     elif content[0:40:2].count(0) > 10:
         encodings = ["utf-16-be"]
@@ -111,7 +108,7 @@ def _text(path: Path | str) -> str:
 
 
 def _mark(lines: Sequence[str], decimal: str) -> str:
-    """Return the separator of cells in most lines; the most probable of several."""
+    """Return the separator in most lines; of several, the most common one."""
     for mark in _MARKS:
         if 2 * sum(mark in line for line in lines) < len(lines):
             continue
@@ -128,6 +125,6 @@ def _cells(line: str, mark: str) -> list[str]:
         line = re.sub(r"\s+(?=\[)", "", line.replace("\t", _BLANK).strip())  # X [mm]
     try:
         row = next(csv.reader([line], delimiter=mark, skipinitialspace=True))
-    except csv.Error:  # a quote without an end shows that the text is not a table
+    except csv.Error:  # an unclosed quote
         row = line.split(mark)
     return [cell.strip().strip('"').removeprefix("'").strip() for cell in row]

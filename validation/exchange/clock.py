@@ -1,4 +1,4 @@
-"""Conversion of the times of devices and controllers to seconds."""
+"""Convert the times of devices and controllers to seconds."""
 
 import re
 from datetime import UTC, datetime
@@ -19,11 +19,12 @@ def parse_time(place: str, text: str, writing: Writing) -> float:
 
     Args:
         place: file and line, for messages.
-        text: content of the cell, or date and time.
-        writing: format: decimal mark, and order of day and month in dates with slashes.
+        text: content of the cell, or a date and a time.
+        writing: declared format: decimal mark, and order of day and month in dates with
+            slashes.
 
     Returns:
-        Seconds on the clock of the file; only differences have a meaning.
+        Seconds on the clock of the file.  Only differences of times are meaningful.
 
     Raises:
         BadInput: the text has none of these forms.
@@ -66,7 +67,7 @@ def _dated(year: str, month: str, day: str, clock: str) -> float:
     clock = clock[: len(clock) - len(half)].strip()
     style = ("%I:%M:%S" if half else "%H:%M:%S") + (".%f" if "." in clock else "")
     if "." in clock:
-        clock = clock[: clock.index(".") + 7]  # the finest resolution is a microsecond
+        clock = clock[: clock.index(".") + 7]  # resolution of a microsecond
     suffix = " %p" if half else ""
     text = f"{year}-{month}-{day} {clock} {half}".strip()
     return _seconds(text, f"%Y-%m-%d {style}{suffix}")

@@ -1,4 +1,4 @@
-"""Meaning of a column of a device's table, from its name alone."""
+"""Find the meaning of a column of a device's table from its name."""
 
 import re
 from dataclasses import dataclass
@@ -38,8 +38,8 @@ class Column:
         kind: ``"axis"``, ``"sigma"``, ``"U"``, ``"quaternion"``, ``"angle"``,
             ``"name"``, ``"time"``, or ``""`` for an ignored column.
         axis: x, y, z, or w of a quaternion.
-        unit: unit stated in the column's name, or empty.
-        target: name of the target, or empty.
+        unit: unit in the name of the column; empty if there is none.
+        target: name of the target; empty if the column names none.
     """
 
     kind: str
@@ -49,13 +49,13 @@ class Column:
 
 
 def column_of(cell: str) -> Column:
-    """Return the meaning of a column from its name alone.
+    """Return the meaning of a column, determined only from its name.
 
     Args:
         cell: cell of the header.
 
     Returns:
-        The meaning, without a target.
+        The meaning of the column without its target.
     """
     stated = _UNIT.search(cell)
     unit = (stated[1] or stated[2] or "") if stated else ""

@@ -1,4 +1,4 @@
-"""The table of commands of an import."""
+"""Read the table of commands of an import."""
 
 import re
 from collections.abc import Mapping
@@ -23,20 +23,21 @@ from forcefit.validation.exchange.clock import parse_time
 from forcefit.validation.exchange.reading import Writing
 
 _UNIT = re.compile(r"\s*[\[(]\s*([^\])]*?)\s*[\])]$")
-# units of a temperature difference, with factors to K
+# Units of a temperature difference, with their factors to K.
 _TEMPERATURES = {"K": 1.0, "degC": 1.0, "°C": 1.0, "C": 1.0}
 _INCHES = {"cm": 1e-2, "in": 0.0254, "inch": 0.0254}
 
 
 @dataclass(frozen=True, eq=False)
 class Commands:
-    """Commands of a machine.
+    """Commands of a machine during a measurement.
 
     Attributes:
         file: path of the table, for messages.
-        ids: labels, unique.
+        ids: unique labels of the commands.
         times: (C,) [s] time of each command; NaN without a time.
-        columns: (C,) values in SI units, by the name of the campaign's column.
+        columns: mapping from the name of each column of the campaign to (C,) values in
+            SI units.
         postures: postures of the declared robot, one for each command.
     """
 
@@ -53,7 +54,8 @@ def read_commands(path: Path | str, robot: Robot, writing: Writing) -> Commands:
     Args:
         path: a table with ``id``, ``q.<frame>`` or ``pose.*``, and optionally ``time``,
             ``load.*``, ``cov.*``, in SI units or with a unit such as ``[deg]``.
-            Covariates other than time and temperature are taken unchanged, in any unit.
+            Covariates other than time and temperature may be in any unit and are not
+            converted.
         robot: the commanded robot.
         writing: format of numbers and times.
 
@@ -113,7 +115,7 @@ def read_commands(path: Path | str, robot: Robot, writing: Writing) -> Commands:
 
 
 def _check_label(place: str, label: str, seen: Mapping[str, int]) -> None:
-    """Reject a missing label, or one that another row has."""
+    """Reject a missing label and a repeated label."""
     if not label:
         raise BadInput(f"{place}: empty; expected a label")
     if label in seen:
@@ -124,7 +126,7 @@ def _check_label(place: str, label: str, seen: Mapping[str, int]) -> None:
 
 
 def _decimal_hint(cell: str, decimal: str) -> str:
-    """Return a hint on the decimal mark of a cell that has the other mark."""
+    """Return a hint if a cell contains the other decimal mark."""
     other = "," if decimal == "." else "."
     if not np.isfinite(parse_number(cell, other)):
         return ""
@@ -147,7 +149,7 @@ def _factor(path: Path | str, name: str, column: str, robot: Robot) -> float:
 
 
 def _units(name: str, robot: Robot) -> Mapping[str, float] | None:
-    """Return the units that a column may have, with factors; None if any is allowed."""
+    """Return the accepted units of a column with factors; None if any is allowed."""
     lengths = UNITS["command_position"] | _INCHES
     if name in {"time", "cov.time"}:
         return UNITS["time"]

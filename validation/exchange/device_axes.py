@@ -1,8 +1,9 @@
-"""Checks of the unit of lengths and of the axes of a device's export.
+"""Check the unit of lengths and the axes in a device's export.
 
-A wrong unit multiplies all distances by one factor.  A left-handed export is a mirror
-image, which no pose of the device explains.  Both are refused and never corrected,
-because the same setting of the device may affect data that cannot be checked here.
+A wrong unit multiplies all distances by one factor.  Left-handed axes mirror the
+readings, which no pose of the device can explain.  Such files are refused and not
+corrected, because the wrong setting of the device may also affect data that cannot be
+checked here.
 
 Sources:
     Umeyama (1991), Least-squares estimation of transformation parameters between two
@@ -21,18 +22,18 @@ from forcefit.validation.exchange.device_frame import robust_frame, scatter_of
 from forcefit.validation.exchange.reading import LENGTHS
 
 _UNITS = {**LENGTHS, "ft": 0.3048}
-# accepted scatter of corrected readings, relative to the scatter of uncorrected
-# readings
+# Corrected readings fit far better if their scatter is below this fraction of the
+# uncorrected scatter.
 _FAR_BETTER = 0.25
-_SCALED = 0.02  # largest relative scatter of distance ratios with one unit factor
-# relative accepted error of the factor between two units, because the robot has errors
-# too
+_SCALED = 0.02  # largest relative scatter of distance ratios for a wrong unit
+# Accepted relative error of the factor between two units, which errors of the robot
+# change.
 _UNIT = 0.05
-# number of following readings to which the distance of each reading is computed
+# Distances are computed from each reading to this number of following readings.
 _PAIRED = 10
-# relative to the declared distance of two targets: larger differences are reported
+# Relative to the declared distance of two targets; larger differences are reported.
 _APART = 0.1
-# reversal of one axis; reversals of other axes differ by a rotation only
+# Reversal of one axis; reversals of other axes differ only by a rotation.
 _MIRRORED = np.array([1.0, -1.0, 1.0])
 
 
@@ -45,10 +46,10 @@ def check_axes(
         file: the targets file, for messages.
         measured: (N, 3) [m] readings, device axes.
         nominal: (N, 3) [m] nominal positions, base axes.
-        known: whether the device's axes are equal to the base's.
+        known: whether the axes of the device equal the axes of the base.
 
     Raises:
-        BadInput: a different unit or different axes fit far better.
+        BadInput: the readings fit far better in a different unit or in different axes.
     """
     scatter = _scatter(measured, nominal, known)
     factor, meant = _units_of(_factor(measured, nominal, known))
@@ -76,18 +77,20 @@ def check_axes(
 def check_targets(
     file: Path, places: Mapping[str, NDArray], measured: NDArray
 ) -> list[str]:
-    """Compare distances between targets with the declared ones.
+    """Compare measured distances between targets with the declared distances.
 
     Args:
         file: the targets file, for messages.
-        places: (3,) [m] declared position of each target by name, platform axes.
+        places: mapping from the name of each target to its declared position (3,) [m],
+            platform axes.
         measured: (R, T, 3) [m] positions of the targets in each row; NaN if not read.
 
     Returns:
-        Remarks on pairs whose distance differs from the declared one.
+        Remarks about pairs of targets whose distance differs from the declared
+        distance.
 
     Raises:
-        BadInput: all distances differ by one factor.
+        BadInput: all distances differ by one common factor.
     """
     names, ratios, remarks = list(places), [], []
     for i, j in combinations(range(len(names)), 2):
@@ -117,7 +120,7 @@ def check_targets(
 
 
 def _units_of(factor: float) -> tuple[float, str]:
-    """Return the nearest factor between two units, and their names; or 1 and empty."""
+    """Return the nearest factor between two units and their names, or 1 and ""."""
     found = [
         (_UNITS[b] / _UNITS[a], f"as {b} taken for {a}", a, b)
         for a, b in permutations(_UNITS, 2)
@@ -131,7 +134,7 @@ def _factor(measured: NDArray, nominal: NDArray, known: bool) -> float:
     """Return the ratio of nominal to measured distances, robust against blunders."""
     if known:
         pairs = [(measured, nominal)]
-    # between readings, because these distances do not depend on the device's pose
+    # Distances between readings do not depend on the pose of the device.
     else:
         shifts = range(1, min(len(measured), _PAIRED))
         pairs = [
@@ -145,7 +148,7 @@ def _factor(measured: NDArray, nominal: NDArray, known: bool) -> float:
 
 
 def _scatter(measured: NDArray, nominal: NDArray, known: bool) -> float:
-    """Return the scatter [m] about the best frame, or about the known base."""
+    """Return the scatter [m] about the best frame, or about the known base frame."""
     if known:
         return scatter_of(np.linalg.norm(measured - nominal, axis=1))
     return robust_frame(measured, nominal)[1]

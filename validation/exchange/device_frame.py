@@ -1,11 +1,4 @@
-"""Pose of the device, exchanged targets, and blunders among readings.
-
-Sources:
-    Kabsch (1976), A solution for the best rotation to relate two sets of vectors, Acta
-    Crystallographica A32, 922.
-    Rousseeuw, Croux (1993), Alternatives to the median absolute deviation: 1.4826 MAD
-    is one standard deviation of Gaussian scatter.
-"""
+"""Estimate the pose of the device, and find exchanged targets and blunders."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,19 +7,20 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
-# multiple of the scatter of all readings that is impossible for a machine
+# Deviations above this multiple of the scatter of all readings are not caused by a
+# machine.
 _GROSS = 20.0
-# relative to the misfit: largest misfit with which an exchange is accepted
+# An exchange is accepted if it reduces the misfit to this fraction.
 _BETTER = 0.25
-_MOST = 6  # largest number of targets whose exchanges are all tried, 720 of them
+_MOST = 6  # largest number of targets for which all 720 orders are tried
 
 
 @dataclass(frozen=True, eq=False)
 class DeviceFrame:
-    """Pose of the base in the device's axes: base = rotation @ device + shift.
+    """Transformation from device axes to base axes: base = rotation @ device + shift.
 
     Attributes:
-        rotation: (3, 3) rotation from the device's to the base's axes.
+        rotation: (3, 3) rotation from the axes of the device to the axes of the base.
         shift: (3,) [m] origin of the device in base axes.
     """
 
@@ -34,12 +28,12 @@ class DeviceFrame:
     shift: NDArray
 
     def to_base(self, points: NDArray) -> NDArray:
-        """Return (..., 3) [m] points, given in device axes, in base axes."""
+        """Transform (..., 3) [m] points from device axes to base axes."""
         return points @ self.rotation.T + self.shift
 
 
 def fit_frame(measured: NDArray, nominal: NDArray) -> DeviceFrame:
-    """Return the frame that brings measured points nearest to nominal points.
+    """Return the frame that fits measured points to nominal points by least squares.
 
     Args:
         measured: (N, 3) [m] points in device axes.
@@ -56,20 +50,20 @@ def fit_frame(measured: NDArray, nominal: NDArray) -> DeviceFrame:
 
 
 def spans_a_plane(points: NDArray) -> bool:
-    """Return whether (N, 3) points determine a frame: they are not on one line."""
+    """Return whether (N, 3) points determine a frame, that is, are not on one line."""
     sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     return len(points) > 2 and bool(sizes[1] > 1e-6 * sizes[0] > 0)
 
 
 def robust_frame(measured: NDArray, nominal: NDArray) -> tuple[DeviceFrame, float]:
-    """Return the frame fitted without gross readings, and the scatter about it.
+    """Fit a frame without gross errors, and return it with the scatter of the points.
 
     Args:
         measured: (N, 3) [m] points in device axes.
         nominal: (N, 3) [m] points in base axes.
 
     Returns:
-        The frame, and the scatter [m] of one component.
+        The frame, and the standard deviation [m] of one component of the points.
     """
     kept = np.ones(len(measured), dtype=bool)
     for _ in range(20):
@@ -84,8 +78,9 @@ def robust_frame(measured: NDArray, nominal: NDArray) -> tuple[DeviceFrame, floa
 
 
 def scatter_of(gaps: NDArray) -> float:
-    """Return the [m] robust scatter of (N,) distances; at least the rounding error."""
-    # the median length of a Gaussian vector in space is 1.538 of one component's sigma
+    """Return the robust scatter [m] of (N,) distances, at least the rounding error."""
+    # The median length of a Gaussian vector in space is 1.538 times the sigma of one
+    # component.
     return float(np.median(gaps)) / 1.538 + 1e-12
 
 
@@ -100,12 +95,13 @@ def exchanged_throughout(
     """Return an order of the targets that fits far better than the given order.
 
     Args:
-        measured: for each target (R, 3) [m] in device axes, NaN where not read.
-        nominal: for each target (R, 3) [m] in base axes.
+        measured: for each target (R, 3) [m] positions in device axes; NaN if not
+            measured.
+        nominal: for each target (R, 3) [m] positions in base axes.
 
     Returns:
-        For each target the index of the target that was read; None if the names are
-        right.
+        For each target the index of the target that was measured; None if the names are
+        correct.
     """
     count = len(measured)
     if not 2 <= count <= _MOST:
@@ -134,8 +130,8 @@ def exchanged_here(measured: NDArray, nominal: NDArray, scatter: float) -> (
         scatter: [m] scatter of all readings.
 
     Returns:
-        For each target the index of the target that was read; None if none was
-        exchanged.
+        For each target the index of the target that was measured; None if no targets
+        were exchanged.
     """
     count = len(measured)
     own = np.linalg.norm(measured - nominal, axis=1).max(initial=0.0)

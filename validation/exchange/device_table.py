@@ -1,10 +1,11 @@
-"""Exports of measuring devices: points by name, in a table that states its units.
+"""Read exports of measuring devices: tables of points with names and units.
 
-Accepted are SpatialAnalyzer text (``collection::group::point``), exports of Leica,
-FARO, API, Vicon and OptiTrack software, and plain tables: cells separated by blanks,
-tabs, semicolons or commas, with or without a header, and with lines before it.  The
-reader does not guess.  Units are stated in the table or in the targets file; a decimal
-comma and the orders of dates and angles are stated in the targets file.
+The reader accepts SpatialAnalyzer text (``collection::group::point``), exports of
+Leica, FARO, API, Vicon and OptiTrack software, and plain tables.  The cells of a plain
+table are separated by blanks, tabs, semicolons or commas.  A header and lines before
+the header are optional.  The reader does not guess the format.  Units must be given in
+the table or in the targets file.  A decimal comma and the orders of dates and angles
+must be given in the targets file.
 """
 
 from collections.abc import Mapping, Sequence
@@ -33,21 +34,21 @@ from forcefit.validation.exchange.reading import Reading, Writing
 def read_device_table(
     path: Path | str, writing: Writing, targets: Mapping[str, NDArray]
 ) -> list[Reading]:
-    """Return the points of an export.
+    """Read the points of an export.
 
     Args:
         path: the file.
-        writing: declared format, used where the file does not state one.
-        targets: (3,) [m] position of each target by name, platform axes; a table may
-            have columns for each target.
+        writing: declared format, for properties that the file does not state.
+        targets: mapping from the name of each target to its position (3,) [m], platform
+            axes.  A table may contain separate columns for each target.
 
     Returns:
-        The readings in the order of the file; a row with several targets yields several
-        readings.
+        The readings in the order of the file.  A row with several targets is converted
+        to several readings.
 
     Raises:
-        BadInput: the file has no coordinates or no unit, or a cell is neither a number
-            nor a time.
+        BadInput: the file contains no coordinates or no unit, or a cell is neither a
+            number nor a time.
     """
     sheet = read_sheet(path, writing.decimal)
     writing = replace(writing, decimal=sheet.decimal)
@@ -67,7 +68,7 @@ def read_device_table(
 
 
 def _lacking(cells: Sequence[str]) -> str:
-    """Return the first axis that is not among the headings of a line."""
+    """Return the first of x, y, z that is missing in the headings of a line."""
     words = " ".join(cells).lower().split()
     return next((axis for axis in "xyz" if axis not in words), "x")
 
@@ -79,7 +80,7 @@ def _is_data(cells: Sequence[str], decimal: str) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _HeadedRows:
-    """Rows below a header, which are converted to readings."""
+    """Converts the rows below a header to readings."""
 
     values: CellValues
 
@@ -88,7 +89,7 @@ class _HeadedRows:
         header = self.values.header
         place = f"{self.values.sheet.file}: line {line}"
         while len(cells) > len(header.cells) and not cells[-1]:
-            cells = cells[:-1]  # the line ends with a separator
+            cells = cells[:-1]  # trailing separator
         if len(cells) != len(header.cells):
             raise BadInput(
                 f"{place}: found {len(cells)} cells, expected {len(header.cells)} as "
@@ -105,14 +106,14 @@ class _HeadedRows:
         return readings
 
     def _time(self, place: str, parts: list[tuple[str, str]]) -> float:
-        """Return time [s] of a row from its date and time of day; NaN without one."""
+        """Return the time [s] of a row from its date and time of day, or NaN."""
         stamp = " ".join(cell for _, cell in sorted(parts))
         if missing(stamp.strip()):
             return np.nan
         return parse_time(place, stamp, self.values.writing)
 
     def _has_place(self, own: list[int]) -> bool:
-        """Return whether columns hold a point, with x, y and z once each."""
+        """Return whether columns contain a point, with x, y and z once each."""
         columns = self.values.header.columns
         axes = [columns[k].axis for k in own if columns[k].kind == "axis"]
         twice = [axis for axis in axes if axes.count(axis) > 1]
@@ -147,7 +148,7 @@ class _HeadedRows:
         return Reading(file, line, names, position, sigma, time, rotation)
 
     def _spread(self, line: int, k: int, value: float) -> float:
-        """Return a standard deviation [m]; NaN if it was rounded to zero."""
+        """Return a standard deviation [m]; NaN if the file rounds it to zero."""
         if value < 0:
             name = self.values.header.cells[k]
             place = f"{self.values.sheet.file}: line {line}, {name}"
@@ -155,7 +156,7 @@ class _HeadedRows:
         return value if value > 0 else np.nan
 
     def _rotation(self, line: int, cells: list[str], own: list[int]) -> NDArray | None:
-        """Return the target's axes in the device's axes; None if they were not read."""
+        """Return the target's axes in the device's axes; None if not measured."""
         header, writing = self.values.header, self.values.writing
         place = f"{self.values.sheet.file}: line {line}"
         kind, at = orientation_columns(header.columns, own)

@@ -1,4 +1,4 @@
-"""The header of a device's table: its line, and the target of each column."""
+"""Find the header of a device's table, and the target of each column."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -25,10 +25,10 @@ class Header:
 
     Attributes:
         first: index of the first row of data among the rows of the table.
-        cells: cells of the header as written; empty without a header.
+        cells: unchanged cells of the header; empty if there is no header.
         columns: meaning of each column.
-        unit: unit of lengths that is stated before the header, or empty.
-        unit_line: line of the unit, for messages.
+        unit: unit of lengths in the lines before the header; empty if there is none.
+        unit_line: number of the line with this unit, for messages.
     """
 
     first: int
@@ -41,14 +41,14 @@ class Header:
 def find_header(
     rows: Sequence[tuple[int, list[str]]], targets: Iterable[str]
 ) -> Header | None:
-    """Return the header of a table, which may follow other lines.
+    """Find the header of a table, which may follow other lines.
 
     Args:
-        rows: rows of the table, by line.
+        rows: line number and cells of each row of the table.
         targets: names of the targets.
 
     Returns:
-        The header; None if no row names x, y and z.
+        The header; None if no row contains the names x, y and z.
     """
     for i, (_, cells) in enumerate(rows[:_PREAMBLE]):
         cells = _with_kinds(cells, rows[i - 1][1] if i else [])
@@ -76,10 +76,10 @@ def find_header(
 
 
 def without_header(rows: Sequence[tuple[int, list[str]]], decimal: str) -> Header:
-    """Return the start of rows without a header, and the unit stated before them.
+    """Find the first row of a table without a header, and the unit before this row.
 
     Args:
-        rows: rows of the table, by line.
+        rows: line number and cells of each row of the table.
         decimal: the decimal mark.
 
     Returns:
@@ -95,10 +95,11 @@ def without_header(rows: Sequence[tuple[int, list[str]]], decimal: str) -> Heade
 def _by_target(
     cells: Sequence[str], before: Sequence[tuple[int, list[str]]], targets: list[str]
 ) -> list[Column]:
-    """Return the columns of a table with several targets in a row; else empty.
+    """Return the columns of a table with several targets in a row, or nothing.
 
-    Targets are named in the columns, or in a row above them.  If there are as many
-    groups of columns as targets, the order of the targets is used.
+    The names of the targets are in the headings of the columns, or in a row above.
+    Without names, the order of the targets is used if the number of column groups
+    equals the number of targets.
 
     Args:
         cells: cells of the header.
@@ -115,7 +116,7 @@ def _by_target(
     plain = [column_of(cell) for cell in cells]
     for _, above in reversed(before):
         labels = _filled(above, len(cells))
-        # a body, not its markers such as arm:1, arm:2
+        # Prefer the name of a body to its markers, such as arm:1, arm:2.
         exact = set(labels) & set(targets)
         found = [
             label if label in exact else _only(label, [*{*targets} - exact])
@@ -136,7 +137,7 @@ def _by_target(
 
 
 def _by_order(columns: Sequence[Column], targets: list[str]) -> list[Column]:
-    """Assign groups of x, y, z to the targets in order, if there is one for each."""
+    """Assign groups of x, y, z to the targets in order if their numbers are equal."""
     groups = -1
     ordered = []
     for column in columns:
@@ -149,7 +150,7 @@ def _by_order(columns: Sequence[Column], targets: list[str]) -> list[Column]:
 
 
 def _complete(columns: Sequence[Column], least: int = 1) -> bool:
-    """Return whether every target with a coordinate has all three coordinates once."""
+    """Return whether columns x, y and z occur exactly once for every named target."""
     axes: dict[str, str] = {}
     for column in columns:
         if column.kind == "axis" and column.target:
@@ -158,7 +159,7 @@ def _complete(columns: Sequence[Column], least: int = 1) -> bool:
 
 
 def _of_target(cell: str, targets: Sequence[str]) -> tuple[Column, str]:
-    """Return the meaning of a column that names a target before or after its kind."""
+    """Return the meaning of a heading with a target's name before or after the axis."""
     for target in sorted(targets, key=len, reverse=True):
         name = re.escape(target)
         before = re.search(rf"(?:^|[^a-z0-9]){name}(?=[^a-z0-9]|[xyz]\b)", cell, re.I)
@@ -175,14 +176,14 @@ def _of_target(cell: str, targets: Sequence[str]) -> tuple[Column, str]:
 
 
 def _only(label: str, targets: Sequence[str]) -> str:
-    """Return the target that a label names, as in arm:SMR1; empty if there is none."""
+    """Return the target that a label such as arm:SMR1 names; empty if there is none."""
     words = re.split(r"[:./|\s]+", label)
     found = [target for target in targets if target in words or target == label]
     return found[0] if len(found) == 1 else ""
 
 
 def _with_kinds(cells: list[str], above: Sequence[str]) -> list[str]:
-    """Return column names with the kind from the line above: Rotation, Position."""
+    """Return headings combined with the kind (Rotation, Position) in the line above."""
     kinds = [word if word.lower() in _KINDS else "" for word in above]
     if not any(kinds) or len(above) > len(cells):
         return cells
@@ -191,7 +192,7 @@ def _with_kinds(cells: list[str], above: Sequence[str]) -> list[str]:
 
 
 def _filled(cells: Sequence[str], count: int) -> list[str]:
-    """Return the labels of merged cells: an empty cell has the label before it."""
+    """Return the labels of merged cells; an empty cell repeats the label before it."""
     labels: list[str] = []
     for cell in [*cells, *[""] * count][:count]:
         labels.append(cell or (labels[-1] if labels else ""))
@@ -199,12 +200,12 @@ def _filled(cells: Sequence[str], count: int) -> list[str]:
 
 
 def _stated(rows: Sequence[tuple[int, list[str]]]) -> tuple[int, str]:
-    """Return line and unit of lengths stated before a header; 0 and empty if absent."""
+    """Return line and unit of lengths before a header; 0 and empty if absent."""
     for line, cells in rows:
         if match := _STATED.search(" ".join(cells)):
             words = re.findall(r"[A-Za-zµμ]+", match[1])[:4]
             units = [unit for w in words if (unit := unit_word(w)) in LENGTH_UNITS]
-            if units:  # the "in" of "units in mm" is a preposition, not inches
+            if units:  # "in" of "units in mm" does not mean inches
                 return line, next((u for u in units if u != "in"), "in")
     return 0, ""
 
@@ -215,13 +216,13 @@ def _is_number(cell: str, decimal: str = ".") -> bool:
 
 
 def by_target(columns: Sequence[Column]) -> Mapping[str, list[int]]:
-    """Return the columns of each target; columns without a target have an empty name.
+    """Group the columns by target; the key of columns without a target is empty.
 
     Args:
         columns: columns of a table.
 
     Returns:
-        The columns by target, in the order in which targets are first named.
+        Mapping from target to its columns, in the order of first occurrence.
     """
     groups: dict[str, list[int]] = {}
     for k, column in enumerate(columns):

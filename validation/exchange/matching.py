@@ -1,4 +1,4 @@
-"""Assignment of readings to targets and commands."""
+"""Assign readings to targets and commands."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,16 +17,16 @@ class Match:
 
     Attributes:
         how: method of the assignment: ``"name"``, ``"time"`` or ``"order"``.
-        rows: for each row of the campaign its command and its readings by target; a
-            second reading of a target at a command makes a second row.
+        rows: for each row of the campaign its command and its readings by target.  A
+            second reading of a target at the same command is stored in a second row.
         strangers: readings of points that are not targets, such as points on the
             ground.
-        unmatched: readings of targets without a command.
+        unmatched: readings of targets to which no command was assigned.
         missing: readings without a position.
-        duplicates: readings that occur twice in a file, with equal digits; they are
-            left out.
-        copies: readings that occur in two files, with equal digits; they are kept,
-            because a device with few digits may repeat them.
+        duplicates: readings that occur twice in one file with equal digits.  The second
+            one is omitted.
+        copies: readings that occur in two files with equal digits.  Both are used,
+            because a device with few digits may measure equal values.
     """
 
     how: str
@@ -105,7 +105,7 @@ def match(
 
 
 def _repeated(readings: Sequence[Reading]) -> str:
-    """Return a hint on the first reading that occurs twice, for a message."""
+    """Return a hint for a message about the first reading that occurs twice."""
     seen: dict[object, Reading] = {}
     for reading in readings:
         digits = (reading.names, reading.position.tobytes(), str(reading.time))
@@ -116,7 +116,7 @@ def _repeated(readings: Sequence[Reading]) -> str:
 
 
 def _same(a: Reading, b: Reading) -> bool:
-    """Return whether two readings have equal digits, name and time."""
+    """Return whether digits, name and time of two readings are equal."""
     timed = a.time == b.time or bool(np.isnan(a.time) and np.isnan(b.time))
     return timed and a.names == b.names and np.array_equal(a.position, b.position)
 
@@ -124,14 +124,15 @@ def _same(a: Reading, b: Reading) -> bool:
 def _of_targets(
     readings: Sequence[Reading], targets: list[str]
 ) -> list[tuple[Reading, str]]:
-    """Return the readings of targets; unnamed readings belong to a single target."""
+    """Return the readings of targets; unnamed readings belong to the only target."""
     ours = []
     for reading in readings:
         named = [part for part in reading.names if part in targets]
         if len(named) > 1:
             expected = ", ".join(map(quoted, targets[:6]))
             raise BadInput(
-                f"{reading.place}: expected the name of one target: {expected}"
+                f"{reading.place}: found the names of several targets, expected one: "
+                f"{expected}"
             )
         if named:
             ours.append((reading, named[0]))
@@ -140,13 +141,14 @@ def _of_targets(
     if not ours:
         expected = ", ".join(map(quoted, targets[:6]))
         raise BadInput(
-            f"{readings[0].place}: expected the name of one target in it: {expected}"
+            f"{readings[0].place}: found no name of a target, expected one of: "
+            f"{expected}"
         )
     return ours
 
 
 def _nearest(reading: Reading, commands: Commands, window: float) -> int:
-    """Return the row of the command nearest in time; -1 if none is in the window."""
+    """Return the index of the command nearest in time; -1 if none is in the window."""
     gaps = np.abs(commands.times - reading.time)
     return int(np.argmin(gaps)) if gaps.min() <= window else -1
 

@@ -1,6 +1,7 @@
-"""Orientations read by a device: quaternions, or three angles in a stated order.
+"""Convert orientations from a device: quaternions, or three angles in a given order.
 
-They transform the target's axes to the device's: p_device = R p_target.
+An orientation R transforms vectors from target axes to device axes: p_device = R
+p_target.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,10 +17,12 @@ from forcefit.validation.exchange.column_names import QUATERNION, Column
 
 ROTATION_VECTOR = "rotation_vector"
 ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180}
-# accepted scatter of inverse rotations, relative to the scatter of the given rotations
+# Inverse rotations fit far better if their scatter is below this fraction of the
+# scatter of the given rotations.
 _FAR_BETTER = 0.25
-_GROSS = 20.0  # multiple of the scatter above which a reading is left out of the mean
-# ratio of the median length of a Gaussian vector in space to the sigma of one component
+_GROSS = 20.0  # multiple of the scatter of readings excluded from the mean
+# Ratio of the median length of a Gaussian vector in space to the sigma of one
+# component.
 _MEDIAN = 1.538
 _ROUNDING = 1e-12  # [rad] smallest scatter, due to rounding
 _UNIT_NORM = 0.01  # accepted error of the norm of rounded quaternions
@@ -50,7 +53,7 @@ def orientation_columns(
     """
     w = {columns[k].axis: k for k in own if columns[k].kind == "quaternion"}
     angles = {columns[k].axis: k for k in own if columns[k].kind == "angle"}
-    # if the columns contain W, then Rotation X, Y, Z are parts of a quaternion
+    # If there is a column W, then Rotation X, Y, Z are components of a quaternion.
     if "w" in w:
         w = angles | w
     if set(w) >= set(QUATERNION):
@@ -116,7 +119,7 @@ class Turns:
 
     Attributes:
         deviation: (R, 3) [rad] rotation vector from nominal to actual orientation, base
-            axes; NaN if not read.
+            axes; NaN if not measured.
         mount: (3, 3) the target's axes in the platform's axes.
         scatter: [rad] scatter of one component.
     """
@@ -129,11 +132,11 @@ class Turns:
 def turns_of(
     file: Path, seen: NDArray, base: NDArray, nominal: NDArray, mount: NDArray | None
 ) -> Turns:
-    """Return the deviations of the orientations of one target.
+    """Return the deviations of one target's orientations from their nominal values.
 
     Args:
         file: the targets file, for messages.
-        seen: (R, 3, 3) the target's axes in the device's axes; NaN if not read.
+        seen: (R, 3, 3) the target's axes in the device's axes; NaN if not measured.
         base: (3, 3) the device's axes in the base's axes.
         nominal: (R, 3, 3) the platform's axes for the declared robot.
         mount: the target's axes in the platform's axes; None if they are to be fitted.
@@ -142,7 +145,7 @@ def turns_of(
         The deviations.
 
     Raises:
-        BadInput: the inverse rotations fit far better.
+        BadInput: the inverses of the rotations fit far better.
     """
     best = _turns(base @ seen, nominal, mount)
     other = _turns(base @ np.swapaxes(seen, 1, 2), nominal, mount)
@@ -157,7 +160,7 @@ def turns_of(
 
 
 def _turns(read: NDArray, nominal: NDArray, mount: NDArray | None) -> Turns:
-    """Return the deviations with a declared or fitted mount, without a check."""
+    """Return the deviations for a declared or fitted mount; nothing is checked."""
     taken = np.isfinite(read).all(axis=(1, 2))
     seen = Rotation.from_matrix(np.swapaxes(nominal[taken], 1, 2) @ read[taken])
     if mount is None:

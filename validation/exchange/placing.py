@@ -1,4 +1,4 @@
-"""Transformation of readings to base axes: pose of the device, impossible readings."""
+"""Transform readings to base axes; find the device's pose and impossible readings."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -24,26 +24,27 @@ from forcefit.validation.exchange.orientation import turns_of
 from forcefit.validation.exchange.reading import Reading
 from forcefit.validation.exchange.targets_file import TargetsFile
 
-# relative to the spread of the commands: larger scatter is not due to the machine
+# Scatter above this fraction of the spread of the commands is not caused by the
+# machine.
 _ASTRAY = 0.1
 _HERE = DeviceFrame(np.eye(3), np.zeros(3))
 
-# number of the command, and readings by target
+# Index of the command, and readings by target.
 Rows = Sequence[tuple[int, Mapping[str, Reading]]]
 
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """Readings as deviations from the declared robot.
+    """Readings, converted to deviations from the declared robot.
 
     Attributes:
         frame: pose of the device.
         scatter: [m] scatter of one component of all readings.
-        read: (R, T) bool, True if a target has a possible reading.
-        gaps: (R, T, 3) [m] deviation of each target, base axes; NaN if not read.
-        turns: (R, 3) [rad] rotation of the platform, base axes; NaN if not read.
-        mounts: (3,) [rad] rotation vector from the platform's axes to the axes of each
-            target whose orientation was read.
+        read: (R, T) bool, True for targets with a plausible reading.
+        gaps: (R, T, 3) [m] deviation of each target, base axes; NaN if not measured.
+        turns: (R, 3) [rad] rotation of the platform, base axes; NaN if not measured.
+        mounts: mapping from each target with measured orientation to the rotation
+            vector (3,) [rad] from platform axes to target axes.
         left_out: descriptions of impossible readings.
         remarks: descriptions of other inconsistencies.
     """
@@ -67,7 +68,7 @@ def place(declared: TargetsFile, commands: Commands, rows: Rows) -> Placed:
         rows: readings by command.
 
     Returns:
-        The readings as deviations.
+        The readings, converted to deviations from the declared robot.
 
     Raises:
         BadInput: the readings do not determine the device's pose, or they fit far
@@ -113,13 +114,13 @@ def place(declared: TargetsFile, commands: Commands, rows: Rows) -> Placed:
 
 
 def _misfit(nominal: NDArray, measured: NDArray, scatter: float) -> list[str]:
-    """Return a remark with a possible reason if readings do not follow the commands."""
+    """Return a remark with a possible cause if readings do not follow the commands."""
     spread = np.linalg.norm(nominal - nominal.mean(axis=(0, 1)), axis=2)
     reach = float(np.sqrt(np.mean(spread**2)))
     if scatter < _ASTRAY * reach:
         return []
     reason = "check whether the readings are joined to the right commands"
-    # distances between targets do not depend on the commands
+    # Distances between targets do not depend on the commands.
     apart = np.linalg.norm(measured - np.roll(measured, 1, axis=1), axis=2)
     known = apart[np.isfinite(apart).all(axis=1)]
     if len(known) and measured.shape[1] > 1 and np.ptp(known, axis=0).max() > scatter:
@@ -134,7 +135,7 @@ def _misfit(nominal: NDArray, measured: NDArray, scatter: float) -> list[str]:
 
 
 def _mean(turns: NDArray) -> NDArray:
-    """Return the (R, 3) mean of (R, T, 3) over the read targets; NaN without any."""
+    """Return the (R, 3) mean of (R, T, 3) over the measured targets, or NaN."""
     read = np.isfinite(turns).all(axis=2)
     total = np.where(read[..., None], turns, 0.0).sum(axis=1)
     count = read.sum(axis=1)[:, None]
@@ -145,7 +146,7 @@ def _turns(
     declared: TargetsFile, commands: Commands, rows: Rows, nominal: NDArray,
     frame: DeviceFrame, name: str, left_out: list[str],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return (R, 3) [rad] deviations by the orientations of a target, and its mount."""
+    """Return (R, 3) [rad] deviations from orientations of a target, and its mount."""
     seen = np.full((len(rows), 3, 3), np.nan)
     for i, (_, readings) in enumerate(rows):
         rotation = readings[name].rotation if name in readings else None
@@ -171,7 +172,7 @@ def _turns(
 def _suspects(
     base: NDArray, nominal: NDArray, read: NDArray, scatter: float, names: list[str]
 ) -> list[tuple[int, str]]:
-    """Return the targets of one command at impossible positions, with reasons."""
+    """Return the targets of one command at implausible positions, with reasons."""
     suspects = []
     ks = np.flatnonzero(read)
     order = exchanged_here(base[ks], nominal[ks], scatter)

@@ -1,4 +1,4 @@
-"""Rows of a device's table without a header: names, followed by numbers."""
+"""Read rows of a device's table without a header: names followed by numbers."""
 
 from collections.abc import Mapping, Sequence
 
@@ -10,9 +10,9 @@ from forcefit.validation.campaign.dialect import parse_number
 from forcefit.validation.exchange.cell_values import CellValues, missing
 from forcefit.validation.exchange.reading import Reading
 
-# largest number of columns before the targets' columns: a counter, a time
+# Largest number of columns before the coordinates, such as a counter or a time.
 _COUNTERS = 3
-# relative to the scatter of distances: largest scatter for the right columns
+# Largest relative scatter of distances between targets for the correct columns.
 _ALIKE = 0.1
 
 
@@ -21,19 +21,21 @@ def read_plain_rows(
     rows: Sequence[tuple[int, list[str]]],
     targets: Mapping[str, NDArray],
 ) -> list[Reading]:
-    """Return the readings of rows without a header.
+    """Read the rows of a table without a header.
 
     Args:
         values: reader of the cells' values.
-        rows: rows by line, with a name and x, y, z, or with numbers only: of one point,
-            or of all targets in their order.  Further cells are ignored.
-        targets: (3,) [m] position of each target by name, platform axes.
+        rows: line number and cells of each row.  A row contains a name and x, y, z, or
+            only numbers: those of one point, or of all targets in order.  Further cells
+            are ignored.
+        targets: mapping from the name of each target to its position (3,) [m], platform
+            axes.
 
     Returns:
         The readings in the order of the file.
 
     Raises:
-        BadInput: a row has too few numbers, or a cell is not a number.
+        BadInput: a row contains too few numbers, or a cell is not a number.
     """
     decimal = values.sheet.decimal
     if len(targets) > 1 and all(_nameless(cells, decimal) for _, cells in rows):
@@ -51,15 +53,16 @@ def _nameless(cells: Sequence[str], decimal: str) -> bool:
 def _first_column(
     rows: Sequence[Sequence[str]], decimal: str, targets: Mapping[str, NDArray]
 ) -> int:
-    """Return the index of the first coordinate in rows of numbers only.
+    """Return the index of the first coordinate in rows that contain only numbers.
 
-    A counter or a time may precede the coordinates.  They do if the distances between
-    targets agree with the declared ones without that column.
+    A counter or a time may precede the coordinates.  Such columns are detected by the
+    distances between targets, which agree with the declared distances only if the
+    correct columns are used.
 
     Args:
         rows: rows of cells.
         decimal: the decimal mark.
-        targets: (3,) [m] position of each target, platform axes.
+        targets: mapping from each target to its position (3,) [m], platform axes.
 
     Returns:
         Index of the column.
@@ -83,7 +86,7 @@ def _first_column(
 
 
 def _of_one(values: CellValues, line: int, cells: list[str], counted: bool) -> Reading:
-    """Return a row with a name, then x, y, z; ``counted``: an integer may be a name."""
+    """Return a row of name, x, y, z; the name may be an integer if ``counted``."""
     names, cells = [], list(cells)
     decimal = values.sheet.decimal
     while cells and not np.isfinite(parse_number(cells[0], decimal)):
@@ -104,7 +107,7 @@ def _of_all(
     values: CellValues, line: int, cells: list[str], first: int,
     targets: Mapping[str, NDArray],
 ) -> list[Reading]:  # fmt: skip
-    """Return a row of numbers only: x, y, z of each target in order."""
+    """Return a row that contains only numbers: x, y, z of each target in order."""
     found = len(cells) - first
     if found < 3 * len(targets):
         raise BadInput(
@@ -120,7 +123,7 @@ def _of_all(
 def _reading(
     values: CellValues, line: int, xyz: list[str], names: tuple[str, ...]
 ) -> Reading:
-    """Return the reading in three cells."""
+    """Return the reading with the coordinates in three cells."""
     position = nothing = np.full(3, np.nan)
     if not any(map(missing, xyz)):
         numbers = [values.number(line, a, c) for a, c in zip("xyz", xyz, strict=True)]

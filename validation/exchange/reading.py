@@ -1,4 +1,4 @@
-"""A reading of a device, and the format of its exports."""
+"""Define a reading of a device, and the format of the device's exports."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ LARGEST = 1e12  # largest accepted absolute value of a number in a table
 
 @dataclass(frozen=True)
 class Writing:
-    """Declared format of an export, used where the export does not state it.
+    """Declared format of an export, for properties that the export does not state.
 
     Attributes:
         unit: unit of lengths; None if the header states it.
@@ -44,11 +44,13 @@ class Reading:
     Attributes:
         file: path of the file, for messages.
         line: line in the file.
-        names: parts of the point's name; the last part is the point's own name.
-        position: (3,) [m] in the device's axes; NaN if the device saw no target.
-        sigma: (3,) [m] standard deviation of each coordinate; NaN where not stated.
+        names: parts of the point's full name, such as collection, group and point.
+        position: (3,) [m] position in the device's axes; NaN if the device detected no
+            target.
+        sigma: (3,) [m] standard deviation of each coordinate; NaN if the file does not
+            state it.
         time: [s] time on the clock of the file; NaN without a time.
-        rotation: (3, 3) the target's axes in the device's axes; None if not read.
+        rotation: (3, 3) the target's axes in the device's axes; None if not measured.
     """
 
     file: str

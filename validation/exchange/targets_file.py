@@ -1,4 +1,4 @@
-"""The targets file of an import: positions of targets, and format of the exports."""
+"""Read the targets file of an import: positions of targets, and format of exports."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -28,14 +28,16 @@ class TargetsFile:
         file: path of the file.
         robot: the declared robot.
         robot_name: name of a built-in robot, or path relative to the targets file.
-        places: (3,) [m] position of each target, platform axes.
+        places: mapping from the name of each target to its position (3,) [m], platform
+            axes.
         registration: ``"unknown"`` if the device's pose is unknown; ``"known"`` if its
             axes are the base's axes.
         window: [s] largest time between a command and its readings.
-        noise: [m] standard deviation of a reading that states none; None if undeclared.
+        noise: [m] standard deviation of readings whose export states none; None if
+            undeclared.
         noise_rotation: [rad] standard deviation of an orientation; None if undeclared.
-        rotations: (3,) [rad] rotation vectors from the platform's axes to the axes of a
-            target, where declared; others are fitted.
+        rotations: mapping from a target to the declared rotation vector (3,) [rad] from
+            platform axes to target axes; all others are fitted.
         writing: format of the exports.
     """
 
@@ -76,7 +78,7 @@ def read_targets(path: Path | str) -> TargetsFile:
         )
     for key in places:
         if not key or set(key) & set(".:,"):
-            raise table.bad("", f"found {quoted(key)}, expected no . , : in a name")
+            raise table.bad("", f"found {quoted(key)}, expected a name without . , :")
     decimal, commands_decimal = _decimals(root)
     writing = Writing(
         unit=_choice(root, "unit", LENGTHS),
@@ -113,7 +115,7 @@ def read_targets(path: Path | str) -> TargetsFile:
 
 
 def _choice(root: Table, key: str, valid: Iterable[str]) -> str | None:
-    """Return the word given for a key; None if the key is absent."""
+    """Return the word of a key; None if the key is absent."""
     return root.choice(key, valid) if root.has(key) else None
 
 

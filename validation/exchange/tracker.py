@@ -1,4 +1,4 @@
-"""``forcefit validation import``: a campaign from a device's files and commands."""
+"""Implement ``forcefit validation import``: convert a device's files to a campaign."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -27,27 +27,27 @@ from forcefit.validation.exchange.placing import Placed, place
 from forcefit.validation.exchange.reading import Reading
 from forcefit.validation.exchange.targets_file import TargetsFile, read_targets
 
-# largest share of readings that may be left out; a larger share has another cause
+# Largest fraction of readings that may be omitted; a larger fraction has another cause.
 _MOST_LEFT_OUT = 0.2
 
 
 @dataclass(frozen=True, eq=False)
 class Import:
-    """A campaign made of a device's files.
+    """A campaign that was created from a device's files.
 
     Attributes:
         robot: name of the robot.
-        how: method of assignment of readings to commands: ``"name"``, ``"time"``,
-            ``"order"``.
+        how: method by which readings were assigned to commands: ``"name"``, ``"time"``
+            or ``"order"``.
         header: columns of the table.
         cells: rows of the table.
         declaration: text of ``campaign.toml``.
         frame: pose of the device.
         scatter: [m] scatter of one component about the declared robot.
         readings: number of used readings.
-        left_out: readings that are not used, with the reason as text.
-        mounts: (3,) [rad] rotation vector from the platform's axes to the axes of each
-            target whose orientation was read.
+        left_out: descriptions of the readings that were not used, with the reasons.
+        mounts: mapping from each target with measured orientation to the rotation
+            vector (3,) [rad] from platform axes to target axes.
         remarks: descriptions of other inconsistencies.
     """
 
@@ -99,22 +99,22 @@ def import_readings(
     files: Sequence[Path | str], targets: Path | str, commands: Path | str,
     folder: Path | str,
 ) -> Import:  # fmt: skip
-    """Make a campaign from a device's files.
+    """Create a campaign from a device's files.
 
     Args:
         files: exports of the device, or ROS bags.
         targets: the targets file (:mod:`forcefit.validation.exchange.targets_file`).
         commands: the table of commands
             (:mod:`forcefit.validation.exchange.commands_table`).
-        folder: folder to be written; it must be absent or empty.
+        folder: folder to be written, which must not exist or must be empty.
 
     Returns:
-        The campaign as written.
+        The campaign that was written.
 
     Raises:
-        BadInput: a file violates a rule, the readings fit far better in a different
-            unit, mirrored or with exchanged targets, or too many readings would be left
-            out.  No file is written in these cases.
+        BadInput: a file violates a rule, or too many readings would be omitted, or the
+            readings fit far better in a different unit, mirrored or with exchanged
+            targets.  In these cases no file is written.
     """
     folder = Path(folder)
     check_new_folder(folder)
@@ -142,7 +142,7 @@ def _read(file: Path | str, declared: TargetsFile) -> list[Reading]:
 def _campaign(
     declared: TargetsFile, commands: Commands, joined: Match, folder: Path, total: int
 ) -> Import:
-    """Return the two texts of the campaign, and the readings left out."""
+    """Return the two texts of the campaign, and descriptions of omitted readings."""
     names = list(declared.places)
     placed = place(declared, commands, joined.rows)
     left_out = _left_out(joined, placed, total)
@@ -172,7 +172,7 @@ def _campaign(
 
 
 def _left_out(joined: Match, placed: Placed, total: int) -> list[str]:
-    """Return descriptions of the readings left out; refuse if there are too many."""
+    """Return descriptions of omitted readings; raise BadInput if there are too many."""
     why = {"time": "no command is near it in time"}.get(
         joined.how, "its name contains no id of a command"
     )
@@ -196,7 +196,7 @@ def _left_out(joined: Match, placed: Placed, total: int) -> list[str]:
 
 
 def _remarks(declared: TargetsFile, joined: Match, placed: Placed) -> list[str]:
-    """Return remarks on the readings in the campaign."""
+    """Return remarks about the readings in the campaign."""
     remarks = []
     if joined.copies:
         remarks.append(

@@ -1,4 +1,4 @@
-"""Effects that a campaign can and cannot show, before any diagnosis.
+"""Find the effects that a campaign can and cannot show, before any diagnosis.
 
-Begin with ``inspection.py``.
+Start with ``inspection.py``.
 """

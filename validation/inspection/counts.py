@@ -1,4 +1,4 @@
-"""Counts and ranges of a campaign's rows, loads, readings and covariates."""
+"""Count the rows, loads, readings and covariates of a campaign, with their ranges."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,7 +7,7 @@ from forcefit.validation.campaign.campaign import LOAD, READING, Campaign
 
 
 def row_counts(kinds: NDArray) -> dict:
-    """Return the number of kinds; the least, median and most rows of a kind."""
+    """Return the number of kinds, and the least, median and largest number of rows."""
     _, rows = np.unique(kinds, return_counts=True)
     return {"count": len(rows), "rows_each": [rows.min(), np.median(rows), rows.max()]}
 
@@ -28,7 +28,7 @@ def load_counts(c: Campaign) -> dict:
 
 
 def reading_counts(c: Campaign) -> dict:
-    """Return the number of cells, the size and the sigma of each component."""
+    """Return the number of cells, the size and the sigma of each reading component."""
     counts = {}
     for k, name in enumerate(READING):
         cells = c.cells[:, k]
@@ -45,7 +45,7 @@ def reading_counts(c: Campaign) -> dict:
 
 
 def covariate_counts(c: Campaign) -> dict:
-    """Return range, levels and correlated covariates of each covariate."""
+    """Return the range, the levels and the correlated covariates of each covariate."""
     return {
         name: {
             "range": [x.min(), x.max()],
@@ -62,7 +62,7 @@ def covariate_counts(c: Campaign) -> dict:
 
 
 def correlation(x: NDArray, y: NDArray) -> float:
-    """Return the correlation of two columns; 0 if one of them does not vary."""
+    """Return the correlation of two columns; 0 if one of them is constant."""
     x, y = x - x.mean(), y - y.mean()
     size = float(np.linalg.norm(x) * np.linalg.norm(y))
     return float(x @ y) / size if size > 0 else 0.0

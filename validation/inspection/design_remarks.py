@@ -1,4 +1,4 @@
-"""Sentences on the effects that a campaign's design can and cannot show."""
+"""Write sentences about the effects that a campaign's design can and cannot show."""
 
 from itertools import combinations
 
@@ -14,22 +14,22 @@ from forcefit.validation.inspection.remark import CAREFUL, FINE, LOST, Remark
 from forcefit.validation.inspection.repeat_remarks import on_repeats
 from forcefit.validation.inspection.repeats import RepeatNoise
 
-# [1/K] expansion of aluminium, which is nearly the largest among materials of machines
+# [1/K] Thermal expansion of aluminium; few machine materials expand more.
 _EXPANSION = 2.4e-5
 _TOGETHER = 0.9  # correlation above which two covariates cannot be distinguished
-# relative to the robot's size; larger deviations are hardly manufacturing errors
+# Deviations above this fraction of the robot's size are hardly manufacturing errors.
 _UNIT = 0.02
 
 
 def remarks_on(
     campaign: Campaign, repeats: Revisits, visits: Revisits, noise: RepeatNoise | None
 ) -> list[Remark]:
-    """Return all remarks on a campaign, those on lost effects first.
+    """Return all remarks about a campaign; those about lost information are first.
 
     Args:
         campaign: campaign of R rows.
-        repeats: order of its repeats in the session.
-        visits: order of its configurations in the session.
+        repeats: order of the repeats in the session.
+        visits: order of the configurations in the session.
         noise: noise computed from the repeats; None without repeats.
 
     Returns:
@@ -45,7 +45,7 @@ def remarks_on(
 
 
 def _on_readings(campaign: Campaign) -> list[Remark]:
-    """Return remarks on unmeasured, constant, rounded and too large components."""
+    """Return remarks about unmeasured, constant, rounded and too large components."""
     remarks = []
     measured, sigma = campaign.measured, campaign.sigma
     absent = ", ".join(campaign.not_measured)
@@ -78,7 +78,7 @@ def _on_readings(campaign: Campaign) -> list[Remark]:
 
 
 def _on_configurations(campaign: Campaign, visits: Revisits) -> list[Remark]:
-    """Return remarks on joints that never moved and on the order of configurations."""
+    """Return remarks about joints that never move and the order of configurations."""
     remarks = []
     robot = campaign.robot
     still = [
@@ -107,7 +107,7 @@ def _on_configurations(campaign: Campaign, visits: Revisits) -> list[Remark]:
 
 
 def _on_loads(campaign: Campaign) -> list[Remark]:
-    """Return remarks on load levels, and on loads that vary with the configuration."""
+    """Return remarks about load levels, and loads that vary with the configuration."""
     loads = campaign.loads
     if not loads.any():
         text = (
@@ -143,7 +143,7 @@ def _on_loads(campaign: Campaign) -> list[Remark]:
 
 
 def _on_temperature(campaign: Campaign) -> list[Remark]:
-    """Return remarks on whether thermal expansion is visible."""
+    """Return remarks about whether thermal expansion is visible."""
     temperature = campaign.covariates.get("temperature")
     if temperature is None:
         text = (
@@ -174,7 +174,7 @@ def _on_temperature(campaign: Campaign) -> list[Remark]:
 
 
 def _on_approach(campaign: Campaign) -> list[Remark]:
-    """Return remarks on whether friction is visible."""
+    """Return remarks about whether friction is visible."""
     side = campaign.covariates.get("approach")
     if side is None:
         text = "No cov.approach: friction can be neither found nor excluded."
@@ -195,7 +195,7 @@ def _on_approach(campaign: Campaign) -> list[Remark]:
 
 
 def _on_time(campaign: Campaign) -> list[Remark]:
-    """Return remarks on whether a drift is visible."""
+    """Return remarks about whether a drift is visible."""
     if np.ptp(campaign.covariates.get("time", np.zeros(1))) == 0.0:
         text = (
             "No cov.time, or the same in every row: a drift can be neither found nor "
@@ -206,7 +206,7 @@ def _on_time(campaign: Campaign) -> list[Remark]:
 
 
 def _on_covariates(campaign: Campaign) -> list[Remark]:
-    """Return remarks on correlated covariates."""
+    """Return remarks about correlated covariates."""
     columns = dict(campaign.covariates)
     for name, values in zip(LOAD, campaign.loads.T, strict=True):
         columns[f"load.{name}"] = values

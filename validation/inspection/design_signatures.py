@@ -1,4 +1,4 @@
-"""Changes of a campaign's readings by each effect of the library."""
+"""Compute the changes of a campaign's readings by each effect of the library."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,7 +20,8 @@ from forcefit.validation.diagnosis.signatures import (
 )
 from forcefit.validation.inspection.repeats import slow_changes
 
-# finite motions have no unknown, and their exact model takes seconds for each row
+# Finite motions are omitted: the effect has no unknown, and its exact model takes
+# seconds per row.
 _NOT_COMPARED = tuple(name for name, effect in LIBRARY.items() if effect.finite)
 
 
@@ -29,10 +30,11 @@ class DesignSignatures:
     """Changes of the readings over sigma, by unknowns of plausible size.
 
     Attributes:
-        columns: (N, k) changes by effect.  Each frame has separate unknowns; clearance
-            is the same in all joints, and the load determines the position within it.
-        nuisance: (N, p) changes by an unknown registration.
-        untestable: reason why an effect has no columns, by name of the effect.
+        columns: mapping from each effect to (N, k) changes of the readings.  Each frame
+            has separate unknowns.  The clearance is equal in all joints, and the load
+            determines the position of a joint within its clearance.
+        nuisance: (N, p) changes by an unknown pose of the device (registration).
+        untestable: mapping from the name of each effect without columns to the reason.
         unregistered: reason why the registration cannot be estimated; empty if it can.
     """
 
@@ -45,15 +47,16 @@ class DesignSignatures:
 def design_signatures(
     campaign: Campaign, progress: Callable[[int, int], None] = lambda done, total: None
 ) -> DesignSignatures:
-    """Return the signatures of all effects of the library on a campaign.
+    """Return the signatures of all library effects for a campaign.
 
-    An unknown registration is estimated first, so that the signatures are computed in
-    the axes of the measuring device.  If it cannot be estimated, the base's axes are
-    used.
+    The signatures are computed in the axes of the measuring device, so an unknown pose
+    of the device is estimated first.  If the pose cannot be estimated, the axes of the
+    base are used.
 
     Args:
         campaign: campaign of N measured cells.
-        progress: called with the number of finished effects and their total.
+        progress: function called with the number of finished effects and the total
+            number.
 
     Returns:
         The signatures of all effects.
@@ -104,7 +107,7 @@ def changes_between_repeats(
 
     Args:
         campaign: campaign of N measured cells.
-        signatures: signatures of the library's effects on the campaign.
+        signatures: signatures of the library's effects for the campaign.
 
     Returns:
         The columns of :func:`forcefit.validation.inspection.repeats.slow_changes`, and
@@ -119,7 +122,7 @@ def changes_between_repeats(
 
 
 def _one_each(every: list[Hypothesis]) -> dict[str, Hypothesis]:
-    """Return one hypothesis for each effect; of several shapes the middle one."""
+    """Return one hypothesis for each effect; of several shapes, the middle one."""
     hypotheses: dict[str, Hypothesis] = {}
     for name in dict.fromkeys(h.effect for h in every):
         of = [h for h in every if h.effect == name]
@@ -134,7 +137,7 @@ def _one_each(every: list[Hypothesis]) -> dict[str, Hypothesis]:
 
 
 def _at_plausible_sizes(tangents: Tangents, hypothesis: Hypothesis) -> NDArray:
-    """Return (N, k) changes of the readings by unknowns of plausible size, one each."""
+    """Return (N, k) changes of the readings, each by one unknown of plausible size."""
     effect = LIBRARY[hypothesis.effect]
     shapes = {n: s.start for s in hypothesis.slots if s.shape for n in s.names}
     rest = {
@@ -155,5 +158,5 @@ def _at_plausible_sizes(tangents: Tangents, hypothesis: Hypothesis) -> NDArray:
 
 
 def _given(campaign: Campaign, covariate: str) -> bool:
-    """Return whether a covariate is present and not zero in every row."""
+    """Return whether a covariate is recorded and not zero in every row."""
     return bool(np.any(campaign.covariates.get(covariate, 0.0)))

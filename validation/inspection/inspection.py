@@ -1,4 +1,4 @@
-"""Inspection of a campaign before any diagnosis: content and visible effects."""
+"""Inspect a campaign before any diagnosis: its content and its visible effects."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """The effects that a campaign's design can and cannot show.
+    """Result of an inspection: effects that a campaign's design can and cannot show.
 
     Attributes:
         campaign: campaign of R rows.
@@ -46,9 +46,9 @@ class Inspection:
         noise: noise computed from the repeats; None if no row was measured twice.
         signatures: signatures of the library's effects.
         separability: angles between the signatures.
-        remarks: sentences on the design; remarks on lost effects are first.
-        open: (R,) bool, True for rows whose pose is not determined by the declared
-            clearances.
+        remarks: sentences about the design; those about lost information are first.
+        open: (R,) bool, True for rows whose pose the declared clearances leave
+            undetermined.
     """
 
     campaign: Campaign
@@ -63,7 +63,7 @@ class Inspection:
     __repr__, _repr_html_ = short_repr, html_table
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return a data set over ``effect``: which effects the design can show."""
+        """Return a data set over ``effect``: whether each effect is visible."""
         s, absent = self.separability, self.signatures.untestable
         no, unknown = [False] * len(absent), [np.nan] * len(absent)
         size = number("norm of the change of the readings over sigma")
@@ -79,7 +79,7 @@ class Inspection:
         return data.assign_attrs(campaign=self.campaign.name)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a row for each effect, columns (variable, component)."""
+        """Return a pandas table, one row per effect, columns (variable, component)."""
         return frame_table(self.to_xarray(), "effect")
 
     def table(self) -> dict:
@@ -113,7 +113,7 @@ class Inspection:
         }  # fmt: skip
 
     def _effect_table(self) -> dict:
-        """Return the visibility of each effect."""
+        """Return the visibility of each effect as plain values."""
         table: dict[str, dict] = {
             name: {"testable": False, "why": why}
             for name, why in self.signatures.untestable.items()
@@ -139,7 +139,8 @@ def inspect_campaign(
 
     Args:
         campaign: campaign to inspect.
-        progress: called with the number of finished effects and their total.
+        progress: function called with the number of finished effects and the total
+            number.
 
     Returns:
         The inspection.
@@ -166,7 +167,7 @@ def inspect_campaign(
 
 
 def _noise_table(c: Campaign, noise: RepeatNoise | None) -> dict | None:
-    """Return the noise from repeats, the stated noise, and suspects by their labels."""
+    """Return the noise from repeats, the declared noise, and the labels of suspects."""
     if noise is None:
         return None
     return {

@@ -1,7 +1,9 @@
-"""Order of a campaign's repeats: spread over the session, or directly in a row.
+"""Determine the order of a campaign's repeats in the session.
 
-Under a slow drift, repeats directly in a row agree better with each other than with the
-other rows.  Their noise is then smaller than the effect of the drift on the other rows.
+Repeats may be spread over the session or measured consecutively.  If the machine drifts
+slowly, consecutive repeats agree better with each other than with the other rows.
+Their scatter then underestimates the noise of the session, because it does not contain
+the drift.
 """
 
 from dataclasses import dataclass
@@ -11,22 +13,24 @@ from numpy.typing import NDArray
 
 from forcefit.validation.campaign.campaign import Campaign
 
-_FEW, _MOST = 0.2, 0.8  # limits of the share of repeats that directly follow each other
-# largest share of the session between first and last row of a set measured in a row
+_FEW, _MOST = 0.2, 0.8  # limits of the fraction of consecutive repeats
+# Largest fraction of the session between the first and the last row of a set that
+# counts as consecutive.
 _SHORT = 0.1
 
 
 @dataclass(frozen=True)
 class Revisits:
-    """Order of rows of one kind in the session.
+    """Order in the session of rows that were measured more than once.
 
     Attributes:
-        sets: number of sets, that is kinds of rows that were measured more than once.
+        sets: number of sets.  A set consists of all rows of one kind, for example of
+            one configuration, and contains at least two rows.
         rows: number of rows in these sets.
         others: number of rows outside these sets.
-        adjacent: share of the repeats that directly follow another row of their set.
-        span: median time from the first to the last row of a set, as a share of the
-            session.
+        adjacent: fraction of the repeats that directly follow another row of their set.
+        span: median time from the first to the last row of a set, as a fraction of the
+            duration of the session.
     """
 
     sets: int
@@ -39,7 +43,7 @@ class Revisits:
     def order(self) -> str:
         """``"interleaved"``, ``"back to back"``, ``"mixed"``, ``"all"``, ``"none"``.
 
-        ``"all"`` means that the whole campaign is one set.
+        The value ``"all"`` means that the whole campaign is one set.
         """
         if self.sets == 0:
             return "none"
@@ -56,14 +60,15 @@ def revisits(campaign: Campaign, kinds: NDArray) -> Revisits:
     """Return the order in the session of rows that were measured more than once.
 
     Args:
-        campaign: campaign of R rows, ordered by ``cov.time`` or else as in the file.
+        campaign: campaign of R rows, which are ordered by ``cov.time`` if it is
+            recorded.
         kinds: (R,) int, such as ``campaign.repeat`` or ``campaign.configuration``.
 
     Returns:
         The order of the rows.
     """
     clock = session_clock(campaign)
-    # rows of several points measured at once count as one row
+    # All points of one measurement count as one row.
     visit = campaign.measured_at_once
     _, first = np.unique(np.column_stack([kinds, visit]), axis=0, return_index=True)
     kinds, clock, visit = kinds[first], clock[first], visit[first]
@@ -87,11 +92,11 @@ def revisits(campaign: Campaign, kinds: NDArray) -> Revisits:
 
 
 def session_clock(campaign: Campaign) -> NDArray:
-    """Return (R,) times, from 0 at the first to 1 at the last measurement.
+    """Return (R,) relative times, 0 at the first and 1 at the last measurement.
 
     Args:
-        campaign: campaign with a varying ``cov.time``; otherwise the order of its rows
-            is used.
+        campaign: campaign of R rows.  The order of the rows is used if ``cov.time`` is
+            absent or constant.
 
     Returns:
         The relative times.

@@ -1,14 +1,14 @@
-r"""Choice of rows that discriminate between effects, before measurement.
+r"""Plan a campaign whose rows discriminate between effects.
 
-An exchange algorithm chooses, out of many possible rows, those for which
+An exchange algorithm chooses, out of many possible rows, the rows that maximise
 
     sum over e, f of ln(1 + l_ef),
     l_ef = tr(S_ee - S_ef (S_ff + I)^-1 S_fe) / k_e,
 
-Here l_ef is the mean non-centrality of effect e if effect f is fitted instead (the
-criterion of Atkinson and Fedorov, averaged over a normal prior).  S contains the sums
-over the rows of products of signatures.  The derivative of the criterion by the weight
-of a row is known for all rows, so rows with the smallest derivative are exchanged for
+Here l_ef is the mean non-centrality of effect e if effect f is fitted instead.  This is
+the criterion of Atkinson and Fedorov, averaged over a normal prior.  The matrices S
+contain products of signatures, summed over the rows.  The derivative of the criterion
+by the weight of each row is known.  Rows with the smallest derivative are exchanged for
 rows with the largest derivative.
 
 Sources:
@@ -40,12 +40,13 @@ from forcefit.validation.synthetic.design import (
 from forcefit.validation.synthetic.generator import Synthetic
 
 _POOL = 600  # number of rows to choose from
-# number of rows of smallest and of largest derivative between which exchanges are tried
+# Number of rows with the smallest and with the largest derivatives between which
+# exchanges are tried.
 _TRIED = 4
-_BETTER = 1e-3  # relative increase of the criterion that counts as an improvement
-_AVERAGE = 20  # number of random plans with which the plan is compared
-_PACE = 60.0  # [s] assumed time for the measurement of a row
-_SWING = 2400.0  # [s] period in which the temperature of a machine rises and falls
+_BETTER = 1e-3  # relative increase of the criterion that counts
+_AVERAGE = 20  # number of random plans for comparison
+_PACE = 60.0  # [s] assumed time to measure one row
+_SWING = 2400.0  # [s] assumed period of the temperature of a machine
 _FEWEST = 8  # minimum number of rows and configurations for held-out rows
 
 
@@ -55,13 +56,14 @@ class Planned:
 
     Attributes:
         robot: declared robot.
-        plan: rows in the order of measuring.
+        plan: rows in the order of measurement.
         design: quantities that may vary, and their ranges.
         sigma: [rad, m] noise of the measuring device.
         effects: names of the compared effects.
-        apart: (e, e) [-] mean non-centrality of the row's effect, scaled to one sigma
-            for each reading, if the column's effect is fitted instead.
-        random: (e, e) mean of ``apart`` over plans with as many random rows.
+        apart: (e, e) [-] mean non-centrality of the row's effect if the column's effect
+            is fitted instead.  Each effect is scaled so that it changes the readings by
+            one sigma (rms).
+        random: (e, e) mean of ``apart`` over plans with the same number of random rows.
     """
 
     robot: Robot
@@ -86,13 +88,14 @@ def plan_rows(
         design: quantities that may vary, their ranges, and the configurations.
         sigma: [rad, m] noise of the measuring device.
         seed: seed of the random rows to choose from.
-        progress: called with the number of finished effects and their total.
+        progress: function called with the number of finished effects and the total
+            number.
 
     Returns:
         The plan.
 
     Raises:
-        BadInput: there are too few rows, the closures hold at hardly any
+        BadInput: there are too few rows, the loops can be closed at hardly any
             configuration, or no effect changes the readings.
     """
     if rows < _FEWEST:
@@ -100,8 +103,8 @@ def plan_rows(
     rng = np.random.default_rng(seed)
     count = max(_POOL, 4 * rows)
     pool = _pool(robot, replace(design, rows=count, corners=True), rows, rng)
-    # the pose within declared clearances takes long to compute and has little effect
-    # here
+    # Clearances are omitted, because computing the pose within them takes long and has
+    # little effect here.
     tight = without_joint_clearances(robot)
     campaign = rows_as_campaign(tight, pool, design, sigma)
     columns = {
@@ -111,9 +114,9 @@ def plan_rows(
     }
     if not columns:
         raise BadInput(
-            f"{robot.name}: found no effect that changes the readings without "
-            "clearances, which a plan leaves out; expected geometric errors that close "
-            "without them"
+            f"{robot.name}: found no effect that changes the readings if all "
+            "clearances are zero, as a plan assumes; expected geometric errors with "
+            "which the loops can be closed without clearances"
         )
     names = tuple(columns)
     criterion = _Criterion([columns[name] for name in names], count)
@@ -133,8 +136,8 @@ def plan_rows(
 def _pool(
     robot: Robot, design: CampaignDesign, wanted: int, rng: np.random.Generator
 ) -> CampaignPlan:
-    """Return the rows to choose from, within the duration of the required rows."""
-    # the temperature changes slowly, so rows at one time have the same temperature
+    """Return the rows to choose from, spread over the duration of the required rows."""
+    # The temperature changes slowly, so rows at equal times have equal temperatures.
     plan = plan_campaign(robot, design, rng)
     time = np.array([row.covariates["time"] for row in plan.rows])
     time = (time % (_PACE * wanted)).round(1)
@@ -185,13 +188,13 @@ def rows_as_campaign(
 
 
 def _alike(columns: NDArray) -> NDArray:
-    """Return the columns of an effect, scaled to one sigma for each reading."""
+    """Return the columns of an effect, scaled to an rms of one sigma per reading."""
     size = np.sqrt(np.mean(np.sum(columns**2, axis=1)))
     return columns / size
 
 
 def _ordered(plan: CampaignPlan, chosen: NDArray) -> CampaignPlan:
-    """Return the rows in the order of measuring."""
+    """Return the chosen rows in the order of measurement."""
     time = [plan.rows[i].covariates["time"] for i in chosen]
     order = chosen[np.argsort(time, kind="stable")]
     return CampaignPlan(
@@ -209,11 +212,11 @@ class _Criterion:
         self._X = np.hstack(blocks).reshape(rows, -1, begin[-1])
 
     def apart(self, chosen: NDArray) -> NDArray:
-        """Return (e, e) mean non-centralities of one effect if another is fitted."""
+        """Return (e, e) mean non-centralities of effects if another is fitted."""
         return self._value(chosen)[0]
 
     def _value(self, chosen: NDArray) -> tuple[NDArray, NDArray]:
-        """Return ``apart``, and (rows,) derivatives of the criterion by weights."""
+        """Return ``apart``, and (rows,) derivatives of the criterion by the weights."""
         X = self._X[chosen].reshape(-1, self._X.shape[2])
         S = X.T @ X
         G, apart = np.zeros_like(S), np.full((len(self._own),) * 2, np.nan)
@@ -234,7 +237,7 @@ class _Criterion:
         return apart, slope
 
     def exchanged(self, start: NDArray) -> NDArray:
-        """Return rows after exchanges of single rows that increase the criterion."""
+        """Return the rows after single exchanges that increase the criterion."""
         chosen = start.copy()
         apart, slope = self._value(chosen)
         best, going = _told(apart), True
@@ -255,12 +258,12 @@ class _Criterion:
 
 
 def _told(apart: NDArray) -> float:
-    """Return the value of the criterion."""
+    """Return the value of the criterion for given non-centralities."""
     return float(np.nansum(np.log1p(apart)))
 
 
 def table(planned: Planned) -> dict[str, Any]:
-    """Return a plan as plain values, with the least distinguishable pairs first."""
+    """Return a plan as plain values; the least distinguishable pairs are first."""
     names = planned.effects
     pairs = [
         {
@@ -294,7 +297,7 @@ def text(planned: Planned) -> str:
 
 
 def unmeasured(planned: Planned) -> Synthetic:
-    """Return a plan as a campaign without readings, for a file to be filled in."""
+    """Return a plan as a campaign without readings, to be filled in later."""
     missing = np.full((len(planned.plan.rows), 6), np.nan)
     return Synthetic(
         robot=planned.robot, plan=planned.plan,

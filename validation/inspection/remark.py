@@ -1,7 +1,7 @@
-"""A sentence on a campaign, and its importance.
+"""Define a sentence about a campaign, and its importance.
 
-A sentence is on something lost, which no analysis can recover; on something that needs
-care; or on something that is as it should be.
+There are three kinds of sentences: about lost information, which no analysis can
+recover; about aspects that need care; and about aspects in good order.
 """
 
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ LOST, CAREFUL, FINE = "lost", "careful", "fine"
 
 @dataclass(frozen=True)
 class Remark:
-    """A sentence on a campaign's design.
+    """A sentence about a campaign's design.
 
     Attributes:
         about: subject of the sentence.

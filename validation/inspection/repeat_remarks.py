@@ -1,4 +1,4 @@
-"""Sentences on the noise computed from the repeats of a campaign."""
+"""Write sentences about the noise computed from the repeats of a campaign."""
 
 import numpy as np
 from scipy.stats import chi2
@@ -10,17 +10,17 @@ from forcefit.validation.inspection.remark import CAREFUL, FINE, LOST, Remark
 from forcefit.validation.inspection.repeats import MOST, RepeatNoise
 
 _FEW = 20  # degrees of freedom below which the uncertainty of the noise exceeds 30 %
-_SEVERAL = 4  # number of suspect readings from which on a common cause is likely
+_SEVERAL = 4  # so many suspect readings probably have a common cause
 
 
 def on_repeats(
     campaign: Campaign, repeats: Revisits, noise: RepeatNoise | None
 ) -> list[Remark]:
-    """Return remarks on the noise computed from the repeats.
+    """Return remarks about the noise computed from the repeats.
 
     Args:
         campaign: campaign of R rows.
-        repeats: order of its repeats in the session.
+        repeats: order of the repeats in the session.
         noise: noise computed from the repeats; None without repeats.
 
     Returns:
@@ -73,7 +73,7 @@ def on_repeats(
 
 
 def _on_suspects(campaign: Campaign, noise: RepeatNoise) -> list[Remark]:
-    """Return remark on readings far from their repeats: single errors or a pattern."""
+    """Return a remark about readings that differ too much from their repeats."""
     suspects = noise.suspects
     if len(suspects) < _SEVERAL:
         return []

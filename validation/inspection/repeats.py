@@ -1,17 +1,16 @@
-"""Noise of a machine and its measuring device, computed from repeated rows.
+"""Compute the noise of a machine and its measuring device from repeated rows.
 
-Rows of the same configuration and load have a common mean.  Their residuals contain
-noise and changes between the rows.  Slow changes (with time, temperature and side of
-approach) are fitted to all sets together and subtracted, so drift does not count as
-noise.
+Rows of the same configuration and load form a set.  The residuals about the mean of a
+set contain noise and changes between the rows.  Slow changes with time, temperature and
+side of approach are fitted to all sets together and subtracted, so that drift does not
+count as noise.
 
 ======  =============  =========  ================================================
 symbol  code           shape      meaning
 ======  =============  =========  ================================================
-z       ``whitened``   (N,)       readings / stated sigma, measured cells by row
-B       ``slow``       (N, p)     columns of slow changes / sigma
-e       ``rest``       (N,)       z minus the mean of its set and the fitted B x
-h       ``leverage``   (N,)       weight of a cell in its fitted value
+z ``whitened`` (N,) readings / declared sigma, measured cells by row B ``slow`` (N, p)
+columns of slow changes / sigma e ``rest`` (N,) z minus the mean of its set and the
+fitted B x h ``leverage`` (N,) weight of a cell in its fitted value
 ======  =============  =========  ================================================
 
 Sources:
@@ -32,20 +31,21 @@ from forcefit.validation.campaign.campaign import READING, Campaign
 from forcefit.validation.diagnosis.separability import orthonormal_basis
 from forcefit.validation.inspection.measuring_order import session_clock
 
-_LEVEL = 0.01  # probability that a campaign without errors has a suspect row
-MOST = 20  # largest number of suspects that are searched for
+_LEVEL = 0.01  # probability of a suspect row without any blunder
+MOST = 20  # largest number of suspects
 
 
 @dataclass(frozen=True)
 class Suspect:
-    """A reading that is too far from its repeats.
+    """A reading that differs too much from its repeats.
 
     Attributes:
-        rows: row of the reading; for a set of two, both rows, because either may be
-            wrong.
+        rows: row of the reading.  For a set of two rows, both rows are listed, because
+            either reading may be wrong.
         component: component of the reading.
-        size: [-] deleted residual, Student's t.
-        chance: probability that noise alone causes a residual as large in the campaign.
+        size: [-] deleted residual (Student's t).
+        chance: probability that noise causes a residual at least as large anywhere in
+            the campaign.
     """
 
     rows: tuple[int, ...]
@@ -59,18 +59,18 @@ class RepeatNoise:
     """Noise computed from repeats, with 90 % confidence intervals.
 
     Attributes:
-        ratio: [-] standard deviation over stated sigma, for all components together.
+        ratio: [-] standard deviation over declared sigma, for all components together.
         degrees: degrees of freedom of the ratio.
         interval: confidence interval of the ratio.
         plain: the ratio without subtraction of slow changes.
         taken_out: names of the slow changes that were fitted and subtracted, each with
-            the probability that noise alone causes a change as large.
+            the probability that noise causes a change at least as large.
         component: (6,) [rad, m] standard deviations; NaN for components without
             repeats.
         component_degrees: (6,) degrees of freedom.
         component_interval: (6, 2) [rad, m] confidence intervals.
-        suspects: readings too far from their repeats, which are excluded from all
-            values above.
+        suspects: readings that differ too much from their repeats.  They are excluded
+            from all values above.
     """
 
     ratio: float
@@ -89,12 +89,13 @@ def repeat_noise(
 ) -> RepeatNoise | None:
     """Return the noise from a campaign's repeats, with slow changes subtracted.
 
-    They are not subtracted if they have more than half of the degrees of freedom.
+    Slow changes are not subtracted if their fit would use more than half of the degrees
+    of freedom.
 
     Args:
         campaign: campaign of N measured cells.
-        slow: (N, p) columns over sigma, by name, of changes between repeats; by default
-            the columns of :func:`slow_changes`.
+        slow: mapping from the name of each slow change to its (N, p) columns over
+            sigma; by default the result of :func:`slow_changes`.
 
     Returns:
         The noise; None if no row was measured twice.
@@ -121,9 +122,10 @@ def slow_changes(campaign: Campaign) -> dict[str, NDArray]:
         campaign: campaign of N measured cells.
 
     Returns:
-        (N, p) columns over sigma by name, separate for each component: a settling and a
-        cubic function of time (of the file's order if no time is given).  There are
-        also shifts with temperature and side of approach, if these vary.
+        Mapping from the name of each change to (N, p) columns over sigma, separate for
+        each component.  The changes are an exponential settling and a cubic function of
+        time, and shifts with temperature and side of approach if these vary.  Without a
+        time, the order of the file is used.
     """
     clock = 2 * session_clock(campaign) - 1
     shapes = {
@@ -156,13 +158,13 @@ def for_each_component(campaign: Campaign, shapes: NDArray) -> NDArray:
 
 
 def _sets(campaign: Campaign) -> NDArray:
-    """Return the (N,) number of the set of repeats of each measured cell."""
+    """Return the (N,) index of the set of repeats of each measured cell."""
     row, component = np.nonzero(campaign.cells)
     return campaign.repeat[row] * 6 + component
 
 
 def _repeated_cells(campaign: Campaign, out: set[int]) -> NDArray:
-    """Return (N,) bool: cells with another one in their set, some rows excluded."""
+    """Return (N,) bool, True for cells with a repeat in rows that are not excluded."""
     row, _ = np.nonzero(campaign.cells)
     kept = ~np.isin(row, list(out))
     sets = _sets(campaign)
@@ -202,7 +204,7 @@ class _RepeatFit:
         return columns - (sums / self.count[:, None])[self.set]
 
     def suspect(self) -> Suspect | None:
-        """Return the reading farthest from its repeats; None if noise explains it."""
+        """Return the reading that differs most from its repeats; None if noise."""
         if self.degrees < 2 or self.rss == 0.0:
             return None
         free = np.maximum(1 - self.leverage, 1e-12)
@@ -246,7 +248,7 @@ class _RepeatFit:
         )
 
     def _chance(self, name: str) -> float:
-        """Return the probability that noise alone causes a slow change as large."""
+        """Return the probability that noise causes a slow change at least as large."""
         others = [B for key, B in self.slow.items() if key != name]
         basis = _basis(others, len(self.z))
         rest = self.z - basis @ (basis.T @ self.z)
@@ -258,7 +260,7 @@ class _RepeatFit:
 
 
 def _basis(blocks: Iterable[NDArray], rows: int) -> NDArray:
-    """Return the (rows, rank) orthonormal basis of all columns."""
+    """Return a (rows, rank) orthonormal basis of the columns of all blocks."""
     return orthonormal_basis(np.column_stack([np.zeros((rows, 0)), *blocks]))
 
 

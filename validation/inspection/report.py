@@ -1,4 +1,4 @@
-"""Page of an inspection: what a campaign's design can show, before any diagnosis."""
+"""Create the report page of an inspection, which precedes any diagnosis."""
 
 from forcefit.page.page import Page, Provenance, Tile, listed, page, paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
@@ -29,10 +29,10 @@ def inspection_page(inspection: Inspection, provenance: Provenance) -> str:
     Args:
         inspection: result of
             :func:`forcefit.validation.inspection.inspection.inspect_campaign`.
-        provenance: command and files.
+        provenance: command and input files.
 
     Returns:
-        HTML, which needs no other file.
+        A self-contained HTML page.
     """
     c = inspection.campaign
     return page(
@@ -64,7 +64,7 @@ def _texts(inspection: Inspection, weight: str) -> list[str]:
 
 
 def _verdict(inspection: Inspection) -> str:
-    """Return the number of detectable effects, of lost things and of warnings."""
+    """Return the number of detectable effects, of losses and of warnings as text."""
     seen, count = int(inspection.separability.visible.sum()), _library(inspection)
     text = f"The design can show {seen} of {count} effects of the library"
     counts = {
@@ -80,12 +80,12 @@ def _verdict(inspection: Inspection) -> str:
 
 
 def _library(inspection: Inspection) -> int:
-    """Return the number of effects of the library."""
+    """Return the total number of library effects."""
     return len(inspection.separability.names) + len(inspection.signatures.untestable)
 
 
 def _good(inspection: Inspection) -> bool | None:
-    """Return whether a diagnosis can begin; None with remarks that need care."""
+    """Return True without warnings, None with any, False if no diagnosis can begin."""
     unregistered = bool(inspection.signatures.unregistered)
     if unregistered or not inspection.separability.visible.any():
         return False
@@ -93,7 +93,7 @@ def _good(inspection: Inspection) -> bool | None:
 
 
 def _tiles(inspection: Inspection) -> list[Tile]:
-    """Return tiles of the rows, the noise, and the effects."""
+    """Return tiles of the number of rows, the noise, and the effects."""
     s, noise = inspection.separability, inspection.noise
     tiles = [
         Tile("Rows", [str(len(inspection.campaign))],
@@ -114,7 +114,7 @@ def _tiles(inspection: Inspection) -> list[Tile]:
 
 
 def _remarks(inspection: Inspection) -> list[str]:
-    """Return a section for each kind of remark that there is."""
+    """Return a section for each kind of remark that occurs."""
     found = {head: _texts(inspection, weight) for weight, head in _HEADS.items()}
     if inspection.open.any():
         found[_HEADS[CAREFUL]].append(f"{open_text(inspection.open)}.")
@@ -122,7 +122,7 @@ def _remarks(inspection: Inspection) -> list[str]:
 
 
 def _effects(inspection: Inspection) -> str:
-    """Return the table of effects: detectable, from which size, or why not testable."""
+    """Return a table of effects: smallest detectable size, or why not testable."""
     s = inspection.separability
     rows: Cells = [
         [name, "yes" if s.visible[i] else "if larger" if s.traced[i] else "no",
@@ -143,7 +143,7 @@ def _effects(inspection: Inspection) -> str:
 
 
 def _distinguished(inspection: Inspection) -> str:
-    """Return the chart of imitations, and the pairs in words."""
+    """Return the chart of effects that imitate each other, and the pairs as text."""
     s = inspection.separability
     texts = [f"{', '.join(group)} cannot be distinguished." for group in s.classes()]
     texts += [f"{b} can reproduce every effect of {a}." for a, b in s.imitated()]
@@ -154,7 +154,7 @@ def _distinguished(inspection: Inspection) -> str:
 
 
 def _readings(inspection: Inspection) -> str:
-    """Return size, stated sigma and noise of each measured component."""
+    """Return a table of size, declared sigma and noise of each measured component."""
     rows: Cells = []
     for k, one in enumerate(reading_counts(inspection.campaign).values()):
         if not one["measured"]:
@@ -173,7 +173,7 @@ def _readings(inspection: Inspection) -> str:
 
 
 def _suspects(inspection: Inspection) -> str:
-    """Return the readings that are too far from their repeats; empty without one."""
+    """Return a table of readings that differ too much from their repeats."""
     if inspection.noise is None or not inspection.noise.suspects:
         return ""
     ids = inspection.campaign.ids
@@ -186,7 +186,7 @@ def _suspects(inspection: Inspection) -> str:
 
 
 def _conditions(inspection: Inspection) -> str:
-    """Return the levels and the ranges of loads and covariates."""
+    """Return a table of the levels and ranges of loads and covariates."""
     loads = load_counts(inspection.campaign)
     rows: Cells = [
         [kind, str(loads["levels"]), *(Value(float(v), unit) for v in loads[kind])]

@@ -1,4 +1,4 @@
-"""An inspection of a campaign as text."""
+"""Format an inspection of a campaign as text."""
 
 import numpy as np
 
@@ -40,7 +40,7 @@ def inspection_text(inspection: Inspection) -> str:
 
 
 def _separability_lines(inspection: Inspection) -> list[str]:
-    """Return lines on detectable effects, and on effects that are indistinguishable."""
+    """Return lines about detectable effects, and about indistinguishable effects."""
     s = inspection.separability
     lines = ["Effects, at plausible sizes, in this design:"]
     shown = [n for n, seen in zip(s.names, s.visible, strict=True) if seen]
@@ -103,7 +103,7 @@ def _covariate_lines(c: Campaign) -> list[str]:
 
 
 def _noise_lines(c: Campaign, noise: RepeatNoise | None) -> list[str]:
-    """Return lines on the noise from repeats, by component, and suspects."""
+    """Return lines about the noise from repeats by component, and about suspects."""
     if noise is None:
         return []
     low, high = noise.interval

@@ -1,4 +1,4 @@
-"""Simulation of the forced assembly in Exudyn; it shares only the robot's data.
+"""Simulate the forced assembly in Exudyn; only the robot's data are shared.
 
-Begin at ``simulation.py``.
+Start with ``simulation.py``.
 """

@@ -1,7 +1,7 @@
-"""Beams of the simulation: their axes and the stiffness of their sections.
+"""Compute the axes and the section stiffness of beams in the simulation.
 
 This module is independent of :mod:`forcefit.assembly.model.links`, except for the
-constants of a section.
+constants of a cross-section.
 """
 
 import math
@@ -24,7 +24,7 @@ def beam_span(frame: Frame, link: BeamLink) -> tuple[float, NDArray]:
 
 
 def beam_axes(x: NDArray, up: Sequence[float] | None) -> NDArray:
-    """Return axes of a beam as columns: along it, across, up; y is up by default."""
+    """Return the axes of a beam as columns: along the beam, across, and up."""
     x = x / np.linalg.norm(x)
     if up is None:
         up = (0.0, 0.0, 1.0) if math.hypot(x[0], x[2]) < 1e-9 else (0.0, 1.0, 0.0)
@@ -34,18 +34,18 @@ def beam_axes(x: NDArray, up: Sequence[float] | None) -> NDArray:
 
 
 def element_stiffness(link: BeamLink, step: float) -> NDArray:
-    """Return EA, GA_y, GA_z, GJ, EI_y, EI_z for elements of a length, corrected.
+    """Return corrected EA, GA_y, GA_z, GJ, EI_y, EI_z for elements of a given length.
 
-    An element of constant strain lacks the deflection step^3 / 12 EI of its own
-    bending. If its shear stiffness includes this deflection, the tip of a cantilever is
-    exact for any number of elements.
+    An element of constant strain neglects the deflection step^3 / 12 EI of its own
+    bending.  If the shear stiffness is reduced by this deflection, the tip deflection
+    of a cantilever is exact for any number of elements.
 
     Args:
         link: the beam.
         step: [m] length of an element.
 
     Returns:
-        (6, 6) diagonal [N, N m^2].
+        (6, 6) diagonal stiffness matrix [N, N m^2].
     """
     section = declared_section(link.section, link.poisson)
     E, G = link.young, link.young / (2 * (1 + link.poisson))

@@ -1,14 +1,15 @@
-"""The wrench of a deformed spring as the gradient of its energy.
+"""Compute the wrench of a deformed spring as the gradient of its energy.
 
-The energy of a link that is a spring is s.K s / 2, with s the logarithm of the motion
-between its ends.  Exudyn applies K s half-way between the ends, which is the gradient
-only to first order in the deformation.  The error of this force, and of the stiffness
-of a robot with deformed springs, is of second order in the rotation.  Here the gradient
-is exact, by the inverse of the derivative of the exponential.  The translational part
-of this inverse is the derivative of its rotational part along the translation (a screw
-is a dual vector).
+The energy of a spring is s.K s / 2, where s is the logarithm of the motion between its
+ends.  Exudyn applies the wrench K s half-way between the ends.  This wrench equals the
+gradient only to first order in the deformation.  The resulting error of forces, and of
+the stiffness of a robot with deformed springs, is of second order in the rotation.
+This module computes the exact gradient with the inverse of the derivative of the
+exponential map.  A screw is a dual vector, so the translational part of this inverse is
+the derivative of its rotational part along the translation.
 
-Exudyn calls this function about a hundred thousand times, so vectors are tuples.
+Exudyn calls these functions about a hundred thousand times, so tuples are used as
+vectors because they are faster.
 
 Sources:
     Selig (2005), Geometric fundamentals of robotics, section 4.5 (the series in
@@ -21,8 +22,8 @@ from collections.abc import Sequence
 _Vector = tuple[float, float, float]
 _BERNOULLI = (1 / 6, -1 / 30, 1 / 42, -1 / 30, 5 / 66, -691 / 2730, 7 / 6,
               -3617 / 510, 43867 / 798, -174611 / 330)  # fmt: skip
-# coefficients of 1 - t/2 cot(t/2) over t^2, as a power series in t^2; for rotations
-# below one radian the error is below (1 / 2 pi)^22
+# Coefficients of 1 - t/2 cot(t/2) over t^2, as a power series in t^2.  For rotations
+# below one radian, the error is below (1 / 2 pi)^22.
 _SERIES = tuple(
     abs(B) / math.factorial(2 * k) for k, B in enumerate(_BERNOULLI, 1)
 )  # fmt: skip
@@ -33,13 +34,13 @@ def middle_wrench(K: Sequence[Sequence[float]], screw: Sequence[float]) -> list[
     """Return the wrench that resists a deformation, half-way between the ends.
 
     Args:
-        K: (6, 6) [N m/rad .. N/m] stiffness in the near end's axes.
+        K: (6, 6) [N m/rad .. N/m] stiffness in the axes of the near end.
         screw: (6,) [rad, m] logarithm of the motion from the near end to the far end.
 
     Returns:
-        (6,) [N m, N] in the mean axes of the ends, at the point where Exudyn applies
-        it: half of the screw's translation, along these axes, from the near end.  It is
-        the gradient of screw.K screw / 2.  At the far end :func:`far_couple` must be
+        (6,) [N m, N] wrench, the gradient of screw.K screw / 2, in the mean axes of
+        both ends.  Exudyn applies the wrench at half of the screw's translation, along
+        these axes, from the near end.  At the far end, :func:`far_couple` must be
         added.
     """
     a, b, c, d, e, g = screw
@@ -55,8 +56,8 @@ def middle_wrench(K: Sequence[Sequence[float]], screw: Sequence[float]) -> list[
     factor, slope = _power_series(_SERIES, square), _power_series(_SLOPES, square)
     across_f, across_m = _cross(w, f), _cross(w, m)
     twice_f = _cross(w, across_f)
-    # at the near end J^-T K s, with J the left derivative of the exponential; in axes
-    # rotated by half of w this is symmetric
+    # The wrench at the near end is J^-T K s, where J is the left derivative of the
+    # exponential.  In axes rotated by half of w, this expression is symmetric.
     short = (1 - turn / 2 / math.sin(turn / 2)) / square
     force = _sum(f, short, twice_f)
     by_shift = _cross(v, f)
@@ -72,9 +73,9 @@ def far_couple(screw: Sequence[float], force: Sequence[float]) -> list[float]:
     """Return the couple that Exudyn omits at a spring's far end.
 
     Exudyn applies the wrench at half of the screw's translation from either end.  These
-    two points coincide only without a rotation: across the rotation axis, a chord is
-    shorter than its arc by the factor sin(t/2) / (t/2).  So the wrenches on the two
-    ends are not opposite.
+    two points coincide only without a rotation, because perpendicular to the rotation
+    axis a chord is shorter than its arc by the factor sin(t/2) / (t/2).  Therefore the
+    wrenches on the two ends are not exactly opposite.
 
     Args:
         screw: (6,) [rad, m] logarithm of the motion from the near end to the far end.
@@ -88,8 +89,8 @@ def far_couple(screw: Sequence[float], force: Sequence[float]) -> list[float]:
     turn = math.hypot(*w)
     if not turn:
         return [0.0] * 3
-    # for x below about half a radian, sin x / x - 1 is computed by its series to avoid
-    # cancellation
+    # For x below about half a radian, sin x / x - 1 is computed by its series to avoid
+    # cancellation.
     x = turn * turn / 4
     short = -x / 6 * (1 - x / 20 * (1 - x / 42 * (1 - x / 72 * (1 - x / 110))))
     along = sum(p * q for p, q in zip(w, v, strict=True)) / (turn * turn)
@@ -99,7 +100,7 @@ def far_couple(screw: Sequence[float], force: Sequence[float]) -> list[float]:
 
 
 def _power_series(factors: Sequence[float], x: float) -> float:
-    """Return the sum of factors times powers of x."""
+    """Return the sum of factors times increasing powers of x."""
     value = 0.0
     for factor in reversed(factors):
         value = factor + x * value

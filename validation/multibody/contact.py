@@ -1,16 +1,19 @@
-"""Joint clearances as smooth, conservative contact.
+"""Model joint clearances as smooth, conservative contacts.
 
-A joint moves freely inside its cones: discs for (TX, TY) and (RX, RY), intervals for TZ
-and RZ, or a ball for (TX, TY, TZ).  At distance r from the middle of a cone of size c,
+Joints move freely inside bounds (cones): discs for (TX, TY) and (RX, RY), intervals for
+TZ and RZ, or a ball for (TX, TY, TZ).  At distance r from the middle of a cone of size
+c,
 
     x = (r^2 - c^2) / 2c,   P = (x + sqrt(x^2 + w^2)) / 2,   energy = k P^2 / 2,
 
-so the force is k P P' r / c: zero inside, a stiff spring outside, and smooth
-everywhere, also at the middle (where smoothing of r - c would be singular).  The width
-w is at first three times c, which centres the joint weakly; it is then reduced to 3e-4.
+so the force is k P P' r / c.  The force is nearly zero inside, is that of a stiff
+spring outside, and is smooth everywhere.  At the middle, a smoothing of r - c would be
+singular.  The width w, relative to c, is 3 at first, which centres the joint weakly.
+It is then reduced to 3e-4.
 
-A pin in two bushes touches at two points, at +-h along z.  Each is a disc for the pin's
-axis there, (TX + h RY, TY - h RX), in place of the cone for (RX, RY).
+A pin in two bushes has contacts at z = +h and z = -h.  At each contact, a disc bounds
+the position of the pin's axis, (TX + h RY, TY - h RX).  The two discs replace the
+bounds for (TX, TY) and (RX, RY).
 """
 
 import math
@@ -21,9 +24,9 @@ from forcefit.assembly.model.robot import Clearance, Frame
 
 TURN_STIFFNESS = 1e9  # [N m/rad] rotational stiffness of the contact
 SHIFT_STIFFNESS = 1e12  # [N/m] translational stiffness of the contact
-# [-] first and last width of the smoothing, relative to the size of the cone
+# [-] First and last width of the smoothing, relative to the size of the cone.
 WIDE, NARROW = 3.0, 3e-4
-_UNBOUNDED = 0.5  # [rad, m] larger bounds of own motions are checked afterwards
+_UNBOUNDED = 0.5  # [rad, m] larger bounds are checked after the solution
 _CONES = (
     ("tilt", (0, 1)), ("spin", (2,)), ("radial", (3, 4)), ("axial", (5,)),
     ("ball", (3, 4, 5)),
@@ -35,11 +38,11 @@ class ClearanceCone:
     """A disc, an interval or a ball that bounds components of a screw.
 
     Attributes:
-        rows: rows of the screw that it bounds together.
+        rows: rows of the screw that the cone bounds together.
         size: [rad or m] bound, > 0.
-        stiffness: [N m/rad or N/m] of the contact.
-        arm: [m] distance along z from the joint's middle to the contact, for radial
-            discs.
+        stiffness: [N m/rad or N/m] stiffness of the contact.
+        arm: [m] distance along z from the middle of the joint to the contact, for
+            radial discs.
     """
 
     rows: tuple[int, ...]
@@ -48,7 +51,7 @@ class ClearanceCone:
     arm: float = 0.0
 
     def offsets(self, screw: Sequence[float]) -> list[float]:
-        """Return the one to three components [rad or m] of a screw that it bounds."""
+        """Return the one to three bounded components [rad or m] of a screw."""
         if self.arm:
             return [
                 screw[3] + self.arm * screw[1],
@@ -59,18 +62,18 @@ class ClearanceCone:
 
 @dataclass(frozen=True)
 class JointClearance:
-    """Possible motions of a joint in addition to its springs.
+    """Motions of a joint that are possible without deformation of its springs.
 
     Attributes:
         cones: the bounds on the motions.
-        free: rows of the screw without a bound.
+        free: rows of the screw that are not bounded.
     """
 
     cones: tuple[ClearanceCone, ...]
     free: tuple[int, ...]
 
     def softened(self, factor: float) -> "JointClearance":
-        """Return the clearance with its contact stiffness multiplied by a factor."""
+        """Return the clearance after multiplying its contact stiffness by a factor."""
         cones = (replace(c, stiffness=factor * c.stiffness) for c in self.cones)
         return replace(self, cones=tuple(cones))
 
@@ -85,17 +88,18 @@ class JointClearance:
 def joint_clearance(
     frame: Frame, scale: float = 1.0, bushes: bool = False
 ) -> JointClearance:
-    """Return the clearances of a frame's joint, and its free motion without a spring.
+    """Return the clearances of a frame's joint, and its motion if it has no spring.
 
     Args:
         frame: frame of a robot.
         scale: factor on the clearances.
-        bushes: whether a joint with both radial clearance and tilt is a pin in two
-            bushes.  Each bush has the radial clearance, and their distance results from
-            the tilt.
+        bushes: whether a joint with both radial clearance and tilt is modelled as a pin
+            in two bushes.  Each bush has the radial clearance, and the distance of the
+            bushes follows from the tilt.
 
     Returns:
-        The clearance; without clearance and without free motion, every row is locked.
+        The clearance.  Every row is locked if the joint has neither clearance nor free
+        motion.
     """
     given = frame.clearance or Clearance()
     moves = frame.passive and not frame.compliant
@@ -127,8 +131,8 @@ def cone_forces(
         width: [-] width of the smoothing, relative to the size of the cone.
 
     Yields:
-        Rows of the screw, and the components [N m or N] of the force along these rows:
-        the gradient of the energy.
+        Rows of the screw, and the components [N m or N] of the contact force along
+        these rows.  The force is the gradient of the energy.
     """
     offsets = cone.offsets(screw)
     P, root = _overlap(cone, offsets, width)
@@ -141,7 +145,7 @@ def cone_forces(
 
 
 def cone_energy(cone: ClearanceCone, screw: Sequence[float], width: float) -> float:
-    """Return the [J] energy of a joint's contact with a cone; see ``cone_forces``."""
+    """Return the energy [J] of a joint's contact with a cone; see ``cone_forces``."""
     return cone.stiffness * _overlap(cone, cone.offsets(screw), width)[0] ** 2 / 2
 
 
@@ -153,5 +157,6 @@ def _overlap(
     x = (squared - cone.size**2) / (2 * cone.size)
     w = width * cone.size
     root = math.hypot(x, w)
-    # x + root, without cancellation for x << 0, inside the clearance
+    # (x + root) / 2, rearranged to avoid cancellation for x << 0, that is, inside the
+    # clearance.
     return (x + root if x > 0 else w * w / (root - x)) / 2, root

@@ -1,9 +1,11 @@
-"""Central differences extrapolated to step zero, with an estimate of uncertainty.
+"""Extrapolate central differences to step zero, and estimate the uncertainty.
 
-The error of a difference has a part proportional to the square of the step, and a part
-of rounding over the step.  The first dominates for large steps, the second for small
-steps.  Two neighbouring steps are extrapolated to step zero.  Of all pairs, the one is
-chosen that differs least from the pair before it; this difference is the uncertainty.
+The error of a central difference consists of a truncation error proportional to the
+square of the step and a rounding error proportional to the inverse of the step.  The
+truncation error dominates for large steps, and the rounding error for small steps.
+Each pair of neighbouring steps is extrapolated to step zero.  The result is the
+extrapolated value that differs least from the preceding one.  This difference is the
+estimated uncertainty.
 
 Sources:
     Ridders (1982), Accurate computation of F'(x) and F'(x) F''(x).
@@ -23,10 +25,11 @@ def without_squares(
 
     Args:
         steps: k decreasing steps.
-        differences: values of the same shape, one for each step.
+        differences: central differences of equal shape, one for each step.
 
     Returns:
-        k - 1 arrays, without the error proportional to the square of the step.
+        k - 1 arrays without the error term that is proportional to the square of the
+        step.
     """
     squares = [(one / two) ** 2 for one, two in pairwise(steps)]
     pairs = zip(squares, pairwise(differences), strict=True)
@@ -36,14 +39,14 @@ def without_squares(
 def steadiest(
     found: Sequence[NDArray], size: Callable[[NDArray], float]
 ) -> tuple[NDArray, NDArray]:
-    """Return the array that differs least from the array before it.
+    """Return the array that differs least from the preceding array.
 
     Args:
         found: at least two arrays of the same shape.
-        size: function that returns the size of a change, by which changes are compared.
+        size: function that returns the norm of a change.
 
     Returns:
-        The array, and its absolute change.
+        The array, and its absolute difference from the preceding array.
     """
     changes = [np.abs(two - one) for one, two in pairwise(found)]
     best = int(np.argmin([size(change) for change in changes]))

@@ -1,9 +1,9 @@
-"""An Exudyn model under construction: bodies, springs, contacts, closures, loads.
+"""Build an Exudyn model of bodies, springs, contacts, closures and loads.
 
-Bodies are massless for the static solver.  Places are points and axes fixed to bodies;
-elastic parts and locked joints connect two places.  Exudyn orders screws and wrenches
-[T R]; arguments and results here are [R T] as in the whole library.
-:mod:`forcefit.validation.multibody.exudyn_solver` solves the model,
+Bodies are massless for the static solver.  A place is a point with axes that is fixed
+to a body.  Elastic parts and locked joints connect two places.  Exudyn orders screws
+and wrenches as [T R].  Arguments and results of this module are [R T] as in the whole
+library.  :mod:`forcefit.validation.multibody.exudyn_solver` solves the model,
 :mod:`forcefit.validation.multibody.exudyn_reading` evaluates it.
 """
 
@@ -27,12 +27,12 @@ from forcefit.validation.multibody.contact import (
 from forcefit.validation.multibody.exudyn_parts import Closure, Contact, Elastic, Place
 from forcefit.validation.multibody.motion import inverse, shifted
 
-_SWAP = np.r_[3:6, 0:3]  # converts our order [R T] to Exudyn's order [T R] and back
+_SWAP = np.r_[3:6, 0:3]  # swaps [R T] and Exudyn's order [T R]
 IDLE_STIFFNESS = 1e-6  # [N m/rad, N/m] residual stiffness of free motions
 # [N m/rad, N/m] stiffness of free motions while the closures are closed
 HOLDING_STIFFNESS = 1e-2
-# [N/m] stiffness that centres clearances; times 1e-3 in N m/rad, times 1e-6 about the
-# joint's axis
+# [N/m] Stiffness that centres clearances.  Its rotational value is 1e-3 times as large
+# [N m/rad], and 1e-6 times about the axis of the joint.
 _CENTRING = 1e3
 
 
@@ -41,15 +41,16 @@ class Regularisation:
     """Springs and tolerances of the simulation that are not data of a robot.
 
     Attributes:
-        closing: [N m/rad, N/m] of the connectors that close the closures; ``inf`` makes
-            them joints without freedom, for a robot built closed.
+        closing: [N m/rad, N/m] stiffness of the connectors that close the loops.
+            ``inf`` replaces the connectors by rigid joints, for a robot that is built
+            closed.
         idle: [N m/rad, N/m] residual stiffness of free motions.
-        narrow: [-] last width of the contacts' smoothing, which centres clearances.
-        tolerance: [m, rad, -] largest last increment of Newton's method, which
-            converges quadratically.
+        narrow: [-] last width of the smoothing of contacts, which also centres
+            clearances.
+        tolerance: [m, rad, -] increment of Newton's method at which the iteration ends.
         contact: factor on the stiffness of contacts.
-        conservative: whether the wrench of a spring is the gradient of its energy
-            instead of Exudyn's wrench half-way.
+        conservative: whether the wrench of a spring is the gradient of its energy,
+            instead of Exudyn's approximation.
     """
 
     closing: float
@@ -70,10 +71,10 @@ class Model:
         width: [-] width of the contacts' smoothing, relative to the size of their
             cones.
         deadline: [s] value of ``time.monotonic`` after which the solver stops.
-        callback_error: exception raised by a user function; Exudyn only reports that
-            there was an error.
+        callback_error: exception that a user function raised.  It is stored here
+            because Exudyn reports only that there was an error.
         idle: Exudyn's numbers of the springs on free motions, and their axes.
-        recorded: places whose motion from open to closed is recorded.
+        recorded: places whose motion is recorded while the loops are closed.
         history: (places, 4, 4) poses of these places at each step.
     """
 
@@ -98,13 +99,13 @@ class Model:
         self.history: list[NDArray] = []
 
     def discard(self) -> None:
-        """Release the memory, which Exudyn's models otherwise keep."""
+        """Release the memory of the model, which Exudyn does not release by itself."""
         self.mbs.SetPreStepUserFunction(0)
         self.mbs.Reset()
         self.container.Reset()
 
     def add_body(self, T: NDArray) -> Place:
-        """Return a rigid body built at ``T``; its mass has no effect in statics."""
+        """Return a rigid body with initial pose ``T``; its mass has no effect."""
         x, y, z, w = Rotation.from_matrix(T[:3, :3]).as_quat()
         node = self.item.NodeRigidBodyEP(referenceCoordinates=[*T[:3, 3], w, x, y, z])
         body = self.item.ObjectRigidBody(
@@ -130,13 +131,13 @@ class Model:
             self.mbs.AddObject(joint)
         K = np.where(np.outer(soft, soft), K, 0.0)
         spring = self._connect(markers, K)
-        # for a single axis Exudyn's own wrench is the gradient
+        # For a single elastic axis, Exudyn's own wrench is the gradient.
         if self.regularisation.conservative and soft.sum() > 1:
             self._follow_energy(spring, markers[1], K)
         return Elastic(place, far, (spring,))
 
     def add_idle(self, place: Place, axis: int) -> Elastic:
-        """Return a body at the place, free along one axis except for a weak spring."""
+        """Return a body that moves along one axis of a place, on a weak spring."""
         K = np.diag(np.where(np.arange(6) == axis, HOLDING_STIFFNESS, np.inf))
         spring = self.add_spring(place, K)
         self.idle.append((spring.parts[0], axis))
@@ -155,7 +156,7 @@ class Model:
             self.mbs.SetObjectParameter(part, "offset", rest[_SWAP].tolist())
 
     def add_contact(self, place: Place, clearance: JointClearance) -> Contact:
-        """Add a body within a clearance at the place; a weak spring centres it."""
+        """Add a body that moves within a clearance and is centred by a weak spring."""
         clearance = clearance.softened(self.regularisation.contact)
         rows = np.array(clearance.unlocked, dtype=int)
         centring = np.full(6, np.inf)
@@ -179,8 +180,8 @@ class Model:
 
         Args:
             connector: Exudyn's number of the connector.
-            law: function that returns the resisting wrench half-way between the ends,
-                (6,) [R T], for the screw between them.
+            law: function that returns the resisting wrench (6,) [R T] half-way between
+                the ends, for the screw between the ends.
         """
 
         def wrench(
@@ -201,15 +202,15 @@ class Model:
         self, base: Place, length: float, K: NDArray, elements: int,
         inertia: NDArray,
     ) -> tuple[tuple[int, ...], tuple[Place, ...]]:  # fmt: skip
-        """Return elements of a beam along the base's x, clamped there, and their ends.
+        """Add a beam along the x axis of its base place, to which it is clamped.
 
         Args:
             base: place of the beam's start.
             length: [m] length of the beam.
             K: (6, 6) [N, N m^2] stiffness of the section.
-            elements: number of them.
-            inertia: (3,) mass [kg/m] and its second moments about y and z [kg m]; they
-                are needed for vibrations only.
+            elements: number of elements.
+            inertia: (3,) mass per length [kg/m] and its second moments about y and z
+                [kg m], which only vibrations require.
 
         Returns:
             Exudyn's numbers of the elements, and the places between them.
@@ -233,7 +234,7 @@ class Model:
         return tuple(parts), tuple(bodies)
 
     def add_closure(self, first: Place, second: Place, closed: NDArray) -> Closure:
-        """Add a connector that is stress-free while the closure is open."""
+        """Add a connector that is free of stress while the loop is open."""
         gap = inverse(first.built) @ second.built
         marker = self.add_marker(first.moved(gap))
         markers = [marker, self.add_marker(second)]
@@ -248,7 +249,7 @@ class Model:
         return Closure(first, second, marker, connector, closed)
 
     def add_load(self, place: Place, wrench: NDArray) -> None:
-        """Add a wrench at a place, in base axes, of constant direction."""
+        """Add a wrench at a place, in base axes, whose direction is constant."""
         torque = self.item.LoadTorqueVector(
             markerNumber=self.add_marker(place), loadVector=wrench[:3].tolist()
         )
@@ -256,7 +257,7 @@ class Model:
         self.add_force(place, wrench[3:])
 
     def add_following_load(self, place: Place, wrench: NDArray) -> None:
-        """Add a wrench at a place, in its axes, which turns with its body."""
+        """Add a wrench at a place, in its axes, that rotates with its body."""
         marker = self.add_marker(place)
         for load, vector in (
             (self.item.LoadTorqueVector, wrench[:3]),
@@ -283,11 +284,11 @@ class Model:
         return self.mbs.GetObjectParameter(place.body, "nodeNumber")
 
     def transform(self, T: NDArray) -> Any:
-        """Return Exudyn's kind of transform."""
+        """Convert a (4, 4) pose to Exudyn's homogeneous transformation."""
         return self.exu.HT(rotation=T[:3, :3], translation=T[:3, 3])
 
     def _follow_energy(self, spring: int, far: int, K: NDArray) -> None:
-        """Set a spring's wrenches on both ends to the gradient of its energy."""
+        """Set the wrenches on both ends of a spring to the gradient of its energy."""
         rows, lacking = K.tolist(), [0.0] * 3
 
         def law(screw: list[float]) -> list[float]:
@@ -295,9 +296,9 @@ class Model:
             lacking[:] = far_couple(screw, wrench[3:])
             return wrench
 
-        # Exudyn evaluates connectors before loads.  When it differentiates loads, it
-        # moves the far end alone, and the couple must not change; it hardly changes if
-        # the near end moves too
+        # Exudyn evaluates connectors before loads.  When Exudyn differentiates loads,
+        # it moves only the far end, and the couple must not change.  The couple hardly
+        # changes if the near end moves too.
         load = self.item.LoadTorqueVector(
             markerNumber=far, bodyFixed=True,
             loadVectorUserFunction=lambda mbs, t, load: lacking,
@@ -306,7 +307,7 @@ class Model:
         self.set_law(spring, law)
 
     def _connect(self, markers: list[int], K: NDArray) -> int:
-        """Return a 6 by 6 spring between two markers."""
+        """Return a connector with a 6 by 6 stiffness between two markers."""
         spring = self.item.RigidBodySpringDamper(
             markerNumbers=markers,
             stiffness=K[np.ix_(_SWAP, _SWAP)],

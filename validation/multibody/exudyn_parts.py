@@ -1,6 +1,7 @@
-"""Parts of a simulation model: places on bodies, and elements between places.
+"""Define the parts of a simulation model: places on bodies, and elements between them.
 
-Numbers are Exudyn's; screws and wrenches are ordered [R T] as in the whole library.
+Numbers of objects are those of Exudyn.  Screws and wrenches are ordered [R T] as in the
+whole library.
 """
 
 from dataclasses import dataclass, replace
@@ -12,11 +13,11 @@ from forcefit.validation.multibody.contact import JointClearance
 
 
 class SimulationFailed(RuntimeError):
-    """No equilibrium was found.
+    """Error: the simulation found no equilibrium.
 
     Attributes:
         robot: name of the robot.
-        status: description in a few words.
+        status: reason in a few words.
     """
 
     def __init__(self, robot: str, status: str) -> None:
@@ -26,7 +27,7 @@ class SimulationFailed(RuntimeError):
 
 
 class OutOfTime(SimulationFailed):
-    """The simulation stopped because its time limit was reached."""
+    """Error: the simulation stopped because its time limit was reached."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +36,7 @@ class Place:
 
     Attributes:
         body: Exudyn's number of the body.
-        start: (4, 4) pose in which the body is built, in the base frame.
+        start: (4, 4) initial pose of the body in the base frame.
         local: (4, 4) pose of the place in the body's frame.
     """
 
@@ -45,11 +46,11 @@ class Place:
 
     @property
     def built(self) -> NDArray:
-        """(4, 4) pose in which the place is built, in the base frame."""
+        """(4, 4) initial pose of the place in the base frame."""
         return self.start @ self.local
 
     def moved(self, T: NDArray) -> "Place":
-        """Return a place on the same body with pose ``T`` in the frame of this one."""
+        """Return a place on the same body with pose ``T`` relative to this place."""
         return replace(self, local=self.local @ T)
 
 
@@ -63,7 +64,7 @@ class Elastic:
         parts: Exudyn's numbers of one connector, or of the elements of a beam.
         beam: whether the part is a beam.
         nodes: places along a beam from base to tip, at equal distances.
-        modes: modes of a meshed body, which is one part; None otherwise.
+        modes: interface modes of a meshed body; None for other parts.
     """
 
     near: Place
@@ -95,10 +96,11 @@ class MeshedSolid:
 
 @dataclass(frozen=True, eq=False)
 class MeshBody:
-    """A solid at its pose in a robot.
+    """A meshed solid and its orientation in a robot.
 
     Attributes:
-        solid: the solid, shared by all links of one shape and condensed once.
+        solid: the solid, which all links of one shape share and which is condensed
+            once.
         turn: (3, 3) the mesh's axes in the frame's axes.
     """
 
@@ -124,16 +126,16 @@ class Modes:
 
 @dataclass(frozen=True, eq=False)
 class Closure:
-    """Two places that a connector brings together.
+    """Two places that a connector moves into coincidence.
 
     Attributes:
         first: place on the first chain.
         second: place on the second chain.
-        marker: Exudyn's number of the connector's end on the first chain; this end is
-            moved.
+        marker: Exudyn's number of the connector's end on the first chain, which is
+            moved to close the loop.
         connector: Exudyn's number of the connector.
-        closed: (4, 4) nominal pose of the second place relative to the first when
-            closed.
+        closed: (4, 4) nominal pose of the second place relative to the first if the
+            loop is closed.
     """
 
     first: Place
@@ -150,7 +152,7 @@ class Contact:
     Attributes:
         near: place on the inner body.
         far: place on the outer body.
-        clearance: possible motions of the joint.
+        clearance: bounds of the motions of the joint.
     """
 
     near: Place

@@ -1,4 +1,4 @@
-"""Evaluation of a solved Exudyn model: places, energies, wrenches."""
+"""Evaluate a solved Exudyn model: poses, energies and wrenches."""
 
 from collections.abc import Mapping
 
@@ -18,7 +18,7 @@ from forcefit.validation.multibody.motion import inverse, logarithm, matrix
 
 
 def pose(model: Model, place: Place) -> NDArray:
-    """Return the (4, 4) present pose of a place in the base frame."""
+    """Return the present (4, 4) pose of a place in the base frame."""
     read, kind = model.mbs.GetObjectOutputBody, model.exu.OutputVariableType
     R = np.reshape(read(place.body, kind.RotationMatrix), (3, 3))
     return matrix(R, read(place.body, kind.Position)) @ place.local
@@ -31,7 +31,7 @@ def closure_error(model: Model, closure: Closure) -> NDArray:
 
 
 def screw_between(model: Model, part: Elastic | Contact) -> NDArray:
-    """Return (6,) [rad, m] logarithm of the motion from the near to the far place."""
+    """Return the (6,) [rad, m] logarithm of the motion from near to far place."""
     return logarithm(inverse(pose(model, part.near)) @ pose(model, part.far))
 
 
@@ -71,7 +71,7 @@ def wrench(model: Model, part: Elastic) -> NDArray:
     force = model.mbs.ComputeItem(last, model.exu.ComputeItemType.ODE2LHS)[7:]
     total = model.exu.OutputVariableType.CoordinatesTotal
     a, b, c, d = model.mbs.GetNodeOutput(model.node(part.far), total)[3:7]
-    # the forces of Euler parameters are G^T times the moment, and G G^T = 4
+    # Forces of Euler parameters are G^T times the moment, and G G^T = 4.
     G = 2 * np.array([[-b, a, -d, c], [-c, d, a, -b], [-d, -c, b, a]])
     R = pose(model, part.far)[:3, :3]
     return np.concatenate([R.T @ G @ force[3:] / 4, R.T @ force[:3]])

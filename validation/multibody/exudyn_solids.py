@@ -1,4 +1,4 @@
-"""Meshed links in an Exudyn model: solids in floating frames, with rigid interfaces."""
+"""Add meshed links to an Exudyn model: solids in floating frames with rigid ends."""
 
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -21,12 +21,12 @@ from forcefit.validation.multibody.motion import matrix, shifted
 def add_mesh(model: Model, place: Place, body: MeshBody) -> Elastic:
     """Add a meshed body in a floating frame, clamped so that its tip is at the place.
 
-    Its modes are the static modes of rigid interfaces (Hurty-Craig-Bampton), which
-    Exudyn computes from the full stiffness matrix.
+    The modes of the body are the static modes of its rigid interfaces
+    (Hurty-Craig-Bampton).  Exudyn computes them from the full stiffness matrix.
 
     Args:
         model: model to which the body is added.
-        place: pose of the frame while the body is free of stress.
+        place: place of the frame while the body is free of stress.
         body: the solid.
 
     Returns:
@@ -60,8 +60,8 @@ def _interface(model: Model, number: int, solid: MeshedSolid, side: int) -> int:
     """Return a marker that moves with an interface: 0 is the base, 1 the tip."""
     nodes = (solid.base, solid.tip)[side]
     arms = solid.nodes[nodes] - solid.centers[side]
-    # the weighted mean of the nodes is the centre: an offset would not rotate with the
-    # nodes
+    # The weighted mean of the nodes is the reference point, because an offset would not
+    # rotate with the nodes.
     rows = np.vstack([np.ones(len(arms)), arms.T / np.abs(arms).max()])
     weights = np.linalg.lstsq(rows, np.array([1.0, 0.0, 0.0, 0.0]))[0]
     marker = model.item.MarkerSuperElementRigid(
@@ -71,7 +71,7 @@ def _interface(model: Model, number: int, solid: MeshedSolid, side: int) -> int:
 
 
 def _tip_wrenches(body: MeshBody, basis: NDArray, K: NDArray) -> NDArray:
-    """Return the (6, 6) wrenches at the tip, in the frame's axes, of unit modes."""
+    """Return the (6, 6) tip wrenches of unit modes, in the frame's axes."""
     solid = body.solid
     arms = solid.nodes[solid.tip] - solid.centers[1]
     rigid = np.zeros((len(arms), 3, 6))
@@ -94,7 +94,7 @@ def _floating(fem: Any, solid: MeshedSolid) -> Any:
         link.nodes = {"Position": solid.nodes}
         link.surface = [{"Name": "none", "Trigs": []}]
         link.stiffnessMatrix = solid.stiffness
-        # required by Exudyn, but not used
+        # Exudyn requires a mass matrix but does not use it.
         link.massMatrix = identity(3 * len(solid.nodes), format="csr")
         link.ComputeHurtyCraigBamptonModes(
             [solid.base.tolist(), solid.tip.tolist()],

@@ -1,12 +1,12 @@
-"""Static solution of an Exudyn model in stages, from the open robot to equilibrium.
+"""Solve an Exudyn model statically in stages, from the open robot to equilibrium.
 
-Closures are closed while loads increase.  Then contacts stiffen, if there are any, and
-free motions are released.  The remaining closure errors are subtracted from the targets
-of the closures until they vanish.
+First the loops are closed while the loads increase.  Then contacts stiffen, if there
+are any, and free motions are released.  Finally the target of each closure is corrected
+by its remaining closure error until all errors vanish.
 
-A solution respects its time limit: Exudyn counts processor time and stops between two
-steps, and its user functions check the clock.  Exceptions in user functions, including
-Ctrl-C, are raised again.
+The time limit is enforced in two ways.  Exudyn measures processor time and stops
+between two steps, and the user functions check the clock.  Exceptions in user
+functions, including Ctrl-C, are raised again.
 """
 
 import time
@@ -31,16 +31,16 @@ from forcefit.validation.multibody.exudyn_reading import (
 )
 from forcefit.validation.multibody.motion import exponential, inverse, logarithm
 
-_CLOSED = 1e-12  # [rad, m] largest component of a closure error that counts as closed
+_CLOSED = 1e-12  # [rad, m] smaller closure errors count as zero
 _LOAD_STEPS = 4
 _RELEASING_STEPS = 4  # number of steps in which free motions are released
-# number of steps in which the smoothing of the contacts is reduced, geometrically
-# spaced
+# Number of steps, geometrically spaced, in which the smoothing of the contacts is
+# reduced.
 _NARROWING_STEPS = 30
 _CLOSING_STEPS = 30
-# largest number of steps; each reduces the residual by a factor of a million
+# Largest number of steps; each reduces the residual by a factor of a million.
 _RELAXING_STEPS = 4
-_RESTS = 1e-10  # [rad, m] change of free motions below which they are at rest
+_RESTS = 1e-10  # [rad, m] change below which free motions count as at rest
 _STAGES = (
     "closures are closed and loads increase",
     "contacts stiffen and free motions are released",
@@ -51,14 +51,14 @@ _STAGES = (
 def solve(
     model: Model, closures: list[Closure], narrow: bool = False, steps: int = 0
 ) -> NDArray:
-    """Close the closures in steps, then correct their targets until they are closed.
+    """Close the loops in steps, then correct the targets until the errors vanish.
 
     Args:
-        model: a built model; afterwards it is in equilibrium.
+        model: complete model, which is in equilibrium after the call.
         closures: closures to be closed.
-        narrow: whether there are contacts, whose smoothing is reduced after the first
-            stage.
-        steps: smallest number of steps in which closures are closed.
+        narrow: whether the model contains contacts, whose smoothing is reduced after
+            the first stage.
+        steps: smallest number of steps for closing the loops.
 
     Returns:
         The shifts of the targets, with which :func:`close` continues if loads change.
@@ -78,7 +78,7 @@ def solve(
 
 
 def close(model: Model, closures: list[Closure], shift: NDArray) -> None:
-    """Correct the targets of the closures until they are closed.
+    """Correct the targets of the closures until the closure errors vanish.
 
     Args:
         model: model in equilibrium, with remaining closure errors.
@@ -107,8 +107,8 @@ def relax(
 ) -> None:
     """Set the rest positions of the weak springs on free motions to the present state.
 
-    Otherwise these springs displace the equilibrium.  A robot that is compliant along
-    such a motion, and deforms while it moves, would then have a different stiffness.
+    Otherwise these springs would displace the equilibrium.  The stiffness of a robot
+    that deforms during such a motion would then be different.
 
     Args:
         model: model in equilibrium.
@@ -131,7 +131,7 @@ def relax(
 def _before_step(
     model: Model, closures: list[Closure], shift: NDArray
 ) -> Callable[[Any, float], bool]:
-    """Return the function that moves targets and narrows contacts before each step."""
+    """Return a function that moves targets and narrows contacts before each step."""
     opened = [
         logarithm(inverse(c.first.built @ c.closed) @ c.second.built) for c in closures
     ]
@@ -159,12 +159,12 @@ def _before_step(
 
 
 def equilibrate(model: Model, start: float, steps: int) -> None:
-    """Run Exudyn's static solver from the last state, over one unit of its time.
+    """Run Exudyn's static solver from the last state over one unit of its time.
 
     Args:
         model: the assembled model.
-        start: 0: closures are closed and loads increase; 1: contacts stiffen; 2:
-            targets of the closures are corrected.
+        start: start time, which selects the stage. 0: loops are closed and loads
+            increase. 1: contacts stiffen. 2: targets of the closures are corrected.
         steps: initial number of steps; a step that fails is divided.
 
     Raises:
@@ -190,7 +190,7 @@ def equilibrate(model: Model, start: float, steps: int) -> None:
 
 
 def raise_callback_error(model: Model, stage: str) -> None:
-    """Raise the exception of a user function, if there was one.
+    """Raise the stored exception of a user function, if there is one.
 
     Args:
         model: model to which the function belongs.
@@ -220,7 +220,7 @@ def static_settings(model: Model, start: float, steps: int) -> Any:
     static.useLoadFactor = start == 0.0
     static.minimumStepSize = 1e-3
     newton = static.newton
-    # judges increments, because weak springs make residuals small
+    # Convergence is judged by increments, because weak springs make residuals small.
     newton.residualMode = 1
     newton.absoluteTolerance = newton.relativeTolerance = model.regularisation.tolerance
     newton.maxIterations = 25

@@ -1,11 +1,11 @@
-"""Small vibrations of an Exudyn model about its equilibrium.
+"""Compute small vibrations of an Exudyn model about its equilibrium.
 
 Exudyn linearises the model by forward differences and projects it onto the motions that
-its joints allow.  Differences of two sizes cancel the error of first order: without
-this a stiff robot's frequencies are wrong by 1e-6 to 1e-2.
-Only bodies with a given mass or moments of inertia have one, so the mass matrix is
-singular: degrees of freedom without inertia are condensed, instead of having an
-infinite frequency.
+its joints allow.  Differences of two step sizes are combined so that the first-order
+error cancels.  Without this combination, the frequencies of a stiff robot are wrong by
+1e-6 to 1e-2.  The mass matrix is singular, because only bodies with a given mass or
+given moments of inertia contribute.  Degrees of freedom without inertia are therefore
+condensed statically.
 """
 
 import numpy as np
@@ -15,17 +15,17 @@ from forcefit.validation.multibody.exudyn_model import Model
 from forcefit.validation.multibody.exudyn_parts import Place
 
 _SIX = (np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1]))  # Exudyn's order
-_STEP = 1e-5  # [-] of the differences: errors 1e-4 to 1e-7 change no frequency by 1e-8
-_NOTHING = 1e-12  # relative to the largest: smaller inertias count as zero
+_STEP = 1e-5  # [-] step of differences; 1e-4 to 1e-7 agree within 1e-8
+_NOTHING = 1e-12  # inertias below this fraction of the largest are zero
 
 
 def set_masses(model: Model, bodies: list[tuple[Place, float, NDArray]]) -> None:
-    """Set masses of the model's rigid bodies, in place of their first masses.
+    """Replace the masses of the model's rigid bodies.
 
     Args:
-        model: solved.
-        bodies: place of each centre, [kg], and (3, 3) [kg m^2] about the centre in the
-            axes of the place.
+        model: solved model.
+        bodies: for each body the place of its centre of mass, its mass [kg], and its
+            inertia tensor (3, 3) [kg m^2] about this centre in the axes of the place.
     """
     for item in range(model.mbs.systemData.NumberOfObjects()):
         if model.mbs.GetObject(item)["objectType"] == "RigidBody":
@@ -35,7 +35,7 @@ def set_masses(model: Model, bodies: list[tuple[Place, float, NDArray]]) -> None
 def _set_mass(
     model: Model, body: int, parts: list[tuple[Place, float, NDArray]]
 ) -> None:
-    """Set mass, centre and inertia about its reference point of one body."""
+    """Set mass, centre and inertia about the reference point of one body."""
     mass, moment, inertia = 0.0, np.zeros(3), np.zeros((3, 3))
     for place, m, J in parts:
         c, R = place.local[:3, 3], place.local[:3, :3]
@@ -54,7 +54,7 @@ def natural_frequencies(model: Model) -> NDArray:
         model: model in its equilibrium.
 
     Returns:
-        One frequency for each inertia.
+        One frequency for each degree of freedom with inertia.
     """
     (M, once), (_, twice) = (_linearised(model, step) for step in (_STEP, 2 * _STEP))
     K = 2 * once - twice

@@ -1,14 +1,15 @@
-"""The platform's compliance from the linearised system of the simulation.
+"""Compute the platform's compliance from the linearised system of the simulation.
 
-Exudyn's residual is differentiated at its equilibrium, while the forces there (loads,
-and reactions of joints and closures) are held constant.  It is differentiated along the
-motions that joints and closures allow, so that stiff directions add no noise. These
-motions follow the modes of Exudyn's own Jacobian, which separates compliant from stiff
-motions.  Differences are extrapolated to step zero.
+Exudyn's residual is differentiated at the equilibrium, while loads and the reactions of
+joints and closures are held constant.  The derivatives are computed along motions that
+joints and closures allow, so that stiff directions add no noise.  These motions are
+modes of Exudyn's own Jacobian, which separate compliant from stiff directions.  The
+differences are extrapolated to step zero.
 
-Weak springs hold free motions, so that the model can be solved.  Without them the
-compliance is larger by k X (1 - k B)^-1 X' (Woodbury), which is added.  X and B are the
-responses of the platform and of the free joints to loads on these joints.
+Weak springs of stiffness k hold free motions, so that the model can be solved.  Their
+effect is removed by adding k X (1 - k B)^-1 X' to the compliance (Woodbury identity).
+X and B are the responses of the platform and of the free joints to loads on these
+joints.
 """
 
 from collections.abc import Callable
@@ -35,15 +36,17 @@ from forcefit.validation.multibody.exudyn_solver import (
 from forcefit.validation.multibody.motion import turned
 from forcefit.validation.multibody.open_robot import OpenTree
 
-# steps in Exudyn's coordinates, whose rotations are parameters of size 1; a contact is
-# smoothed over some nm, and its penetration is smaller
+# Steps in Exudyn's coordinates, in which rotations are parameters of size 1.  The steps
+# for contacts are smaller than the penetration and the width of the smoothing, which
+# are some nm.
 _STEPS, _CONTACT_STEPS = (2e-4, 1e-4, 5e-5), (1e-8, 3e-9, 1e-9, 3e-10)
 _GAP_STEP = 1e-5
 _RANK = 1e-7  # relative size below which a derivative of a closure error counts as zero
-# relative to a joint's motion: smaller stiffness is due to the joint's idle spring
-# alone
+# Relative to a joint's motion.  A motion with a smaller stiffness is resisted only by
+# the weak spring of the joint.
 _ROLLS = 1e-4
-# number of Newton steps at the end; rounding of closures moves compliant robots
+# Number of Newton steps at the end, because rounding errors of closures move compliant
+# robots.
 _POLISH = 2
 
 
@@ -58,9 +61,9 @@ def linearised_compliance(
         platform: name of the platform's frame.
 
     Returns:
-        (6, 6) [rad/(N m) .. m/N] for small motions at the platform's present origin,
-        base axes; its uncertainty, for entries over sqrt(C_ii C_jj); and whether the
-        equilibrium is stable.
+        (6, 6) [rad/(N m) .. m/N] compliance for small motions at the platform's present
+        origin, base axes; its uncertainty, for entries over sqrt(C_ii C_jj); and
+        whether the equilibrium is stable.
 
     Raises:
         OutOfTime: the model's deadline has passed.
@@ -85,10 +88,10 @@ _LAW = "springForceTorqueUserFunction"
 
 
 def _freeze(model: Model, closure: Closure) -> None:
-    """Hold a closed closure's wrench constant.
+    """Replace the connector of a closed loop by a constant wrench.
 
-    The connector acts half-way between the closed place and its target, which differ by
-    the connector's own deformation, about 1 mm under 1e5 N.  The constant wrench is
+    The connector acts half-way between the closed place and its target.  Both differ by
+    the deformation of the connector, about 1 mm under 1e5 N. The constant wrench is
     computed at the closed place.
     """
     wrench = connector_wrench(model, closure.connector)
@@ -117,7 +120,7 @@ def _compliance(
         ahead, back = ([forces(q + sign * step * z) for z in Z.T] for sign in (1, -1))
         return Z.T @ (np.array(ahead) - np.array(back)).T / (2 * step)
 
-    # contacts change with the pressure, so no Newton steps follow
+    # Contact forces change with pressure, so no Newton steps follow.
     steps, polish = (_CONTACT_STEPS, 0) if tree.contacts else (_STEPS, _POLISH)
     q = np.array(model.mbs.systemData.GetODE2Coordinates())
     forces(q)
@@ -150,8 +153,9 @@ def _compliance(
 
 
 def _is_stable(model: Model, K: NDArray, V: NDArray) -> bool:
-    """Return whether no motion lowers the potential by more than K's uncertainty."""
-    # the curvature of free motions is due to rounding and has either sign
+    """Return whether no motion lowers the potential beyond the uncertainty of K."""
+    # The computed curvature of free motions is a rounding error and may have either
+    # sign.
     K = K + 1e3 * model.regularisation.idle * V[6:].T @ V[6:]
     size = 1.0 / np.sqrt(np.abs(np.diag(K)))
     scaled = (K + K.T) / 2 * np.outer(size, size)
@@ -159,24 +163,24 @@ def _is_stable(model: Model, K: NDArray, V: NDArray) -> bool:
 
 
 def _held(model: Model, K: NDArray, V: NDArray) -> NDArray:
-    """Return the stiffness of the modes with the idle springs."""
+    """Return the stiffness of the modes including the weak springs."""
     return K + model.regularisation.idle * V[6:].T @ V[6:]
 
 
 def _by_modes(model: Model, K: NDArray, V: NDArray) -> NDArray:
-    """Return the compliance from the stiffness of the modes, without idle springs."""
+    """Return the compliance from the stiffness of the modes without weak springs."""
     whole = V @ _solve(_held(model, K, V), V.T)
     k, coupled = model.regularisation.idle, whole[:6, 6:]
     held, ways = np.linalg.eigh(np.eye(len(whole) - 6) - k * whole[6:, 6:])
-    # motions that only idle springs resist, such as the rolling of a rod, move no other
-    # body
+    # Motions that only weak springs resist, such as the rotation of a rod about its
+    # axis, move no other body.
     ways, held = ways[:, held > _ROLLS], held[held > _ROLLS]
     ways = coupled @ ways / np.sqrt(held)
     return whole[:6, :6] + k * ways @ ways.T
 
 
 def _solve(K: NDArray, right: NDArray) -> NDArray:
-    """Return K^-1 right, for stiffnesses of very different size."""
+    """Return K^-1 right for stiffnesses of very different magnitudes."""
     K = (K + K.T) / 2
     size = 1.0 / np.sqrt(np.abs(np.diag(K)))
     scaled = K * np.outer(size, size)
@@ -186,7 +190,7 @@ def _solve(K: NDArray, right: NDArray) -> NDArray:
 def _motion(
     model: Model, tree: OpenTree, platform: str, q: NDArray, Z: NDArray, step: float
 ) -> NDArray:
-    """Return derivatives along Z of closure errors, platform pose and idle joints."""
+    """Return derivatives along Z of closure errors, platform pose and free joints."""
     system, place = model.mbs.systemData, tree.before[platform]
 
     def read(q: NDArray) -> tuple[NDArray, NDArray, NDArray]:

@@ -1,10 +1,11 @@
-"""The platform's compliance from small loads, with its uncertainty.
+"""Compute the platform's compliance from small loads, with its uncertainty.
 
-At its equilibrium the simulation is loaded slightly along each axis, in both
-directions, with decreasing steps.  Half the difference of the platform's motions per
-load is the compliance, with an error proportional to the square of the step.  The size
-of this error depends on internal motions: a joint may rotate a hundred times as much as
-the platform.  So the differences are extrapolated to step zero.
+At the equilibrium, small loads are applied to the platform along each axis in both
+directions, with decreasing steps.  The compliance is half the difference of the
+platform's motions divided by the load.  Its error is proportional to the square of the
+step.  The size of this error depends on internal motions, because a joint may rotate a
+hundred times as much as the platform.  Therefore the differences are extrapolated to
+step zero.
 """
 
 from functools import partial
@@ -20,12 +21,12 @@ from forcefit.validation.multibody.exudyn_reading import idle_motions, pose
 from forcefit.validation.multibody.exudyn_solver import close, equilibrate
 from forcefit.validation.multibody.open_robot import OpenTree
 
-# [rad, m] largest step of the platform; ratio and number of steps
+# [rad, m] Largest step of the platform; ratio of consecutive steps, and their number.
 _LARGEST, _RATIO, _SIZES = 4e-3, 5.0, 4
 
 
 def add_step_loads(model: Model, tree: OpenTree, platform: str) -> tuple[int, int]:
-    """Add a moment and a force on the platform, zero at first, before the solution."""
+    """Add a moment and a force on the platform, which are zero before the solution."""
     marker = model.add_marker(tree.before[platform])
     item = model.item
     moment = item.LoadTorqueVector(markerNumber=marker, loadVector=[0.0] * 3)
@@ -37,7 +38,7 @@ def stepped_compliance(
     model: Model, tree: OpenTree, platform: str, loads: tuple[int, int], shift: NDArray,
     sizes: NDArray,
 ) -> tuple[NDArray, float]:  # fmt: skip
-    """Return the compliance of a model at its present equilibrium by differences.
+    """Return the compliance of a model at its present equilibrium by load steps.
 
     Args:
         model: model in equilibrium.
@@ -46,11 +47,12 @@ def stepped_compliance(
         loads: loads from :func:`add_step_loads`.
         shift: shifts of the targets from
             :func:`forcefit.validation.multibody.exudyn_solver.solve`.
-        sizes: (6,) [rad or m per N m or N] approximate largest motion under unit loads.
+        sizes: (6,) [rad or m per N m or N] approximate largest motion under each unit
+            load.
 
     Returns:
-        (6, 6) [rad/(N m) .. m/N] for small motions at the platform's present origin,
-        base axes; and its uncertainty, for entries over sqrt(C_ii C_jj).
+        (6, 6) [rad/(N m) .. m/N] compliance for small motions at the platform's present
+        origin, base axes; and its uncertainty, for entries over sqrt(C_ii C_jj).
 
     Raises:
         SimulationFailed: there is no equilibrium nearby, even under the smallest loads.
@@ -62,8 +64,8 @@ def stepped_compliance(
     def moved(step: float, unit: NDArray, drift: NDArray) -> tuple[NDArray, ...]:
         for number, part in zip(loads, np.split(step * unit, 2), strict=True):
             model.mbs.SetLoadParameter(number, "loadVector", part.tolist())
-        # targets move with the load, so the motion of the last step is a good start
-        # value
+        # Targets move in proportion to the load, so the motion of the last step is a
+        # good start value.
         shift[:] = first[1] + step * drift
         system.SetSystemState(start, configuration=initial)
         equilibrate(model, 2.0, 1)
@@ -87,7 +89,7 @@ def stepped_compliance(
             except OutOfTime:
                 raise
             except SimulationFailed:
-                # a large step may be outside the range with an equilibrium
+                # A large step may leave the range in which an equilibrium exists.
                 if step <= _LARGEST / size / _RATIO ** (_SIZES - 3):
                     raise
                 slopes.clear()
@@ -110,5 +112,5 @@ def stepped_compliance(
 
 
 def _relative(sizes: NDArray, change: NDArray) -> float:
-    """Return the largest change of the platform's motion, relative to the motion."""
+    """Return the largest change of the platform's motion, relative to this motion."""
     return float((change[:6] / sizes).max())

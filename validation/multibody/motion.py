@@ -1,7 +1,7 @@
-"""Finite rigid motions as 4 by 4 matrices, for the multibody simulation only.
+"""Compute finite rigid motions as 4 by 4 matrices, for the simulation only.
 
-This module is independent of :mod:`forcefit.stiffness.screws` on purpose: a mistake in
-the placement of frames must not affect both sides.
+This module does not use :mod:`forcefit.stiffness.screws`, so that a mistake in the
+placement of frames cannot affect both the model and the simulation.
 """
 
 import math
@@ -25,7 +25,8 @@ def turned(rotation_vector: ArrayLike) -> NDArray:
 
 def turn_of(R: NDArray) -> NDArray:
     """Return the (3,) [rad] rotation vector, at most pi long, of a rotation (3, 3)."""
-    # by the quaternion; its largest component is computed first (Shepperd 1978)
+    # The quaternion is computed first, beginning with its largest component (Shepperd
+    # 1978).
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = R.tolist()
     trace = xx + yy + zz
     largest = max(trace, xx, yy, zz)
@@ -49,7 +50,7 @@ def placement(rotation_vector: ArrayLike, translation: ArrayLike) -> NDArray:
 
 
 def shifted(translation: ArrayLike) -> NDArray:
-    """Return the (4, 4) motion of a translation alone."""
+    """Return the (4, 4) motion of a pure translation."""
     return matrix(np.eye(3), translation)
 
 
@@ -62,16 +63,16 @@ def exponential(screw: NDArray) -> NDArray:
     """Return the finite motion of a constant screw acting for unit time.
 
     Args:
-        screw: (6,) ``[RX RY RZ TX TY TZ]`` [rad, m].
+        screw: (6,) ``[RX RY RZ TX TY TZ]`` [rad, m] screw.
 
     Returns:
-        (4, 4) motion.
+        (4, 4) matrix of the motion.
     """
     return matrix(turned(screw[:3]), _mean_turn(screw[:3]) @ screw[3:])
 
 
 def logarithm(T: NDArray) -> NDArray:
-    """Return the constant screw that makes a finite motion in unit time.
+    """Return the constant screw that causes a finite motion in unit time.
 
     Args:
         T: (4, 4) motion with a rotation of less than pi.
@@ -84,11 +85,12 @@ def logarithm(T: NDArray) -> NDArray:
 
 
 def _mean_turn(angles: NDArray) -> NDArray:
-    """Return (3, 3) mean of the rotations by t times a rotation vector, 0 < t < 1."""
+    """Return the (3, 3) mean of rotations by t times a rotation vector, 0 < t < 1."""
     a = float(np.linalg.norm(angles))
     x, y, z = angles
     W = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    # the closed form cancels; neglected terms of the series are below 1e-15
+    # The closed form loses digits by cancellation; neglected terms of the series are
+    # below 1e-15.
     if a < 1e-3:
         first, second = 1 / 2 - a**2 / 24, 1 / 6 - a**2 / 120
     else:

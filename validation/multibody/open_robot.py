@@ -1,9 +1,9 @@
-"""The open robot without stress: bodies along their chains, with geometric errors.
+"""Build the open robot without stress from bodies with geometric errors.
 
-At a frame the geometric error acts first, then the deformation of the link, then the
-motion of the joint, as in the paper.  Rotation vector and translation of an error are
-both in the frame's axes.  Passive joints without a spring rotate about or slide along
-their z axis freely.
+At each frame, the geometric error is applied first, then the deformation of the link,
+then the motion of the joint, as in the paper.  Rotation vector and translation of an
+error are both in the frame's axes.  Passive joints without a spring move freely about
+or along their z axis.
 """
 
 from collections.abc import Mapping
@@ -31,7 +31,7 @@ from forcefit.validation.multibody.motion import inverse, matrix, placement, shi
 
 
 class PostureLike(Protocol):
-    """The properties of a posture that the simulation uses."""
+    """The properties of a posture that the simulation uses (protocol)."""
 
     @property
     def robot(self) -> Robot:
@@ -39,7 +39,7 @@ class PostureLike(Protocol):
 
     @property
     def coordinates(self) -> NDArray:
-        """(n,) [rad or m] joint coordinates at which the nominal closures hold."""
+        """(n,) [rad or m] joint coordinates that close the nominal loops."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,13 +49,14 @@ class Case:
     Attributes:
         posture: the robot and its joint coordinates.
         scale: factor on geometric errors and clearances.
-        springs: K_E by frame, for links that are springs; see :func:`link_springs`.
-        meshes: meshed body by frame, for links that are solids.
-        elements: number of elements of every other link, which is a beam.
+        springs: mapping from frame to K_E, for links that are springs; see
+            :func:`link_springs`.
+        meshes: mapping from frame to meshed body, for links that are solids.
+        elements: number of elements of each beam; all other links are beams.
         clearances: whether joints have their clearances.
         bushes: whether a pin is held in two bushes.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes.
+        load: (6,) [N m, N] load on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] gravity in base axes.
         couple: (3,) [N m] additional couple of dead forces on the platform, base axes.
     """
 
@@ -82,12 +83,12 @@ def link_springs(
     Args:
         robot: robot of the simulation.
         links: ``"beam"`` or ``"spring"``.
-        given: K_E (6, 6) [N m/rad .. N/m] by frame, for links whose K_E the robot
-            lacks.
-        meshes: solids by frame.
+        given: mapping from frame to K_E (6, 6) [N m/rad .. N/m], for links whose K_E is
+            missing in the robot.
+        meshes: mapping from frame to solid.
 
     Returns:
-        K_E by frame.
+        Mapping from frame to K_E.
 
     Raises:
         BadInput: a stiffness is missing.
@@ -104,25 +105,25 @@ def link_springs(
             springs[frame.name] = given[frame.name]
         else:
             raise BadInput(
-                f"simulate_assembly: the link of frame '{frame.name}' becomes a "
-                "spring, expected its 6 by 6 matrix in `stiffness`"
+                f"simulate_assembly: the link of frame '{frame.name}' is simulated "
+                "as a spring; expected its 6 by 6 matrix in `stiffness`"
             )
     return springs
 
 
 @dataclass(frozen=True, eq=False)
 class OpenTree:
-    """Parts of the built model, by frame.
+    """Parts of a complete model, by name of the frame.
 
     Attributes:
-        platform: (4, 4) nominal platform in the base frame.
+        platform: (4, 4) nominal pose of the platform in the base frame.
         bodies: places of the frames on their bodies, before clearances and springs.
         before: places of the frames before the motion of their joints.
         links: elastic bodies by frame.
         joints: joint springs by frame.
         idle: the springs of free motions by frame.
         contacts: joints with clearance by frame.
-        closures: closures in the robot's order.
+        closures: closures in the order of the robot.
     """
 
     platform: NDArray
@@ -140,13 +141,13 @@ def build(model: Model, case: Case) -> OpenTree:
 
     Args:
         model: empty model.
-        case: the description.
+        case: description of the robot and its loads.
 
     Returns:
         The parts of the model.
 
     Raises:
-        BadInput: the robot has a helical joint.
+        BadInput: the robot contains a helical joint.
     """
     posture, robot = case.posture, case.posture.robot
     refuse_helical(robot)
@@ -157,7 +158,7 @@ def build(model: Model, case: Case) -> OpenTree:
         place = _add_frame(model, case, frame, after[frame.parent], tree)
         after[frame.name] = place.moved(_own_motion(frame, q))
     for a, b in robot.closures:
-        # closure errors due to rounding of files are not geometric errors
+        # Closure errors that are caused by rounding in files are not geometric errors.
         closed = inverse(nominal[a]) @ nominal[b]
         closure = model.add_closure(tree.before[a], tree.before[b], closed)
         tree.closures.append(closure)
@@ -171,7 +172,7 @@ def build(model: Model, case: Case) -> OpenTree:
 
 
 def refuse_helical(robot: Robot) -> None:
-    """Raise BadInput if a robot has a helical joint, which no simulation here has."""
+    """Raise BadInput if a robot contains a helical joint, which is not supported."""
     for frame in robot.frames:
         if frame.pitch:
             raise BadInput(
@@ -183,7 +184,7 @@ def refuse_helical(robot: Robot) -> None:
 def _add_frame(
     model: Model, case: Case, frame: Frame, parent: Place, tree: OpenTree
 ) -> Place:
-    """Add a body with its error, link and joint; return the place before the joint."""
+    """Add a body with error, link and joint; return the place before the joint."""
     error = case.scale * frame.geometric_error
     place = parent.moved(placement(frame.rotation, frame.translation))
     place = place.moved(placement(error[:3], error[3:]))
@@ -236,7 +237,7 @@ def _own_motion(frame: Frame, q: float) -> NDArray:
 
 
 def _add_beam(model: Model, place: Place, frame: Frame, elements: int) -> Elastic:
-    """Add a straight beam, clamped to the place's body, whose tip is at the place."""
+    """Add a straight beam that is clamped to a body and ends at the place."""
     link = frame.link
     assert isinstance(link, BeamLink)
     length, x = beam_span(frame, link)
@@ -251,7 +252,7 @@ def _add_beam(model: Model, place: Place, frame: Frame, elements: int) -> Elasti
 
 
 def _add_couple(model: Model, place: Place, nominal: NDArray, couple: NDArray) -> None:
-    """Add a couple: two forces m x axis / 2 on an arm of 1 m along each axis."""
+    """Add a couple as two forces m x axis / 2 on an arm of 1 m along each axis."""
     for axis, arm in zip(nominal[:3, :3].T, np.eye(3), strict=True):
         force = np.cross(couple, axis) / 2
         model.add_force(place.moved(shifted(arm)), force)
@@ -261,10 +262,10 @@ def _add_couple(model: Model, place: Place, nominal: NDArray, couple: NDArray) -
 def _add_weights(model: Model, robot: Robot, tree: OpenTree, gravity: NDArray) -> None:
     """Add the weights of all masses.
 
-    A beam's weight acts at its nodes, with the end moments of a clamped beam under
-    uniform load, so that the tip of a cantilever is exact for any number of nodes.  The
-    moments are pairs of forces on arms that rotate with the ends.  Like weight, they
-    keep their direction and have a potential.
+    The weight of a beam acts at its nodes, with the end moments of a clamped beam under
+    uniform load.  The tip deflection of a cantilever is then exact for any number of
+    nodes.  The moments are pairs of forces on arms that rotate with the ends.  Like
+    weight, these forces have a constant direction and a potential.
     """
     for frame in robot.frames:
         if frame.mass:

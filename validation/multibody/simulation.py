@@ -1,16 +1,17 @@
-"""The forced assembly as a multibody simulation, independent of the linear model.
+"""Simulate the forced assembly as a multibody system, independently of the model.
 
-Every body is placed without stress in the open robot, with its full geometric error.
-The closures are then closed by force, and Exudyn computes the static equilibrium with
-finite rotations.  Only the robot's data and its joint coordinates are shared with the
-virtual-joint model; placement, beams and equilibrium are computed independently.
+In the open robot, every body is placed without stress and with its full geometric
+error.  The loops are then closed by force, and Exudyn computes the static equilibrium
+with finite rotations.  Only the data of the robot and its joint coordinates are shared
+with the virtual-joint model.  Placement, beams and equilibrium are computed
+independently.
 
-At a frame the geometric error acts first, then the deformation of the link, then the
-motion of the joint, as in the paper.  Rotation vector and translation of an error are
-both in the frame's axes.  Without clearances, passive joints rotate about or slide
-along their z axis freely.  A connector closes each closure; its target is corrected
-until the closure error vanishes, so overconstrained rigid loops (parallelograms) need
-no special treatment.
+At each frame, the geometric error is applied first, then the deformation of the link,
+then the motion of the joint, as in the paper.  Rotation vector and translation of an
+error are both in the frame's axes.  Without clearances, passive joints move freely
+about or along their z axis.  A connector closes each loop.  The target of the connector
+is corrected until the closure error vanishes, so overconstrained rigid loops such as
+parallelograms need no special treatment.
 
 Sources:
     Gerstmayr (2023), "Exudyn - a C++-based Python package for flexible multibody
@@ -71,20 +72,20 @@ from forcefit.validation.multibody.open_robot import (
 )
 
 LINKS = ("beam", "spring")
-# [s] largest time of a simulation; the slowest known one took 26 s on an idle core
+# [s] Largest time of a simulation; the slowest known one took 26 s on an idle core.
 TIME_LIMIT = 600.0
 _FINEST = 1e-10  # [m, rad, -] smallest tolerance of Newton's last increment
-# regularisations that are tried in turn; with contacts, closures must not be much more
-# compliant than contacts, and a rod between two spherical joints may roll by radians
-# under its weight unless it is held
+# Regularisations that are tried in turn.  With contacts, connectors must not be much
+# more compliant than contacts.  A rod between two spherical joints may rotate by
+# radians about its axis under its weight unless this motion is held.
 _TIGHT = (
     Regularisation(1e10, IDLE_STIFFNESS),
     Regularisation(1e10, HOLDING_STIFFNESS),
 )
-# A joint without contact is undetermined within its clearance.  Rounding of forces
-# moves it by 1e-3 m with the first of these, by 1e-7 m with the third, which smooths a
-# little more. At small scales clearances have this size too; softer contacts reduce the
-# rounding of forces.
+# The position of a joint within its clearance is undetermined without contact.
+# Rounding of forces moves the joint by 1e-3 m with the first regularisation, and by
+# 1e-7 m with the third, which smooths more.  At small scales, the clearances are as
+# small as these motions.  Softer contacts reduce the rounding of forces.
 WITH_CLEARANCES = (
     Regularisation(1e12, IDLE_STIFFNESS),
     Regularisation(1e10, IDLE_STIFFNESS, contact=0.1),
@@ -99,14 +100,16 @@ class SimulationModel:
     """Options for the model of links and joints.
 
     Attributes:
-        links: ``"beam"``: links with a section are geometrically exact beams, other
-            links are 6 by 6 springs; ``"spring"``: all links are springs.
-        stiffness: K_E (6, 6) [N m/rad .. N/m] by frame, at the frame in its axes, for
-            links that are springs and whose matrix the robot does not give.
-        meshes: meshed body by frame, for links that are solids of finite elements in a
-            floating frame.
+        links: model of the links.  ``"beam"``: links with a cross-section are
+            geometrically exact beams, and other links are 6 by 6 springs.
+            ``"spring"``: all links are springs.
+        stiffness: mapping from frame to K_E (6, 6) [N m/rad .. N/m], at the frame in
+            its axes, for links that are springs and whose matrix is missing in the
+            robot.
+        meshes: mapping from frame to meshed body, for links that are solids of finite
+            elements in a floating frame.
         elements: number of elements of each beam.
-        clearances: whether joints have their clearances, scaled like the errors.
+        clearances: whether joints have clearances, which are scaled like the errors.
         bushes: whether joints with radial clearance and tilt are pins in two bushes
             instead of a disc and a cone, see
             :func:`forcefit.validation.multibody.contact.joint_clearance`.
@@ -137,7 +140,7 @@ class MultibodyAssembly:
     """A robot assembled by the simulation.
 
     Rows are frames in the robot's order.  Screws and wrenches are at the frame, in its
-    axes; they are zero for a frame without the spring.
+    axes; they are zero for a frame without that spring.
 
     Attributes:
         platform_screw: (6,) [rad, m] rotation vector of R_actual R_nominal^T, and
@@ -155,10 +158,11 @@ class MultibodyAssembly:
         transforms: (n, 4, 4) frames in the base frame, before the motion of their
             joints.
         gap: [rad, m] largest component of a closure error.
-        idle_energy: [J] energy in the springs on free motions; it must be nearly zero.
+        idle_energy: [J] energy in the weak springs on free motions, which must be
+            nearly zero.
         contact_energy: [J] energy in the compliance of contacts.
-        held: whether free motions are held by 0.01 N m/rad or N/m, because no
-            equilibrium was found otherwise.
+        held: whether springs of 0.01 N m/rad or N/m hold free motions, because no
+            equilibrium was found without them.
         seconds: [s] computing time.
     """
 
@@ -201,20 +205,20 @@ def simulate_assembly(
         posture: the robot and its joint coordinates; actuated joints are locked there.
         scale: factor on the robot's geometric errors and on the forces of its drives.
         model: options for links and joints.
-        load: (6,) [N m, N] on the platform at its origin, base axes, of constant
-            direction.
-        gravity: (3,) [m/s^2] base axes; bodies with a mass and beams with a density
-            have weight, other links have none because their mass is unknown.
-        couple: (3,) [N m] additional couple on the platform, base axes.  It consists of
-            dead forces on arms that rotate with the platform, so that it has a
-            potential, which a moment about fixed axes has not.
+        load: (6,) [N m, N] load of constant direction on the platform at its origin,
+            base axes.
+        gravity: (3,) [m/s^2] gravity in base axes.  Only bodies with a mass and beams
+            with a density have weight, because the mass of other links is unknown.
+        couple: (3,) [N m] additional couple on the platform, base axes.  The couple
+            consists of dead forces on arms that rotate with the platform.  Unlike a
+            moment about fixed axes, such a couple has a potential.
         time_limit: [s] time after which the simulation fails.
 
     Returns:
         The assembled robot.
 
     Raises:
-        BadInput: a spring's stiffness is missing.
+        BadInput: the stiffness of a spring is missing.
         SimulationFailed: no equilibrium was found.
         OutOfTime: no solution was found within the time limit; a
             :class:`SimulationFailed`.
@@ -257,7 +261,8 @@ def _simulate(
 ) -> MultibodyAssembly:
     """Build and solve a model, read its results, and release the memory."""
     robot = case.posture.robot
-    # relative to the clearances, the accepted increment is the same at every scale
+    # The tolerance is proportional to the scale, so that it is constant relative to the
+    # clearances.
     tolerance = max(regularisation.tolerance * min(case.scale, 1.0), _FINEST)
     regularisation = replace(regularisation, tolerance=tolerance)
     model = Model(*import_exudyn(), robot.name, regularisation)
@@ -276,18 +281,18 @@ def simulated_frequencies(
     """Return the natural frequencies of a robot in Exudyn at its nominal pose.
 
     Args:
-        posture: see :func:`simulate_assembly`; drives are held.  Links with a section
-            are beams with consistent masses; other links must be given by a matrix and
-            have no mass.
+        posture: the robot and its joint coordinates; drives are locked.  Links with a
+            cross-section are beams with consistent masses.  Other links must be given
+            by a matrix and have no mass.
         count: largest number of frequencies.
         elements: number of elements of each beam.
 
     Returns:
-        (k,) [Hz] frequencies, lowest first; free motions are held by 1e-6 N m/rad or
-        N/m.
+        (k,) [Hz] frequencies, lowest first.  Springs of 1e-6 N m/rad or N/m hold free
+        motions.
 
     Raises:
-        BadInput: a link's stiffness is unknown.
+        BadInput: the stiffness of a link is unknown.
     """
     robot = without_clearance(posture.robot)
     robot = robot.with_errors(np.zeros_like(robot.errors))
@@ -297,7 +302,7 @@ def simulated_frequencies(
         meshes={}, elements=elements, clearances=False, bushes=False,
         load=np.zeros(6), gravity=np.zeros(3), couple=np.zeros(3),
     )  # fmt: skip
-    # built closed and without load, the robot is in equilibrium
+    # The robot is built closed and without load, so it is in equilibrium.
     model = Model(
         *import_exudyn(), robot.name, Regularisation(math.inf, IDLE_STIFFNESS)
     )
@@ -322,21 +327,22 @@ def closing_sequence(
     scale: float = 1.0,
     load: ArrayLike | None = None,
 ) -> NDArray:
-    """Return the frames of a robot without clearances while its closures are closed.
+    """Return the frames of a robot without clearances while its loops are closed.
 
     Args:
-        posture: see :func:`simulate_assembly`; links with a section are beams, other
-            links must be given by a matrix.
-        steps: number of steps that close the closures, at least 4.
+        posture: the robot and its joint coordinates.  Links with a cross-section are
+            beams.  Other links must be given by a matrix.
+        steps: number of steps for closing the loops, at least 4.
         scale: factor on the geometric errors.
-        load: (6,) [N m, N] on the platform; it increases while the closures are closed.
+        load: (6,) [N m, N] load on the platform, which increases while the loops are
+            closed.
 
     Returns:
-        (k, n, 4, 4) frames in the base frame: first open and without stress, last
-        closed; k is at least ``steps + 1``.
+        (k, n, 4, 4) poses of the frames in the base frame.  The first state is open and
+        without stress, and the last state is closed. k is at least ``steps + 1``.
 
     Raises:
-        BadInput: a link's stiffness is unknown.
+        BadInput: the stiffness of a link is unknown.
         SimulationFailed: no equilibrium was found.
     """
     robot = posture.robot
@@ -371,8 +377,9 @@ def without_clearance(robot: Robot) -> Robot:
         robot: robot with or without clearances.
 
     Returns:
-        The robot; its passive joints move about or along their z axis without bounds.
-        Closures between parallel contacts, which are rigid then, are left out.
+        The robot, whose passive joints move about or along their z axis without bounds.
+        Closures between parallel contacts are omitted, because they are rigid without
+        clearance.
     """
     frames = tuple(replace(frame, clearance=None) for frame in robot.frames)
     return replace(robot, frames=frames, closures=loops(robot))

@@ -1,7 +1,7 @@
-"""The platform's compliance in the simulation, at an equilibrium, by two methods.
+"""Compute the platform's compliance in the simulation by two methods.
 
 Errors, loads and weight act as in :func:`.simulation.simulate_assembly`.  The wrench of
-a spring is the gradient of its energy, so that the tangent belongs to a potential.
+a spring is the gradient of its energy, so that the tangent stiffness is symmetric.
 """
 
 import time
@@ -31,13 +31,14 @@ from forcefit.validation.multibody.simulation import (
     import_exudyn,
 )
 
-# rounding of the closures' forces is 1e-16 of their stiffness and moves compliant
-# robots
+# Rounding of the closures' forces is 1e-16 of their stiffness, and such forces move
+# compliant robots.
 _REGULARISATIONS = (
     Regularisation(1e8, 1e-8), Regularisation(1e8, 1e-6), Regularisation(1e10, 1e-6)
 )  # fmt: skip
 
-# a large load step may pass a bifurcation and reach an unstable equilibrium
+# Numbers of load steps, because a large step may pass a bifurcation and reach an
+# unstable equilibrium.
 _SMALLER_STEPS = (16, 64)
 
 
@@ -48,10 +49,10 @@ class SimulatedTangent:
     Attributes:
         linearised: (6, 6) [rad/(N m) .. m/N] compliance from the linearised system, for
             small motions at the platform's present origin, base axes.
-        stepped: (6, 6) compliance from small loads; NaN if not requested.
+        stepped: (6, 6) compliance from small loads; NaN if it was not requested.
         linearised_error: [-] uncertainty of ``linearised``, for entries over sqrt(C_ii
             C_jj).
-        stepped_error: [-] uncertainty of ``stepped``, likewise.
+        stepped_error: [-] uncertainty of ``stepped``, for entries over sqrt(C_ii C_jj).
         platform: (4, 4) present pose of the platform in the base frame.
         stable: whether the equilibrium is stable.
         seconds: [s] computing time.
@@ -80,28 +81,29 @@ def simulated_tangent(
 
     Args:
         posture: the robot's configuration, with its geometric errors.
-        model: model of the links.  Clearances are included if the model has them, as
-            smoothed contacts of 1e12 N/m; there are no load steps then.
-        load: (6,) [N m, N] on the platform at its origin, base axes: a dead force, and
-            a moment as a couple of dead forces.
-        gravity: (3,) [m/s^2] base axes.
+        model: model of the links.  If it includes clearances, they are smoothed
+            contacts of 1e12 N/m, and no load steps are computed.
+        load: (6,) [N m, N] load on the platform at its origin, base axes.  The force is
+            a dead force, and the moment is a couple of dead forces.
+        gravity: (3,) [m/s^2] gravity in base axes.
         steps: whether small loads are used too.
         time_limit: [s] largest time of the whole computation.
 
     Returns:
-        Both compliances.  The equilibrium is stable, unless smaller load steps than
-        usual also lead to an unstable one.
+        Both compliances.  If the equilibrium is unstable, the solution is repeated with
+        smaller load steps.  It is returned as unstable only if they also lead to an
+        unstable equilibrium.
 
     Raises:
-        BadInput: a spring's stiffness is missing.
+        BadInput: the stiffness of a spring is missing.
         SimulationFailed: no equilibrium was found.
         OutOfTime: no solution was found within the time limit; a
             :class:`SimulationFailed`.
     """
     started = time.monotonic()
     case = _case(posture, model, load, gravity)
-    # without deformed springs their nonlinear law does not matter, and Exudyn's is
-    # faster
+    # Without deformed springs, their nonlinear law does not matter, and Exudyn's own
+    # law is faster.
     bent = is_bent(posture.robot.errors, load, gravity)
     hard = tuple(r for r in WITH_CLEARANCES if r.contact == 1.0)
     tried = hard[:2] if model.clearances else _REGULARISATIONS
@@ -140,7 +142,7 @@ def _case(
     posture: PostureLike, model: SimulationModel,
     load: ArrayLike | None, gravity: ArrayLike | None,
 ) -> Case:  # fmt: skip
-    """Return the description of the model."""
+    """Return the description of the model to be built."""
     given = {name: np.asarray(K, dtype=float) for name, K in model.stiffness.items()}
     solids = dict(model.meshes)
     wrench = np.zeros(6) if load is None else np.asarray(load, dtype=float)
@@ -158,7 +160,7 @@ def _tangent(
     case: Case, regularisation: Regularisation, load_steps: int, steps: bool,
     started: float, limit: float,
 ) -> SimulatedTangent:  # fmt: skip
-    """Build, solve and differentiate a model, and release the memory."""
+    """Build and solve a model, compute its compliance, and release its memory."""
     robot = case.posture.robot
     program = Model(*import_exudyn(), robot.name, regularisation)
     program.deadline = started + limit

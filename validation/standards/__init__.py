@@ -1,4 +1,4 @@
-"""Accuracy and repeatability according to standards, from repeats of a campaign.
+"""Compute accuracy and repeatability according to ISO standards from repeats.
 
-Begin with ``figures.py``.
+Start with ``figures.py``.
 """

@@ -1,4 +1,4 @@
-"""Characteristics of ISO 9283 and ISO 230-2 from a campaign's repeats."""
+"""Compute characteristics of ISO 9283 and ISO 230-2 from a campaign's repeats."""
 
 import math
 from collections.abc import Iterator
@@ -22,7 +22,7 @@ from forcefit.validation.standards.iso9283 import (
     position_repeatability,
 )
 
-_MOST_PAIRS = 2000  # largest number of pairs of positions whose distances are evaluated
+_MOST_PAIRS = 2000  # largest number of evaluated pairs of positions
 
 
 @dataclass(frozen=True)
@@ -76,9 +76,9 @@ class StandardFigures:
         poses: poses measured at least twice.
         distances: characteristics of pairs of poses with equal load, session, point and
             side of approach.
-        axes: ISO 230-2 characteristics of each reading approached from both sides, by
-            name; separate for each load, session and point, which the id of the first
-            row identifies.
+        axes: mapping from name to the ISO 230-2 characteristics of each reading that
+            was approached from both sides.  Characteristics are separate for each load,
+            session and point.  The name contains the id of the first row.
     """
 
     campaign: str
@@ -100,7 +100,7 @@ class StandardFigures:
         }
 
     def text(self) -> str:
-        """Return table as text, with the worst value of each kind in the last line."""
+        """Return a table as text, with the worst value of each kind at the end."""
         rows = {
             pose.label: [
                 pose.cycles,
@@ -140,7 +140,8 @@ def standard_figures(campaign: Campaign) -> StandardFigures:
         campaign: campaign with rows measured more than once.
 
     Returns:
-        The characteristics; sides of approach are evaluated separately for ISO 9283.
+        The characteristics.  For ISO 9283, both sides of approach are evaluated
+        separately.
 
     Raises:
         BadInput: no row was measured more than once.
@@ -189,7 +190,7 @@ def _pose(campaign: Campaign, rows: NDArray) -> PoseFigures:
 
 
 def _circumstances(campaign: Campaign) -> NDArray:
-    """Return (R,) numbers of each row's combination of load, session and point."""
+    """Return (R,) indices of each row's combination of load, session and point."""
     names = [
         np.unique(column, return_inverse=True)[1]
         for column in (campaign.session, campaign.point)
@@ -201,9 +202,9 @@ def _circumstances(campaign: Campaign) -> NDArray:
 def _distances(campaign: Campaign, sets: list[NDArray]) -> Iterator[DistanceFigures]:
     """Yield the ISO 9283 characteristics of distances between different poses.
 
-    The cycles of the standard go from one pose to the other under one load.  Poses
-    under two loads differ by a deflection, poses of two sessions by the position of the
-    device.
+    In the standard, the cycles alternate between two poses under one load.  Poses under
+    different loads would differ by a deflection, and poses of different sessions by the
+    position of the device.
 
     Yields:
         The characteristics of each pair.

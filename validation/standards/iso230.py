@@ -1,4 +1,4 @@
-"""Reversal and repeatability by the formulas of ISO 230-2.
+"""Compute reversal and repeatability by the formulas of ISO 230-2.
 
 Sources:
     ISO 230-2:2014, Test code for machine tools, part 2: determination of accuracy and

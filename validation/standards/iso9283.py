@@ -1,4 +1,4 @@
-"""Pose accuracy and repeatability by the formulas of ISO 9283.
+"""Compute pose accuracy and repeatability by the formulas of ISO 9283.
 
 Sources:
     ISO 9283:1998, Manipulating industrial robots, performance criteria and related test
@@ -9,7 +9,8 @@ Sources:
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-# number of cycles of each block whose AP is compared with the first block's AP
+# Number of cycles in a block.  AP of later blocks is compared with AP of the first
+# block.
 DRIFT_CYCLES = 10
 
 

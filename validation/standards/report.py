@@ -1,4 +1,4 @@
-"""Page of the characteristics of ISO 9283 and ISO 230-2."""
+"""Create the report page of the characteristics of ISO 9283 and ISO 230-2."""
 
 from dataclasses import asdict
 
@@ -30,10 +30,10 @@ def standards_page(figures: StandardFigures, provenance: Provenance) -> str:
     Args:
         figures: result of
             :func:`forcefit.validation.standards.figures.standard_figures`.
-        provenance: command and files.
+        provenance: command and input files.
 
     Returns:
-        HTML, which needs no other file.
+        A self-contained HTML page.
     """
     reservations = _reservations(figures)
     return page(
@@ -53,7 +53,7 @@ def standards_page(figures: StandardFigures, provenance: Provenance) -> str:
 
 
 def _verdict(figures: StandardFigures) -> str:
-    """Return the worst accuracy and repeatability over the poses."""
+    """Return the worst accuracy and repeatability of all poses as text."""
     worst = [
         f"{words} {Value(max(known), unit).text}"
         for words, unit, known in (
@@ -68,13 +68,13 @@ def _verdict(figures: StandardFigures) -> str:
 
 
 def _known(figures: StandardFigures, key: str) -> list[float]:
-    """Return a characteristic of all poses that have it."""
+    """Return the known values of a characteristic of all poses."""
     values = [getattr(pose, key) for pose in figures.poses]
     return [value for value in values if value is not None]
 
 
 def _reservations(figures: StandardFigures) -> list[str]:
-    """Return what limits the meaning of the characteristics, in words."""
+    """Return text about the limitations of the characteristics."""
     found = []
     fewest = min(pose.cycles for pose in figures.poses)
     if fewest < CYCLES:
@@ -111,7 +111,7 @@ def _tiles(figures: StandardFigures) -> list[Tile]:
 
 
 def _poses(figures: StandardFigures) -> str:
-    """Return the characteristics of ISO 9283 at every pose."""
+    """Return a table of the ISO 9283 characteristics at every pose."""
     turns = [f"{kind} about {axis}" for kind in ("AP", "RP") for axis in "xyz"]
     head: list[str | Column] = [
         "pose", Column("cycles"), *(Column(name, "rad") for name in turns),
@@ -136,17 +136,17 @@ def _poses(figures: StandardFigures) -> str:
 
 
 def _angles(pose: PoseFigures) -> list[float]:
-    """Return AP and RP of the three angles; NaN where no rotation was measured."""
+    """Return AP and RP of the three angles; NaN if no rotation was measured."""
     return [*(pose.angles or [np.nan] * 3), *(pose.angle_repeatability or [np.nan] * 3)]
 
 
 def _number(value: float | None) -> float:
-    """Return a number; NaN without one."""
+    """Return a number; NaN for None."""
     return np.nan if value is None else value
 
 
 def _distances(figures: StandardFigures) -> str:
-    """Return the distances between poses; empty without one."""
+    """Return a table of distances between poses; empty if there are none."""
     rows: Cells = [
         [f"{a} to {b}", one.commanded, one.accuracy, one.repeatability]
         for one in figures.distances
@@ -162,7 +162,7 @@ def _distances(figures: StandardFigures) -> str:
 
 
 def _axes(figures: StandardFigures) -> str:
-    """Return the readings approached from both sides; empty without one."""
+    """Return a table of readings approached from both sides; empty without any."""
     if not figures.axes:
         return ""
     rows: Cells = []

@@ -1,4 +1,4 @@
-"""Study: all checks that a study file requests, in one report.
+"""Run all checks that a study file requests, and write one report.
 
-Begin with ``study.py``.
+Start with ``study.py``.
 """

@@ -1,4 +1,4 @@
-"""The report's sections on parts within the tolerances of the drawing."""
+"""Create report sections about parts within the tolerances of the drawing."""
 
 from typing import Any
 
@@ -35,7 +35,7 @@ def drawn_tiles(found: dict[str, Any] | None, worst: dict[str, Any]) -> list[Til
             :func:`forcefit.validation.study.headline.worst_clearance`.
 
     Returns:
-        One tile, none without such a bound.
+        A list of one tile; empty without such a bound.
     """
     if found is None or "drawn" not in worst:
         return []
@@ -54,5 +54,5 @@ def drawn_tiles(found: dict[str, Any] | None, worst: dict[str, Any]) -> list[Til
 
 
 def _bounds(found: dict[str, float]) -> list[str | Value]:
-    """Return bounds of a rotation and of a translation."""
+    """Return bounds of a rotation and of a translation as text."""
     return rotation_and_translation(found["rotation"], found["translation"], 3)

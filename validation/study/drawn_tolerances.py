@@ -1,7 +1,7 @@
-"""Statistics and worst case of the tolerances of a drawing, at the pose of a study.
+"""Compute statistics and worst case of drawing tolerances at the pose of a study.
 
-The table ``[statistics]`` of a study file changes the defaults.  Errors of drawn parts
-take the place of the errors of the study.
+The table ``[statistics]`` of a study file changes the defaults.  The errors of randomly
+drawn parts replace the errors in the study file.
 """
 
 from collections.abc import Callable
@@ -27,7 +27,7 @@ from forcefit.inputs.table import BadInput, Table, nearest
 if TYPE_CHECKING:
     import xarray
 
-_LEAST_BASE_DRAWS = 16  # of the Sobol indices, as on the command line
+_LEAST_BASE_DRAWS = 16  # smallest number of base draws for Sobol indices
 _MOST_DRAWS = 1_000_000
 IN_BOUNDS = (
     "tolerances of the drawing and the largest clearances of fits are in the certified "
@@ -35,18 +35,18 @@ IN_BOUNDS = (
     "errors above alone, and the mean clearance of fits"
 )
 DRAWN_ERRORS = {key: f"drawn_{key}_error" for key in POSE_ERRORS}
-_MAP_TOLERANCE = 1e-3  # relative to the supports: the bounds of a map are this near
+_MAP_TOLERANCE = 1e-3  # [-] accuracy of the bounds of a map
 
 
 @dataclass(frozen=True)
 class DrawnTolerances:
-    """Results that a study requests on the tolerances of the robot's drawing.
+    """Requested results for the tolerances of the robot's drawing.
 
     Attributes:
-        draws: number of drawn machines.
-        seed: of the draws.
-        importance: base draws of the Sobol indices; 0 for none.
-        limits: [rad, m, J, ..] by quantity.
+        draws: number of randomly drawn machines.
+        seed: seed of the random draws.
+        importance: number of base draws for Sobol indices; 0 for no indices.
+        limits: mapping from quantity to its limit [rad, m, J, ..].
     """
 
     draws: int = 1000
@@ -63,19 +63,20 @@ def read_statistics(root: Table, robot: Robot) -> DrawnTolerances | None:
         robot: robot of the study.
 
     Returns:
-        The requested results; None of a robot without tolerances of a drawing, and
-        without the table also of one whose loops were closed by the study.
+        The requested results.  None if the robot has no drawing tolerances.  None also
+        if the table is absent and the study closes the loops of the robot.
 
     Raises:
         BadInput: the table violates a rule, the robot has no tolerances, or the study
-            closes its loops, which leaves a misfit that no part has.
+            closes the loops of the robot, because the errors that close them are not
+            errors of parts.
     """
     drawn = bool(robot.callouts or robot.fits)
     closing = [key for key in ("rest", "mismatch") if root.has(key)]
     if not root.has("statistics"):
         return DrawnTolerances() if drawn and not closing else None
     if closing:
-        fault = f'found it together with "{closing[0]}", whose misfit no part has'
+        fault = f'found it together with "{closing[0]}", whose errors are not of parts'
         raise root.bad("statistics", f"{fault}; expected one of them")
     table = root.table("statistics")
     if not drawn:
@@ -92,7 +93,7 @@ def read_statistics(root: Table, robot: Robot) -> DrawnTolerances | None:
 
 
 def _count(table: Table, key: str, default: int, least: int) -> int:
-    """A number of draws."""
+    """Return a number of draws."""
     value = table.integer(key, default)
     if not least <= value <= _MOST_DRAWS:
         raise table.bad(key, f"found {value}, expected {least} to {_MOST_DRAWS}")
@@ -100,7 +101,7 @@ def _count(table: Table, key: str, default: int, least: int) -> int:
 
 
 def _limits(table: Table) -> dict[str, float]:
-    """The limits by quantity, in SI units."""
+    """Return the limits by quantity in SI units."""
     if not table.has("limits"):
         return {}
     given, names = table.table("limits"), limit_names()
@@ -116,19 +117,21 @@ def _limits(table: Table) -> dict[str, float]:
 def drawn_at_pose(
     posture: Posture, asked: DrawnTolerances, progress: Callable[[int, int], None]
 ) -> tuple[dict[str, Any], "xarray.Dataset"]:
-    """Return statistics, importance and worst case of drawn parts at one pose.
+    """Return statistics, importance and worst case of randomly drawn parts at a pose.
 
     Args:
         posture: the robot's configuration; its geometric errors are not used.
         asked: the requested results.
-        progress: called with the number of finished draws and their total.
+        progress: function called with the number of finished draws and the total
+            number.
 
     Returns:
-        The summary with the keys of ``assembly statistics``, and the draws.  Instead of
-        ``worst_case`` it has ``worst_case_left_out``, the reason, where there is none.
+        The summary with the keys of ``assembly statistics``, and the draws.  If there
+        is no worst case, the summary contains the reason ``worst_case_left_out``
+        instead of ``worst_case``.
 
     Raises:
-        BadInput: a limit is one on a quantity that this robot does not have.
+        BadInput: a limit refers to a quantity that is not computed for this robot.
     """
     sources = sources_of(posture.robot)
     experiment = Experiment(
@@ -156,16 +159,17 @@ def drawn_at_pose(
 def bounds_over_grid(
     maps: "xarray.Dataset", robot: Robot, progress: Callable[[int, int], None]
 ) -> "xarray.Dataset":
-    """Return the maps of a study with bounds over all parts within the tolerances.
+    """Add bounds over all parts within the tolerances to the maps of a study.
 
     Args:
-        maps: over the grid.
+        maps: data set over the grid.
         robot: robot of the study, with tolerances of a drawing or fits.
-        progress: called with the number of finished points and their total.
+        progress: function called with the number of finished points and the total
+            number.
 
     Returns:
-        The maps with a certified upper bound of the worst rotation and translation over
-        all parts and clearances at every point, NaN where there is no solution.
+        The maps, with certified upper bounds of rotation and translation over all parts
+        and clearances at every point.  The bounds are NaN at points without a solution.
     """
     sources, axes = sources_of(robot), [str(axis) for axis in maps["status"].dims]
     bounds = np.full((maps["status"].size, len(POSE_ERRORS)), np.nan)

@@ -1,4 +1,4 @@
-"""Certified error bounds of a robot with one part made perfect at a time."""
+"""Compute certified error bounds of a robot after making one part perfect."""
 
 from dataclasses import replace
 from typing import Any
@@ -18,20 +18,21 @@ ERROR, CLEARANCE = "geometric error", "clearance"
 
 
 def governing(posture: Posture, assumption: str = "frozen") -> list[dict[str, Any]]:
-    """Return bounds (27) without one frame's error or one joint's clearance.
+    """Return the bounds of problem (27) without one part's error or clearance.
 
-    The robot's given errors are used.  Two of them may compensate each other; removing
-    one then increases the bound.
+    The given errors of the robot are used.  Two errors may compensate each other.
+    Removing one of them then increases the bound.
 
     Args:
         posture: configuration of a robot with errors or clearances.
         assumption: assumption of problem (27).
 
     Returns:
-        For each frame with errors and each joint with clearances a table: its name
-        (``part``), the removed imperfection (``what``), and the upper bounds
-        ``rotation`` [rad] and ``translation`` [m] without it.  The smallest translation
-        is first; bounds are None without a solution.
+        A mapping for each frame with errors and each joint with clearances.  It
+        contains the name (``part``), the removed imperfection (``what``), and the upper
+        bounds ``rotation`` [rad] and ``translation`` [m] without this imperfection.
+        The mapping with the smallest translation is first.  Bounds are None without a
+        solution.
     """
     rows: list[dict[str, Any]] = []
     for part, what, robot in _improved(posture.robot):
@@ -57,7 +58,7 @@ def _by_translation(row: dict[str, Any]) -> tuple[float, float]:
 
 
 def _improved(robot: Robot) -> list[tuple[str, str, Robot]]:
-    """Yield robots that each lack one of the robot's imperfections."""
+    """Yield copies of the robot, each without one of its imperfections."""
     cases = []
     declared = robot.declared_errors
     for i, frame in enumerate(robot.frames):
@@ -74,7 +75,7 @@ def _improved(robot: Robot) -> list[tuple[str, str, Robot]]:
 
 
 def _tight(frame: Frame) -> Frame | None:
-    """Return the joint without its clearances; None if it has none."""
+    """Return the joint without its clearances; None if there are no clearances."""
     own = own_cone(frame)
     clearances = [key for k, key in enumerate(BOUNDS) if k != own]
     bounds = [getattr(frame.clearance, key, None) or 0.0 for key in clearances]

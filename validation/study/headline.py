@@ -1,7 +1,7 @@
-"""Conclusions of a study in a few sentences: assembly, pose error and checks.
+"""Write the conclusions of a study: assembly, pose error and checks.
 
 The first pose error is the certified bound over all positions within the clearances.
-Every other one names its assumption on the clearances.
+Every other pose error is printed with its assumption about the clearances.
 """
 
 from typing import Any
@@ -13,13 +13,14 @@ from forcefit.results.text import in_unit
 from forcefit.validation.study.drawn_tolerances import DRAWN_ERRORS
 from forcefit.validation.study.study import StudyResults
 
-# assumption of (27): all motions within the clearances, without elastic deformation
+# Assumption of problem (27): all motions within the clearances, without elastic
+# deformation.
 WORST = "frozen"
 _CHECKED = {
     "energy": "energy", "margin": "zone margin", "margin_free": "free zone margin"
 }  # fmt: skip
 _OUTCOMES = ("passed", "failed", "not decided")  # possible results of a check
-# [-] share of the clearances below which the need is a rounding error
+# [-] A required fraction of the clearances below this value is a rounding error.
 _NO_CLEARANCE = 1e-6
 
 
@@ -31,11 +32,12 @@ def worst_clearance(results: StudyResults) -> dict[str, Any]:
 
     Returns:
         Bounds ``rotation`` [rad] and ``translation`` [m] under the assumption
-        ``frozen`` of (27), at the study's pose (``pose``) and the largest over its
-        ``map``; ``points`` is the number of points with bounds, ``of`` the number of
-        all points.  None where there is no bound; infinite where the pose is unbounded.
-        ``drawn``, of a robot with tolerances of a drawing, has the same bounds over all
-        parts within them, and the assumption.
+        ``frozen`` of problem (27), at the pose of the study (``pose``) and their
+        largest values over its ``map``.  ``points`` is the number of points with
+        bounds, and ``of`` is the number of all points.  A bound is None if it was not
+        computed, and infinite if the pose is unbounded.  For a robot with drawing
+        tolerances, ``drawn`` contains the bounds over all parts within the tolerances,
+        and the assumption.
     """
     parts = ("rotation", "translation")
     error = results.error.get(WORST)
@@ -55,7 +57,7 @@ def worst_clearance(results: StudyResults) -> dict[str, Any]:
 
 
 def _worst_drawn(results: StudyResults) -> dict[str, Any] | None:
-    """Return certified upper bounds over all parts within the tolerances, if any."""
+    """Return certified upper bounds over all parts within the tolerances, or None."""
     found = results.statistics
     if found is None or "worst_case" not in found:
         return None
@@ -76,21 +78,22 @@ def _worst_drawn(results: StudyResults) -> dict[str, Any] | None:
 
 
 def verdict(results: StudyResults) -> str:
-    """Return the conclusions of a study in a few sentences: :func:`conclusions`."""
+    """Return the conclusions of a study as one text; see :func:`conclusions`."""
     return " ".join(conclusions(results))
 
 
 def conclusions(results: StudyResults) -> list[str]:
     """Return the conclusions of a study, the main one first.
 
-    The certified pose error within the clearances is first, with its largest value over
-    the map if there is one.  The error at least energy follows.
+    The pose error begins with the certified bound within the clearances, and with its
+    largest value over the map if there is a map.  The pose error at least energy
+    follows.
 
     Args:
         results: results of :func:`forcefit.validation.study.study.run_study`.
 
     Returns:
-        Sentences, of which the first is on the assembly.
+        Sentences.  The first sentence is about the assembly.
     """
     solution = results.solution
     if solution["status"] == BEYOND_LIMITS:
@@ -114,7 +117,7 @@ def by_force(results: StudyResults) -> bool:
         results: results of :func:`forcefit.validation.study.study.run_study`.
 
     Returns:
-        The answer; False also if the robot cannot be assembled at all.
+        True or False; also False if the robot cannot be assembled at all.
     """
     if results.solution["status"] != "ok":
         return False
@@ -124,7 +127,7 @@ def by_force(results: StudyResults) -> bool:
 
 
 def _assembly_text(results: StudyResults) -> str:
-    """Return a sentence on the assembly: by clearances, or by force with its energy."""
+    """Return a sentence about the assembly: by clearances, or by force and energy."""
     zone, assembly = results.solution["zone"], results.assembly
     assert assembly is not None
     if not by_force(results):
@@ -141,7 +144,7 @@ def _assembly_text(results: StudyResults) -> str:
 
 
 def _pose_error_text(results: StudyResults) -> str:
-    """Return the platform's pose error as text, with the certified bound first."""
+    """Return the platform's pose error as text; the certified bound is first."""
     worst = worst_clearance(results)
     screw = results.solution["platform_screw"]
     turn, shift = (float(np.linalg.norm(half)) for half in (screw[:3], screw[3:]))
@@ -165,7 +168,7 @@ def _pose_error_text(results: StudyResults) -> str:
 
 
 def _bounds_text(worst: dict[str, Any]) -> str:
-    """Return bounds at the pose, and the largest over the map, as text."""
+    """Return the bounds at the pose, and the largest bounds over the map, as text."""
     text = f"{_bound_text(worst['pose'])} from the nominal pose"
     if worst["map"] is not None:
         over = worst["map"]
@@ -175,7 +178,7 @@ def _bounds_text(worst: dict[str, Any]) -> str:
 
 
 def _drawn_text(results: StudyResults) -> str:
-    """Return sentences on the parts within the tolerances of the drawing."""
+    """Return sentences about the parts within the tolerances of the drawing."""
     if not (results.robot.callouts or results.robot.fits):
         return ""
     found, text = results.statistics, ""
@@ -205,7 +208,7 @@ def _other_assumptions(results: StudyResults) -> str:
 
 
 def _bound_text(bounds: dict[str, float]) -> str:
-    """Return the text of an upper bound of the pose error."""
+    """Return an upper bound of the pose error as text."""
     if not all(np.isfinite([bounds["rotation"], bounds["translation"]])):
         return "free to move without bound"
     return f"at most {_pose_text(bounds['rotation'], bounds['translation'])}"
@@ -223,7 +226,7 @@ def covered(results: StudyResults) -> list[str]:
         results: results of :func:`forcefit.validation.study.study.run_study`.
 
     Returns:
-        A phrase for each check; checks without a significant comparison are left out.
+        A phrase for each check; checks without a significant comparison are omitted.
     """
     phrases = []
     verdicts = results.verdicts
@@ -245,7 +248,7 @@ def covered(results: StudyResults) -> list[str]:
 
 
 def _checks_text(results: StudyResults) -> str:
-    """Return a sentence on independent checks: their results, and missing checks."""
+    """Return a sentence about independent checks: their results, and missing checks."""
     phrases, missing = covered(results), results.unchecked
     text = "No independent check was requested."
     if phrases:

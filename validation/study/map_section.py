@@ -1,4 +1,4 @@
-"""The report's section on the grid: variation and largest values over it."""
+"""Create the report section about the grid: maps and largest values."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -14,7 +14,7 @@ from forcefit.results.quantities import unit_of
 from forcefit.stiffness.screws import WRENCH
 from forcefit.validation.study.drawn_tolerances import DRAWN_ERRORS
 
-# quantities that are shown as maps: name in the results, description
+# Quantities that are shown as maps: name in the results, and description.
 MAPPED = {
     "translation_error": "largest translation, eq. (27), over all clearances",
     "rotation_error": "largest rotation, eq. (27), over all clearances",
@@ -42,14 +42,7 @@ class Mapped(NamedTuple):
 
 
 def mapped(maps: Any) -> Iterator[Mapped]:
-    """Yield the quantities of a study's maps; for pose errors the upper bound.
-
-    Args:
-        maps: data set over the grid.
-
-    Yields:
-        The quantities of every study, then those of the robot under load.
-    """
+    """Yield the quantities of a study's maps; upper bounds for pose errors."""
     for key, words in MAPPED.items():
         one = maps[key].sel(bound="upper") if "bound" in maps[key].dims else maps[key]
         yield Mapped(key, words, unit_of(key), one)
@@ -81,7 +74,7 @@ def mapped(maps: Any) -> Iterator[Mapped]:
 
 
 def finite(one: Mapped) -> NDArray:
-    """Return the values of a map; NaN without a solution, infinite without a bound."""
+    """Return the values of a map: NaN without a solution, infinite without a bound."""
     values = np.asarray(one.values, dtype=float).ravel()
     if one.key.endswith("_error"):
         return values[~np.isnan(values)]
@@ -96,9 +89,9 @@ def maps_section(maps: Any, summary: dict[str, Any]) -> str:
         summary: result of :func:`forcefit.validation.study.report.map_summary`.
 
     Returns:
-        Counts, a table of smallest, median and largest values with the place of the
-        largest, and the map.  If there are more than two axes, the map shows two of
-        them at fixed values of the others.
+        HTML with counts, a table of smallest, median and largest values, and the map.
+        If the grid has more than two axes, the map shows two axes at fixed values of
+        the others.
     """
     title = "Over the workspace"
     counts = ", ".join(f"{k}: {v}" for k, v in summary["status"].items())
@@ -123,11 +116,11 @@ def maps_section(maps: Any, summary: dict[str, Any]) -> str:
 
 
 def _drawn(maps: Any, first: Mapped) -> str:
-    """Return the map over two axes, with a sentence on the values of the others."""
+    """Return the map over two axes, and a sentence about values of other axes."""
     names = [str(d) for d in maps["energy"].dims if maps.sizes[d] > 1]
     if not names:
         return ""
-    # the axes with the most values; of equal ones the first
+    # The axes with the most values; of axes with equally many values, the first.
     axes = sorted(sorted(names, key=lambda n: -maps.sizes[n])[:2], key=names.index)
     at = {name: i for name, i in _largest(first).items() if name not in axes}
     held = {name: i for name, i in at.items() if name in names}
@@ -150,7 +143,7 @@ def _drawn(maps: Any, first: Mapped) -> str:
 
 
 def _largest(one: Mapped) -> dict[str, int]:
-    """Return the index of the largest value along each axis."""
+    """Return the index along each axis at which a map is largest."""
     values = np.nan_to_num(np.asarray(one.values, dtype=float), nan=-np.inf)
     if not one.key.endswith("_error"):
         values = np.where(np.isposinf(values), -np.inf, values)
@@ -159,7 +152,7 @@ def _largest(one: Mapped) -> dict[str, int]:
 
 
 def _where(maps: Any, one: Mapped) -> str:
-    """Return the place where a map is largest as text."""
+    """Return the coordinates at which a map is largest as text."""
     known = finite(one)
     bounded = bool(np.isfinite(known).all())
     if bounded and np.ptp(known) <= 1e-9 * np.abs(known).max():

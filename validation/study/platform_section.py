@@ -1,4 +1,4 @@
-"""The report's section on the platform's stiffness."""
+"""Create the report section about the platform's stiffness."""
 
 from typing import Any
 
@@ -24,7 +24,8 @@ def platform_section(stiffness: dict[str, Any]) -> str:
             :func:`forcefit.assembly.report.platform_stiffness.stiffness_of`.
 
     Returns:
-        Headings, tables and the chart of the parts' shares.
+        HTML with tables, and a chart of the contribution of each part to the
+        compliance.
     """
     K = np.asarray(stiffness["stiffness"])
     eigen = ", ".join(f"{one['stiffness']:.4g}" for one in stiffness["eigen"])

@@ -1,4 +1,4 @@
-"""Problems (21) and (22) as the paper prints them, solved by cvxpy for comparison."""
+"""Solve problems (21) and (22), as printed in the paper, with cvxpy for comparison."""
 
 import math
 from typing import Any
@@ -16,8 +16,8 @@ from forcefit.assembly.model.statuses import (
 )
 from forcefit.validation.crosscheck.verdict import Check
 
-TOLERANCE = 1e-6  # relative tolerance of energies and margins
-# tolerances of cvxpy's solver: [J] for energies, [-] for margins
+TOLERANCE = 1e-6  # [-] relative tolerance of energies and margins
+# Noise of cvxpy's solver: [J] for energies, [-] for margins.
 _NOISE_ENERGY, _NOISE_MARGIN = 1e-12, 1e-10
 
 
@@ -32,10 +32,11 @@ def compare_printed(
         zone: forcefit's ``margin`` and ``margin_free``.
 
     Returns:
-        Plain values: cvxpy's ``energy``, ``platform_screw``, ``margin`` and
-        ``margin_free``; the ``relative_difference`` of each, NaN where nothing can be
-        compared; ``checks``, the verdict on each; ``verdict`` and ``passed``.  If cvxpy
-        finds no solution, only the ``reason``.
+        Plain values: ``energy``, ``platform_screw``, ``margin`` and ``margin_free``
+        computed by cvxpy; the ``relative_difference`` of each, NaN if there is nothing
+        to compare; ``checks``, the verdict of each comparison; ``verdict`` and
+        ``passed``.  If cvxpy finds no solution, the mapping contains only the
+        ``reason``.
     """
     from forcefit.assembly.linear.reference.as_printed import (
         energy_as_printed,
@@ -71,7 +72,7 @@ def compare_printed(
 
 
 def _energy_check(assembly: Assembly, energy: float) -> Check:
-    """Return the check of the energies; inside an assembly zone both are about zero."""
+    """Return the check of the energies; both are about zero in an assembly zone."""
     tight = assembly.energy_without_clearance
     scale = max(assembly.energy, 1e-6 * tight, _NOISE_ENERGY / TOLERANCE)
     return Check(
@@ -81,7 +82,7 @@ def _energy_check(assembly: Assembly, energy: float) -> Check:
 
 
 def _margin_check(ours: float | None, theirs: float | None) -> Check:
-    """Return the check of a margin; no verdict if a margin is missing or not needed."""
+    """Return the check of a margin; it has no signal if a margin is missing."""
     if ours is None or theirs is None:
         value = 0.0 if ours is theirs else math.inf
         return Check(value, TOLERANCE, signal=False)

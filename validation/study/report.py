@@ -1,4 +1,4 @@
-"""Report of a study: one self-contained HTML page, and the results as JSON."""
+"""Write the report of a study: a self-contained HTML page, and the results as JSON."""
 
 from importlib.metadata import version
 from pathlib import Path
@@ -117,7 +117,7 @@ def map_summary(maps: Any) -> dict[str, Any]:
 
 
 def report_page(results: StudyResults) -> str:
-    """Return the page as HTML, which needs no other file."""
+    """Return the report as a self-contained HTML page."""
     study, robot = results.study, results.robot
     body = [
         unchecked_section(results),
@@ -157,7 +157,7 @@ def report_page(results: StudyResults) -> str:
 
 
 def _verdict(results: StudyResults) -> str:
-    """Return the sentence on the assembly, with the checks that did not pass."""
+    """Return the sentence about the assembly, and the checks that did not pass."""
     first = conclusions(results)[0].removesuffix(".")
     missed = [
         f"{in_words(name)} {outcome}"
@@ -168,10 +168,10 @@ def _verdict(results: StudyResults) -> str:
 
 
 def _good(results: StudyResults) -> bool | None:
-    """Return whether the result is favourable, without force and with all checks.
+    """Return True if the robot is assembled without force and all checks passed.
 
-    None if assembly needs force or a check has no outcome; False without a solution, or
-    if a check failed.
+    The result is None if assembly needs force or a check has no outcome.  The result is
+    False without a solution, or if a check failed.
     """
     if results.solution["status"] != OK or FAILED in results.verdicts.values():
         return False
@@ -226,7 +226,7 @@ def _force_tile(assembly: Assembly) -> Tile:
 
 
 def _governing_tiles(results: StudyResults, worst: dict[str, float]) -> list[Tile]:
-    """Return tiles of the governing part, and of the tolerance to tighten."""
+    """Return tiles of the governing part, and of the tolerance to be tightened."""
     known = [
         one for one in results.governing
         if one["translation"] is not None and np.isfinite(one["translation"])
@@ -254,5 +254,5 @@ def _governing_tiles(results: StudyResults, worst: dict[str, float]) -> list[Til
 
 
 def _percent(ratio: float) -> str:
-    """Return the change by a factor in per cent."""
+    """Return the change by a factor as text in per cent."""
     return f"{100 * (ratio - 1):+.0f} %"

@@ -1,4 +1,4 @@
-"""Sections of a study's page: tables, charts, maps and the robot, as HTML."""
+"""Create sections of a study's page: tables, charts, maps and the robot, as HTML."""
 
 from typing import Any
 
@@ -58,7 +58,7 @@ def robot_section(results: StudyResults) -> str:
 
 
 def _error_body(results: StudyResults) -> ErrorBody | None:
-    """Return the translations within the clearances; None if they are unbounded."""
+    """Return a 3-D body of the possible platform translations; None if unbounded."""
     assert results.assembly is not None
     reach = reachable_screws(results.assembly, WORST)
     if reach.unbounded(3):
@@ -70,7 +70,7 @@ def _error_body(results: StudyResults) -> ErrorBody | None:
 
 
 def governing_section(results: StudyResults) -> str:
-    """Return the section on the certified worst case with one part perfect."""
+    """Return the section about the certified worst case with one part made perfect."""
     worst = worst_clearance(results)["pose"]
     if worst is None or not results.governing:
         return ""
@@ -141,7 +141,7 @@ def solution_section(results: StudyResults) -> str:
 
 
 def _linearisation_rows(error: dict[str, Any]) -> list[list[Any]]:
-    """Return the rows on the error of linear closures, compared with finite motions."""
+    """Return table rows about the error of linear closures against finite motions."""
     if error["status"] != "ok":
         return [["linearisation error", error["status"]]]
     turn, shift = (float(np.linalg.norm(error[k])) for k in ("rotation", "translation"))
@@ -153,7 +153,7 @@ def _linearisation_rows(error: dict[str, Any]) -> list[list[Any]]:
 
 
 def _pose_error(results: StudyResults) -> str:
-    """Return the table of the bounds (27) under each assumption."""
+    """Return a table of the bounds of problem (27) under each assumption."""
     rows = [
         [
             assumption,
@@ -177,7 +177,7 @@ def _pose_error(results: StudyResults) -> str:
 
 
 def _wrenches(results: StudyResults) -> str:
-    """Return the table of the wrench through each elastic link."""
+    """Return a table of the wrench through each elastic link."""
     frames = results.solution["frames"]
     elastic = [f.name for f in results.robot.frames if f.link is not None]
     wrenches = without_rounding(
@@ -196,7 +196,7 @@ def _wrenches(results: StudyResults) -> str:
 
 
 def reference_section(results: StudyResults) -> str:
-    """Return the section on the problems of the paper, solved in cvxpy."""
+    """Return the section about the problems of the paper, solved with cvxpy."""
     reference, solution = results.reference, results.solution
     title = "The same problems as printed, in cvxpy"
     if reference is None:
@@ -265,7 +265,7 @@ def _significant(K: NDArray) -> NDArray:
 
 
 def crosscheck_section(results: StudyResults) -> str:
-    """Return the section on the multibody simulation."""
+    """Return the section about the multibody simulation."""
     check, title = results.crosscheck, "Against a multibody simulation"
     if check is None:
         if not results.crosscheck_failure:

@@ -1,7 +1,7 @@
-"""The robot under load and weight: platform deflection, stiffness and frequencies.
+"""Compute deflection, stiffness and natural frequencies of a robot under load.
 
-The table ``[service]`` of a study file requests them.  At the study's pose all of them
-are computed; over the grid they are additional variables of the maps.
+The table ``[service]`` of a study file requests these results.  They are computed at
+the pose of the study.  Over the grid, they are additional variables of the maps.
 """
 
 from collections.abc import Callable, Mapping
@@ -26,18 +26,18 @@ from forcefit.inputs.table import BadInput, Table
 if TYPE_CHECKING:
     import xarray
 
-_MODES = 1000  # largest accepted number of frequencies, as on the command line
+_MODES = 1000  # largest accepted number of frequencies
 _KEPT = ("stiffness", "eigen_stiffness", "stiffness_condition", "share", "frequency")
 
 
 @dataclass(frozen=True, eq=False)
 class Service:
-    """Results that a study requests on the robot under load.
+    """Requested results for the robot under load.
 
     Attributes:
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes.
-        stiffness: whether to compute stiffness over the grid along each axis.
+        load: (6,) [N m, N] load on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] gravity in base axes.
+        stiffness: whether the stiffness along each axis is computed over the grid.
         frequencies: number of natural frequencies.
     """
 
@@ -48,7 +48,7 @@ class Service:
 
     @property
     def loaded(self) -> bool:
-        """Whether there is any load or weight."""
+        """Whether there is a load or gravity."""
         return bool(self.load.any() or self.gravity.any())
 
 
@@ -58,7 +58,8 @@ def read_service(root: Table, robot: Robot, links: bool = True) -> Service | Non
     Args:
         root: root table of the file.
         robot: robot of the study.
-        links: whether its links given by meshes are solved, and masses are known.
+        links: whether the stiffness of meshed links is computed, so that masses are
+            known.
 
     Returns:
         The requested results.
@@ -98,12 +99,11 @@ def at_pose(posture: Posture, service: Service, unloaded: Mapping) -> dict[str, 
         unloaded: solution without loads, with the keys of ``assembly solve``.
 
     Returns:
-        ``status`` and, if it failed, ``reason``; ``load`` and ``gravity``;
-        ``frequencies`` with the keys of ``assembly frequencies``.  With a load or
-        gravity also ``solution`` with the keys of ``assembly solve``, and
-        ``deflection``: (6,) the platform's screw with loads minus the screw without
-        loads, both at least energy.
-        platform's screw with loads minus that without, with clearances at least energy.
+        Mapping with ``status`` and, after a failure, ``reason``; ``load`` and
+        ``gravity``; and ``frequencies`` with the keys of ``assembly frequencies``.
+        With a load or gravity, the mapping also contains ``solution`` with the keys of
+        ``assembly solve``, and ``deflection``: (6,) the platform's screw with loads
+        minus its screw without loads.  Both screws are solutions of least energy.
     """
     found: dict[str, Any] = {
         "status": OK, "load": service.load, "gravity": service.gravity
@@ -127,18 +127,20 @@ def over_grid(
     maps: "xarray.Dataset", robot: Robot, service: Service,
     grid: Mapping[str, NDArray], progress: Callable[[int, int], None],
 ) -> "xarray.Dataset":  # fmt: skip
-    """Return the maps of a study, with additional maps of the robot under load.
+    """Add maps of the robot under load to the maps of a study.
 
     Args:
         maps: maps without loads.
         robot: robot of the study.
         service: the requested results.
         grid: axes of the maps.
-        progress: called with the number of finished points and their total.
+        progress: function called with the number of finished points and the total
+            number.
 
     Returns:
-        The maps with ``deflection``, as in :func:`at_pose`, and ``loaded_status``; if
-        requested also ``stiffness`` with its further variables, and ``frequency``.
+        The maps with ``deflection`` as in :func:`at_pose`, and ``loaded_status``.  If
+        requested, the maps also contain ``stiffness`` with its further variables, and
+        ``frequency``.
     """
     targets = grid_targets(grid)
     question = Question(

@@ -1,4 +1,4 @@
-"""The report's section on the robot under load and weight."""
+"""Create the report section about the robot under load and weight."""
 
 from typing import Any
 
@@ -13,8 +13,8 @@ def service_section(service: dict[str, Any] | None) -> str:
     """Return loads, platform deflection and natural frequencies as HTML.
 
     Args:
-        service: result of :func:`forcefit.validation.study.service.at_pose`; None if
-            not requested.
+        service: result of :func:`forcefit.validation.study.service.at_pose`; None if it
+            was not requested.
 
     Returns:
         A table for the loads and a table for the frequencies.
@@ -30,7 +30,7 @@ def service_section(service: dict[str, Any] | None) -> str:
 
 
 def _loaded(service: dict[str, Any]) -> list[str]:
-    """Return the table of the platform's pose error under load and weight."""
+    """Return a table of the platform's pose error under load and weight."""
     load = ", ".join(f"{v:.6g}" for v in service["load"])
     weight = ", ".join(f"{v:.6g}" for v in service["gravity"])
     about = paragraph(
@@ -52,7 +52,7 @@ def _loaded(service: dict[str, Any]) -> list[str]:
 
 
 def _frequencies(found: dict[str, Any]) -> str:
-    """Return table of natural frequencies, with the parts that deform in each mode."""
+    """Return a table of natural frequencies, and parts that deform in each mode."""
     if "frequencies" not in found:
         return paragraph(f"Frequencies: {found['status']}, {found['reason']}.")
     rows: list[list[Cell]] = []
@@ -67,7 +67,7 @@ def _frequencies(found: dict[str, Any]) -> str:
 
 
 def service_tile(service: dict[str, Any] | None) -> list[Tile]:
-    """Return the tile of the deflection under load, or of the lowest frequency."""
+    """Return a tile of the deflection under load, or of the lowest frequency."""
     if service is None:
         return []
     tiles = []

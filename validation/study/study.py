@@ -1,7 +1,7 @@
-"""A study: every check of a study file on one robot.
+"""Run every check of a study file on one robot.
 
-:mod:`forcefit.validation.study.study_file` reads the file,
-:mod:`forcefit.validation.study.report` writes the results.
+The file is read by :mod:`forcefit.validation.study.study_file`.  The results are
+written by :mod:`forcefit.validation.study.report`.
 """
 
 from collections.abc import Callable
@@ -49,7 +49,7 @@ from forcefit.validation.study.study_file import Study
 
 Progress = Callable[[str, int, int], None]
 THEORIES = ("euler", "timoshenko")
-_PACKAGES = {  # packages that each check needs; its results also name them
+_PACKAGES = {  # packages that each check requires
     "stiffness": ("pyvista", "pytetwild"),
     "reference": ("cvxpy",),
     "maps": ("xarray", "h5netcdf", "h5py"),
@@ -63,26 +63,27 @@ class StudyResults:
 
     Attributes:
         study: content of the study file.
-        robot: robot with the link stiffnesses that were used.
+        robot: robot with the link stiffnesses that were used in the computations.
         solution: solution at the study's pose, with the keys of ``assembly solve``.
         assembly: assembly of the solution; None if the robot cannot be assembled.
-        error: bounds (27) by assumption, with the keys of ``assembly error``.
+        error: bounds of problem (27) by assumption, with the keys of ``assembly
+            error``.
         reference: result of
             :func:`forcefit.validation.study.printed_problems.compare_printed`.
-        stiffness: K_E of the beam and of the finite elements, by frame.
+        stiffness: mapping from frame to K_E of the beam and of the finite elements.
         maps: data set over the grid.
         crosscheck: comparison with the multibody simulation.
         crosscheck_failure: reason why the simulation failed; empty if it did not.
         platform_stiffness: K_C at the pose, with the keys of ``assembly stiffness``.
-        governing: bounds (27) with one part made perfect, from
+        governing: bounds of problem (27) with one part made perfect, from
             :func:`forcefit.validation.study.governing.governing`.
         service: the robot under load, from
             :func:`forcefit.validation.study.service.at_pose`.
-        statistics: drawn parts at the pose, with the keys of ``assembly statistics``;
-            None of a robot without tolerances of a drawing.
-        draws: the data set of the draws, or None.
-        closing: (k, n, 4, 4) frames while the simulation closes the closures; None if
-            it failed.
+        statistics: statistics of drawn parts at the pose, with the keys of ``assembly
+            statistics``; None for a robot without drawing tolerances.
+        draws: data set of the random draws, or None.
+        closing: (k, n, 4, 4) poses of the frames while the simulation closes the loops;
+            None if the simulation failed.
     """
 
     study: Study
@@ -108,8 +109,8 @@ class StudyResults:
     def verdicts(self) -> dict[str, str]:
         """Verdict of each requested independent check.
 
-        ``"passed"``, ``"failed"``, ``"not decided"``, ``"no signal"`` if there is
-        nothing to compare, ``"not run"`` if there is no assembly to check.
+        The verdict is ``"passed"``, ``"failed"``, ``"not decided"``, ``"no signal"`` if
+        there is nothing to compare, or ``"not run"`` if there is no assembly to check.
         """
         independent = ("reference", "crosscheck")
         verdicts = {n: NOT_RUN for n in independent if n in self.study.checks}
@@ -143,8 +144,8 @@ class StudyResults:
     def passed(self) -> bool:
         """Whether there is a certified solution and every check passed.
 
-        A check without a signal has not passed if it was requested, or if no other
-        check was run.
+        A check without a signal counts as not passed if it was requested, or if no
+        other check was run.
         """
         verdicts, missing = self.verdicts, self.unchecked
         ran = [v for v in verdicts.values() if v != NO_SIGNAL]
@@ -161,18 +162,18 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
 
     Args:
         study: study from :func:`forcefit.validation.study.study_file.read_study`.
-        progress: called with the name of a check, the finished steps and their total.
+        progress: function called with the name of a check, the number of finished steps
+            and the total number.
 
     Returns:
         The results; no file is written.
 
     Raises:
-        BadInput: the robot does not reach the pose, or a surface is not usable.
-        ModuleNotFoundError: a package that a check needs is missing.
+        BadInput: the robot does not reach the pose, or a surface cannot be meshed.
+        ModuleNotFoundError: a package that a check requires is missing.
     """
     wanted = set(study.checks)
-    # missing packages and unreachable poses must be reported before the long
-    # computations
+    # Missing packages and unreachable poses are reported before the long computations.
     need(*(one for check in sorted(wanted) for one in _PACKAGES.get(check, ())))
     place_robot(study.robot, pose=study.pose)
     stiffness, robot = None, study.robot
@@ -239,12 +240,12 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
 
 
 def points_solved(maps: Any) -> int:
-    """Return the number of grid points that have a solution."""
+    """Return the number of grid points with a solution."""
     return int((maps["status"] == OK).sum())
 
 
 def _closing(posture: Posture) -> NDArray | None:
-    """Return frames while the closures close; None if link stiffnesses are unknown."""
+    """Return the frames while the loops are closed; None without link stiffnesses."""
     tight = replace(posture, robot=without_clearance(posture.robot))
     try:
         return closing_sequence(tight)
@@ -255,7 +256,7 @@ def _closing(posture: Posture) -> NDArray | None:
 def _compare_links(
     study: Study, progress: Progress
 ) -> tuple[dict[str, dict[str, Any]], Robot]:
-    """Return K_E by beam theory and by finite elements; replace links if requested."""
+    """Return K_E by beam theory and finite elements; replace the links if requested."""
     compared: dict[str, dict[str, Any]] = {}
     links: dict[str, MatrixLink] = {}
     for done, (name, mesh) in enumerate(study.meshes.items()):

@@ -1,7 +1,8 @@
-"""A study file: a robot and the checks to be run on it.
+"""Read a study file: a robot and the checks to be run on this robot.
 
-The file is TOML; ``docs/study.md`` describes it, ``examples/irsbot2.toml`` is an
-example.  The whole content is checked before any computation.
+The file format is TOML. It is described in ``docs/study.md``, and
+``examples/irsbot2.toml`` is an example.  The whole content is checked before any
+computation.
 """
 
 import os.path
@@ -48,20 +49,22 @@ class Study:
 
     Attributes:
         title: title of the report.
-        robot: robot with its errors, before links are replaced.
-        errors: sentence on the origin of the errors.
+        robot: robot with its errors and its original links.
+        errors: sentence about the origin of the errors.
         source: source of the links' stiffness, ``"beam"`` (declared) or ``"fea"``.
-        meshes: meshed link by frame, for the comparison and for ``"fea"``.
+        meshes: mapping from frame to meshed link, for the comparison and for ``"fea"``.
         accuracy: required accuracy of the finite elements.
         pose: nominal platform pose for the detailed checks.
-        grid: axes of the maps by pose component; empty without maps.
+        grid: mapping from pose component to its values in the maps; empty without maps.
         scales: scales of the errors in the cross-check; empty without a cross-check.
         checks: names of the checks to run.
-        asked: checks that the file requests by name, by a grid or by scales.
+        asked: names of the checks that the file requests explicitly, by a grid or by
+            scales.
         folder: folder of the report.
         files: files that were read: the study file, a robot file, surfaces.
-        service: results requested on the robot under load; None without a table.
-        statistics: results requested on the tolerances of the robot's drawing; None
+        service: results requested for the robot under load; None without a table
+            ``[service]``.
+        statistics: results requested for the tolerances of the robot's drawing; None
             without tolerances.
     """
 
@@ -87,16 +90,16 @@ class Study:
 def read_study(
     path: Path | str, folder: Path | str | None = None, *, links: bool = True
 ) -> Study:
-    """Return a study from its file.
+    """Read a study file.
 
     Args:
         path: path of the TOML file.
         folder: folder of the report, instead of the one in the file.
-        links: whether links given by meshes are solved; a study without them cannot be
-            run.
+        links: whether the stiffness of meshed links is computed, which is required for
+            running the study.
 
     Returns:
-        The study; its whole content has been checked.
+        The study, after a check of its whole content.
 
     Raises:
         BadInput: the study file or the robot file violates a rule.
@@ -155,7 +158,7 @@ def read_study(
 
 
 def _files(path: Path, root: Table, meshes: dict[str, MeshLink]) -> tuple[Path, ...]:
-    """Return the files of a study, each of them once."""
+    """Return the files of a study, each listed once."""
     robot = path.parent / root.text("robot")
     surfaces = (named_solid(mesh.surface)[0] for mesh in meshes.values())
     return tuple(
@@ -164,7 +167,7 @@ def _files(path: Path, root: Table, meshes: dict[str, MeshLink]) -> tuple[Path, 
 
 
 def _robot(root: Table, folder: Path, links: bool) -> Robot:
-    """Return the robot, built in or from a file, with closures that hold."""
+    """Return the robot, built in or from a file, with closed kinematic loops."""
     if not root.has("robot") and (root.has("frame") or root.has("body")):
         line = f'robot = "{Path(root.file).name}"'
         expected = f"a study file, in the simplest case with the one line {line}"
@@ -181,7 +184,7 @@ def _robot(root: Table, folder: Path, links: bool) -> Robot:
 
 
 def _closed(root: Table, name: Path | str, links: bool) -> Robot:
-    """Return the robot with closures adjusted as the keys of the study request."""
+    """Return the robot with loops closed as the keys of the study request."""
     rest = root.text("rest") if root.has("rest") else None
     mismatch = root.choice("mismatch", ("spring",)) if root.has("mismatch") else None
     own_errors = not root.has("errors")
@@ -190,8 +193,9 @@ def _closed(root: Table, name: Path | str, links: bool) -> Robot:
         if driven(robot):
             raise root.bad(
                 "robot",
-                "found a robot with drive_force; expected one without, because a study "
-                "bounds errors of a robot without load (assembly solve computes it)",
+                "found a robot with drive_force; expected one without drive_force, "
+                "because a study computes error bounds without load; use assembly "
+                "solve for this robot",
             )
         return robot
     except BadInput as error:
@@ -203,7 +207,7 @@ def _closed(root: Table, name: Path | str, links: bool) -> Robot:
 
 
 def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
-    """Return the robot with the requested errors, and a sentence on them."""
+    """Return the robot with the requested errors, and a sentence about them."""
     if not root.has("errors"):
         return robot, "geometric errors as in the robot file"
     closing = root.has("rest") or root.has("mismatch")
@@ -245,7 +249,7 @@ def _frames(table: Table, robot: Robot, default: list[str]) -> tuple[str, ...]:
 
 
 def _known(table: Table, key: str, robot: Robot, names: list[str]) -> tuple[str, ...]:
-    """Return full names of frames; an unknown name is reported with its place."""
+    """Return the full names of frames; raise BadInput at an unknown name."""
     try:
         return frames_named(robot, names)
     except BadInput as error:
@@ -253,7 +257,7 @@ def _known(table: Table, key: str, robot: Robot, names: list[str]) -> tuple[str,
 
 
 def _links(root: Table, robot: Robot) -> tuple[str, dict[str, MeshLink], float]:
-    """Return the source of the links' stiffness, and meshes of beams to compare."""
+    """Return the source of the links' stiffness, and meshes of beams for comparison."""
     if not root.has("links"):
         return "beam", {}, 0.005
     table = root.table("links")
@@ -288,7 +292,7 @@ def _links(root: Table, robot: Robot) -> tuple[str, dict[str, MeshLink], float]:
 
 
 def _pose(root: Table) -> dict[str, float]:
-    """Return the pose for the detailed checks, by default the home pose."""
+    """Return the pose for the detailed checks; the default is the home pose."""
     if not root.has("pose"):
         return {}
     table = root.table("pose")
@@ -317,7 +321,7 @@ def _scales(root: Table) -> tuple[float, ...]:
 def _checks(
     root: Table, meshes: bool, grid: bool, scales: bool
 ) -> tuple[tuple[str, ...], set[str]]:
-    """Return the checks to run: by default all with input, and the requested ones."""
+    """Return the checks to run, and the names of the checks in the table [checks]."""
     possible = {"stiffness": meshes, "maps": grid, "crosscheck": scales}
     if not root.has("checks"):
         return tuple(c for c in _CHECKS if possible.get(c, True)), set()

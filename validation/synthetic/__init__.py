@@ -1,4 +1,4 @@
-"""Measured data of a simulated machine with hidden effects.
+"""Synthetic measurement data of a simulated machine with hidden effects.
 
-Begin at ``generator.py``.
+Start with ``generator.py``.
 """

@@ -1,7 +1,8 @@
-"""Distance of a simulated machine from the wanted poses, for given commands.
+"""Compute the distance of a simulated machine from the wanted poses.
 
-The distance is computed at the machine, without noise and without errors of the
-measuring device, so that a correction is judged independently of its data.
+The distance is that of the true pose, without noise and without errors of the measuring
+device.  A correction of commands is thus judged independently of the readings from
+which it was computed.
 """
 
 from collections.abc import Sequence
@@ -33,13 +34,15 @@ def distances(
 
     Args:
         robot: the declared robot.
-        effects: effects of the machine; effects of the device alone are ignored.
+        effects: effects of the machine; effects that change only the readings are
+            ignored.
         targets: commands at which the nominal robot would have the wanted poses.
         coordinates: (R, n) [rad or m] nominal coordinates of the commands.
         program: name of the simulation program.
 
     Returns:
-        (R, 2) distance of the reference points [m], and rotation angle [rad].
+        (R, 2) distance of the actual from the wanted reference point [m], and angle of
+        rotation between both orientations [rad].
     """
     names = [frame.name for frame in robot.frames]
 

@@ -1,4 +1,4 @@
-"""Temperatures that lag behind the recorded temperature by a time constant."""
+"""Compute temperatures that follow the recorded temperature with a time constant."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -8,7 +8,7 @@ from forcefit.validation.synthetic.effects import Row
 
 
 def behind(time_constant: float) -> str:
-    """Return the name of a temperature [K] with a lag."""
+    """Return the name of the temperature [K] that lags by a time constant [s]."""
     return f"behind {time_constant!r}"
 
 
@@ -20,8 +20,8 @@ def with_delays(rows: Sequence[Row], time_constants: Iterable[float]) -> list[Ro
         time_constants: [s] time constant of each lagged temperature.
 
     Returns:
-        The rows with one lagged temperature for each time constant; in the first row it
-        equals the recorded one.
+        The rows with one lagged temperature for each time constant.  In the first row,
+        all lagged temperatures equal the recorded one.
     """
     rows = list(rows)
     for late in dict.fromkeys(time_constants):
@@ -32,7 +32,7 @@ def with_delays(rows: Sequence[Row], time_constants: Iterable[float]) -> list[Ro
             step = (row.covariates["time"] - before["time"]) / late
             if step == 0.0:
                 warm = now
-            # response to a ramp, plus the decay of the initial difference
+            # Response to a ramp, plus the decay of the initial difference.
             else:
                 lag = (now - before["temperature"]) / step
                 start = warm - before["temperature"] + lag

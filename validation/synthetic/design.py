@@ -1,4 +1,4 @@
-"""Configurations, loads and conditions of a synthetic campaign."""
+"""Design the configurations, loads and conditions of a synthetic campaign."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
@@ -16,7 +16,7 @@ from forcefit.validation.synthetic.effects import Row
 TEMPERATURES = ("swing", "around", "constant")
 _PERIOD = 2400.0  # [s] period of the temperature
 _STEP = 60.0  # [s] time between measurements
-_DRAWS = 40  # largest number of draws, relative to the number of configurations
+_DRAWS = 40  # largest ratio of draws to configurations
 _DIGITS = 6  # number of decimal digits of commanded coordinates
 
 
@@ -26,7 +26,7 @@ class CampaignDesign:
 
     Attributes:
         configurations: number of distinct configurations.
-        rows: number of measurements, whose configurations alternate over the session.
+        rows: number of measurements; the configurations alternate during the session.
         reach: [rad] largest change of a revolute drive from its home position; for a
             prismatic drive it is multiplied by ``size``.
         size: [m] length by which ``reach`` is multiplied.
@@ -36,12 +36,13 @@ class CampaignDesign:
         temperature: ``"swing"``: -0.5 ... 6.5 K; ``"around"``: -4 ... 4 K;
             ``"constant"``: 6 K.
         command: form of commands in the file, ``"joints"`` or ``"pose"``.
-        humidity: whether a covariate ``humidity`` [%] is recorded.
-        tilt: [rad] magnitude of a covariate ``tilt``; 0 if it is not recorded.
-        gravity: [m/s^2] recorded gravity, straight down.
+        humidity: whether the covariate ``humidity`` [%] is recorded.
+        tilt: [rad] magnitude of the covariate ``tilt``; 0 if it is not recorded.
+        gravity: [m/s^2] magnitude of the recorded gravity, which points vertically
+            down.
         reference_point: [m] measured point, at which loads act, platform axes.
-        corners: whether half of the configurations have every drive at an end of its
-            reach.
+        corners: whether every drive is at an end of its reach in half of the
+            configurations.
     """
 
     configurations: int = 24
@@ -90,7 +91,7 @@ def varied_for(design: CampaignDesign, names: Iterable[str]) -> CampaignDesign:
         names: names of the effects.
 
     Returns:
-        The design with additional varying conditions, if the effects need them.
+        The design, with additional varying conditions if the effects require them.
     """
     given: dict[str, Any] = {}
     for name in names:
@@ -111,7 +112,7 @@ class CampaignPlan:
 
     Attributes:
         rows: rows in the order of measurement.
-        configuration: (rows,) number of each row's configuration.
+        configuration: (rows,) index of the configuration of each row.
         commands: (rows, m) values as written to the file.
         columns: names of the m columns.
     """
@@ -125,7 +126,7 @@ class CampaignPlan:
 def plan_campaign(
     robot: Robot, design: CampaignDesign, rng: np.random.Generator
 ) -> CampaignPlan:
-    """Draw configurations, loads and conditions.
+    """Draw configurations, loads and conditions at random.
 
     Args:
         robot: the declared robot.
@@ -136,7 +137,7 @@ def plan_campaign(
         The plan.
 
     Raises:
-        BadInput: the closures hold at hardly any configuration within the reach.
+        BadInput: the loops can be closed at hardly any configuration within the reach.
     """
     coordinates = _configurations(robot, design, rng)
     commands, columns, coordinates = _commands(robot, design, coordinates)
@@ -173,7 +174,7 @@ def plan_campaign(
 def _configurations(
     robot: Robot, design: CampaignDesign, rng: np.random.Generator
 ) -> NDArray:
-    """Return the (k, n) joint coordinates at which the nominal closures hold."""
+    """Return the (k, n) joint coordinates that close the loops of the nominal robot."""
     home = home_posture(robot)
     spans = np.array([
         0.0 if not f.actuated
@@ -194,16 +195,15 @@ def _configurations(
         if len(reachable) >= design.configurations:
             return np.array(reachable[: design.configurations])
     raise BadInput(
-        f"{robot.name}: the closures hold at hardly any configuration within "
-        f"{design.reach:g} rad of "
-        "home; expected a smaller reach"
+        f"{robot.name}: the loops can be closed at hardly any configuration within "
+        f"{design.reach:g} rad of the home position; expected a smaller reach"
     )
 
 
 def _commands(
     robot: Robot, design: CampaignDesign, coordinates: NDArray
 ) -> tuple[NDArray, tuple[str, ...], NDArray]:
-    """Return commands as in the file, their columns, and the resulting coordinates."""
+    """Return the commands of the file, their columns, and the resulting coordinates."""
     driven = [i for i, f in enumerate(robot.frames) if f.actuated]
     if design.command == "joints":
         columns = tuple(f"q.{robot.frames[i].name}" for i in driven)
@@ -216,7 +216,7 @@ def _commands(
     if not track.reached.all():
         raise BadInput(
             f"{robot.name}: a full platform pose cannot be commanded; expected a robot "
-            'of six freedoms, or command = "joints"'
+            'with six degrees of freedom, or command = "joints"'
         )
     return poses, tuple(f"pose.{name}" for name in POSE), track.coordinates
 
@@ -229,7 +229,7 @@ def _interleaved(design: CampaignDesign, rng: np.random.Generator) -> NDArray:
 
 
 def _loads(design: CampaignDesign, order: NDArray, rng: np.random.Generator) -> NDArray:
-    """Return (rows, 6) [N m, N] loads; two rows of each configuration repeat a load."""
+    """Return (rows, 6) [N m, N] loads; two rows of each configuration repeat one."""
     loads = np.zeros((design.rows, 6))
     if design.levels == "one":
         loads[:, 3:] = (design.load * _direction(rng)).round(3)

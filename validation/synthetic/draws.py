@@ -1,4 +1,4 @@
-"""Plausible parameters of hidden effects, and effects scaled by a factor."""
+"""Draw plausible parameters of hidden effects, and scale effects by a factor."""
 
 import math
 from collections.abc import Callable
@@ -23,7 +23,7 @@ SLIDING = ("_lead", "_lead_backlash")  # effects of prismatic joints only
 
 
 class NotApplicable(ValueError):
-    """Error: a robot has no place where an effect can act."""
+    """Error: an effect cannot act at any place of the robot."""
 
 
 def draw_effect(
@@ -34,17 +34,17 @@ def draw_effect(
     Args:
         name: name of the effect.
         robot: the robot with the effect.
-        duration: [s] of the session.
+        duration: [s] duration of the session.
         rng: random number generator of the draws.
 
     Returns:
-        The effect; :func:`strengthened` sets its strength.
+        The effect, whose strength can be changed by :func:`strengthened`.
 
     Raises:
-        BadInput: there is no such effect.
-        NotApplicable: the robot has no place where the effect acts.
+        BadInput: the name of the effect is unknown.
+        NotApplicable: the effect cannot act at any place of the robot.
     """
-    # the effects outside the library are for tests
+    # Effects outside the library are only for tests, so the message does not list them.
     if name not in (*LIBRARY, *OUTSIDE):
         raise BadInput(
             f'effect: found "{name[:60]}", expected one of {", ".join(LIBRARY)}'
@@ -57,7 +57,7 @@ def strengthened(effect: Hidden, factor: float) -> Hidden:
 
     Args:
         effect: effect with its parameters.
-        factor: [-] > 0.
+        factor: [-] positive factor.
 
     Returns:
         The effect with more compliant springs or larger errors.
@@ -72,7 +72,7 @@ def strengthened(effect: Hidden, factor: float) -> Hidden:
         elif name == "contact_stiffening":
             exponent = given[key.removesuffix("coefficient") + "exponent"]
             given[key] = value / factor**exponent
-        # the modulus is in the denominator of the compliance
+        # The compliance is inversely proportional to the modulus.
         elif name == "modulus_scale":
             given[key] = 1.0 / max(1.0 + factor * (1.0 / value - 1.0), 0.05)
         elif key == "factor":
@@ -96,7 +96,7 @@ def _beams(robot: Robot) -> list[Frame]:
 
 
 def _bodies(robot: Robot) -> list[Frame]:
-    """Return the beams or, without beams, all bodies with a length."""
+    """Return the beams or, if there are none, all bodies with a length."""
     return _beams(robot) or [f for f in robot.frames if f.translation.any()]
 
 
@@ -150,7 +150,7 @@ def _lengths(robot: Robot, duration: float, rng: np.random.Generator) -> Paramet
 
 
 def _errors(names: list[str], rng: np.random.Generator) -> Parameters:
-    """Return errors of about 1e-4 rad or m, of random sign."""
+    """Return errors of about 1e-4 rad or m with random signs."""
     signs = rng.choice([-1.0, 1.0], len(names)) * rng.uniform(0.4, 1.0, len(names))
     return dict(zip(names, (1e-4 * signs).tolist(), strict=True))
 

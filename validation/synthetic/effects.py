@@ -1,14 +1,15 @@
-"""Effects of a simulated machine, modelled by their physics.
+"""Model the effects of a simulated machine by their physics.
 
-A machine is a robot of frames, and most effects are additional frames: an elastic drive
-is a spring after its joint, an encoder error is a finite rotation after it, an elastic
-foundation is a spring below all frames.  Other effects change a body (a beam is longer
-or more compliant, a joint has clearance), the load (weight, a load that differs from
-the recorded one), the measuring frame, or the reading alone.
+The machine is a tree of frames, and most effects are additional frames.  For example,
+an elastic drive is a spring after the joint, an encoder error is a finite rotation
+after the joint, and an elastic foundation is a spring below all frames.  Other effects
+change a body (length, compliance, clearance), the load (weight, or a load that differs
+from the recorded load), the measuring frame, or only the reading.
 
-No code is shared with the effects that a diagnosis fits, because an error in those must
-not affect the data by which they are tested.  Names and parameters are the public ones.
-Springs, rotations and translations of joints act about or along the joint's z axis.
+The code of the effects that a diagnosis fits is not used here, because an error in that
+code must not affect the data with which it is tested.  Effects have their public names
+and parameters.  Springs, rotations and translations of joints act about or along the z
+axis of the joint.
 """
 
 import math
@@ -30,7 +31,7 @@ from forcefit.validation.synthetic.laws import (
 
 SCREW = ("rx", "ry", "rz", "tx", "ty", "tz")
 WRENCH = ("mx", "my", "mz", "fx", "fy", "fz")
-SENSOR = (1e9, 1e10)  # [N m/rad], [N/m] stiffness of a force sensor, practically rigid
+SENSOR = (1e9, 1e10)  # [N m/rad], [N/m] stiffness of an almost rigid force sensor
 Parameters = Mapping[str, float]
 
 
@@ -39,11 +40,12 @@ class Row:
     """One commanded measurement.
 
     Attributes:
-        coordinates: [rad or m] coordinate of every joint by frame, nominal
-            configuration.
-        load: (6,) [N m, N] recorded, at the reference point, base axes.
-        covariates: ``temperature`` [K], ``time`` [s], ``approach`` and further ones;
-            ``gravity.x`` .. ``gravity.z`` [m/s^2] act as gravity.
+        coordinates: mapping from frame to the nominal coordinate of its joint [rad or
+            m].
+        load: (6,) [N m, N] recorded load at the reference point, base axes.
+        covariates: values of ``temperature`` [K], ``time`` [s], ``approach`` and
+            further covariates.  ``gravity.x`` .. ``gravity.z`` [m/s^2] are the
+            components of gravity.
     """
 
     coordinates: Mapping[str, float]
@@ -53,15 +55,16 @@ class Row:
 
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """The simulated machine in a row.
+    """The simulated machine in one row of a design.
 
     Attributes:
-        robot: robot with the frames that effects have added; the load acts at its
-            platform, and the pose of the platform is read.
-        coordinates: [rad or m] of every joint, 0 where absent.
+        robot: robot with the frames that effects have added.  The load acts at its
+            platform, whose pose is measured.
+        coordinates: mapping from frame to joint coordinate [rad or m]; missing joints
+            are at 0.
         load: (6,) [N m, N] applied load.
-        gravity: (3,) [m/s^2] base axes.
-        laws: nonlinear laws of springs or positions, by frame; see
+        gravity: (3,) [m/s^2] gravity in base axes.
+        laws: mapping from frame to the nonlinear law of its joint; see
             :mod:`forcefit.validation.synthetic.rest`.
     """
 
@@ -76,10 +79,11 @@ class Machine:
 
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """Equilibrium of a machine; rows are frames.
+    """Equilibrium of a machine with n frames.
 
     Attributes:
-        transforms: (n, 4, 4) frames in the base frame, before the joint's own motion.
+        transforms: (n, 4, 4) poses of the frames in the base frame, before the motion
+            of their joints.
         joint_wrenches: (n, 6) [N m, N] wrenches of joint springs, in the frame's axes.
         joint_screws: (n, 6) [rad, m] deformations of joint springs.
     """
@@ -94,26 +98,26 @@ Moved = Callable[[NDArray, Row, Parameters], NDArray]
 
 
 def insert_after(robot: Robot, name: str, suffix: str, **given: Any) -> Robot:
-    """Return a robot with a fixed frame between a joint and its children."""
+    """Return a robot with a fixed frame inserted between a joint and its children."""
     new = f"{name}~{suffix}"
     frames = [replace(f, parent=new) if f.parent == name else f for f in robot.frames]
     return replace(robot, frames=(*frames, Frame(new, name, **given)))
 
 
 def along_own_axis(frame: Frame, value: float, others: float = 0.0) -> NDArray:
-    """Return a (6,) with one value along a joint's motion and another elsewhere."""
+    """Return a (6,) vector with one value along a joint's motion and one elsewhere."""
     screw = np.full(6, others)
     screw[frame.own_axis] = value
     return screw
 
 
 def sprung(frame: Frame, stiffness: float) -> NDArray:
-    """Return a (6, 6) stiffness along a joint's motion, rigid in other directions."""
+    """Return a (6, 6) stiffness, finite along a joint's motion and rigid elsewhere."""
     return np.diag(along_own_axis(frame, stiffness, math.inf))
 
 
 def beam_length(robot: Robot, name: str) -> float:
-    """Return the declared length [m] of a frame's beam, or of its body."""
+    """Return the declared length [m] of a frame's beam or body."""
     frame = robot.frame(name)
     if not isinstance(frame.link, BeamLink):
         return float(np.linalg.norm(frame.translation))
@@ -121,7 +125,7 @@ def beam_length(robot: Robot, name: str) -> float:
 
 
 def lengthened(robot: Robot, name: str, change: float) -> Robot:
-    """Return a robot with a body longer by [m] along its actual axis."""
+    """Return a robot with a body longer by ``change`` [m] along its actual axis."""
     frame = robot.frame(name)
     if not isinstance(frame.link, BeamLink):  # along the line between its joints
         longer = 1.0 + change / float(np.linalg.norm(frame.translation))
@@ -141,7 +145,7 @@ def with_frame(robot: Robot, frame: Frame) -> Robot:
 
 
 def misread(machine: Machine, name: str, suffix: str, change: float) -> Machine:
-    """Return a machine in which a joint deviates from its command by [rad or m]."""
+    """Return a machine with a joint that deviates from its command by [rad or m]."""
     screw = along_own_axis(machine.robot.frame(name), change)
     robot = insert_after(machine.robot, name, suffix, geometric_error=screw)
     return replace(machine, robot=robot)
@@ -244,7 +248,7 @@ def _joint_clearance(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _friction_hysteresis(machine: Machine, row: Row, given: Parameters) -> Machine:
-    # a constant torque on a linear spring shifts its equilibrium
+    # A constant torque on a linear spring shifts its equilibrium.
     for name, torque in given.items():
         compliance = own_compliance(machine.robot.frame(name))
         change = -torque * row.covariates["approach"] * compliance
@@ -268,7 +272,7 @@ def _load_gain(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _body_mass(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Make a body heavier [kg]; the centre moves by moment [kg m] over its mass."""
+    """Add a mass [kg] to a body, with its centre at the moment [kg m] over the mass."""
     robot = machine.robot
     keys = ("mass", "moment.x", "moment.y", "moment.z")
     for name in dict.fromkeys(n for key in keys for n in named(given, key)):
@@ -282,7 +286,7 @@ def _body_mass(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _geometric_stiffening(machine: Machine, row: Row, given: Parameters) -> Machine:
-    return machine  # the simulation contains this effect; only a linear model lacks it
+    return machine  # the simulation always contains this effect
 
 
 def _registration(pose: NDArray, row: Row, given: Parameters) -> NDArray:
@@ -295,7 +299,7 @@ def _registration(pose: NDArray, row: Row, given: Parameters) -> NDArray:
 
 
 def _device_scale(pose: NDArray, row: Row, given: Parameters) -> NDArray:
-    """Return the pose with all lengths from the device's origin scaled."""
+    """Return the pose after scaling all lengths from the origin of the device."""
     measured = pose.copy()
     measured[:3, 3] *= given["factor"]
     return measured
@@ -309,7 +313,7 @@ def _drift(reading: NDArray, row: Row, given: Parameters) -> NDArray:
 
 
 def named(given: Parameters, component: str) -> list[str]:
-    """Return the frames of parameters ``<frame>.<component>`` of a component."""
+    """Return the frames in parameters ``<frame>.<component>`` for a component."""
     end = f".{component}"
     return [key.removesuffix(end) for key in given if key.endswith(end)]
 

@@ -1,14 +1,15 @@
-"""Effects that a campaign's design cannot distinguish from the hidden ones.
+"""Find effects that a campaign's design cannot distinguish from the hidden effects.
 
-The first-order signature of every public effect, whitened by the noise, is computed by
-the spring program, not by the model under test.  A set of effects explains the data as
-well as the hidden ones if its signatures span their contribution to within the noise.
-Naming such a set is therefore not wrong.
+The first-order signature of every public effect, divided by the noise, is computed by
+the program of ``springs.py`` and not by the model under test.  A set of effects
+explains the data as well as the hidden effects if a combination of its signatures
+equals their contribution within the noise.  A diagnosis that names such a set is
+therefore not wrong.
 
-Signatures of one rotated drive or lengthened beam depend on the configuration only, and
-those of temperature, approach and contact follow from them.  An arm thus needs 600
-solutions instead of 5000.  Clearance and geometric stiffening have no linear signature
-and are left out.
+The signature of a rotated drive or a lengthened beam depends only on the configuration.
+The signatures of temperature, approach and contact follow from these signatures.  An
+arm therefore requires 600 solutions instead of 5000.  Clearance and geometric
+stiffening are omitted, because they have no linear signature.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,7 +26,7 @@ from forcefit.validation.synthetic.generator import Synthetic
 from forcefit.validation.synthetic.machine import Hidden, simulate_readings
 
 SAME = 10.0  # residual chi-square below which the difference is hidden by noise
-# time constants of a drift that are tried, relative to the duration
+# Tested time constants of a drift, relative to the duration.
 _DRIFTS = (0.1, 0.3, 1.0)
 _STEP = 1e-5  # [rad, m] step of a finite difference
 _GRAM = 1e-3  # [kg, kg m] step of a finite difference
@@ -40,8 +41,8 @@ class Alternative:
     Attributes:
         names: names of the effects.
         parameters: number of their parameters.
-        residual: [-] chi-square of the noise-free contribution that they do not
-            explain.
+        residual: [-] chi-square of the noise-free contribution of the hidden effects
+            that this set does not explain.
     """
 
     names: tuple[str, ...]
@@ -54,10 +55,10 @@ def alternatives(campaign: Synthetic, size: int = 1) -> list[Alternative]:
 
     Args:
         campaign: campaign with its hidden effects.
-        size: size of the largest sets.
+        size: largest number of effects in a set.
 
     Returns:
-        The sets, with their residuals of the contribution of the hidden effects.
+        The sets, each with the residual of the hidden effects' contribution.
     """
     known = np.isfinite(campaign.readings)
     target = (campaign.added / campaign.sigma)[known]
@@ -75,7 +76,7 @@ def alternatives(campaign: Synthetic, size: int = 1) -> list[Alternative]:
 
 
 def _residual(A: NDArray, target: NDArray) -> float:
-    """Return the squared norm of a vector outside the span of columns."""
+    """Return the squared norm of the part of a vector outside the span of columns."""
     norms = np.linalg.norm(A, axis=0)
     A = A[:, norms > 0] / norms[norms > 0]
     if not A.shape[1]:
@@ -93,7 +94,8 @@ def signatures(campaign: Synthetic) -> dict[str, NDArray]:
         campaign: campaign with the design and the noise.
 
     Returns:
-        (6 rows, parameters) arrays by name; a drift has one for each time constant.
+        Mapping from name to an array (6 rows, parameters).  There is one drift for each
+        time constant.
     """
     raw = dict(_raw(campaign))
     sigma = np.tile(campaign.sigma, len(campaign.plan.rows))
@@ -120,7 +122,7 @@ def _of_drives_and_lengths(
     campaign: Synthetic, differences: "_FiniteDifferences",
     covariate: Mapping[str, NDArray],
 ) -> Iterator[tuple[str, NDArray]]:  # fmt: skip
-    """Return effects that rotate a drive or lengthen a beam, by common derivatives."""
+    """Return the columns of effects that rotate a drive or lengthen a beam."""
     robot, rows = campaign.robot, campaign.plan.rows
     drives = [f.name for f in robot.frames if f.actuated]
     turning = [f.name for f in robot.frames if f.actuated and f.joint == "revolute"]
@@ -154,7 +156,7 @@ def _of_drives_and_lengths(
 def _of_loads(
     campaign: Synthetic, differences: "_FiniteDifferences"
 ) -> Iterator[tuple[str, NDArray]]:
-    """Return effects that depend on loads: springs, weight, wrong loads."""
+    """Return columns of effects that depend on loads: springs, weight, wrong loads."""
     beams = [f for f in campaign.robot.frames if isinstance(f.link, BeamLink)]
     base = [
         differences.loaded("base_compliance", f"stiffness.{k}", _SOFT, 1 / _SOFT)
@@ -181,7 +183,7 @@ def _of_loads(
 def _of_the_device(
     differences: "_FiniteDifferences", time: NDArray
 ) -> Iterator[tuple[str, NDArray]]:
-    """Return effects of the measuring device: its pose and its drift."""
+    """Return the columns of effects of the measuring device: its pose and its drift."""
     keys = [*(f"base.{k}" for k in SCREW), "tool.tx", "tool.ty", "tool.tz"]
     frame = [differences.unloaded("registration", key, _STEP) for key in keys]
     yield "registration", _columns(frame)
@@ -218,14 +220,14 @@ class _FiniteDifferences:
         return (readings - self._loaded_readings) / step
 
     def unloaded(self, name: str, key: str, step: float) -> NDArray:
-        """Return derivative by an effect independent of the load, by configuration."""
+        """Return the derivative by an effect that does not depend on the load."""
         readings = self._read(self._unloaded, [Hidden(name, {key: step})])
         return ((readings - self._unloaded_readings) / step)[self._of]
 
 
 def _stiffening(softer: NDArray, offset: NDArray) -> NDArray:
-    """Return columns of a Hertz contact: offset x load^(2/3), by the drive's spring."""
-    # [1/m] makes lengths comparable with angles
+    """Return the columns of a Hertz contact, offset x load^(2/3), of a drive."""
+    # [1/m] Factors that make lengths comparable with angles.
     scale = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
     a, b = softer * scale, offset * scale
     moments = (a * b).sum(axis=1) / (b * b).sum(axis=1)

@@ -1,12 +1,12 @@
-"""Synthetic campaigns: measured data of a simulated machine with hidden effects.
+"""Generate synthetic campaigns: data of a simulated machine with hidden effects.
 
 The machine is simulated in Exudyn with finite rotations and geometrically exact beams,
 not by the model that is fitted later.  Each effect has the requested strength: the rms
-of its contribution to the readings is a multiple of the noise.  Weight and geometric
-stiffening have a fixed strength; with them the noise is adjusted.
+of its contribution to the readings is a multiple of the noise.  The strength of weight
+and geometric stiffening is fixed, so for these effects the noise is adjusted instead.
 
-The written folder holds the data of a measuring machine.  The hidden effects are stored
-separately, in the format of the practice campaigns' truth.
+The folder contains the data that a measurement would provide.  The hidden effects are
+stored separately, in the truth format of the practice campaigns.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -34,11 +34,11 @@ from forcefit.validation.synthetic.machine import Hidden, simulate_readings
 _GIVEN_STRENGTH = ("self_weight", "geometric_stiffening")
 _TRIES = 5
 _DRAWS = 6  # largest number of draws of an effect's parameters until it is visible
-_CLOSE = 0.05  # relative accepted difference of a strength from the requested strength
+_CLOSE = 0.05  # accepted relative error of a strength
 _MOST = (
     1000.0  # times its plausible size: an effect that needs more is hardly observable
 )
-_SMALL = 1e-2  # scale of errors and load at which the machine is practically linear
+_SMALL = 1e-2  # scale of errors and load at which the machine is nearly linear
 _BLUNDER = 40.0  # [sigma] size of a blunder
 
 Progress = Callable[[str, int, int], None]
@@ -56,11 +56,12 @@ class Synthetic:
         registration: ``"known"``, or ``"unknown"`` with a hidden measuring frame.
         sigma: (6,) [rad, m] standard deviation of the noise.
         readings: (rows, 6) [rad, m] measured deviations; NaN where missing.
-        exact: (rows, 6) [rad, m] deviations without noise and blunders.
+        exact: (rows, 6) [rad, m] deviations without noise and without blunders.
         added: (rows, 6) [rad, m] contribution of the hidden effects without the
             measuring frame.
         effects: hidden effects with their parameters.
-        strength: rms of each effect's contribution in sigmas, by name.
+        strength: mapping from the name of each effect to the rms of its contribution
+            [sigma].
         outliers: rows with a blunder.
         hidden_base: (6,) screw of the measuring frame; None if it is known.
     """
@@ -89,9 +90,9 @@ class Noise:
         rotation: [rad] standard deviation of rotations.
         position: [m] standard deviation of positions.
         outliers: number of rows with a blunder in one reading.
-        missing: share of cells that were not measured.
-        hidden_frame: [rad, m] size of an unknown pose of the measuring frame; 0 if
-            known.
+        missing: fraction of cells without a measurement.
+        hidden_frame: [rad, m] size of the unknown pose of the measuring frame; 0 if the
+            pose is known.
     """
 
     rotation: float = 1e-5
@@ -126,8 +127,9 @@ def generate_campaign(
 
     Args:
         robot: the declared robot; its geometric errors are known.
-        wanted: pairs of an effect and the requested multiple of the noise.  An effect
-            is a name, whose parameters are drawn, or has parameters.
+        wanted: pairs of an effect and its requested strength, as a multiple of the
+            noise.  The parameters of an effect that is given only by its name are drawn
+            at random.
         design: design of the campaign.
         noise: errors of the readings.
         seed: seed of all random draws.
@@ -140,9 +142,9 @@ def generate_campaign(
     Raises:
         BadInput: an effect is unknown, there are more blunders than rows, or the robot
             cannot execute the design.
-        NotApplicable: the robot has no place where an effect could act, or the effect
-            is hardly visible in every draw.
-        SimulationFailed: a row has no equilibrium.
+        NotApplicable: an effect cannot act at any place of the robot, or it is hardly
+            visible in every draw.
+        SimulationFailed: no equilibrium was found for a row.
     """
     design, noise = design or CampaignDesign(), noise or Noise()
     if noise.outliers > design.rows:
@@ -186,11 +188,12 @@ def generate_campaign(
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
-    """Hidden effects that are visible in the readings.
+    """Hidden effects, scaled so that they are visible in the readings.
 
     Attributes:
         effects: effects with their parameters.
-        strength: rms of each effect's contribution in sigmas, by name.
+        strength: mapping from the name of each effect to the rms of its contribution
+            [sigma].
         declared: (rows, 6) [rad, m] readings without the effects.
         exact: (rows, 6) [rad, m] readings with all effects.
         sigma: (6,) [rad, m] standard deviation of the noise.
@@ -205,7 +208,7 @@ class _Shown:
 
 @dataclass(eq=False)
 class _SimulatedMachine:
-    """A robot and the rows at which it is measured."""
+    """A robot and the rows of a design that are simulated."""
 
     robot: Robot
     point: NDArray
@@ -226,8 +229,9 @@ def _shown_effects(
     machine: _SimulatedMachine, wanted: Sequence[tuple[Hidden, float]], sigma: NDArray,
     redraw: Draw | None,
 ) -> _Shown:  # fmt: skip
-    """Return all effects, each scaled to its requested multiple of the noise."""
-    # effects of fixed strength determine the noise before other effects are scaled
+    """Return all effects; each is scaled to its requested multiple of the noise."""
+    # Effects of fixed strength determine the noise, so they are processed before other
+    # effects are scaled.
     wanted = sorted(wanted, key=lambda pair: pair[0].name not in _GIVEN_STRENGTH)
     declared = machine.read((), "declared")
     if any(effect.name == "geometric_stiffening" for effect, _ in wanted):
@@ -249,9 +253,9 @@ def _shown_effect(
     machine: _SimulatedMachine, effect: Hidden, multiple: float, sigma: NDArray,
     declared: NDArray, redraw: Draw | None,
 ) -> tuple[Hidden, NDArray, NDArray]:  # fmt: skip
-    """Return the scaled effect; draw again while it is hardly visible."""
-    # an effect may be invisible in a draw: for example, a force whose line meets the
-    # axis of a drive does not load the spring of this drive
+    """Return the scaled effect; parameters are drawn again if it is hardly visible."""
+    # An effect may be invisible in one draw.  For example, a force whose line
+    # intersects the axis of a drive does not load the spring of this drive.
     for _ in range(_DRAWS - 1):
         try:
             return _scaled_effect(machine, effect, multiple, sigma, declared)
@@ -287,15 +291,16 @@ def _scaled_effect(
         factor *= multiple / reached
         if factor > _MOST:
             raise NotApplicable(
-                f"{effect.name}: {multiple:g} times the noise needs more than "
-                f"{_MOST:g} times the plausible size of the effect, because "
-                "this robot or its loads hardly show it; choose another effect"
+                f"{effect.name}: a contribution of {multiple:g} times the noise "
+                f"requires more than {_MOST:g} times the plausible size of the "
+                "effect, because the effect hardly changes the readings of this "
+                "robot under these loads; choose another effect"
             )
     return tried, exact, sigma
 
 
 def _linear(machine: _SimulatedMachine) -> NDArray:
-    """Return (rows, 6) readings of the machine, linear in errors and load."""
+    """Return (rows, 6) readings of the machine that are linear in errors and load."""
     ends = []
     for scale in (_SMALL, -_SMALL):
         small = machine.robot.with_errors(scale * machine.robot.errors)
@@ -324,10 +329,10 @@ def _rms(values: NDArray) -> float:
 
 
 def write_campaign(campaign: Synthetic, folder: Path | str) -> None:
-    """Write campaign.toml, measurements.csv and robot.toml; all or none of them.
+    """Write campaign.toml, measurements.csv and robot.toml, either all or none.
 
     Args:
-        campaign: campaign to be written; hidden effects are not written.
+        campaign: campaign to be written; its hidden effects are not written.
         folder: new or empty folder.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Nonlinear laws of the joints of a simulated machine."""
+"""Define nonlinear laws of the joints of a simulated machine."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ class PowerLawSpring:
     exponent: float
 
     def secant(self, deflection: float) -> float:
-        """Return [N m/rad or N/m] secant stiffness, from a nanometre of deflection."""
+        """Return the secant stiffness [N m/rad or N/m] at a deflection."""
         bent = max(abs(deflection), 1e-9)
         return float(self.coefficient * bent ** (self.exponent - 1.0))
 
@@ -29,8 +29,8 @@ class TwoStepSpring:
 
     Attributes:
         below: [rad/(N m) or m/N] compliance below the knee.
-        above: compliance for the part of the load above the knee.
-        knee: [N m or N] load of the knee, > 0.
+        above: [rad/(N m) or m/N] compliance for the part of the load above the knee.
+        knee: [N m or N] load at which the compliance changes, positive.
     """
 
     below: float
@@ -38,7 +38,7 @@ class TwoStepSpring:
     knee: float
 
     def secant(self, load: float) -> float:
-        """Return [N m/rad or N/m] secant stiffness, from a millionth of the knee."""
+        """Return the secant stiffness [N m/rad or N/m] for a load."""
         size = max(abs(load), 1e-6 * self.knee)
         more = max(size - self.knee, 0.0)
         return size / (self.below * (size - more) + self.above * more)

@@ -1,4 +1,4 @@
-"""Readings of a simulated machine at the rows of a design, with hidden effects."""
+"""Compute readings of a simulated machine with hidden effects in rows of a design."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -33,10 +33,11 @@ _ALL_COVARIATES = COVARIATES | OUTSIDE_COVARIATES
 
 @dataclass(frozen=True, eq=False)
 class Hidden:
-    """An effect that the declared model lacks.
+    """An effect of the machine that the declared model does not contain.
 
     Attributes:
-        name: public name, or a name with a leading underscore.
+        name: public name of the effect; a leading underscore marks effects outside the
+            library.
         parameters: parameters as in the public formats.
     """
 
@@ -52,26 +53,27 @@ def simulate_readings(
     program: str = "multibody",
     update: Progress | None = None,
 ) -> NDArray:
-    """Return the deviations of a simulated machine at the rows of a design.
+    """Return the deviations of a simulated machine in the rows of a design.
 
-    They have no noise.  Rows with the same machine are simulated once.
+    The deviations do not contain noise.  Rows with equal machines are simulated once.
 
     Args:
-        robot: the declared robot; a joint without declared clearance is tight.
-        reference_point: (3,) [m] point at which the load acts and the pose is read,
+        robot: the declared robot; a joint without declared clearance has no clearance.
+        reference_point: (3,) [m] point at which the load acts and the pose is measured,
             platform axes.
         rows: commanded configurations, loads and covariates.
-        effects: effects of the machine, which the declared model lacks.
+        effects: effects of the machine that the declared model does not contain.
         program: ``"multibody"`` for Exudyn, or ``"springs"``, which is much faster.
-        update: called with the number of finished machines and their total.
+        update: function called with the number of finished machines and the total
+            number.
 
     Returns:
         (rows, 6) [rad, m] rotation vector of R_actual R_nominal^T, and displacement of
         the reference point, base axes.
 
     Raises:
-        BadInput: the robot has a helical joint.
-        SimulationFailed: a row has no equilibrium.
+        BadInput: the robot contains a helical joint.
+        SimulationFailed: no equilibrium was found for a row.
     """
     refuse_helical(robot)
     pointed = with_point(robot, reference_point)
@@ -107,13 +109,13 @@ def acts_on_machine(name: str) -> bool:
 
 
 def with_point(robot: Robot, reference_point: NDArray) -> Robot:
-    """Return the robot with its reference point as the platform."""
+    """Return the robot whose platform frame is at the reference point."""
     point = Frame("platform~point", robot.platform, translation=reference_point)
     return replace(robot, platform=point.name, frames=(*robot.frames, point))
 
 
 def nominal_pose(robot: Robot, row: Row) -> NDArray:
-    """Return the (4, 4) nominal platform of the robot, computed along its chain."""
+    """Return the (4, 4) nominal platform pose, computed along the chain of frames."""
     T, frame = np.eye(4), robot.frame(robot.platform)
     while True:
         own = np.array([0.0, 0.0, row.coordinates.get(frame.name, 0.0)])
@@ -128,7 +130,7 @@ def nominal_pose(robot: Robot, row: Row) -> NDArray:
 
 
 def _machine(robot: Robot, row: Row, changing: Sequence[Hidden]) -> Machine:
-    """Return the machine of a row, with the effects that change it."""
+    """Return the machine of a row after applying the effects that change it."""
     gravity = np.array([row.covariates.get(f"gravity.{k}", 0.0) for k in "xyz"])
     machine = Machine(robot, row.coordinates, row.load, gravity)
     for effect in changing:
@@ -140,7 +142,7 @@ def _machine(robot: Robot, row: Row, changing: Sequence[Hidden]) -> Machine:
 def _read(
     pose: NDArray, nominal: NDArray, row: Row, effects: Sequence[Hidden]
 ) -> NDArray:
-    """Return the (6,) [rad, m] reading of the measuring device at a pose."""
+    """Return the (6,) [rad, m] reading of the measuring device for a true pose."""
     for effect in effects:
         if effect.name in POSES:
             pose = POSES[effect.name](pose, row, effect.parameters)

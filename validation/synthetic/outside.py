@@ -1,7 +1,7 @@
-"""Effects outside the library, to test whether a diagnosis reports them as such.
+"""Model effects outside the library, which test whether a diagnosis reports them.
 
-Each effect occurs in real machines, and no public effect describes it.  The names begin
-with an underscore.
+Each effect occurs in real machines but is not described by any public effect.  The
+names of these effects begin with an underscore.
 """
 
 import math
@@ -30,7 +30,7 @@ from forcefit.validation.synthetic.laws import ClearanceLaw, TwoStepSpring
 
 
 def _pose_stiffness(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply a drive's compliance that varies as 1 + cos 3q, as of a gear mesh."""
+    """Apply a drive's compliance that varies as 1 + cos 3q, as in a gear mesh."""
     robot = machine.robot
     for name, softest in given.items():
         share = 1.0 + math.cos(3 * row.coordinates[name])
@@ -40,7 +40,7 @@ def _pose_stiffness(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _humidity(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply a beam's swelling: a strain per per cent of humidity."""
+    """Apply a beam's swelling: a strain that is proportional to the humidity."""
     return _swollen(machine, given, row.covariates["humidity"] - 40.0)
 
 
@@ -57,7 +57,7 @@ def _swollen(machine: Machine, given: Parameters, cause: float) -> Machine:
 
 
 def _second_harmonic(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply an encoder error that repeats twice in a turn: a wobbling disc."""
+    """Apply an encoder error that repeats twice per turn, as of a tilted disc."""
     for name in (key[: -len(".amplitude")] for key in given if "amplitude" in key):
         angle = 2 * row.coordinates[name] + given[f"{name}.phase"]
         change = given[f"{name}.amplitude"] * math.sin(angle)
@@ -66,12 +66,12 @@ def _second_harmonic(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _growth(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply a beam's growth by a strain per second, as by wear or long creep."""
+    """Apply a beam's elongation at a constant strain rate, as by wear or long creep."""
     return _swollen(machine, given, row.covariates["time"])
 
 
 def _gear(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply waves of a gear to a drive's angle, several in one turn."""
+    """Apply an angle error of a drive with several periods per turn, as of a gear."""
     for name in (key[: -len(".order")] for key in given if key.endswith(".order")):
         angle = given[f"{name}.order"] * row.coordinates[name] + given[f"{name}.phase"]
         change = given[f"{name}.amplitude"] * math.sin(angle)
@@ -89,7 +89,7 @@ def _uneven_backlash(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _load_friction(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply a drive's friction that grows with the size of the load: c f/100 N."""
+    """Apply a drive's friction that is proportional to the load: c f/100 N."""
     pressed = float(np.linalg.norm(row.load[3:])) / 100 * row.covariates["approach"]
     for name, short in given.items():
         machine = misread(machine, name, "friction", -short * pressed)
@@ -104,7 +104,7 @@ def _cable(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _slipped(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply a jump of a drive's zero at an instant."""
+    """Apply a jump of a drive's zero at one point in time."""
     for name in (key[: -len(".at")] for key in given if key.endswith(".at")):
         late = row.covariates["time"] >= given[f"{name}.at"]
         machine = misread(machine, name, "slip", given[f"{name}.jump"] * late)
@@ -112,7 +112,7 @@ def _slipped(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _lead(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply waves of a screw to a slide's position, one in each period."""
+    """Apply a periodic position error of a slide, one period per turn of its screw."""
     for name in named(given, "period"):
         turns = row.coordinates[name] / given[f"{name}.period"]
         wave = math.sin(2 * math.pi * turns + given[f"{name}.phase"])
@@ -122,7 +122,7 @@ def _lead(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _lead_backlash(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply a screw's backlash that varies over its turn."""
+    """Apply a screw's backlash that varies over each turn."""
     for name in named(given, "period"):
         turns = row.coordinates[name] / given[f"{name}.period"]
         share = 1.0 + 0.8 * math.sin(2 * math.pi * turns + given[f"{name}.phase"])
@@ -144,7 +144,7 @@ def _two_steps(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _torque_backlash(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply a gear's backlash on the side to which the load pushes the drive."""
+    """Apply a gear's backlash, taken up in the direction of the drive's load."""
     robot, laws = machine.robot, dict(machine.laws)
     for name, clearance in given.items():
         frame = robot.frame(name)
@@ -157,7 +157,7 @@ def _torque_backlash(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _tilting(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply a tilt of the ground, proportional to a sensor's reading."""
+    """Apply a tilt of the ground that is proportional to a sensor's reading."""
     new, screw = "base~tilt", np.zeros(6)
     screw[0] = given["gain"] * row.covariates["tilt"]
     frames = [
@@ -168,13 +168,13 @@ def _tilting(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _stand(reading: NDArray, row: Row, given: Parameters) -> NDArray:
-    """Apply a device stand's deflection by the squared load: c (f/100 N)^2."""
+    """Apply a deflection of the device's stand by the squared load: c (f/100 N)^2."""
     squared = float(row.load[3:] @ row.load[3:]) / 1e4
     return reading + squared * np.array([given.get(f"c.{k}", 0.0) for k in SCREW])
 
 
 def _sag(reading: NDArray, row: Row, given: Parameters) -> NDArray:
-    """Apply a sag of the measured target that grows with the size of the load."""
+    """Apply a deflection of the measured target that is proportional to the load."""
     sag = np.zeros(6)
     sag[5] = -given["rate"] * np.linalg.norm(row.load[3:])
     return reading + sag

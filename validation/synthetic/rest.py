@@ -1,15 +1,16 @@
-"""Equilibria of a simulated machine with nonlinear laws of its joints.
+"""Compute equilibria of a simulated machine with nonlinear laws of its joints.
 
-A law is solved by fixed-point iteration.  The machine is simulated with a linear spring
-or an offset in the joint; the load of the joint determines the next spring or offset.
-The iteration ends when the change is below a tolerance.
+The laws are solved by fixed-point iteration.  The machine is simulated with a linear
+spring or an offset in the joint.  The resulting load on the joint determines the next
+spring or offset.  The iteration ends when the change is below a tolerance.
 
-- A stiffening contact has its secant stiffness.  It moves less than its last stiffness
-  predicts, so each step reduces the error at least by 1 - 1/n.
-- A joint with clearance is displaced by its load up to its bounds.  On an open chain
-  the load does not depend on the clearance.  A weak spring (grease, seals) keeps the
-  joint near the middle under small loads; otherwise rounding would determine its
-  position.
+- A stiffening contact is replaced by a spring of its secant stiffness.  The deflection
+  is smaller than the last stiffness predicts.  Each step therefore multiplies the error
+  by at most 1 - 1/n, where n is the exponent of the contact law.
+- The load displaces a joint with clearance up to the bounds of the clearance.  On an
+  open chain, the load does not depend on the clearance.  A weak spring (grease, seals)
+  centres the joint under small loads.  Without the spring, rounding errors would
+  determine the position of the joint.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -37,15 +38,15 @@ from forcefit.validation.synthetic.laws import (
 )
 from forcefit.validation.synthetic.springs import rest_on_springs
 
-# number of elements of a beam; corrected elements are accurate at these small
-# deflections
+# Number of elements of a beam; corrected elements are accurate for these small
+# deflections.
 _ELEMENTS = 2
 _STEPS = 60
 _SETTLED = 1e-11  # [rad, m] change of power-law springs at convergence
-# [rad, m] change of clearances at convergence; rounding in the force sensor prevents a
-# smaller value at small loads
+# [rad, m] Change of a joint's position in its clearance at convergence.  At small
+# loads, rounding in the force sensor prevents a smaller value.
 _SETTLED_CLEARANCE = 5e-9
-# [N/m, N m/rad] springs that centre clearances
+# [N/m, N m/rad] Springs that centre joints in their clearances.
 _CENTRING = {"radial": 3e3, "axial": 3e3, "tilt": 3e2, "spin": 3e2}
 Progress = Callable[[int, int], None]
 _ROWS = {"tilt": [0, 1], "spin": [2], "radial": [3, 4], "axial": [5]}
@@ -54,15 +55,16 @@ _ROWS = {"tilt": [0, 1], "spin": [2], "radial": [3, 4], "axial": [5]}
 def rest_poses(
     machines: Sequence[Machine], program: str, update: Progress | None = None
 ) -> NDArray:
-    """Return the equilibria of machines of one structure under their loads.
+    """Return the equilibria of machines with equal structure under their loads.
 
     Args:
         machines: machines with all their effects.
         program: one of :data:`PROGRAMS`.
-        update: called with the number of machines at rest and their total.
+        update: function called with the number of finished machines and the total
+            number.
 
     Returns:
-        (k, 4, 4) platforms of the machines in the base frame.
+        (k, 4, 4) poses of the platforms in the base frame.
 
     Raises:
         SimulationFailed: there is no equilibrium, or the joints' laws do not converge.
@@ -82,12 +84,12 @@ def rest_poses(
             return poses
     raise SimulationFailed(
         machines[0].robot.name,
-        "the search for equilibrium with its joints' laws does not converge",
+        "the iteration for the equilibrium with nonlinear joints does not converge",
     )
 
 
 def _updated(machine: Machine, equilibrium: Rest) -> tuple[Machine, float]:
-    """Return machine with laws evaluated at its loads, and the change in tolerances."""
+    """Return a machine with laws evaluated at its loads, and the change / tolerance."""
     largest, robot = 0.0, machine.robot
     for name, law in machine.laws.items():
         i, frame = robot.index(name), robot.frame(name)
@@ -126,14 +128,14 @@ def _clearance_position(law: ClearanceLaw, wrench: NDArray) -> NDArray:
 
 @dataclass(frozen=True, eq=False)
 class _Placed:
-    """Robot and joint coordinates in the form that the simulation needs."""
+    """Robot and joint coordinates in the form that the simulation requires."""
 
     robot: Robot
     coordinates: NDArray
 
 
 def _simulated(machines: Sequence[Machine]) -> Iterator[Rest]:
-    """Yield equilibria by the multibody simulation, one by one."""
+    """Yield the equilibria, each computed by the multibody simulation."""
     for machine in machines:
         robot = machine.robot
         q = np.array([machine.coordinates.get(f.name, 0.0) for f in robot.frames])

@@ -1,24 +1,28 @@
-"""Equilibria of machines with springs at the tips of beams, for all rows together.
+"""Compute equilibria of machines whose links are springs, for all rows together.
 
-This is a second, faster program.  Motions are finite and the equilibrium is that of the
-deformed machine, as in the multibody simulation.  A beam is represented by its
-compliance at the tip instead of elements, which differs under large deflections.
-Clearances in closed loops need the multibody simulation.
+This program is faster than the multibody simulation.  Motions are finite, and the
+equilibrium is that of the deformed machine, as in the multibody simulation.  A beam is
+represented by its compliance at the tip instead of finite elements.  Both
+representations differ under large deflections.  Clearances in closed loops require the
+multibody simulation.
 
-The unknowns are the passive joints' motions q and the wrench l of each closure.  Given
-these, the springs deform under their wrenches, and the frames follow; the residuals are
+The unknowns are the motions q of the passive joints and the wrench l of each closure.
+They determine the deformation of the springs and the poses of the frames.  The
+residuals are
 
     r = errors of the closures,        t = moments about passive joints' axes.
 
-Newton's step uses the nominal posture, because springs deform little.  With a_j the
-axis of joint j, and s_kj = +1 or -1 if it is on the first or second chain of closure k,
+Newton's method uses the Jacobian of the nominal posture, because springs deform little.
+a_j is the axis of joint j. s_kj is +1 or -1 if joint j is on the first or second chain
+of closure k:
 
     [ -S       -(s a) ] [ dl ]     [ r ]
     [ (s a)^T    0    ] [ dq ] = - [ t ]
 
-with S the compliance between each pair of closures.  Steps have minimum norm, so idle
-rotations and the wrenches of overconstrained rigid loops are determined.  Screws and
-wrenches are read at the base origin in base axes unless stated otherwise.
+S is the compliance between each pair of closures.  Each step is the solution of minimum
+norm, which also determines free rotations and the wrenches of overconstrained rigid
+loops.  Screws and wrenches refer to the base origin and base axes unless stated
+otherwise.
 """
 
 from collections.abc import Sequence
@@ -37,24 +41,25 @@ from forcefit.validation.synthetic.effects import Machine, Rest
 
 _STEPS = 60
 _CONVERGED = 1e-12  # [rad, m] size of the last step at convergence
-_DIVERGED = 1e3  # [rad, m] coordinate above which the steps diverge
-_RANK = 1e-10  # relative size below which singular values belong to idle motions
+_DIVERGED = 1e3  # [rad, m] coordinate above which the iteration has diverged
+_RANK = 1e-10  # relative size below which singular values belong to free motions
 
 
 @dataclass(frozen=True, eq=False)
 class _SpringModel:
-    """Arrays of k machines of one structure, with n frames.
+    """Arrays that describe k machines of equal structure with n frames.
 
     Attributes:
-        robot: one of the robots, for the structure.
+        robot: one of the robots, which defines the structure.
         placed: (k, n, 4, 4) frames with their errors, relative to their parents.
         compliances: (2, k, n, 6, 6) compliances of links and joints, at the frame, in
             its axes.
         nominal: (k, n, 4, 4) nominal frames of the robot.
-        passive: rows of the frames whose motion is free.
-        pairs: (closures, 2) rows of the frames that each closure joins.
+        passive: indices of the frames with free joints.
+        pairs: (closures, 2) indices of the frames that each closure joins.
         signs: (closures, n) +1 on the first chain, -1 on the second.
-        closed: (k, closures, 4, 4) nominal second frame relative to the first.
+        closed: (k, closures, 4, 4) nominal pose of the second frame relative to the
+            first.
     """
 
     robot: Robot
@@ -71,7 +76,7 @@ def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
     """Return the equilibria of machines whose links are springs.
 
     Args:
-        machines: machines of one structure, without clearances.
+        machines: machines of equal structure, without clearances.
 
     Returns:
         The equilibrium of each machine.
@@ -95,8 +100,8 @@ def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
     ends = _forward(parts, q, screws)
     for _ in range(_STEPS):
         carried = _carried(machines, parts, ends, wrenches)
-        # wrenches are read half-way along the deformation; read at an end, they would
-        # not be the gradient of an energy
+        # Wrenches are evaluated half-way along the deformation.  Wrenches at an end
+        # would not be the gradient of an energy.
         halfway = ends @ np.linalg.inv(_deflections(screws / 2))
         read = _at_frames(halfway, carried)
         new = np.einsum("skaij,skaj->skai", parts.compliances, read)
@@ -189,11 +194,11 @@ def _chain(robot: Robot, steps: NDArray, ends: NDArray, q: NDArray) -> NDArray:
     Args:
         robot: robot with the tree of frames.
         steps: (k, n, 4, 4) motions from the parent's joint.
-        ends: (k, n, 4, 4) motions after the step, before the joint's motion.
+        ends: (k, n, 4, 4) motions after the step and before the motion of the joint.
         q: (k, n) [rad or m] coordinates of the joints.
 
     Returns:
-        Frames in the base frame, before their joint's motion.
+        Poses of the frames in the base frame, before the motion of their joints.
     """
     own = np.zeros((*q.shape, 6))
     for i, frame in enumerate(robot.frames):
@@ -234,8 +239,8 @@ def _axes(parts: _SpringModel, T: NDArray) -> NDArray:
 
 
 def _newton(parts: _SpringModel, q: NDArray) -> tuple[NDArray, float]:
-    """Return inverses of Newton's matrices, and the compliance that scales wrenches."""
-    # rows of one configuration and equal springs have the same matrix
+    """Return inverses of Newton's matrices, and the compliance for scaling wrenches."""
+    # Rows of one configuration with equal springs have equal matrices.
     distinct = np.hstack([
         q,
         parts.compliances.sum(axis=(0, 3, 4)).reshape(len(q), -1),
@@ -251,7 +256,7 @@ def _newton(parts: _SpringModel, q: NDArray) -> tuple[NDArray, float]:
     S = np.einsum("an,bn,knij->kaibj", s, s, at_base, optimize=True)
     S = S.reshape(machines, size, size)
     axes = _axes(parts, nominal)
-    # a closure's wrench acts on a joint that is on one of its chains only
+    # The wrench of a closure acts only on joints that are on one of its two chains.
     A = np.einsum("an,kni->kain", s[:, parts.passive], axes)
     A = A.reshape(machines, size, passive)
     diagonal = np.diagonal(S, axis1=1, axis2=2)
@@ -316,13 +321,13 @@ def _force(vectors: NDArray) -> NDArray:
 
 
 def _at_base(wrenches: NDArray, points: NDArray) -> NDArray:
-    """Return the (k, 6) wrenches at points, read at the base origin."""
+    """Transform (k, 6) wrenches from given points to the base origin."""
     moments = wrenches[:, :3] + np.cross(points, wrenches[:, 3:])
     return np.concatenate([moments, wrenches[:, 3:]], axis=1)
 
 
 def _at_frames(T: NDArray, wrenches: NDArray) -> NDArray:
-    """Return the (..., 6) wrenches read at frames, in their axes."""
+    """Transform (..., 6) wrenches to frames and their axes."""
     return np.einsum("...ij,...i->...j", _maps(T), wrenches)
 
 

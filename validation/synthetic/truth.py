@@ -1,4 +1,4 @@
-"""Hidden effects of a synthetic campaign, in the format of the practice campaigns."""
+"""Convert the hidden effects of a campaign to the practice campaigns' format."""
 
 from typing import Any
 
@@ -47,14 +47,14 @@ def truth_of(
     accept: list[list[str]] | None = None,
     note: str = "",
 ) -> dict[str, Any]:
-    """Return the truth of a campaign.
+    """Return the hidden effects of a campaign and the correct verdict (the truth).
 
     Args:
         campaign: campaign with its hidden effects.
-        verdict: verdict of a correct diagnosis; by default the verdict for a design
-            that distinguishes the effects.
+        verdict: verdict of a correct diagnosis.  The default applies to a design that
+            distinguishes the effects.
         accept: other sets of effects that explain the data equally well.
-        note: explanation for the reader.
+        note: explanation for the reader of the file.
 
     Returns:
         Plain values with the keys of the practice campaigns' truth.
@@ -93,7 +93,7 @@ def truth_of(
 
 
 def _effect(campaign: Synthetic, effect: Hidden) -> dict[str, Any]:
-    """Return name, place and parameters of an effect."""
+    """Return the name, place and parameters of an effect."""
     names = [frame.name for frame in campaign.robot.frames]
     where: list[str] = []
     parameters = []
@@ -124,6 +124,6 @@ def _unit(campaign: Synthetic, effect: str, key: str, frame: str) -> str:
 
 
 def _rms(values: np.ndarray) -> float:
-    """Return the root mean square of the measured values; 1 without values."""
+    """Return the root mean square of the measured values; 1 if there are none."""
     known = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(known**2))) if known.size else 1.0

@@ -74,7 +74,9 @@ def test_registration_needs_three_points_that_are_not_collinear(points):
     seen[:, :3], seen[points:] = np.nan, np.nan
     campaign = bar(measured=seen)
     if points < 3:
-        with pytest.raises(BadInput, match="nor 3 measured points off one line"):
+        with pytest.raises(
+            BadInput, match="nor 3 measured points that are not on one line"
+        ):
             coarse_frame(campaign, conditions_of(campaign))
         return
     guess = coarse_frame(campaign, conditions_of(campaign))
@@ -131,7 +133,7 @@ def test_collinear_points_do_not_determine_the_device_rotation():
         coordinates=np.stack([p.coordinates for p in placed]),
         transforms=np.stack([p.transforms for p in placed]),
     )  # fmt: skip
-    with pytest.raises(BadInput, match="measured points off one line"):
+    with pytest.raises(BadInput, match="measured points that are not on one line"):
         register(campaign, conditions_of(campaign))
 
 

@@ -220,7 +220,7 @@ def test_readings_are_joined_by_order_and_repeated_files_become_repeats(lab, run
     ("name;x [furlong];y;z\nA;1;2;3", {}, 'found the unit "furlong"'),
     ("name;x;y;z\nA;1,5;2;3", {}, "if this is a decimal mark, set decimal"),
     ("name;x;y;z\nA;1;2", {}, "found 3 cells, expected 4"),
-    ("name;x;y;z\nD;1;2;3", {}, 'the name of one target in it: "A", "B", "C"'),
+    ("name;x;y;z\nD;1;2;3", {}, 'no name of a target, expected one of: "A", "B", "C"'),
     ("A 1 2 3\nA 1 2 4", {}, 'found 2 readings of "A" for 13 commands'),
     ("name;x;y;z;time\nA;1;2;3;noon", {}, "expected a time: seconds"),
     ("name;x;y;z;date\nA;1;2;3;3/4/2026 10:00:00", {}, 'expected dates = "day_fi'),

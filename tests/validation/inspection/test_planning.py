@@ -81,4 +81,4 @@ def test_plan_refuses_a_rigid_robot_that_closes_in_its_clearances_only(tmp_path,
     code, _, message = run("validation", "plan", file, "--rows", "12", "-o", folder)
     assert code == 2
     assert not folder.exists()
-    assert "found no effect that changes the readings without clearances" in message
+    assert "found no effect that changes the readings if all clearances" in message

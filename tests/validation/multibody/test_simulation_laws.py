@@ -158,7 +158,7 @@ def test_simulation_prints_nothing(capfd, rng):
 
 
 def test_spring_link_without_matrix_is_refused():
-    with pytest.raises(BadInput, match="link of frame 'a' becomes a spring"):
+    with pytest.raises(BadInput, match="link of frame 'a' is simulated as a spring"):
         simulate_assembly(coaxial(np.zeros(6)), model=SimulationModel("spring"))
     with pytest.raises(BadInput, match="links = 'shell', expected one of"):
         simulate_assembly(coaxial(np.zeros(6)), model=SimulationModel("shell"))

@@ -316,7 +316,7 @@ def test_effect_that_the_robot_cannot_have_is_refused():
         draw_effect("friction_hysteresis", two_axes(spring=None), 1.0, rng)
     # loads too small to show it; a drive none reaches is the same
     away = CampaignDesign(configurations=8, rows=40, load=1e-3)
-    with pytest.raises(NotApplicable, match="hardly show it"):
+    with pytest.raises(NotApplicable, match="hardly changes the readings"):
         quick({"drive_compliance": 5.0}, design=away)
     with pytest.raises(BadInput, match='found "gravity"') as caught:
         draw_effect("gravity", two_axes(), 1.0, rng)
