@@ -217,7 +217,7 @@ def test_command_reports_the_importance_by_callout(tmp_path):
     assert sentence in result.output
     page = (tmp_path / "page.html").read_text()
     assert sentence in page.replace("&nbsp;", " ")
-    columns = parse(page).table("", "limit", "Cp")[1]
+    columns = parse(page).table("quantity", "limit", "Cp")[1]
     for index in ("cp", "cpk", "ppm"):
         one = results["capability"]["translation"][index]
         assert str(one["value"]) != "nan"
