@@ -15,7 +15,7 @@ from forcefit.stiffness.screws import SCREW
 
 # ends of the names of a joint's contacts (assembly/drawing/contacts.py)
 _CONTACT = re.compile(
-    r"(bore|bearing)_(start|end)|guide_(yaw|pitch)_(start|end)|pad_[1-4]"
+    r"(bore|bearing)_(start|end)|guide_(far_)?(roll|(yaw|pitch)_(start|end))|pad_[1-4]"
 )
 # component of the frame slide_x, whose z is the joint's x, for each of a planar joint
 _OF_PLANE = (2, 0, 1, 5, 3, 4)
@@ -98,6 +98,26 @@ def shown_name(robot: Robot, row: int) -> str:
         if name == joint.main and joint.kind != "universal":
             return joint.name
     return name
+
+
+def clearance_name(robot: Robot, row: int, bound: str) -> str:
+    """Return the name under which a bound of a clearance is shown.
+
+    Args:
+        robot: any robot.
+        row: of the frame with the clearance.
+        bound: ``radial``, ``axial``, ``tilt``, ``spin`` or ``ball``.
+
+    Returns:
+        ``"rail.clearance"`` of a contact of the joint ``rail``, because the bounds of
+        its contacts follow from the joint's gaps; otherwise ``"hinge.tilt"``.
+    """
+    joint = joint_of(robot, row)
+    if _CONTACT.fullmatch(robot.frames[row].name.rpartition(".")[2]) and (
+        joint != robot.frames[row].name
+    ):
+        return f"{joint}.clearance"
+    return f"{shown_name(robot, row)}.{bound}"
 
 
 def joint_of(robot: Robot, row: int) -> str:
