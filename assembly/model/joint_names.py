@@ -8,6 +8,7 @@ finds the joints.
 """
 
 import re
+from collections.abc import Container
 
 from forcefit.assembly.model.frame_series import NamedJoint
 from forcefit.assembly.model.robot import Robot
@@ -15,7 +16,8 @@ from forcefit.stiffness.screws import SCREW
 
 # ends of the names of a joint's contacts (assembly/drawing/contacts.py)
 _CONTACT = re.compile(
-    r"(bore|bearing)_(start|end)|guide_(far_)?(roll|(yaw|pitch)_(start|end))|pad_[1-4]"
+    r"(bore|bearing)_(start|end)|guide_(far_)?(roll|(yaw|pitch)_(start|end))"
+    r"|pad_[1-4]|contacts_(start|(far_)?end)"
 )
 # component of the frame slide_x, whose z is the joint's x, for each of a planar joint
 _OF_PLANE = (2, 0, 1, 5, 3, 4)
@@ -112,11 +114,8 @@ def clearance_name(robot: Robot, row: int, bound: str) -> str:
         ``"rail.clearance"`` of a contact of the joint ``rail``, because the bounds of
         its contacts follow from the joint's gaps; otherwise ``"hinge.tilt"``.
     """
-    joint = joint_of(robot, row)
-    if _CONTACT.fullmatch(robot.frames[row].name.rpartition(".")[2]) and (
-        joint != robot.frames[row].name
-    ):
-        return f"{joint}.clearance"
+    if owner_of_contact(robot.frames[row].name, names_of(robot)):
+        return f"{joint_of(robot, row)}.clearance"
     return f"{shown_name(robot, row)}.{bound}"
 
 
@@ -132,13 +131,27 @@ def joint_of(robot: Robot, row: int) -> str:
         is (``"foot"`` of ``foot.bore_start``); otherwise the name of the frame.
     """
     frame = robot.frames[row]
-    stem, _, end = frame.name.rpartition(".")
-    of_contact = frame.joint == "fixed" and _CONTACT.fullmatch(end) is not None
-    name = stem if of_contact and stem in names_of(robot) else frame.name
+    fixed = frame.joint == "fixed"
+    owner = owner_of_contact(frame.name, names_of(robot)) if fixed else ""
+    name = owner or frame.name
     for joint in robot.joints.values():
         if name in joint.frames:
             return joint.name
     return name
+
+
+def owner_of_contact(name: str, names: Container[str]) -> str:
+    """Return the joint or frame whose contact a frame is, or an empty text.
+
+    Args:
+        name: of a frame, such as ``"foot.bore_start"``.
+        names: of frames and joints.
+
+    Returns:
+        ``"foot"`` if it is one of the names.
+    """
+    stem, _, end = name.rpartition(".")
+    return stem if stem in names and _CONTACT.fullmatch(end) else ""
 
 
 def moves(robot: Robot, name: str) -> bool:
