@@ -75,7 +75,8 @@ def test_study_page_has_the_numbers_of_its_results(results):
     text = verdict(found)
     begin = "For all parts within the tolerances of the drawing and all positions"
     assert f"{begin} within the clearances its platform is at most" in text
-    assert f"{worst['rotation']['bound'] * 1e3:.3g} mrad from the nominal pose" in text
+    turn, shift = (1e3 * worst[key]["bound"] for key in ("rotation", "translation"))
+    assert f"{turn:.3g} mrad and {shift:.3g} mm from the nominal pose" in text
     assert "Without these tolerances and for all positions within the clear" in text
     assert "Of 4000 drawn machines 4000 assemble" in text
 
@@ -132,7 +133,8 @@ def test_map_bounds_the_rotation_over_all_parts_as_by_hand(tmp_path):
     over = table["worst_clearance"]["drawn"]["map"]
     assert over["rotation"] == bounds.values.max()
     assert over["points"] == 4
-    assert f"{1e3 * bounds.values.max():.3g} mrad over the 4 poses" in verdict(found)
+    turn, shift = (1e3 * over[key] for key in ("rotation", "translation"))
+    assert f"{turn:.3g} mrad and {shift:.3g} mm over the 4 poses" in verdict(found)
     page = (tmp_path / "out" / "report.html").read_text()
     assert "largest rotation over all parts within the tolerances" in page
 
