@@ -135,9 +135,13 @@ def report_page(results: StudyResults) -> str:
         stiffness_section(results),
         crosscheck_section(results),
     ]
+    described = (
+        f"{robot.name}: {robot.description}" if robot.description else robot.name
+    )
+    closed = len(loops(robot))
     about = (
-        f"{robot.name}: {robot.description}. {len(robot.frames)} frames, "
-        f"{len(loops(robot))} closures; {study.errors}; link stiffness: "
+        f"{described}. {len(robot.frames)} frames, {closed} "
+        f"closure{'' if closed == 1 else 's'}; {study.errors}; link stiffness: "
         f"{study.source}."
     )
     command = command_line()

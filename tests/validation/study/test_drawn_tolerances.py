@@ -137,6 +137,9 @@ def test_map_bounds_the_rotation_over_all_parts_as_by_hand(tmp_path):
     assert f"{turn:.3g} mrad and {shift:.3g} mm over the 4 poses" in verdict(found)
     page = (tmp_path / "out" / "report.html").read_text()
     assert "largest rotation over all parts within the tolerances" in page
+    # a four-bar closes one loop; this one has no description
+    assert ">four_bar. " in page
+    assert " frames, 1 closure; " in page
 
 
 def test_study_without_tolerances_has_no_statistics(tmp_path):
