@@ -1,4 +1,4 @@
-"""Problems (22) and (21) by others: cvxpy, Clarabel, moreau; for assembly_speed."""
+"""Problems (22) and (21) solved by cvxpy, Clarabel and moreau, for assembly_speed."""
 
 import time
 import warnings
@@ -23,7 +23,7 @@ GRAVITY = np.array([0.0, 0.0, -9.81])  # [m/s^2]
 def closure_matrices(
     posture: Posture, springs: bool = True, own_axes_free: bool = False
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Columns of free motions, clearances, springs, and the misfit, scaled to 1."""
+    """Return columns of free motions, clearances and springs, and the scaled misfit."""
     lin, joints = (
         linearise(posture),
         virtual_joints(posture.robot, springs, own_axes_free),
@@ -38,11 +38,11 @@ def closure_matrices(
 
 
 def loaded_matrices(posture: Posture) -> tuple[NDArray, ...]:
-    """The same, and the loads on free motions, clearances and springs, scaled alike."""
+    """Return the closure matrices and the loads on their columns, equally scaled."""
     lin, joints = linearise(posture), virtual_joints(posture.robot)
     loads = all_loads(posture, LOAD, None, GRAVITY)
     small = np.abs(lin.rows @ joints.cones).max()
-    soft = np.abs(lin.rows @ joints.elastic).max() / small  # springs are in this unit
+    soft = np.abs(lin.rows @ joints.elastic).max() / small  # unit of springs
     on_springs = np.where(
         joints.links, loads.body @ joints.elastic, loads.joint @ joints.elastic
     )
@@ -53,10 +53,10 @@ def loaded_matrices(posture: Posture) -> tuple[NDArray, ...]:
 
 
 class Dpp:
-    """One of the two problems with parameters, canonicalised once.
+    """Problem (22) or (21) with cvxpy parameters, canonicalised only once.
 
-    Entries that are zero at every posture are no parameters: cvxpy would hand them to
-    the solver as explicit zeros, at twice the time.
+    Entries that are zero at every posture are not made parameters, because cvxpy would
+    pass them to the solver as explicit zeros, which doubles the time.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class Dpp:
         self(data[0])
 
     def __call__(self, data: tuple) -> float:
-        """The least value with the closure matrices of another posture."""
+        """Return the least value for the closure matrices of another posture."""
         for parameter, value, at in zip(
             self.parameters, data, self.entries, strict=True
         ):
@@ -102,7 +102,7 @@ class Dpp:
 
 
 def clarabel_full(posture: Posture) -> object:
-    """The full problem, scaled, by Clarabel without a modelling layer."""
+    """Solve the full, scaled problem by Clarabel without a modelling layer."""
     A_q, A_u, A_y, misfit = closure_matrices(posture)
     group = virtual_joints(posture.robot).group
     limits, radii = conic._unit_cones(group, np.ones(len(group)))
@@ -120,7 +120,7 @@ def clarabel_full(posture: Posture) -> object:
 
 
 def clarabel_reduced(posture: Posture) -> object:
-    """The reduced problem by Clarabel, the reduction counted."""
+    """Reduce the problem and solve it by Clarabel; the reduction is timed too."""
     joints = virtual_joints(posture.robot)
     small = reduce_problem(linearise(posture), joints)
     size = max(np.linalg.norm(small.h), np.linalg.norm(small.G, axis=0).max())
@@ -130,9 +130,10 @@ def clarabel_reduced(posture: Posture) -> object:
 
 
 def moreau_batched(postures: list[Posture]) -> float:
-    """Processor time a point [us] of the full problem, scaled, by moreau in one batch.
+    """Return the processor time [us] per point of moreau, for one batch of problems.
 
-    Its matrices are ready made; handing them over counts.  NaN where there is none.
+    The matrices are prepared in advance, but passing them is timed.  NaN without
+    moreau.
     """
     try:
         import moreau
@@ -146,7 +147,7 @@ def moreau_batched(postures: list[Posture]) -> float:
     A = np.array([np.vstack([np.hstack([u, y, q]), limits]) for q, u, y, _ in data])
     at = np.nonzero(np.any(A, axis=0))
     offsets = np.cumsum([0, *np.bincount(at[0], minlength=A.shape[1])])
-    stored = len(group) + np.arange(springs)  # P = 1 on the springs' diagonal
+    stored = len(group) + np.arange(springs)  # unit quadratic cost on the springs
     P_offsets = np.searchsorted(stored, np.arange(A.shape[2] + 1))
     solver = moreau.CompiledSolver(
         A.shape[2], A.shape[1], P_offsets, stored, offsets, at[1],
@@ -167,6 +168,6 @@ def moreau_batched(postures: list[Posture]) -> float:
 
 
 def cvxpy_rebuilt(posture: Posture) -> object:
-    """As printed, in SI units, built again."""
+    """Solve the problem as printed, in SI units, with a new model for each posture."""
     as_printed._UNIT = 1.0
     return as_printed.energy_as_printed(posture)

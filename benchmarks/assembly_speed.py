@@ -1,25 +1,26 @@
-"""Prints how fast problems (22) and (21) are solved, beside other ways, on one core.
+"""Measure the speed of problems (22) and (21) on one core, compared with other solvers.
 
-Run ``python -m benchmarks.assembly_speed``; about ten seconds.  The robot is the
-paper's with the errors of the first draw in ``tests/irsbot2_numbers.json``, on a 25 mm
-grid of its workspace.  Printed, in this order:
+Run ``python -m benchmarks.assembly_speed``; it takes about ten seconds.  The robot is
+that of the paper, with the errors of the first draw in ``tests/irsbot2_numbers.json``.
+The postures are a 25 mm grid of its workspace.  The program prints:
 
-- microseconds of processor time a point for the energy (22), at the errors times 1 and
-  times 0.2, by cvxpy rebuilt for every point (SI units), cvxpy with parameters (scaled,
-  DPP; its matrices ready made), Clarabel on the full problem, Clarabel on the problem
-  reduced by ``forcefit.assembly.linear.reference.reduction`` (reduction counted), a
-  batch of moreau's on the full problem (to its 1e-8, without our certificate), our
-  reference in numpy, ``solve_assembly``, of one posture and of many (linearisation,
-  reduction, certificate counted), with the ratio of cvxpy's DPP to each;
-- the same for the energy under a force and a moment on the platform and weight, errors
-  times 1, 0.2 and 0, and for draws of the errors at one posture under them;
-- the same for the margin (21), both readings;
-- what other single calls take, and placing many poses;
-- the share of the grid's points with a certified energy at six multiples of the errors,
-  and under four sizes of the load at three, and how many the reference had to solve.
+- processor time [us] per point for the energy (22), with the errors times 1 and times
+  0.2.  The methods are: cvxpy with a new model per point (SI units); cvxpy with
+  parameters (scaled, DPP, matrices prepared in advance); Clarabel on the full problem;
+  Clarabel on the problem reduced by ``forcefit.assembly.linear.reference.reduction``
+  (reduction included); a batch of moreau on the full problem (to its tolerance of 1e-8,
+  without a certificate); the reference method in numpy; and ``solve_assembly`` for one
+  posture and for many (linearisation, reduction and certificate included).  The ratio
+  of cvxpy's DPP time to each time is printed too; - the same for the energy under a
+  force, a moment and weight, with the errors times 1, 0.2 and 0, and for draws of the
+  errors at one posture under these loads; - the same for the margin (21), with
+  compliant joints rigid and free; - the time of other single calls, and of placing many
+  poses; - the share of points with a certified energy at six multiples of the errors,
+  and under four sizes of the load at three of them; and how many points the reference
+  solved.
 
-The slow ways see a sample of the grid, ours all of it; nothing is run twice to choose
-the better time but our batches.
+The slow methods are run on a sample of the grid, and those of forcefit on the whole
+grid.  Only the batches of forcefit are repeated to select the shortest time.
 """
 
 # ruff: noqa: E402  one thread must be asked for before numpy is imported
@@ -62,12 +63,12 @@ from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.robots.irsbot2 import NAMES, irsbot2
 
 NUMBERS = Path(__file__).parents[1] / "tests" / "irsbot2_numbers.json"
-SAMPLE = 24  # points of the slow ways
+SAMPLE = 24  # number of points for the slow methods
 READINGS = ("rigid", "free")
 
 
 def paper_robot() -> Robot:
-    """The paper's robot with the errors of the first draw."""
+    """Return the robot of the paper with the errors of the first draw."""
     robot = irsbot2()
     case = json.loads(NUMBERS.read_text())["cases"][0]
     errors = np.zeros((len(robot.frames), 6))
@@ -78,7 +79,7 @@ def paper_robot() -> Robot:
 
 
 def workspace(robot: Robot, step: float = 0.025) -> list[Posture]:
-    """Postures on a grid, below the base."""
+    """Return the postures on a grid below the base."""
     x, z = np.meshgrid(np.arange(-0.65, 0.651, step), np.arange(-0.75, 0.001, step))
     poses = np.full((x.size, 6), np.nan)
     poses[:, 0], poses[:, 2] = x.ravel(), z.ravel()
@@ -86,10 +87,10 @@ def workspace(robot: Robot, step: float = 0.025) -> list[Posture]:
 
 
 def timed(solve: Callable[..., object], postures: Iterable) -> float:
-    """Processor time a point [us], failures included; those are counted."""
+    """Return the processor time [us] per point; count failures, which are included."""
     failed = count = 0
     gc.collect()
-    gc.disable()  # as timeit does: a collection takes as long as a thousand calls
+    gc.disable()  # like timeit; a collection takes as long as a thousand calls
     start = time.process_time()
     for one in postures:
         count += 1
@@ -105,7 +106,7 @@ def timed(solve: Callable[..., object], postures: Iterable) -> float:
 
 
 def batched(solve: Callable[..., object], postures: list[Posture]) -> float:
-    """Processor time a point [us] of a batch, the best of 10."""
+    """Return the processor time [us] per point of a batch, the best of ten runs."""
     at, best = together(postures), np.inf
     for _ in range(10):
         start = time.process_time()
@@ -115,7 +116,7 @@ def batched(solve: Callable[..., object], postures: list[Posture]) -> float:
 
 
 def print_table(title: str, rows: dict[str, float]) -> None:
-    """Microseconds, and how many times cvxpy's DPP takes."""
+    """Print the times, and the ratio of cvxpy's DPP time to each of them."""
     print(f"\n{title}\n{'':38}{'us/point':>10}{'DPP over it':>13}")
     dpp = rows["cvxpy DPP, scaled"]
     for name, value in rows.items():
@@ -123,11 +124,11 @@ def print_table(title: str, rows: dict[str, float]) -> None:
 
 
 def print_energies(robot: Robot, postures: list[Posture], kappa: float) -> None:
-    """The table of problem (22) at a multiple of the errors."""
+    """Print the table of problem (22) at a multiple of the errors."""
     scaled = robot.with_errors(kappa * robot.errors)
     own = [replace(p, robot=scaled) for p in postures]
     few = own[:: len(own) // SAMPLE][:SAMPLE]
-    for posture in own:  # what one of them needs first is loaded
+    for posture in own:  # load what a first call needs
         solve_assembly(posture)
     data = [closure_matrices(p) for p in few]
     rows = {
@@ -146,7 +147,7 @@ def print_energies(robot: Robot, postures: list[Posture], kappa: float) -> None:
 
 
 def print_loaded(robot: Robot, postures: list[Posture], kappa: float) -> None:
-    """The table of problem (22) under loads at a multiple of the errors."""
+    """Print the table of problem (22) under loads at a multiple of the errors."""
     scaled = robot.with_errors(kappa * robot.errors)
     own = [replace(p, robot=scaled) for p in postures]
     few = own[:: len(own) // SAMPLE][:SAMPLE]
@@ -172,7 +173,7 @@ def print_loaded(robot: Robot, postures: list[Posture], kappa: float) -> None:
 
 
 def print_margins(postures: list[Posture]) -> None:
-    """The table of problem (21), both readings."""
+    """Print the table of problem (21) with compliant joints rigid and free."""
     few = postures[:: len(postures) // SAMPLE][:SAMPLE]
     for reading in READINGS:
         ours = partial(zone_margin, compliant=reading)
@@ -191,7 +192,7 @@ def print_margins(postures: list[Posture]) -> None:
 
 
 def print_calls(robot: Robot, postures: list[Posture]) -> None:
-    """The table of what else is called one at a time, and of placing."""
+    """Print the table of other single calls and of placing poses."""
     some = [solve_assembly(posture) for posture in postures[::8]]
     poses = [{k: v for k, v in p.pose().items() if k in ("tx", "tz")} for p in postures]
     grid = np.full((len(poses), 6), np.nan)
@@ -219,7 +220,7 @@ def print_calls(robot: Robot, postures: list[Posture]) -> None:
 
 
 def print_certified(robot: Robot, postures: list[Posture]) -> None:
-    """Shares of certified points, and of those that the reference solved."""
+    """Print the shares of certified points and of points solved by the reference."""
     at = together(postures)
     print(f"\ncertified energies of {len(postures)} points")
     for kappa in (0.0, 0.05, 0.1, 0.2, 0.5, 1.0):
@@ -241,7 +242,7 @@ def print_certified(robot: Robot, postures: list[Posture]) -> None:
 
 
 def main() -> None:
-    """Print everything."""
+    """Print all tables."""
     robot = paper_robot()
     postures = workspace(robot)
     print(f"{robot.name}, {len(postures)} points, one core")

@@ -1,10 +1,10 @@
-"""Faults put into functions that are loaded: their code is exchanged in a fork.
+"""Faults in functions that are already loaded: their code is exchanged in a fork.
 
-All tests are collected once, all modules imported.  For each fault the process forks,
-exchanges the code of the fault's functions, and runs the tests that pass its line:
-hundredths of a second more than the tests, not the seconds that a process of its own
-takes.  Only a statement within a function can be exchanged so; what an import has
-worked out is in use already.
+All tests are collected once, and all modules are imported.  For each fault the process
+forks, exchanges the code of the functions with the fault, and runs the tests that
+execute its line.  This takes hundredths of a second in addition to the tests, instead
+of the seconds that a new process needs.  Only a statement within a function can be
+exchanged in this way, because values computed by an import are already in use.
 """
 
 import functools

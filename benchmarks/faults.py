@@ -1,14 +1,14 @@
-"""Wrong expressions of one line, drawn at random from the numerical modules.
+"""Random faults: wrong expressions of one line in the numerical modules.
 
-A file is as likely as it is long; pages and pictures (``report.py``, ``plot.py``,
-``figures.py``, ``scene.py``) are left out: what they show is tested where it is a
-number.
+The probability of a file is proportional to its length.  Pages and pictures
+(``report.py``, ``plot.py``, ``figures.py``, ``scene.py``) are excluded, because their
+numbers are tested where they are computed.
 
-An operator becomes its opposite (``+`` and ``-``, ``<`` and ``>=``, ``and`` and
-``or``), a sign or a ``not`` is dropped, a number becomes one larger, as mutmut and
-cosmic-ray do it: a tolerance of 1e-9 becomes 1.  A number above ten becomes one: 401
-steps at most instead of 400 would be no fault.  Left out are the places
-of a size that ``reshape`` is to find, where any negative number is the same.
+An operator is replaced by its opposite (``+`` and ``-``, ``<`` and ``>=``, ``and`` and
+``or``), a sign or a ``not`` is removed, or a number is increased by one, as mutmut and
+cosmic-ray do; a tolerance of 1e-9 becomes 1.  A number above ten becomes one, because
+401 instead of 400 steps would not be a fault.  Sizes that ``reshape`` has to find are
+excluded, because any negative number has the same effect.
 """
 
 import ast
@@ -38,11 +38,11 @@ LEFT_OUT = {
 
 @dataclass(frozen=True)
 class Fault:
-    """A wrong expression: in which file, on which row, the new line, what it is.
+    """A wrong expression in a line of a file.
 
-    Its statement's rows are those that a trace may name; the name is what the
-    statement gives a value to, where that happens as the module is imported, and not
-    within a function.
+    ``rows`` are the rows of its statement, which a trace may contain.  ``name`` is the
+    variable that the statement assigns when the module is imported; it is None inside
+    a function.
     """
 
     chapter: str
@@ -55,7 +55,7 @@ class Fault:
     within: bool
 
     def put_into(self, source: str) -> str:
-        """The file's text with the fault."""
+        """Return the text of the file with the fault."""
         lines = source.splitlines(keepends=True)
         lines[self.row - 1] = self.line
         return "".join(lines)
@@ -65,7 +65,7 @@ class Fault:
 
 
 def places(tree: ast.Module) -> Iterator[ast.AST]:
-    """Nodes that can be made wrong: not in messages, annotations or docstrings."""
+    """Yield nodes that can be changed, except messages, annotations and docstrings."""
     waiting: list[ast.AST] = [tree]
     while waiting:
         node = waiting.pop()
@@ -87,12 +87,12 @@ def places(tree: ast.Module) -> Iterator[ast.AST]:
 
 
 def is_left_open(node: ast.AST) -> bool:
-    """Whether it is a size that numpy works out: any negative number will do."""
+    """Return whether a node is a size that numpy computes, given as -1."""
     return isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub)
 
 
 def wrong(node: ast.AST) -> list[ast.AST]:
-    """The node with one fault, in each of its ways."""
+    """Return the variants of a node with one fault each."""
     if isinstance(node, ast.Constant):
         value = node.value
         assert isinstance(value, int | float)
@@ -115,7 +115,7 @@ def wrong(node: ast.AST) -> list[ast.AST]:
 
 
 def faults_at(chapter: str, path: Path, node: ast.AST, source: str) -> list[Fault]:
-    """Faults of an expression of one line, which is in a file's text."""
+    """Return the faults of an expression of one line in a file."""
     old = ast.get_source_segment(source, node)
     if old is None or "\n" in old:
         return []
@@ -132,7 +132,7 @@ def faults_at(chapter: str, path: Path, node: ast.AST, source: str) -> list[Faul
 
 
 def drawn(chapter: str, path: Path, random: Random) -> Fault | None:
-    """A fault in a file; None where the expression drawn has none of ours."""
+    """Return a random fault in a file; None if the drawn expression has no variant."""
     source = (ROOT / path).read_text(encoding="utf-8")
     nodes = list(places(ast.parse(source)))
     if not nodes:
@@ -142,7 +142,7 @@ def drawn(chapter: str, path: Path, random: Random) -> Fault | None:
 
 
 def all_in(chapter: str, path: Path) -> list[Fault]:
-    """All faults of a file, row by row."""
+    """Return all faults of a file in the order of its rows."""
     source = (ROOT / path).read_text(encoding="utf-8")
     faults = [
         fault
@@ -153,7 +153,7 @@ def all_in(chapter: str, path: Path) -> list[Fault]:
 
 
 def statement(tree: ast.Module, row: int) -> tuple[range, str | None, bool]:
-    """Rows of a row's innermost statement, what it names, whether in a function."""
+    """Return the rows of the innermost statement, its name, and if in a function."""
     within: list[ast.stmt] = []
     waiting: list[ast.AST] = [tree]
     while waiting:
@@ -181,13 +181,13 @@ def statement(tree: ast.Module, row: int) -> tuple[range, str | None, bool]:
 
 
 def path_name(node: ast.AST) -> str | None:
-    """The first name in an expression that runs while the module is imported."""
+    """Return the first name in an expression that is evaluated at import."""
     names = [n.id for n in ast.walk(node) if isinstance(n, ast.Name)]
     return names[0] if names else None
 
 
 def files_of(chapters: str) -> list[tuple[str, Path]]:
-    """Chapters whose names begin so, and the files of each."""
+    """Return the packages whose names begin with a text, and their files."""
     return [
         (chapter, path.relative_to(ROOT))
         for chapter in CHAPTERS

@@ -1,4 +1,4 @@
-"""Gives every reader and every command's options invalid input, and count the failures.
+"""Give every reader and the options of every command invalid input; count failures.
 
 Run from the repository's root: ``python benchmarks/fuzz.py [COUNT] [--seed N]
 [--every-option]``. Each input is a sound command of ``fuzz_seeds.py``,
@@ -9,11 +9,11 @@ everything, and judged by ``fuzz_faults.py``. Input i of a seed is always the sa
 ``--every-option`` draws nothing: each option that takes a value, of each command, gets
 each of EXTREMES once.
 
-What is asked of each: an exit status of 0, 1, 2 or 130; with 2 one line that begins
-``forcefit: `` and no new file; nothing on stderr but that and progress; only whole
-files, none that was there changed; nothing left beside them or in the temporary
-folder. A command that takes longer than LIMIT of processor time is interrupted, as by
-Ctrl-C, and asked the same.
+Requirements on each command: the exit status is 0, 1, 2 or 130; with status 2, stderr
+contains one line that begins with ``forcefit: ``, and no new file exists; stderr
+contains nothing else except progress; all files are complete, and existing files are
+unchanged; no temporary files remain.  A command that takes more than LIMIT of processor
+time is interrupted as by Ctrl-C, and must then satisfy the same requirements.
 """
 
 import argparse
@@ -57,7 +57,7 @@ _HEAD = struct.Struct("<Q")
 
 
 class Asked(NamedTuple):
-    """Inputs are numbered; a number is the same input whenever these are the same."""
+    """Settings of a run; with equal settings, each number has the same input."""
 
     seed: int
     options: dict[str, list[tuple[str, bool]]]
@@ -66,7 +66,7 @@ class Asked(NamedTuple):
 
 
 def options_of() -> dict[str, list[tuple[str, bool]]]:
-    """By command: names of its options, and whether they take a value."""
+    """Return the options of each command, and whether each requires a value."""
     faults = {}
 
     def walk(command, path):
@@ -84,7 +84,7 @@ def options_of() -> dict[str, list[tuple[str, bool]]]:
 
 
 def every_option(asked: Asked) -> list[list[str]]:
-    """Words of a sound command with one more option, for each option and value."""
+    """Return valid commands with one additional option, for each option and value."""
     sound: dict[str, list[str]] = {}
     for _, command in asked.commands:
         words = shlex.split(command)
@@ -99,14 +99,14 @@ def every_option(asked: Asked) -> list[list[str]]:
 
 
 def command_name(words: list[str]) -> str:
-    """The words before a command's arguments."""
+    """Return the words that name a command."""
     if words[0] in {"study", "convert"}:
         return words[0]
     return " ".join(words[:3] if words[1] == "library" else words[:2])
 
 
 def prepare(folder: Path, commands: list[str]) -> None:
-    """Sound files of all kinds; each of the sound commands once, which compiles."""
+    """Write valid files and run each valid command once, which compiles the code."""
     write_seeds(folder)
     write_foreign(folder)
     write_machines(folder)
@@ -148,7 +148,7 @@ def prepare(folder: Path, commands: list[str]) -> None:
 
 
 def run(words: list[str]) -> tuple[object, str, str]:
-    """The command in this process: exit status, standard output, error output."""
+    """Run a command in this process; return exit status, stdout and stderr."""
     saved = [os.dup(1), os.dup(2)]
     files = [tempfile.TemporaryFile(), tempfile.TemporaryFile()]
     sys.stdout.flush()
@@ -189,7 +189,7 @@ def run(words: list[str]) -> tuple[object, str, str]:
 
 
 def changed(number: int, asked: Asked) -> tuple[list[str], list[str]]:
-    """The words of an input, in the current folder, whose files it changes."""
+    """Return the words of an input, after changing files in the current folder."""
     if asked.fixed:
         return asked.fixed[number], ["an option"]
     random = Random(f"{asked.seed}:{number}")
@@ -220,7 +220,7 @@ def changed(number: int, asked: Asked) -> tuple[list[str], list[str]]:
 
 
 def snapshot() -> dict[str, bytes]:
-    """All files here, by name, and all empty folders, with a stroke at the end."""
+    """Return the contents of all files here by name; empty folders end with a slash."""
     return {
         str(p) if p.is_file() else f"{p}/": p.read_bytes() if p.is_file() else b""
         for p in sorted(Path().rglob("*"))
@@ -229,7 +229,7 @@ def snapshot() -> dict[str, bytes]:
 
 
 def one(number: int, asked: Asked, seeds: Path) -> dict:
-    """One input, from its files to what is wrong with it."""
+    """Run one input and return the faults of its result."""
     place = Path(tempfile.mkdtemp(dir=f"{seeds}.inputs"))
     folder_of_run, temporary = place / "here", place / "tmp"
     shutil.copytree(seeds, folder_of_run)
@@ -267,7 +267,7 @@ def one(number: int, asked: Asked, seeds: Path) -> dict:
 
 
 def tell(numbers: list[int], asked: Asked, seeds: Path, say: int) -> None:
-    """In a child: inputs one after the other, each result into a pipe."""
+    """Run inputs one after the other in a child process; write results to a pipe."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     with os.fdopen(say, "wb") as file:
@@ -278,7 +278,7 @@ def tell(numbers: list[int], asked: Asked, seeds: Path, say: int) -> None:
 
 
 def batch(numbers: list[int], asked: Asked, seeds: Path) -> list:
-    """Inputs in a forked process, or in several if one dies of an input."""
+    """Run inputs in a forked process, and in another one if an input kills it."""
     results = []
     while numbers:
         listen, say = os.pipe()
@@ -317,7 +317,7 @@ def batch(numbers: list[int], asked: Asked, seeds: Path) -> list:
 
 
 def main() -> int:
-    """Run, count and print; the exit status."""
+    """Run the inputs, print the counts, and return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("count", nargs="?", type=int, default=3000)
     parser.add_argument("--seed", type=int, default=1)

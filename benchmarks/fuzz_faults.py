@@ -1,4 +1,4 @@
-"""What is wrong with the result of a command that was given invalid input."""
+"""Checks of the result of a command that was run with invalid input."""
 
 import json
 import re
@@ -12,7 +12,7 @@ _OURS = re.compile(
 
 
 def faults(words, status, out, err, before, after, left) -> list[str]:
-    """What is wrong with a result; nothing if it is as it should be."""
+    """Return the faults of a result; an empty list if it is correct."""
     faults = []
     if status not in {0, 1, 2, 130}:
         faults.append(f"status {status}")
@@ -58,7 +58,7 @@ def faults(words, status, out, err, before, after, left) -> list[str]:
 
 
 def may_change(name: str, after: dict[str, bytes]) -> bool:
-    """Whether a file that was there may be another now: ours, of the same kind.
+    """Return whether an existing file may be replaced by one of the same kind.
 
     An empty folder may be filled.
     """
@@ -69,7 +69,7 @@ def may_change(name: str, after: dict[str, bytes]) -> bool:
 
 
 def is_whole(name: str, content: bytes) -> bool:
-    """Whether a file is one of those that commands write, from end to end."""
+    """Return whether a file is complete and of a kind that commands write."""
     path = Path(name)
     if path.suffix == ".json":
         try:

@@ -76,7 +76,7 @@ def change_file(path: Path, random: Random) -> str:
 
 
 def _bytes(content: bytes, random: Random, _: str) -> bytes:
-    """A piece removed, doubled, replaced, or a bit turned."""
+    """Remove, repeat or replace a piece, or flip a bit."""
     start = random.randrange(len(content) + 1)
     stop = min(len(content), start + random.choice([0, 1, 1, 4, 40]))
     piece = content[start:stop]
@@ -87,7 +87,7 @@ def _bytes(content: bytes, random: Random, _: str) -> bytes:
 
 
 def _cut(content: bytes, random: Random, _: str) -> bytes:
-    """The beginning alone."""
+    """Keep only the beginning."""
     return content[: random.randrange(len(content) + 1)]
 
 
@@ -100,7 +100,7 @@ def _coded(text: str) -> bytes:
 
 
 def _token(content: bytes, random: Random, _: str) -> bytes:
-    """A number, string or name replaced by another of the file or an odd one."""
+    """Replace a number, string or name by another of the file, or an unusual one."""
     text = _text(content)
     tokens = list(_TOKEN.finditer(text))
     if not tokens:
@@ -116,7 +116,7 @@ def _token(content: bytes, random: Random, _: str) -> bytes:
 
 
 def _lines(content: bytes, random: Random, _: str) -> bytes:
-    """Lines dropped, doubled or exchanged."""
+    """Remove, repeat or exchange lines."""
     lines = content.split(b"\n")
     i, j = random.randrange(len(lines)), random.randrange(len(lines))
     how = random.randrange(4)
@@ -132,7 +132,7 @@ def _lines(content: bytes, random: Random, _: str) -> bytes:
 
 
 def _coding(content: bytes, random: Random, _: str) -> bytes:
-    """Other line ends, a mark at the beginning or another encoding."""
+    """Change line ends or the encoding, or add a byte order mark."""
     text = _text(content)
     how = random.randrange(6)
     if how < 2:
@@ -144,7 +144,7 @@ def _coding(content: bytes, random: Random, _: str) -> bytes:
 
 
 def _units(content: bytes, random: Random, _: str) -> bytes:
-    """A unit exchanged wherever it stands."""
+    """Replace a unit everywhere."""
     units = ["mm", "um", "in", "m", "deg", "rad", "mrad", "K", "furlong", ""]
     text = _text(content)
     found = [u for u in units if u and re.search(rf"\b{u}\b", text)]
@@ -155,7 +155,7 @@ def _units(content: bytes, random: Random, _: str) -> bytes:
 
 
 def _nested(content: bytes, random: Random, _: str) -> bytes:
-    """A bracket, a tag or a table opened many times, and closed in half of them."""
+    """Open a bracket, tag or table many times; close all of them in half the cases."""
     times = random.choice([20, 300, 3000, 200_000])
     pairs = {b"[": b"]", b"{": b"}", b"(": b")", b"<body>": b"</body>",
              b"<frame>": b"</frame>", b"<a>": b"</a>"}  # fmt: skip
@@ -167,7 +167,7 @@ def _nested(content: bytes, random: Random, _: str) -> bytes:
 
 
 def _rename(content: bytes, random: Random, _: str) -> bytes:
-    """A name replaced wherever it stands."""
+    """Replace a name everywhere."""
     text = _text(content)
     names = re.findall(r'name = "([^"\n]+)"', text) or re.findall(r"[A-Za-z_.]+", text)
     if not names:
@@ -185,7 +185,7 @@ def _rename(content: bytes, random: Random, _: str) -> bytes:
 
 
 def _tree(content: bytes, random: Random, suffix: str) -> bytes:
-    """A value of the tables dropped, renamed, repeated or replaced."""
+    """Remove, rename, repeat or replace a value of the tables."""
     try:
         text = content.decode("utf-8")
         data = tomllib.loads(text) if suffix == ".toml" else json.loads(text)
@@ -212,7 +212,7 @@ def _tree(content: bytes, random: Random, suffix: str) -> bytes:
 
 
 def _places(value: Any, path: tuple = ()) -> Any:
-    """Where something stands in nested tables and lists."""
+    """Yield the paths to all values in nested tables and lists."""
     yield path
     items: Any = value.items() if isinstance(value, dict) else ()
     items = enumerate(value) if isinstance(value, list) else items
@@ -250,7 +250,7 @@ def _written(value: Any) -> str:
 
 
 def _cells(content: bytes, random: Random, _: str) -> bytes:
-    """Cells of a table replaced, a row or a column moved."""
+    """Replace cells of a table, or move a row or a column."""
     try:
         rows = list(csv.reader(io.StringIO(_text(content))))
     except csv.Error:
@@ -275,7 +275,7 @@ def _cells(content: bytes, random: Random, _: str) -> bytes:
 def change_words(
     words: list[str], options: list[tuple[str, bool]], random: Random
 ) -> list[str]:
-    """A command with one to three of its words changed.
+    """Change one to three words of a command.
 
     Args:
         words: of a sound command.
@@ -304,7 +304,7 @@ def change_words(
 
 
 def _value(old: str, random: Random) -> str:
-    """An odd value in place of one."""
+    """Return an unusual value in place of a value."""
     if "." in old and not old.replace(".", "").isdigit() and random.random() < 0.6:
         return random.choice(PATHS)
     pieces = re.split(r"([=,:])", old)

@@ -1,4 +1,4 @@
-"""Stops commands at random moments until they are done, and counts what was lost.
+"""Kill commands at random moments until they are done, and count lost results.
 
 Run from the repository's root: ``python benchmarks/kills.py [KILLS] [--seed N]``. Four
 commands, ``assembly sweep``, ``statistics``, ``tolerances`` and ``validation
@@ -8,9 +8,9 @@ may not grow beyond a random size, or the folder is a small tmpfs where mounting
 allowed. Between, journals are cut or one of their bits is turned. Then the same command
 runs to its end, and its files are compared with those of an undisturbed run.
 
-Lost is a point that a child had put into the journal, that no cut or turned bit hit,
-and that is not there or is solved again. Half-written is a file that stands under its
-name without being one of those of the undisturbed run.
+A point is lost if a child had written it to the journal, no cut or flipped bit affected
+it, and it is missing or solved again.  A file is half-written if it exists under its
+final name but differs from that of the undisturbed run.
 """
 
 import argparse
@@ -58,12 +58,12 @@ def count(place: int, more: int) -> None:
 
 
 def counted(place: int) -> int:
-    """A number of the last child."""
+    """Return a number that the last child has counted."""
     return struct.unpack_from("<q", shared, place)[0]
 
 
 def watch() -> None:
-    """Count points solved, and points that the journal said are kept."""
+    """Count points that are solved, and points that the journal confirmed."""
     solve, draw, add = (
         sweeps.solve_points,
         monte_carlo.Experiment.solve,
@@ -90,7 +90,7 @@ def watch() -> None:
 
 
 def start(words: list[str], limit: int | None = None) -> int:
-    """The command in a child, in the current folder; its pid."""
+    """Run a command in a child process in the current folder; return its pid."""
     shared[:] = bytes(16)
     child = os.fork()
     if child:
@@ -117,7 +117,7 @@ def start(words: list[str], limit: int | None = None) -> int:
 
 
 def run_here(words: list[str]) -> None:
-    """The command in this process, so that children find everything compiled."""
+    """Run a command in this process, so that its code is compiled for children."""
     before = sys.argv, sys.stdout, sys.stderr
     sys.argv, sys.stdout, sys.stderr = (
         ["forcefit", *words],
@@ -136,12 +136,12 @@ def run_here(words: list[str]) -> None:
 
 
 def finish(child: int) -> int:
-    """Wait for a child: exit status, or less than 0 by which signal it died."""
+    """Wait for a child; return its exit status, or minus the signal that killed it."""
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
 
 def records(content: bytes, case: Case) -> list[tuple[int, int, int]]:
-    """Where each sound record of a journal begins and ends, and its points."""
+    """Return the start, the end and the points of each valid record of a journal."""
     owner = zlib.crc32(case.header)
     places, _ = journal._scan(content, len(case.header), owner)
     head = journal._HEAD.size
@@ -152,7 +152,7 @@ def records(content: bytes, case: Case) -> list[tuple[int, int, int]]:
 
 
 def points_in(path: Path, case: Case) -> int:
-    """Points in a journal; none if there is none."""
+    """Return the number of points in a journal; zero if it does not exist."""
     if not case.header or not path.exists():
         return 0
     return sum(points for *_, points in records(path.read_bytes(), case))
@@ -214,7 +214,7 @@ def spoil(path: Path, case: Case, random: Random, counts: Counter) -> int:
 
 
 def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
-    """Disturb a command some times, let it end, and compare."""
+    """Disturb a command several times, let it end, and compare its files."""
     path, standing = Path("out.nc.journal"), 0
     while random.random() < 0.75:
         (way,) = random.choices(list(WAYS), list(WAYS.values()))
@@ -289,13 +289,13 @@ def check(case: Case, counts: Counter, status: int, before: set[Path]) -> int:
 
 
 def mounted(folder: Path, kilobytes: int) -> bool:
-    """Whether a small tmpfs could be mounted on a folder."""
+    """Return whether a small tmpfs could be mounted on a folder."""
     command = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "none", str(folder)]
     return subprocess.run(command, check=False, capture_output=True).returncode == 0
 
 
 def main() -> int:
-    """Disturb, count and print; the exit status."""
+    """Disturb the commands, print the counts, and return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("kills", nargs="?", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)

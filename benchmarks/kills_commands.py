@@ -33,7 +33,7 @@ SHARES = {"sweep": 6, "statistics": 5, "tolerances": 3, "diagnose": 3}
 
 @dataclass
 class Case:
-    """A command and what it does undisturbed.
+    """A command and the results of its undisturbed run.
 
     Attributes:
         words: of the command.
@@ -51,7 +51,7 @@ class Case:
 
 
 def inputs(folder: Path) -> None:
-    """What the commands read."""
+    """Write the files that the commands read."""
     from tests.planar_arm_for_tests import measure
 
     (folder / "errors.toml").write_text(ERRORS)

@@ -1,10 +1,11 @@
-"""Certified energy problems a second at one posture, by the size of the errors.
+"""Rate of certified energy problems at one posture, for several sizes of the errors.
 
-The paper's robot, every delta l of its section IV drawn: uniform, random signs, sizes
-up to a share of the paper's.  Printed for each share: how many of the draws cost
-nothing, how many were certified and how many needed the reference; draws per second of
-processor time and what 1e7 would take on two cores at that rate, which other work on
-the machine does not blur; and draws per second of the clock on two threads.
+The robot is that of the paper.  All its errors delta l of section IV are drawn
+uniformly with random signs, up to a share of their size in the paper.  For each share,
+the program prints how many draws need no energy, how many were certified, and how many
+the reference solved.  It also prints the draws per second of processor time, the time
+for 1e7 draws on two cores at this rate, and the draws per second of wall time on two
+threads.
 ``python benchmarks/monte_carlo_speed.py [DRAWS]``.
 """
 
@@ -29,7 +30,7 @@ BLOCK, TARGET, GOAL = 4096, 1e7, 600.0  # draws, draws, s
 
 
 def paper_sources(share: float) -> ErrorSources:
-    """The paper's errors, scaled, with random signs."""
+    """Return the errors of the paper, scaled, with random signs."""
     robot = load_robot("irsbot2")
     rows = [robot.index(name) for name in frames_named(robot, FRAMES)]
     count = 6 * len(rows)
@@ -42,7 +43,7 @@ def paper_sources(share: float) -> ErrorSources:
 
 
 def solve_block(one: LinearResponse, sources: ErrorSources, block: int) -> NDArray:
-    """Draws without energy, certified, and by the reference, of one block."""
+    """Return numbers of draws in a block: no energy, certified, by the reference."""
     errors = sources.errors(sources.draw(block * BLOCK, BLOCK, seed=1))
     draws = one.solve(errors)
     reference = draws.method == "reference"
@@ -51,7 +52,7 @@ def solve_block(one: LinearResponse, sources: ErrorSources, block: int) -> NDArr
 
 
 def run(one: LinearResponse, sources: ErrorSources, blocks: int, threads: int) -> tuple:
-    """Draws per second of processor and of the clock, and shares of the draws."""
+    """Return draws per second of processor and wall time, and shares of the draws."""
     clock, processor = time.perf_counter(), time.process_time()
     with threadpool_limits(1), ThreadPoolExecutor(threads) as pool:
         counts = list(pool.map(lambda b: solve_block(one, sources, b), range(blocks)))
@@ -73,7 +74,7 @@ def main() -> None:
     )
     for share in SHARES:
         sources = paper_sources(share)
-        solve_block(one, sources, 0)  # loaded before the clock starts
+        solve_block(one, sources, 0)  # load everything before the time is measured
         single, _, (without, certified, reference) = run(one, sources, blocks, 1)
         _, double, _ = run(one, sources, blocks, 2)
         print(

@@ -1,22 +1,22 @@
-"""Random one-line faults in the numerical modules, and whether the tests see them.
+"""Random one-line faults in the numerical modules, and the tests that detect them.
 
     python -m benchmarks.mutants [COUNT] [--seed N] [--only FOLDER] [--files PATH ...]
         [--seconds S] [--traced FOLDER]
 
-The default tests of all folders and ``tests/test_answers.py`` run once, traced: which
-test passes which line, and how long it takes (kept in the folder after --traced, and
-traced again where a test has changed; what was traced of a file that has changed since
-is of no use).  Then the tests that pass a fault's line run, the nearest and shortest
-first, as many as take S seconds; the first failure is enough.  A fault that longer or
-other tests would see counts as survived.
+The default tests of all folders and ``tests/test_answers.py`` are run once and traced:
+which test executes which line, and how long it takes.  The trace is stored in the
+folder after --traced.  It is repeated for folders with changed tests, and ignored for
+changed files.  Then the tests that execute the line of a fault are run, nearest and
+shortest first, for up to S seconds.  The first failure is sufficient.  A fault that
+only longer or other tests would detect counts as survived.
 
 Faults within functions are exchanged in a process that has loaded everything
-(``exchanged_code.py``).  The others are put into a copy of the tree, and tests run in a
-fork of this process, which has imported all libraries: of an eighth of S seconds first.
-C++ is left alone.
+(``exchanged_code.py``).  Other faults are written into a copy of the source tree.
+Their tests run in a fork of this process, which has imported all libraries, at first
+for an eighth of S seconds.  C++ code is excluded.
 
-After --files: every fault of these files instead of COUNT that are drawn.  Printed: the
-share caught, and every survivor.
+With --files, every fault of these files is tested instead of COUNT random ones.  The
+program prints the share of detected faults and lists all others.
 """
 
 import argparse
@@ -45,7 +45,7 @@ LEAST_SECONDS = 15  # of processor time, for collecting tests
 
 
 def chosen(tests: list[str], trace: Trace, seconds: float) -> list[str]:
-    """As many of the first tests as take so long."""
+    """Return as many of the first tests as fit into the given time."""
     total = 0.0
     some: list[str] = []
     for test in tests:
@@ -69,7 +69,7 @@ def caught(fault: Fault, tree: Path, trace: Trace, seconds: float) -> str | None
 
 
 def seen(fault: Fault, tree: Path, trace: Trace, seconds: float) -> str | None:
-    """The first test that sees the fault in the tree; None if none does."""
+    """Return the first test that detects the fault in the tree, or None."""
     tests = trace.nearest(fault)
     for share in (seconds / 8, seconds):
         some = chosen(tests, trace, share)
@@ -122,7 +122,7 @@ def asked_for(asked: argparse.Namespace) -> list[Fault]:
 
 
 def main() -> None:
-    """Draw faults, count those caught, name those that were not."""
+    """Test the faults, print the share of detected ones, and list the others."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("count", nargs="?", type=int, default=300)
     parser.add_argument("--seed", type=int, default=1)

@@ -1,12 +1,12 @@
-"""Seconds of a path of 1000 points with inertial loads, and the same point by point.
+"""Time of a path of 1000 points with inertial loads, compared with single points.
 
-Three built-in robots whose beams and platform have a mass, over 0.1 m by the quintic
-profile at 20 G.  Both columns compute motion, loads, problem (22) with and without
-acceleration, and K_C; ``point by point`` calls the same public functions for each
-instant in a loop.  Stress, verdicts on the postures, and the first natural frequency at
-five of them are in the whole path alone.  The least of several runs, by the clock and
-by processor time; the ratio is of processor time.
-``python -m benchmarks.path_speed``.
+Three built-in robots, whose beams and platform have mass, move over 0.1 m with the
+quintic profile at 20 G.  Both methods compute motion, loads, problem (22) with and
+without acceleration, and K_C.  ``point by point`` calls the same public functions for
+each instant in a loop.  Stress, verdicts on the postures, and the first natural
+frequency at five postures are computed only for the whole path.  The table shows the
+least wall and processor time of several runs, and the ratio of processor times.
+Run ``python -m benchmarks.path_speed``.
 """
 
 import time

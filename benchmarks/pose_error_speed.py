@@ -1,24 +1,25 @@
-"""Prints how fast problem (27) is solved, beside global solvers, on one core.
+"""Measure the speed of problem (27) on one core, compared with global solvers.
 
-Run ``python benchmarks/pose_error_speed.py``; some minutes, nearly all of them SCIP's.
-The robot and the grid are those of ``benchmarks/assembly_speed.py``.  Printed, for the
-rotation and the translation each,
+Run ``python benchmarks/pose_error_speed.py``; it takes some minutes, mainly for SCIP.
+The robot and the grid are those of ``benchmarks/assembly_speed.py``.  Rotation and
+translation are bounded for two cases:
 
-- clearances only (no errors), reading ``frozen``;
-- the first draw's errors, reading ``free``, at the points inside the assembly zone,
-  where play is left, and at all points, most of which have little;
+- clearances only (no errors), with the assumption ``frozen``;
+- the errors of the first draw, with the assumption ``free``, at the points inside the
+  assembly zone, where clearance remains, and at all points, most of which have little.
 
-milliseconds of processor time a point to bounds 1e-6 rad or 1e-6 m apart by SCIP, by
-Gurobi, by a plain branch and bound written here (secants above the squares, Clarabel at
-every node), by ``bound_pose_error`` one at a time, and of all points at once; and the
-ratios to the last.  Then the whole study: four quantities, both readings, 1113 points,
-in seconds.
+The program prints the processor time [ms] per point until the bounds differ by 1e-6 rad
+or 1e-6 m, for SCIP, Gurobi, a simple branch and bound in this file (secants above the
+squares, Clarabel at every node), ``bound_pose_error`` for single points, and
+``bound_pose_error`` for all points together; and the ratios to the last.  Then it
+prints the time [s] of a whole study: four quantities, two assumptions, 1113 points.
 
-The other solvers are given the problem as our reduction leaves it, unit cones and poses
-in mrad or mm, so their times hold no modelling but their own objects.  Ours hold all
-that follows the placing of the frames: (22), what it loads, the reduction, the search.
-A solver that is not installed, or whose licence does not allow the size, says so in its
-line; ``pip install forcefit[benchmarks]`` brings both.
+The other solvers receive the reduced problem with unit cones and with poses in mrad or
+mm, so their times include no modelling except their own objects.  The times of forcefit
+include everything after the frames are placed: problem (22), the loaded clearances, the
+reduction and the search.  A solver that is not installed, or whose licence does not
+allow the size, is reported in its line.  ``pip install forcefit[benchmarks]`` installs
+both.
 """
 
 # ruff: noqa: E402  one thread must be asked for before numpy is imported

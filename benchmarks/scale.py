@@ -1,12 +1,13 @@
-"""Time and memory from a thousand points to a million, and ten million energies.
+"""Time and memory for a thousand to a million points, and for ten million energies.
 
     python -m benchmarks.scale [LARGEST]
 
-A sweep of the four-bar linkage with twelve errors, energy, margins and bounds of the
-pose error, over 1000 crank angles and 1, 10, 100 .. draws, up to LARGEST points
-(default 10^6); then 10^7 energies of the paper's robot at one posture, in blocks.  Each
-case has a process of its own: printed are its points, processor seconds, microseconds
-of processor time a point less those of starting, largest memory and the file's size.
+A sweep of the four-bar linkage with twelve errors computes energy, margins and bounds
+of the pose error over 1000 crank angles and 1, 10, 100, ... draws, up to LARGEST points
+(default 10^6).  Then 10^7 energies of the paper's robot at one posture are computed in
+blocks.  Each case runs in a separate process.  Printed are points, processor seconds,
+microseconds of processor time per point (without start-up), largest memory and file
+size.
 """
 
 import resource
@@ -23,7 +24,7 @@ BLOCK, ENERGIES = 100_000, 10_000_000
 
 
 def sweep(draws: int, path: Path) -> int:
-    """Sweep so many draws into a file; how many points."""
+    """Sweep the given number of draws into a file; return the number of points."""
     from forcefit.assembly.model.error_distributions import tolerance_sources
     from forcefit.assembly.robots import load_robot
     from forcefit.assembly.sweeps.plan import Sweep
@@ -44,7 +45,7 @@ def sweep(draws: int, path: Path) -> int:
 
 
 def energies(count: int) -> int:
-    """So many least energies at one posture, each with errors of its own."""
+    """Compute least energies at one posture, each with different errors."""
     from forcefit.assembly.kinematics.posture import place_robot
     from forcefit.assembly.linear.energy import solve_assembly
     from forcefit.assembly.robots import load_robot
@@ -62,7 +63,7 @@ def energies(count: int) -> int:
 
 
 def case(name: str, count: int) -> None:
-    """One case, in this process: points, seconds, memory [MB] and file [MB]."""
+    """Run a case in this process; print points, seconds, memory [MB] and file [MB]."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "sweep.nc"
         began = time.process_time()
@@ -74,7 +75,7 @@ def case(name: str, count: int) -> None:
 
 
 def measured(name: str, count: int) -> tuple[int, float, float, float]:
-    """What a process of its own says of a case."""
+    """Run a case in a separate process and return what it prints."""
     words = [sys.executable, "-m", "benchmarks.scale", name, str(count)]
     done = subprocess.run(words, stdout=subprocess.PIPE, text=True, check=True)
     points, *figures = done.stdout.splitlines()[-1].split()
@@ -84,7 +85,7 @@ def measured(name: str, count: int) -> tuple[int, float, float, float]:
 def main(largest: int = LARGEST) -> None:
     """Print the table."""
     print(f"{'':10}{'points':>10}{'s':>9}{'us/point':>10}{'MB':>8}{'file, MB':>10}")
-    measured("sweep", 1)  # the first compiles
+    measured("sweep", 1)  # the first run compiles
     draws, first = 1, None
     while SMALLEST * draws <= largest:
         points, seconds, memory, size = measured("sweep", draws)

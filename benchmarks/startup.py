@@ -1,10 +1,10 @@
-"""What a command costs before it computes: a table of processor times as ratios.
+"""Start-up time of commands: processor times relative to an import of numpy and scipy.
 
-Run as ``python benchmarks/startup.py [RUNS]``.  User and system time of each command,
-summed over its threads, divided by that of ``import numpy, scipy.linalg``; medians of
-RUNS (7) runs each, taken in turn, so that a machine that is busy for a while slows all
-of them alike.  Every command runs once before, so that compiled code is on disk.
-Exit status 1 where a ratio exceeds what is wanted.
+Run ``python benchmarks/startup.py [RUNS]``.  The user and system time of each command,
+summed over its threads, is divided by that of ``import numpy, scipy.linalg``.  The
+table shows medians of RUNS (7) runs.  The commands alternate, so that other work on the
+machine slows all of them equally.  Each command runs once before, so that compiled code
+is on disk.  The exit status is 1 if a ratio exceeds its limit.
 """
 
 import os
@@ -14,7 +14,7 @@ import sys
 
 BASE = ["-c", "import numpy, scipy.linalg"]
 AT = ["irsbot2", "--pose", "tx=0.1,tz=-0.5"]
-WANTED = {  # largest ratio
+WANTED = {  # largest allowed ratio
     "--help": 2.5,
     "--version": 2.5,
     "assembly solve": 5.0,
@@ -24,7 +24,7 @@ WANTED = {  # largest ratio
 
 
 def processor_time(arguments):
-    """[s] user and system, of a Python with these arguments and its threads."""
+    """Return user and system time [s] of Python with these arguments."""
     child = subprocess.Popen([sys.executable, *arguments], stdout=subprocess.DEVNULL)
     _, status, used = os.wait4(child.pid, 0)
     child.returncode = os.waitstatus_to_exitcode(status)
@@ -34,7 +34,7 @@ def processor_time(arguments):
 
 
 def main(runs=7):
-    """Run, print, and say whether all ratios are as wanted."""
+    """Run all commands, print the table, and return whether all ratios are allowed."""
     commands = {"import numpy, scipy.linalg": BASE}
     for words in WANTED:
         place = AT if words.startswith("assembly") else []

@@ -1,8 +1,9 @@
-"""Seconds for the assembly of 100 000 machines in steps, with clearances, on one core.
+"""Time to assemble 100 000 machines in steps, with clearances, on one core.
 
-Two built-in robots are assembled with drawn errors of 50 um and 0.1 mrad: a fixture
-holds the platform, its five closures are joined one after another, and the fixture is
-released.  Printed are processor times.  ``python -m benchmarks.steps_speed``.
+Two built-in robots are assembled with random errors of 50 um and 0.1 mrad.  A fixture
+holds the platform, the five closures are joined one after another, and the fixture is
+released.  The program prints processor times.  Run ``python -m
+benchmarks.steps_speed``.
 """
 
 import time

@@ -1,16 +1,16 @@
-"""Times one sweep here, on one worker process and on two; prints a table.
+"""Print the times of a sweep in this process, on one worker process, and on two.
 
-Run from the repository's root: ``python -m benchmarks.sweep_scaling [DRAWS]``.  The
-sweep is the five-bar robot at 100 postures with DRAWS draws of errors each; worker
-processes are started and warmed by a short sweep of their own before the clock runs.
-Two processes are compared with one worker, so what Dask costs shows in the first ratio
-and how it scales in the second.  The files are compared byte by byte.
+Run ``python -m benchmarks.sweep_scaling [DRAWS]`` from the root of the repository.  The
+sweep is that of the five-bar robot at 100 postures with DRAWS draws of errors each.
+Worker processes are started and run a short sweep before the time is measured.  The
+first ratio, one worker to this process, shows the overhead of Dask.  The second ratio,
+two workers to one, shows how the sweep scales.  The files are compared byte by byte.
 
-What the machine itself gives stands beside it, of the same workers and between the
-same sweeps: a loop of sums and products in each of two at once against one alone, and
-the sweep's own points, without what sends, keeps and writes them.  All in turns, the
-best of five; where other programs run, whose load is printed, processor seconds say
-more.
+For comparison, the scaling of the machine itself is measured with the same workers,
+alternating with the sweeps.  Two programs run on one worker and on two at once: a loop
+of sums and products, and the points of the sweep without sending, storing or writing.
+The best of five times is used.  If other programs run, as the printed load shows,
+processor seconds are more reliable.
 """
 
 import os
@@ -37,7 +37,7 @@ TURNS = 5
 
 
 def sweep(draws):
-    """100 postures of the five-bar robot, all within reach."""
+    """Return a sweep of the five-bar robot over 100 reachable postures."""
     robot = load_robot("five_bar")
     targets = grid_targets(parse_grid("tx=-0.018:0.018:0.004,ty=0.11:0.146:0.004"))
     sources = tolerance_sources(robot, np.array([1e-4] * 3 + [1e-5] * 3))
@@ -46,7 +46,7 @@ def sweep(draws):
 
 
 def loop(_):
-    """Seconds of sums and products that need no memory."""
+    """Return the time [s] of sums and products that need no memory."""
     start, x = time.perf_counter(), 1.0
     for _ in range(8_000_000):
         x = 0.999999 * x + 1e-9
@@ -54,7 +54,7 @@ def loop(_):
 
 
 def points(draws):
-    """Seconds of the sweep's first blocks, solved and dropped."""
+    """Return the time [s] to solve the sweep's first blocks without storing them."""
     asked = sweep(draws)
     blocks = [asked.points(block) for block in range(min(asked.blocks, 64))]
     start = time.perf_counter()
@@ -64,7 +64,7 @@ def points(draws):
 
 
 def at_once(client, workers, work, draws):
-    """Seconds of the same work on each of these workers at once, the slowest's."""
+    """Return the longest time [s] of the same work on all given workers at once."""
     asked = [
         client.submit(work, draws, workers=[worker], pure=False) for worker in workers
     ]
@@ -72,7 +72,7 @@ def at_once(client, workers, work, draws):
 
 
 def timed(asked, path, solve, client):
-    """Seconds of a sweep; processor seconds here and of the workers."""
+    """Return the time [s] of a sweep, and processor times here and of the workers."""
 
     def spent():
         workers = client.run(time.process_time).values() if client else ()

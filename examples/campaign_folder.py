@@ -33,7 +33,7 @@ def data_folder(name: str, data: Path | None = None) -> Path:
         The folder.
 
     Raises:
-        BadInput: there is no such folder, and the data cannot be downloaded.
+        BadInput: the folder does not exist, and the data cannot be downloaded.
     """
     given = data or os.environ.get("FORCEFIT_DATA")
     folder = Path(given or DATA) / name
@@ -47,7 +47,7 @@ def data_folder(name: str, data: Path | None = None) -> Path:
         return _fetched(name, sources[name])
     except ImportError as error:
         raise BadInput(
-            f"{wanted}, FORCEFIT_DATA naming the folder that holds it, or pooch to "
+            f"{wanted}, FORCEFIT_DATA naming the folder that contains it, or pooch to "
             "fetch it (pip install 'forcefit[examples]'; docs/measured_data.md)"
         ) from error
     except (OSError, ValueError) as error:
@@ -73,7 +73,7 @@ def from_command_line(
     """Run a converter as a program: print the written folders, or an error."""
     parser = argparse.ArgumentParser(description=(about or "").split("\n")[0])
     parser.add_argument("-o", "--out", type=Path, required=True)
-    parser.add_argument("--data", type=Path, help="folder that holds the data sets")
+    parser.add_argument("--data", type=Path, help="folder that contains the data sets")
     given = parser.parse_args()
     try:
         written = convert(given.out, given.data)
@@ -152,7 +152,7 @@ def deviation_columns(nominal: NDArray, measured: NDArray, turn: bool) -> dict:
 
 
 def base_pose(nominal: NDArray, measured: NDArray) -> NDArray:
-    """Return (4, 4) pose of the base in the device's frame: Kabsch (1976)."""
+    """Return the (4, 4) pose of the base in the device frame, by Kabsch (1976)."""
     a, b = nominal[:, :3, 3], measured[:, :3, 3]
     U, _, Vt = np.linalg.svd((b - b.mean(0)).T @ (a - a.mean(0)))
     T = np.eye(4)

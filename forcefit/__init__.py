@@ -1,14 +1,15 @@
 """forcefit: assembly of parallel manipulators by force, with independent checks.
 
 ``import forcefit as ff; ff.load_robot("irsbot2")`` loads a robot.  Each public name is
-imported at its first use.  Files are read by :mod:`forcefit.inputs`; the commands are
-in :mod:`forcefit.commands`.
+imported when it is first used.  :mod:`forcefit.inputs` reads and checks files, and
+:mod:`forcefit.commands` contains the command line.
 """
 
 import os.path
 import sys
 
-# In a checkout without symbolic links, as on Windows, the packages are one level up.
+# A checkout without symbolic links, for example on Windows, has the packages one level
+# up
 if not os.path.isdir(os.path.join(__path__[0], "assembly")):
     __path__.append(os.path.dirname(__path__[0]))
 from forcefit.old_packages import OldPackages
@@ -20,7 +21,7 @@ TYPE_CHECKING = False  # importing typing takes longer than the rest of this mod
 if TYPE_CHECKING:
     __version__: str
 
-# modules and the public names that they define: the whole interface
+# public names by the module that defines them: the complete public interface
 _OWNERS = {
     "forcefit.inputs.errors": ("BadInput",),
     "forcefit.stiffness.beam.beam": ("beam_compliance",),
@@ -68,8 +69,8 @@ _OWNERS = {
     "forcefit.validation.study.study": ("run_study",),
     "forcefit.validation.study.study_file": ("read_study",),
 }  # fmt: skip
-# old public names that are valid for one release; for each the new public name, or the
-# module and the name of the object in it
+# Old public names, which still work for one release.  Each entry gives the new public
+# name, or the module and the name of the object in that module.
 _RENAMED = {
     "foretell": ("predict",), "load_deflection": ("deflection_curve",),
     "read_robot": ("load_robot",),
@@ -79,7 +80,7 @@ _RENAMED = {
     "ask_sweep"), "run_sweep": ("sweep", "forcefit.assembly.sweeps.sweep", "run_sweep"),
     "sweep_in_memory": ("sweep", "forcefit.assembly.sweeps.sweep", "sweep_in_memory"),
 }  # fmt: skip
-# public names of the last release that are now imported from their module
+# public names of the last release that must now be imported from their module
 _MOVED = {
     "forcefit.stiffness.beam.sections": ("Section",),
     "forcefit.stiffness.fem.fea": ("FemOptions",),
@@ -102,7 +103,7 @@ __all__ = [*sorted(_OWNER_OF), "__version__"]
 
 
 def __getattr__(name: str) -> object:
-    """Import a public name at its first use; give a warning for an old name."""
+    """Import a public name when it is first used; warn if the name is an old one."""
     if name == "__version__":
         return _version()
     if name not in _OWNER_OF and name not in _RENAMED and name not in _MOVED_TO:

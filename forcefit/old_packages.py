@@ -1,8 +1,9 @@
-"""Packages by their names of the last release, ``assembly`` for ``forcefit.assembly``.
+"""Old names of the packages, such as ``assembly`` for ``forcefit.assembly``.
 
-Nothing is installed under the old names, so that they can hide no module of a user or
-of another distribution.  They work for one more release: importing one gives the
-present module and a warning, unless another module of that name is found first.
+Nothing is installed under the old names, because a user or another distribution may
+have modules of these names.  The old names work for one more release.  Importing one
+returns the present module and prints a warning, unless Python finds another module of
+that name first.
 """
 
 import sys
@@ -16,15 +17,15 @@ _PACKAGES = ("stiffness", "assembly", "validation")
 
 
 class OldPackages:
-    """Finder and loader of Python's import: an old name leads to the present module.
+    """Finder and loader for Python's import system that maps an old name to a module.
 
-    ``import forcefit`` puts it in front of ``sys.meta_path``.
+    ``import forcefit`` puts this finder at the start of ``sys.meta_path``.
     """
 
     def find_spec(
         self, name: str, path: object, target: object = None
     ) -> ModuleSpec | None:
-        """Return the specification of an old name's module, or None for other names."""
+        """Return the specification of a module with an old name, or None."""
         package, dot, _ = name.partition(".")
         if package not in _PACKAGES:
             return None
@@ -37,29 +38,29 @@ class OldPackages:
         return ModuleSpec(name, self) if ours else None  # type: ignore[arg-type]
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
-        """Return the present module, which has its own specification already."""
+        """Return the present module, which already has a specification."""
         module = import_module(f"forcefit.{spec.name}")
         self._spec = module.__spec__
         return module
 
     def exec_module(self, module: ModuleType) -> None:
-        """Restore the module's own specification, which the import has replaced."""
+        """Restore the specification of the module, which the import has replaced."""
         module.__spec__ = self._spec
 
 
 def use_present_name(package: str) -> None:
-    """Let the old name of a package lead to the present module, with a warning.
+    """Make the old name of a package refer to the present module, and warn.
 
-    A package calls it when it is imported by its old name, which is possible in a
-    checkout only: there the folders ``assembly``, ``stiffness`` and ``validation`` are
-    on the path.
+    A package calls this function when it is imported by its old name.  This is possible
+    only in a checkout, where the folders ``assembly``, ``stiffness`` and ``validation``
+    are on the import path.
     """
     sys.modules[package] = import_module(f"forcefit.{package}")
     _warn(package)
 
 
 def _is_of_others(package: str) -> bool:
-    """Return whether the name leads to a module that does not belong to forcefit."""
+    """Return whether the name refers to a module that does not belong to forcefit."""
     found = PathFinder.find_spec(package)
     if found is None:
         return False

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import Figures, html_table, numbers, short_repr
 
-# rounding error of a scaled 6 by 6 matrix's eigenvalues, relative to its size
+# rounding error of the eigenvalues of a scaled 6 by 6 matrix, relative to its size
 _ROUNDING = 6 * np.finfo(float).eps
 
 
@@ -19,8 +19,8 @@ _ROUNDING = 6 * np.finfo(float).eps
 class LinkStiffness:
     """An elastic link between two interfaces, described at its tip.
 
-    The base is held and a wrench acts on the tip: ``screw = compliance @ wrench``.
-    Both are read at ``tip``, in the axes in which ``tip`` and ``base`` are given.
+    The base is held, and a wrench acts on the tip: ``screw = compliance @ wrench``.
+    Screw and wrench are read at ``tip``, in the axes of ``tip`` and ``base``.
 
     Attributes:
         method: method of the computation, such as ``"Timoshenko beam"``.
@@ -29,11 +29,11 @@ class LinkStiffness:
         base: (3,) [m] centre of the held interface.
         stiffness_error: (6, 6) [N m/rad .. N/m] estimated difference between
             ``stiffness`` and the exact stiffness, symmetric; zero for a closed form.
-        mesh: counts, volume and quality of the mesh; empty without a mesh.
+        mesh: counts, volume and quality of the mesh; empty for a closed form.
         mass: [kg] mass of the link; 0 if no density was given.
-        center_of_mass: (3,) [m] centre of mass.
+        center_of_mass: (3,) [m] position of the centre of mass.
         inertia: (3, 3) [kg m^2] about the centre of mass.
-        stiffness: (6, 6) [N m/rad .. N/m] inverse of the compliance; it is computed.
+        stiffness: (6, 6) [N m/rad .. N/m] inverse of the compliance, computed here.
     """
 
     method: str
@@ -50,7 +50,7 @@ class LinkStiffness:
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 
     def _figures(self) -> Figures:
-        """Return lines on the stiffness and on its accuracy."""
+        """Return the values that represent the link in short texts."""
         K = np.diag(self.stiffness)
         error = self.relative_error_estimate
         figures = {
@@ -103,7 +103,7 @@ class LinkStiffness:
 
 
 def scaled(matrix: ArrayLike, stiffness: ArrayLike) -> NDArray:
-    """Return entries over sqrt(K_ii K_jj), so that rotations compare with translations.
+    """Divide entries by sqrt(K_ii K_jj), so that rotations compare with translations.
 
     Args:
         matrix: (6, 6) stiffness, or difference of two stiffnesses.
@@ -117,10 +117,10 @@ def scaled(matrix: ArrayLike, stiffness: ArrayLike) -> NDArray:
 
 
 def check_definite(who: str, matrix: NDArray) -> None:
-    """Reject a matrix that is neither a stiffness nor a compliance.
+    """Raise an error if a matrix is neither a stiffness nor a compliance.
 
     Args:
-        who: owner of the matrix, for the error message.
+        who: description of the matrix, for the error message.
         matrix: (6, 6) matrix.
 
     Raises:
@@ -159,11 +159,11 @@ def inverted(matrix: NDArray) -> NDArray:
 
 
 def turn_link(link: LinkStiffness, rotation: ArrayLike) -> LinkStiffness:
-    """Return the same link, described in other axes with the same origin.
+    """Express a link in other axes with the same origin.
 
     Args:
         link: the link.
-        rotation: (3, 3) old axes in the new axes, proper orthogonal.
+        rotation: (3, 3) rotation whose columns are the old axes in the new axes.
 
     Returns:
         The link with all its vectors and matrices in the new axes.

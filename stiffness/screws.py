@@ -1,4 +1,4 @@
-"""Screws and wrenches: small motions and loads, read at a point in some axes.
+"""Screws and wrenches: small motions and loads, read at a point in given axes.
 
 All packages use one convention:
 
@@ -11,8 +11,8 @@ C       compliance             ``s = C @ w``                   rad/(N m) .. m/N
 K       stiffness              ``w = K @ s``                   N m/rad .. N/m
 ======  =====================  ==============================  ================
 
-Rotations are computed with NumPy.  SciPy's class agrees to rounding (tests compare
-them), but its import takes a quarter of the time in which a posture is solved.
+Rotations are computed with NumPy.  SciPy's results agree up to rounding (tests compare
+them), but importing them takes a quarter of the time that solving a posture takes.
 """
 
 import numpy as np
@@ -36,25 +36,25 @@ def skew(vector: ArrayLike) -> NDArray:
     """
     v = np.asarray(vector, dtype=float)
     S = np.zeros((*v.shape[:-1], 3, 3))
-    S[..., (2, 0, 1), (1, 2, 0)] = v  # exactly three components
+    S[..., (2, 0, 1), (1, 2, 0)] = v  # requires exactly three components
     return S - np.swapaxes(S, -1, -2)
 
 
 def screw_map(offset: ArrayLike, rotation: ArrayLike | None = None) -> NDArray:
     """Return the matrix that transforms a screw to another point and other axes.
 
-    A body moves by the small screw ``s``, read at point ``q`` in the axes of a frame
-    there.  The same motion, read at point ``p``, is ``screw_map(q - p, R) @ s``: the
-    block ``[R 0; [q - p]x R, R]`` of the paper's eqs. (13)-(15), as corrected.
+    A body moves by the small screw ``s``, read at point ``q`` in the axes of a frame at
+    ``q``.  The same motion, read at point ``p``, is ``screw_map(q - p, R) @ s``.  This
+    is the block ``[R 0; [q - p]x R, R]`` of the paper's eqs. (13)-(15), as corrected.
 
-    Wrenches transform in the opposite direction: a wrench ``w`` read at ``p`` is
-    ``screw_map(q - p, R).T @ w`` when read at ``q`` in the frame's axes, so that the
+    Wrenches transform in the opposite direction.  A wrench ``w`` read at ``p`` becomes
+    ``screw_map(q - p, R).T @ w`` when it is read at ``q`` in the frame's axes.  The
     power ``w @ s`` is the same at both points.
 
     Args:
         offset: (..., 3) [m] vector from the new point to the old point, in the new
             axes.
-        rotation: (..., 3, 3) old axes in the new axes; identity if absent.
+        rotation: (..., 3, 3) old axes in the new axes; the identity if None.
 
     Returns:
         (..., 6, 6) matrix A with ``new = A @ old``.
@@ -78,14 +78,15 @@ def rotation_matrix(rotation_vector: ArrayLike) -> NDArray:
     """
     vectors = np.asarray(rotation_vector, dtype=float)
     angle = np.linalg.norm(vectors, axis=-1)[..., None, None]
-    # Rodrigues' formula 1 + sin a / a S + (1 - cos a) / a^2 S^2, both quotients by sinc
+    # Rodrigues' formula 1 + sin a / a S + (1 - cos a) / a^2 S^2, both quotients from
+    # sinc
     first, second = np.sinc(angle / np.pi), np.sinc(angle / (2 * np.pi)) ** 2 / 2
     S = skew(vectors)
     return np.eye(3) + first * S + second * (S @ S)
 
 
 def rotation_vector(rotation: ArrayLike) -> NDArray:
-    """Return the rotation vectors, of length at most pi, of rotation matrices.
+    """Return the rotation vectors of rotation matrices, with angles of at most pi.
 
     Args:
         rotation: (..., 3, 3) proper orthogonal matrices.
@@ -94,11 +95,12 @@ def rotation_vector(rotation: ArrayLike) -> NDArray:
         (..., 3) [rad] axis times angle.
 
     Sources:
-        Shepperd (1978), Quaternion from rotation matrix, for the choice of the row.
+        Shepperd (1978), Quaternion from rotation matrix, for the choice of row.
     """
     R = np.asarray(rotation, dtype=float)
     trace = np.trace(R, axis1=-2, axis2=-1)[..., None]
-    # 4 q q^T of the unit quaternion q = [x y z w]; its largest row determines q best
+    # matrix 4 q q^T of the unit quaternion q = [x y z w]; the row with the largest norm
+    # determines q with the smallest rounding error
     products = np.empty((*R.shape[:-2], 4, 4))
     products[..., :3, :3] = R + np.swapaxes(R, -1, -2)
     products[..., [0, 1, 2], [0, 1, 2]] += 1.0 - trace
@@ -107,14 +109,14 @@ def rotation_vector(rotation: ArrayLike) -> NDArray:
     products[..., 3, 3] = 1.0 + trace[..., 0]
     largest = np.diagonal(products, axis1=-2, axis2=-1).argmax(axis=-1)
     q = np.take_along_axis(products, largest[..., None, None], axis=-2)[..., 0, :]
-    q = np.where(q[..., 3:] < 0, -q, q)  # the rotation by the smaller angle
+    q = np.where(q[..., 3:] < 0, -q, q)  # use the smaller of the two angles
     sine = np.linalg.norm(q[..., :3], axis=-1, keepdims=True)
     angle = 2.0 * np.arctan2(sine, q[..., 3:])
     return q[..., :3] * np.divide(angle, sine, out=np.zeros_like(sine), where=sine > 0)
 
 
 def transform(translation: ArrayLike, rotation: ArrayLike) -> NDArray:
-    """Return the homogeneous matrices ``T_a_b`` of frame b's pose in frame a.
+    """Return the homogeneous matrices ``T_a_b`` of the pose of frame b in frame a.
 
     Args:
         translation: (..., 3) [m] origin of b in the axes of a.

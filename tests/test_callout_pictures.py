@@ -22,7 +22,7 @@ def test_page_shows_the_picture_of_each_callout():
     assert {p.stem for p in (DOCS / "pictures" / "callouts").iterdir()} == set(shown)
 
 
-def test_outline_of_a_bore_is_the_diamond_of_shift_and_tilt():
+def test_outline_of_a_bore_zone_is_a_diamond_of_shift_and_tilt():
     """|TX| + L/2 |RY| = 25 um for a position of 0.05 mm and a bore of 20 mm."""
     points = outline(axis_position(50e-6, 0.020), 3, 1)  # um, mrad
     assert abs(points[:, 0]) + 10 * abs(points[:, 1]) == pytest.approx(25, rel=1e-6)

@@ -79,7 +79,7 @@ def test_commands_of_a_page_have_valid_options(name, tmp_path, monkeypatch):
         parsed(words)
 
 
-def test_every_block_of_a_page_states_its_language():
+def test_every_code_block_of_a_page_states_its_language():
     """A block without a language would not be run."""
     for page in PAGES.values():
         text = page.read_text(encoding="utf-8")
@@ -266,7 +266,7 @@ STAGE = {
 @pytest.mark.slow
 @pytest.mark.exudyn
 @pytest.mark.parametrize("name", sorted(set(PAGES) - OTHERS))
-def test_commands_of_a_page_run(name, tmp_path, monkeypatch, run):
+def test_commands_of_a_page_run_without_error(name, tmp_path, monkeypatch, run):
     commands = list(commands_of(PAGES[name]))
     if not commands:
         pytest.skip("the page has no commands")

@@ -75,7 +75,7 @@ def test_base_pose_of_exact_positions_is_recovered(rng):
     np.testing.assert_allclose(base_pose(T, base @ T), base, atol=1e-13)
 
 
-def test_last_direction_is_kept_during_a_rest():
+def test_last_direction_of_motion_is_kept_during_a_rest():
     q = np.array([0.0, 0.0, 0.2, 0.2, 0.2001, -0.5, -0.5])
     assert last_direction(q).tolist() == [0, 0, 1, 1, 1, -1, -1]
 

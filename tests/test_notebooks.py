@@ -56,7 +56,7 @@ def test_page_of_notebooks_lists_every_notebook():
 
 @pytest.mark.slow
 @pytest.mark.exudyn
-def test_notebook_of_ones_own_robot_ends_with_a_report(tmp_path, monkeypatch):
+def test_notebook_for_a_custom_robot_ends_with_a_report(tmp_path, monkeypatch):
     """A planar loop of five bars: 2 freedoms, 3 constraints out of the plane."""
     found = variables("own_robot", tmp_path, monkeypatch)
     assert (found["mobility"].freedoms, found["mobility"].overconstraint) == (2, 3)
@@ -66,7 +66,9 @@ def test_notebook_of_ones_own_robot_ends_with_a_report(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_notebook_of_seoul_has_the_rotations_of_the_closed_form(tmp_path, monkeypatch):
+def test_rotations_in_the_notebook_of_the_seoul_robot_equal_the_closed_form(
+    tmp_path, monkeypatch
+):
     """The corners of three slabs: 48.033 mrad at 20 mm; as 1/distance near home."""
     pytest.importorskip("xarray")
     found = variables("seoul", tmp_path, monkeypatch)
@@ -77,7 +79,9 @@ def test_notebook_of_seoul_has_the_rotations_of_the_closed_form(tmp_path, monkey
 
 
 @pytest.mark.slow
-def test_notebook_of_a_cad_link_has_the_deflection_of_a_cone(tmp_path, monkeypatch):
+def test_deflection_in_the_notebook_of_a_cad_link_equals_that_of_a_cone(
+    tmp_path, monkeypatch
+):
     """Bending and shear of a cone by hand, which a rigid end stiffens by 1 to 2 %.
 
     F L^3 / (3 E I) R / r + F L / (k G pi R r); mass pi L / 3 (R^2 + R r + r^2) rho.
@@ -101,7 +105,7 @@ def test_notebook_of_a_cad_link_has_the_deflection_of_a_cone(tmp_path, monkeypat
 
 
 @pytest.mark.slow
-def test_notebook_of_a_campaign_has_the_numbers_of_the_command(
+def test_numbers_in_the_notebook_of_a_campaign_equal_those_of_the_command(
     tmp_path, monkeypatch, run
 ):
     """Held-out errors of the command; commands compensate what the machine deviates."""
@@ -122,7 +126,9 @@ def test_notebook_of_a_campaign_has_the_numbers_of_the_command(
 
 
 @pytest.mark.slow
-def test_notebook_of_drawing_tolerances_encloses_all_draws(tmp_path, monkeypatch):
+def test_bounds_in_the_notebook_of_drawing_tolerances_contain_all_draws(
+    tmp_path, monkeypatch
+):
     """No machine exceeds the bound; parts of the drawing are as in the robot file.
 
     The shares sum to the support along the direction of the value attained, which is
@@ -142,7 +148,7 @@ def test_notebook_of_drawing_tolerances_encloses_all_draws(tmp_path, monkeypatch
 
 
 @pytest.mark.slow
-def test_notebook_of_stiffness_maps_agrees_with_the_sum_over_struts(
+def test_stiffness_in_the_notebook_of_maps_agrees_with_the_sum_over_struts(
     tmp_path, monkeypatch
 ):
     """K = sum of k w w'; the robot is symmetric about the plane x = 0."""
@@ -158,7 +164,9 @@ def test_notebook_of_stiffness_maps_agrees_with_the_sum_over_struts(
 
 
 @pytest.mark.slow
-def test_notebook_of_the_paper_has_the_numbers_of_the_reference(tmp_path, monkeypatch):
+def test_numbers_in_the_notebook_of_the_paper_equal_the_reference(
+    tmp_path, monkeypatch
+):
     """Two or three digits of another program, as in tests of the paper's study."""
     pytest.importorskip("xarray")
     found = variables("paper_figures", tmp_path, monkeypatch)

@@ -32,7 +32,7 @@ def test_word_list_sections_are_read_without_comments():
     assert CHECK["read_list"](text) == {"one": {"x": "y"}, "two": {"u v": "w"}}
 
 
-def test_comments_and_docstrings_keep_their_lines():
+def test_comments_and_docstrings_are_reported_with_their_lines():
     source = '"""Title."""\n\nx = "text"  # note\n\n\ndef f():\n    """Do."""\n'
     expected = '"""Title."""\n\n# note\n\n\n\n"""Do."""'
     assert CHECK["comments"](source) == expected

@@ -107,7 +107,7 @@ def test_gallery_has_a_scene_of_each_robot_that_the_browser_draws(site):
 
 
 @pytest.mark.slow
-def test_search_finds_a_page_from_a_folder(site):
+def test_search_of_the_site_finds_a_page_opened_from_a_folder(site):
     """The page of the built-in robots names Kutzbach."""
     assert "Kutzbach" in (DOCS / "robots.md").read_text("utf-8")
     tab = browser()

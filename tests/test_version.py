@@ -53,7 +53,7 @@ def repository(tree):
     return tree
 
 
-def test_tree_without_git_has_the_next_development_version(tree):
+def test_source_tree_without_git_has_the_next_development_version(tree):
     assert version(tree) == f"{NEXT}.dev0"
 
 
@@ -72,7 +72,9 @@ def test_version_before_the_first_tag_counts_the_commits(repository, tmp_path):
     assert version(shallow).startswith(f"{NEXT}.dev1+g")
 
 
-def test_tag_is_the_version_and_later_commits_have_the_next_one(repository):
+def test_version_equals_the_tag_and_later_commits_have_the_next_development_version(
+    repository,
+):
     git(repository, "tag", "v7.2.0")
     assert version(repository) == "7.2.0"
     git(repository, "commit", "-q", "--allow-empty", "-m", "after")

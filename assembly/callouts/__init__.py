@@ -1,4 +1,4 @@
-"""Tolerances as a drawing states them: zones of small screws, fits, general tolerances.
+"""Tolerances on a drawing: zones of small screws, fits and general tolerances.
 
-Begin at ``zone.py`` for the convex zones, at ``fits.py`` for ISO 286.
+Start with ``zone.py`` for the convex zones, ``fits.py`` for ISO 286.
 """

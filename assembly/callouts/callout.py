@@ -1,4 +1,4 @@
-"""The callouts of one feature, as a drawing states them, and their zone."""
+"""The callouts of one feature on a drawing, and their common zone."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -27,7 +27,7 @@ from forcefit.assembly.callouts.zones_of_features import (
 from forcefit.inputs.table import BadInput
 
 SHAPES = ("axis", "plane", "point")
-# components of a screw that a datum of each shape holds, in its axes
+# components of a screw that a datum of each shape constrains, in the datum's axes
 HELD = {
     "axis": (0, 1, 3, 4),
     "plane": (0, 1, 5),
@@ -37,23 +37,23 @@ HELD = {
 }
 LOCATIONS = ("position", "coaxiality", "profile")
 ORIENTATIONS = ("perpendicularity", "parallelism", "angularity")
-_ALONG = 1e-3  # sine of the angle below which two directions are parallel
-_SAME_LENGTH = 1e-6  # [m] a stated length may differ so much from the nominal geometry
+_ALONG = 1e-3  # sine of the angle below which two directions count as parallel
+_SAME_LENGTH = 1e-6  # [m] allowed difference between a stated and the nominal length
 
 
 @dataclass(frozen=True)
 class Datum:
-    """A feature from which others are measured.
+    """A datum: a feature relative to which other features are measured.
 
     Attributes:
         frame: name of the frame.
-        shape: one of :data:`HELD`; a guide is an axis that holds the turn about itself
-            too, a body holds all.
-        axis: (3,) unit vector of its axis or normal, in the frame's axes.
-        at: (3,) [m] its middle, in the frame's axes.
+        shape: one of :data:`HELD`. A guide is an axis that also constrains the rotation
+            about itself; a body constrains all components.
+        axis: (3,) unit vector of the axis or normal, in the frame's axes.
+        at: (3,) [m] middle of the feature, in the frame's axes.
         hole: size of a hole that is a datum at maximum material, such as ``"12 H7"``:
-            the larger the hole, the more the datum shifts.  Empty for other datums.
-        hole_of: as :attr:`Callout.hole_of`.
+            the larger the hole, the more the datum can shift.  Empty for other datums.
+        hole_of: as for :attr:`Callout.hole_of`.
     """
 
     frame: str
@@ -66,34 +66,34 @@ class Datum:
 
 @dataclass(frozen=True, eq=False)
 class Callout:
-    """The callouts of one feature of a body, which its joint or frame names.
+    """The callouts of one feature of a body, at a joint or a frame.
 
     Attributes:
-        name: of the feature, such as ``"leg1.bore on tube"``.
+        name: name of the feature, such as ``"leg1.bore on tube"``.
         feature: name of the frame.
-        after: whether the feature is on the body that the frame's joint moves, not on
-            the body before it.
-        datums: A, B, C in this order, at least one.
+        after: whether the feature is on the body that the frame's joint moves; False
+            for the body before the joint.
+        datums: datums A, B, C in this order, at least one.
         shape: one of :data:`SHAPES`.
         axis: (3,) unit vector of the axis or the normal, in the frame's axes.
-        extent: [m] length of a bore; two sizes of a face, along its x and y, or the
+        extent: [m] length of a bore; the two sizes of a face along its x and y; or the
             diameter of a round face.
-        widths: [m] of each zone, by the words of :data:`LOCATIONS` and
+        widths: [m] width of each zone, by the words of :data:`LOCATIONS` and
             :data:`ORIENTATIONS`.
-        hole: size of a hole whose position holds at maximum material, such as
-            ``"12 H7"``; empty if it holds at every size.
-        direction: (3,) unit vector in which the zones are, at right angles to the
-            axis, in the frame's axes; None for all directions.  Of a face: that of its
-            first size.
+        hole: size of a hole whose position applies at maximum material, such as
+            ``"12 H7"``; empty if it applies at every size.
+        direction: (3,) unit vector across the axis along which the zones are measured,
+            in the frame's axes; None for all directions.  For a face: the direction of
+            its first size.
         length: [m] distance from datum A and its tolerance to each side, or None.
         general: general tolerance, such as ``"ISO 2768-mK"``, or empty.
         distribution: see :meth:`forcefit.assembly.callouts.zone.Zone.draw`.
-        cp: capability of a normal distribution.
-        at: (3,) [m] the middle of the feature, in the frame's axes.
-        envelope: whether a face is within the limits of its length as a whole (envelope
-            principle), not only its middle.
-        hole_of: name of the fit or joint whose hole is at maximum material: its size is
-            the same wherever this name is.
+        cp: capability index of a normal distribution.
+        at: (3,) [m] middle of the feature, in the frame's axes.
+        envelope: whether the whole face is within the limits of its length (envelope
+            principle), instead of only its middle.
+        hole_of: name of the fit or joint whose hole is at maximum material. All
+            features with this name have the same hole size.
     """
 
     name: str
@@ -116,7 +116,7 @@ class Callout:
 
     @property
     def words(self) -> str:
-        """What is called out: ``"position and perpendicularity"``."""
+        """Names of the callouts, such as ``"position and perpendicularity"``."""
         found = [*self.widths, *(["length"] if self.length else [])]
         found += ["general tolerance"] if self.general else []
         return " and ".join(found)
@@ -130,7 +130,7 @@ class Callout:
 
     @property
     def axes(self) -> NDArray:
-        """(3, 3) axes of the feature as columns, in the frame's: z = axis."""
+        """(3, 3) axes of the feature as columns, in the frame's axes; z is the axis."""
         if self.shape == "plane" and self.direction is not None:
             x, z = np.array(self.direction), np.array(self.axis)
             return np.column_stack([x, np.cross(z, x), z])
@@ -138,7 +138,7 @@ class Callout:
 
 
 def axes_along(axis: tuple[float, float, float]) -> NDArray:
-    """Return (3, 3) axes as columns with z along a unit vector, unchanged for z."""
+    """Return (3, 3) axes as columns with z along a unit vector; for z the identity."""
     z = np.array(axis)
     if np.array_equal(z, [0.0, 0.0, 1.0]):
         return np.eye(3)
@@ -152,13 +152,13 @@ def zone_of(callout: Callout, offset: NDArray, datum_axis: NDArray | None) -> Zo
     """Return the zone of a feature's deviation relative to its datums.
 
     Args:
-        callout: of the feature.
-        offset: (3,) [m] from datum A to the feature, in the feature's axes.
-        datum_axis: (3,) unit vector of datum A, its axis or its normal, in the
-            feature's axes; None for a point.
+        callout: callouts of the feature.
+        offset: (3,) [m] vector from datum A to the feature, in the feature's axes.
+        datum_axis: (3,) unit vector of the axis or normal of datum A, in the feature's
+            axes; None if datum A is a point.
 
     Returns:
-        The zone in the feature's axes, within the zones of all its callouts.
+        The zone that is within the zones of all callouts, in the feature's axes.
 
     Raises:
         BadInput: a callout does not fit the nominal geometry.
@@ -187,7 +187,7 @@ def zone_of(callout: Callout, offset: NDArray, datum_axis: NDArray | None) -> Zo
 def _check_coaxial(
     callout: Callout, offset: NDArray, datum_axis: NDArray | None
 ) -> None:
-    """Refuse coaxiality of axes that are not the same at home."""
+    """Reject coaxiality of axes that do not coincide at home."""
     if "coaxiality" not in callout.widths:
         return
     expected = "expected the same axis at home; position is for others"
@@ -201,7 +201,7 @@ def _check_coaxial(
 
 
 def _zone(callout: Callout, kind: str, width: float) -> Zone:
-    """The zone of one width."""
+    """Return the zone of one callout with the given width [m]."""
     across = callout.direction
     direction = None if across is None else (np.array(across) @ callout.axes)[:2]
     location = kind in LOCATIONS
@@ -225,7 +225,7 @@ def _zone(callout: Callout, kind: str, width: float) -> Zone:
 
 
 def _face_within(callout: Callout, width: float) -> Zone:
-    """The zone of a face between two planes at a distance [m]."""
+    """Return the zone of a face between two planes with the given distance [m]."""
     is_round = len(callout.extent) == 1
     return (round_plane_position if is_round else plane_position)(
         width, *callout.extent
@@ -233,7 +233,7 @@ def _face_within(callout: Callout, width: float) -> Zone:
 
 
 def _away(shape: str, offset: NDArray, datum_axis: NDArray | None) -> NDArray:
-    """(3,) the offset that a length states: across parallel axes, along a normal."""
+    """Return the offset (3,) to which a length refers: across axes, along normals."""
     if shape == "plane":
         return np.array([0.0, 0.0, offset[2]])
     if datum_axis is not None and np.linalg.norm(datum_axis[:2]) < _ALONG:
@@ -242,7 +242,7 @@ def _away(shape: str, offset: NDArray, datum_axis: NDArray | None) -> NDArray:
 
 
 def _general(callout: Callout, away: NDArray, datum_axis: NDArray | None) -> list[Zone]:
-    """The zones of a general tolerance: the length, and perpendicularity."""
+    """Return the zones of a general tolerance: of the length and perpendicularity."""
     linear, geometry = parse_general(callout.general)
     distance = float(np.linalg.norm(away))
     zones = [shift_along(linear_tolerance(distance, linear), away / distance)]
@@ -260,17 +260,17 @@ def check_orientation(
     callout: Callout, axis: NDArray, datum_axis: NDArray | None,
     same_shape: bool | None,
 ) -> None:  # fmt: skip
-    """Refuse perpendicularity and parallelism that the nominal geometry does not have.
+    """Reject perpendicularity or parallelism that contradicts the nominal geometry.
 
     Args:
-        callout: of the feature.
+        callout: callouts of the feature.
         axis: (3,) unit vector of the feature's axis or normal.
-        datum_axis: (3,) of datum A in the same axes, None for a point.
-        same_shape: whether both are axes, or both planes; None if datum A may be the
-            face or the bore of a fixed joint.
+        datum_axis: (3,) unit vector of datum A in the same axes; None for a point.
+        same_shape: whether both features are axes, or both are planes; None if datum A
+            may be the face or the bore of a fixed joint.
 
     Raises:
-        BadInput: the angle at home is another one, or the datum is a point.
+        BadInput: the angle at home differs from the callout, or the datum is a point.
     """
     for kind in set(callout.widths) & set(ORIENTATIONS):
         if datum_axis is None:
@@ -294,7 +294,7 @@ def check_orientation(
 
 
 def _expected(kind: str, same_shape: bool | None) -> str:
-    """[deg] angle of axes or normals."""
+    """Return the angle [deg] between axes or normals for a kind of orientation."""
     if same_shape is None:
         return "0 or 90"
     return "0" if (kind == "parallelism") == same_shape else "90"

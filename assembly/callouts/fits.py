@@ -1,7 +1,7 @@
 """Fits of ISO 286: limits of a hole and a shaft, and the clearance between them.
 
-The tables are those of ISO 286-1:2010 for the letters d to p without finer size steps.
-A step is "over a, up to b": 30 mm belongs to 18-30.
+The tables contain the values of ISO 286-1:2010 for the letters d to p, without the
+finer steps of nominal size.  A step means "over a, up to b": 30 mm belongs to 18-30.
 """
 
 import re
@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput, quoted
 
-STEPS = (3, 6, 10, 18, 30, 50, 80, 120, 180, 250, 315, 400, 500)  # [mm] up to
+STEPS = (3, 6, 10, 18, 30, 50, 80, 120, 180, 250, 315, 400, 500)  # [mm] upper ends
 GRADES = (5, 6, 7, 8, 9, 10, 11)
-# [um] tolerance of each grade, a row for each step
+# [um] tolerance of each grade, one row per step
 _WIDTHS = (
     (4, 6, 10, 14, 25, 40, 60),
     (5, 8, 12, 18, 30, 48, 75),
@@ -31,7 +31,7 @@ _WIDTHS = (
     (25, 36, 57, 89, 140, 230, 360),
     (27, 40, 63, 97, 155, 250, 400),
 )
-# [um] fundamental deviation of shafts: the upper one of d to h, the lower one of k to p
+# [um] fundamental deviation of shafts: upper deviation for d to h, lower for k to p
 _DEVIATIONS = {
     "d": (-20, -30, -40, -50, -65, -80, -100, -120, -145, -170, -190, -210, -230),
     "e": (-14, -20, -25, -32, -40, -50, -60, -72, -85, -100, -110, -125, -135),
@@ -52,12 +52,12 @@ _FIT = re.compile(
 _SIZE = re.compile(rf"\s*(\d+\.?\d*)\s*(?:mm)?\s*{_ONE}\s*")
 _UM = 1e-6
 _EXPECTED = 'expected a fit such as "12 H7/g6"'
-# share of a normal size outside its limits is 2 Phi(-3 Cp): limits at 3 Cp deviations
+# a share 2 Phi(-3 Cp) of normally distributed sizes is outside limits at 3 Cp sigma
 _DEVIATIONS_IN_LIMIT = 3.0
 
 
 class Limits(NamedTuple):
-    """Deviations of a hole or a shaft from the nominal size, [m]."""
+    """Limit deviations [m] of a hole or a shaft from the nominal size."""
 
     lower: float
     upper: float
@@ -68,11 +68,11 @@ class Fit:
     """A hole and a shaft of the same nominal size.
 
     Attributes:
-        text: as the drawing states it.
+        text: text on the drawing.
         size: [m] nominal diameter.
-        hole: deviations of the hole.
-        shaft: deviations of the shaft.
-        form: [m] radial clearance that the form of the parts adds, >= 0.
+        hole: limit deviations of the hole.
+        shaft: limit deviations of the shaft.
+        form: [m] additional radial clearance due to the form of the parts, >= 0.
     """
 
     text: str
@@ -83,7 +83,7 @@ class Fit:
 
     @property
     def diametral(self) -> tuple[float, float]:
-        """[m] least and largest hole minus shaft; negative is interference."""
+        """[m] least and largest hole minus shaft; negative for interference."""
         return self.hole.lower - self.shaft.upper, self.hole.upper - self.shaft.lower
 
     @property
@@ -98,14 +98,14 @@ class Fit:
     def radial(self) -> tuple[float, float]:
         """[m] least and largest radial clearance, >= 0.
 
-        It is half the diametral one, with that of the form.
+        The radial clearance is half the diametral clearance, plus ``form``.
         """
         least, most = self.diametral
         return max(0.0, least / 2) + self.form, max(0.0, most / 2) + self.form
 
     @property
     def mean_radial(self) -> float:
-        """[m] radial clearance of parts of mean sizes, 0 if they interfere."""
+        """[m] radial clearance of parts with mean sizes, 0 if they interfere."""
         return max(0.0, sum(self.diametral) / 4) + self.form
 
     def draw(
@@ -115,12 +115,12 @@ class Fit:
 
         Args:
             uniform: (k, 2) numbers between 0 and 1, for the hole and the shaft.
-            distribution: of each size within its limits: ``"uniform"`` or ``"normal"``,
-                centred, not cut at the limits.
-            cp: capability of the normal sizes, (upper - lower) / (6 sigma).
+            distribution: distribution of each size within its limits: ``"uniform"``, or
+                ``"normal"``, centred and not truncated at the limits.
+            cp: capability index of the normal sizes, (upper - lower) / (6 sigma).
 
         Returns:
-            (k,) [m].
+            (k,) [m] radial clearances.
         """
         from scipy.special import ndtri
 
@@ -138,15 +138,17 @@ class Fit:
 
 @dataclass(frozen=True)
 class FittedEnd:
-    """An end of a bore or a guide, or a bearing, that turns about another place.
+    """One of two fitted places, at a distance about which the parts rotate.
+
+    The places are the ends of a bore or a guide, or two bearings.
 
     Attributes:
-        length: [m] between the two places, > 0: the rotation is at most the radial
-            clearance divided by it.
-        parts: name of the hole and the shaft; ends of the same parts have the same
+        length: [m] distance between the two places, > 0. The rotation is at most the
+            radial clearance divided by this distance.
+        parts: name of the hole and the shaft; places with the same parts have the same
             clearance.
-        bound: of the clearance that follows from the fit: ``"tilt"`` of a bore,
-            ``"spin"`` of a guide, whose contacts turn about one axis each.
+        bound: name of the clearance that follows from the fit: ``"tilt"`` for a bore,
+            ``"spin"`` for a guide, each of whose contacts rotates about one axis.
     """
 
     length: float
@@ -154,22 +156,23 @@ class FittedEnd:
     bound: str = "tilt"
 
     def bounds(self, radial: float) -> dict[str, float]:
-        """[rad] largest rotation, by its name, for a radial clearance [m]."""
+        """Return the largest rotation [rad] by name for a radial clearance [m]."""
         return {self.bound: radial / self.length}
 
 
 def parse_fit(text: str) -> Fit:
-    """Return the fit that a text states.
+    """Return the fit that a text specifies.
 
     Args:
-        text: nominal size in mm, hole and shaft, such as ``"12 H7/g6"``; or with the
-            radial clearance that the form of the parts adds, ``"12 H7/g6 + 5 um"``.
+        text: nominal size in mm, hole and shaft, such as ``"12 H7/g6"``; optionally
+            with the radial clearance due to the form of the parts, such as
+            ``"12 H7/g6 + 5 um"``.
 
     Returns:
         The fit, of any kind.
 
     Raises:
-        BadInput: it is no fit, or one that the tables do not have.
+        BadInput: the text is not a fit, or the tables do not contain it.
     """
     match = _FIT.fullmatch(text)
     if match is None:
@@ -185,7 +188,7 @@ def parse_fit(text: str) -> Fit:
 
 
 def clearance_fit(text: str) -> Fit:
-    """Return a fit whose parts have clearance at least for some sizes.
+    """Return a fit whose parts have clearance, at least for some sizes.
 
     Raises:
         BadInput: see :func:`parse_fit`; or the parts always interfere.
@@ -203,10 +206,11 @@ def clearance_fit(text: str) -> Fit:
 
 
 def parse_hole(text: str) -> tuple[float, Limits]:
-    """Return nominal size [m] and deviations of a hole, such as ``"12 H7"``.
+    """Return the nominal size [m] and deviations of a hole, such as ``"12 H7"``.
 
     Raises:
-        BadInput: it is no such text, a shaft, or a hole that the tables do not have.
+        BadInput: the text is not a size, or is a shaft; or the tables do not contain
+            the hole.
     """
     match = _SIZE.fullmatch(text)
     if match is None:
@@ -221,15 +225,15 @@ def limits_of(size: float, letter: str, grade: int) -> Limits:
     """Return the deviations of a hole (capital letter) or a shaft (small letter).
 
     Args:
-        size: [mm] nominal, over 0 to 500.
-        letter: d e f g h js k m n p, or D to P for a hole.
-        grade: 5 to 11; K, M, N of grades 6 to 8 and P of 6 and 7 only.
+        size: [mm] nominal size, above 0 and up to 500.
+        letter: d e f g h js k m n p for a shaft, or D to P for a hole.
+        grade: 5 to 11. For K, M and N only 6 to 8, for P only 6 and 7.
 
     Returns:
         The deviations.
 
     Raises:
-        BadInput: the tables have no such entry.
+        BadInput: the tables do not contain the entry.
     """
     name = f"{letter}{grade}"
     small = letter.lower()
@@ -253,12 +257,12 @@ def limits_of(size: float, letter: str, grade: int) -> Limits:
 
 
 def _width(step: int, grade: int) -> float:
-    """[um] tolerance of a grade."""
+    """Return the tolerance [um] of a grade."""
     return float(_WIDTHS[step][grade - GRADES[0]])
 
 
 def _shaft(step: int, letter: str, grade: int) -> tuple[float, float]:
-    """[um] lower and upper deviation of a shaft."""
+    """Return the lower and upper deviation [um] of a shaft."""
     width = _width(step, grade)
     if letter == "js":
         return -width / 2, width / 2
@@ -271,9 +275,9 @@ def _shaft(step: int, letter: str, grade: int) -> tuple[float, float]:
 
 
 def _hole(step: int, letter: str, grade: int) -> tuple[float, float]:
-    """[um] lower and upper deviation of a hole."""
-    # D to H mirror the shafts.  K, M, N and P have ES = -ei + Delta with Delta = IT(n)
-    # - IT(n-1) over 3 mm, except M6 of 250-315.
+    """Return the lower and upper deviation [um] of a hole."""
+    # D to H mirror the shafts.  For K, M, N and P over 3 mm, ES = -ei + Delta with
+    # Delta = IT(n) - IT(n-1), except M6 of 250-315.
     width = _width(step, grade)
     if letter == "js":
         return -width / 2, width / 2

@@ -1,7 +1,8 @@
-"""General tolerances of ISO 2768: lengths by class, perpendicularity by class.
+"""General tolerances of ISO 2768: lengths and perpendicularity by class.
 
-Part 1 limits linear dimensions.  Of part 2 (withdrawn, ISO 22081 has no tables) only
-perpendicularity is here.  Neither part limits a position or a coaxiality.
+Part 1 limits linear dimensions.  Of part 2, which is withdrawn and whose successor ISO
+22081 contains no tables, only perpendicularity is available.  Neither part limits a
+position or a coaxiality.
 """
 
 import re
@@ -11,9 +12,9 @@ import numpy as np
 
 from forcefit.inputs.table import BadInput, quoted
 
-# [mm] largest length of each column, the first column over 0.5
+# [mm] largest length of each column; the first column begins above 0.5
 LENGTHS = (3, 6, 30, 120, 400, 1000, 2000, 4000)
-# [mm] plus and minus; nan: the class has no value
+# [mm] tolerance to each side; nan where the class has no value
 LINEAR = {
     "f": (0.05, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5, np.nan),
     "m": (0.1, 0.1, 0.2, 0.3, 0.5, 0.8, 1.2, 2.0),
@@ -21,28 +22,28 @@ LINEAR = {
     "v": (np.nan, 0.5, 1.0, 1.5, 2.5, 4.0, 6.0, 8.0),
 }
 _SIDES = (100, 300, 1000, 3000)  # [mm] largest length of the shorter side
-# [mm] width of the zone; class L up to 100 mm was not confirmed, so it has no value
+# [mm] width of the zone; class L up to 100 mm has no value, as it was not confirmed
 PERPENDICULARITY = {
     "H": (0.2, 0.3, 0.4, 0.5),
     "K": (0.4, 0.6, 0.8, 1.0),
     "L": (np.nan, 1.0, 1.5, 2.0),
 }
-_SHORTEST = 0.5  # [mm] below it part 1 has no value
+_SHORTEST = 0.5  # [mm] part 1 has no values for shorter lengths
 _TEXT = re.compile(r"\s*ISO\s*2768\s*-\s*([fmcv])([HKL])?\s*")
 
 
 class GeneralTolerance(NamedTuple):
-    """Classes of ISO 2768: of lengths, and of geometry (empty if not stated)."""
+    """Classes of ISO 2768 for lengths and for geometry; empty if not specified."""
 
     linear: str
     geometry: str
 
 
 def parse_general(text: str) -> GeneralTolerance:
-    """Return the classes that a text such as ``"ISO 2768-mK"`` states.
+    """Return the classes that a text such as ``"ISO 2768-mK"`` specifies.
 
     Raises:
-        BadInput: it states no classes.
+        BadInput: the text does not specify classes.
     """
     match = _TEXT.fullmatch(text)
     if match is None:
@@ -54,10 +55,10 @@ def parse_general(text: str) -> GeneralTolerance:
 
 
 def linear_tolerance(length: float, kind: str) -> float:
-    """Return [m] the tolerance, plus and minus, of a length [m] in a class.
+    """Return the tolerance [m] to each side of a length [m] in a class.
 
     Raises:
-        BadInput: the table has no value.
+        BadInput: the table contains no value.
     """
     mm = length * 1e3
     if mm < _SHORTEST or mm > LENGTHS[-1]:
@@ -67,10 +68,10 @@ def linear_tolerance(length: float, kind: str) -> float:
 
 
 def perpendicularity_tolerance(side: float, kind: str) -> float:
-    """Return [m] the width of the zone of a shorter side [m] in a class H, K or L.
+    """Return the width [m] of the zone for a shorter side [m] in class H, K or L.
 
     Raises:
-        BadInput: the table has no value.
+        BadInput: the table contains no value.
     """
     mm = side * 1e3
     if not 0 < mm <= _SIDES[-1]:
@@ -82,8 +83,8 @@ def perpendicularity_tolerance(side: float, kind: str) -> float:
 def _entry(
     row: tuple[float, ...], steps: tuple[int, ...], mm: float, name: str
 ) -> float:
-    """[m] the value of a size, of the first step that reaches it."""
-    # rounding of a length in metres must not move it to the next step
+    """Return the value [m] of the first step that is at least as large as a size."""
+    # a rounding error of a length in metres must not select the next step
     value = row[int(np.searchsorted(steps, mm * (1 - 1e-12)))]
     if np.isnan(value):
         fault = f"found {mm:g} mm in {name}, for which the table has no value"

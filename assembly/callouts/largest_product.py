@@ -1,29 +1,30 @@
-"""The support function of a convex zone, with a certificate."""
+"""Support function of a convex zone, with a certified upper bound."""
 
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-_GAP = 3e-8  # relative, of a certified support
-_LEAST_MU = 1e-9  # a smaller barrier leaves no digits in the Newton steps
-_STEPS = 50  # most Newton steps of one barrier
+_GAP = 3e-8  # relative gap of a certified support function
+_LEAST_MU = 1e-9  # for a smaller barrier parameter, Newton steps are rounding errors
+_STEPS = 50  # largest number of Newton steps for one barrier parameter
 
 
 def largest_product(
     w: NDArray, bounds: Sequence[NDArray], cones: Sequence[NDArray] = ()
 ) -> tuple[NDArray, float]:
-    """Return the largest w.x where |bound @ x| <= 1, by an interior-point method.
+    """Maximise w.x subject to |bound @ x| <= 1 by an interior-point method.
 
     Args:
-        w: (m,).
-        bounds: (k, m) each, bounding every direction.
-        cones: (k, m) each, the rows s and S of a double cone |s.x| + |S x| <= 1.
+        w: (m,) coefficients.
+        bounds: matrices (k, m), which together bound every direction.
+        cones: matrices (k, m) with the rows s and S of a double cone
+            |s.x| + |S x| <= 1.
 
     Returns:
-        (m,) x in the set, and a certified upper bound of the largest w.x: the sum of
-        the sizes of multipliers with sum bound^T multiplier = w.  The size of a cone's
-        multiplier is the larger one of its first entry and of the others together.
+        (m,) x in the set, and a certified upper bound of the maximum. The bound is the
+        sum of the norms of multipliers with sum bound^T multiplier = w.  For a cone,
+        the norm is the larger one of the first entry and of the norm of the others.
     """
     x, value, _ = product_by_bounds(w, bounds, cones)
     return x, value
@@ -47,7 +48,7 @@ def product_by_bounds(
     length = float(np.linalg.norm(w))
     if length == 0.0:
         return np.zeros_like(w), 0.0, np.zeros(len(bounds) + len(cones))
-    # a value that is attained along w itself is the unit of all others
+    # the value attained along w itself is the unit of all other values
     reached = 1.0 / max(_largest_gauge(w, bounds, cones), 1e-300)
     unit = length * length * reached
     w = w / unit
@@ -58,10 +59,10 @@ def product_by_bounds(
     of_bounds = [float(part.sum()) for part in np.split(start, ends)]
     while best > (1 + _GAP) * max(float(w @ x), 0.0) and mu > _LEAST_MU:
         centre = _centre(w, bounds, cones, x, mu)
-        if centre is None:  # rounding: what is certified so far remains
+        if centre is None:  # rounding errors: keep the value certified so far
             break
         x, multipliers = centre
-        # the least change that balances w exactly
+        # the smallest change of the multipliers that balances w exactly
         change = np.linalg.lstsq(rows.T, w - rows.T @ multipliers, rcond=None)[0]
         parts = np.split(multipliers + change, ends)
         count = len(bounds)
@@ -79,7 +80,7 @@ def product_by_bounds(
 def _largest_gauge(
     x: NDArray, bounds: Sequence[NDArray], cones: Sequence[NDArray]
 ) -> float:
-    """The factor by which the set must grow until it reaches x."""
+    """Return the factor by which the set must be enlarged to reach x."""
     sizes = [float(np.linalg.norm(b @ x)) for b in bounds]
     sizes += [abs(c[0] @ x) + float(np.linalg.norm(c[1:] @ x)) for c in cones]
     return max(sizes)
@@ -89,7 +90,7 @@ def _centre(
     w: NDArray, bounds: Sequence[NDArray], cones: Sequence[NDArray], x: NDArray,
     mu: float,
 ) -> tuple[NDArray, NDArray] | None:  # fmt: skip
-    """The largest w.x + mu sum log(1 - |bound x|^2) and its multipliers, from x."""
+    """Maximise w.x + mu sum log(1 - |bound x|^2) from x; return x and multipliers."""
     # a double cone adds log((1 - s.x)^2 - |S x|^2) + log((1 + s.x)^2 - |S x|^2)
     for _ in range(_STEPS):
         slacks = [1.0 - float((b @ x) @ (b @ x)) for b in bounds]
@@ -127,18 +128,18 @@ def _centre(
 
 
 def _halves(cones: Sequence[NDArray], x: NDArray) -> Iterator[tuple[NDArray, float]]:
-    """Each half |S x| <= 1 - s.x of the double cones: its rows, and its slack."""
+    """Yield rows and slack of each half |S x| <= 1 - s.x of the double cones."""
     for cone in cones:
         for sign in (1.0, -1.0):
             signed = np.vstack([sign * cone[:1], cone[1:]])
             height = 1.0 - float(signed[0] @ x)
             across = float(np.linalg.norm(signed[1:] @ x))
-            # (height - across) is negative outside; both factors are positive inside
+            # outside the cone, (height - across) is negative; inside, both are positive
             yield signed, (height - across) * (height + across)
 
 
 def _slope(cone: NDArray, x: NDArray) -> NDArray:
-    """(m,) derivative of (1 - s.x)^2 - |S x|^2."""
+    """Return the derivative (m,) of (1 - s.x)^2 - |S x|^2."""
     return np.asarray(
         -2.0 * (1.0 - cone[0] @ x) * cone[0] - 2.0 * cone[1:].T @ (cone[1:] @ x)
     )

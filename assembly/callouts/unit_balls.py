@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-VOLUMES = {1: 2.0, 2: np.pi, 3: 4 * np.pi / 3}  # of unit balls, by dimension
+VOLUMES = {1: 2.0, 2: np.pi, 3: 4 * np.pi / 3}  # volumes of unit balls, by dimension
 
 
 def in_balls(
@@ -13,13 +13,14 @@ def in_balls(
     """Return points in a product of unit balls from uniform numbers.
 
     Args:
-        uniform: (k, m or more) independent, between 0 and 1.
-        dimensions: of each ball, m in all.
-        distribution: ``"uniform"``, ``"truncated"``, or ``"normal"`` (also outside).
-        s: standard deviation of each coordinate of the normal ones.
+        uniform: (k, m or more) independent uniform numbers between 0 and 1.
+        dimensions: dimension of each ball, with the sum m.
+        distribution: ``"uniform"``, ``"truncated"``, or ``"normal"``, whose points may
+            be outside the balls.
+        s: standard deviation of each coordinate for the normal distributions.
 
     Returns:
-        (k, m).
+        (k, m) points.
     """
     ends = np.cumsum(dimensions)
     parts = np.split(uniform[:, : ends[-1]], ends[:-1], axis=1)
@@ -27,7 +28,7 @@ def in_balls(
 
 
 def _in_ball(uniform: NDArray, distribution: str, s: float) -> NDArray:
-    """(k, d) points of a unit ball of dimension d from (k, d) uniform numbers."""
+    """Return points (k, d) of a d-dimensional unit ball from uniform numbers (k, d)."""
     from scipy.special import gammainc, gammaincinv
 
     d = uniform.shape[1]

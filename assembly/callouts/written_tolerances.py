@@ -1,4 +1,4 @@
-"""Widths, lengths with tolerances, and zones at maximum material, as texts."""
+"""Texts of tolerances: zone widths, lengths with tolerances, maximum material."""
 
 import re
 
@@ -15,16 +15,16 @@ _LENGTH = re.compile(
 
 
 def parse_width(value: object) -> tuple[float, bool]:
-    """Return the width of a zone, and whether it holds at maximum material.
+    """Return the width of a zone, and whether it applies at maximum material.
 
     Args:
         value: a number in m, or a text such as ``"0.05 mm"`` or ``"0.05 mm (M)"``.
 
     Returns:
-        [m] > 0, and whether ``(M)`` follows.
+        The width [m] > 0, and whether the text ends with ``(M)``.
 
     Raises:
-        BadInput: it is neither.
+        BadInput: the value is not a width.
     """
     expected = 'expected a width > 0 such as "0.05 mm"'
     width, at_most = -1.0, False
@@ -38,16 +38,17 @@ def parse_width(value: object) -> tuple[float, bool]:
 
 
 def parse_length(value: object) -> tuple[float, float]:
-    """Return a length and its tolerance, plus and minus, both in m.
+    """Return a length and its tolerance to each side, both in m.
 
     Args:
         value: a text such as ``"452 +- 0.1 mm"`` or ``"20 +- 0.1 mm (E)"``.
 
     Returns:
-        [m] the length, and [m] its tolerance > 0.
+        The length [m], and its tolerance [m] > 0.
 
     Raises:
-        BadInput: it is no such text, or the tolerance is 0 or not below the length.
+        BadInput: the text is not a length with a tolerance, or the tolerance is 0 or
+            not below the length.
     """
     expected = 'expected a length such as "452 +- 0.1 mm"'
     match = _LENGTH.fullmatch(value) if isinstance(value, str) else None
@@ -62,11 +63,11 @@ def parse_length(value: object) -> tuple[float, float]:
 
 
 def within_envelope(value: object) -> bool:
-    """Return whether a length is stated with ``(E)``, the envelope principle."""
+    """Return whether a length is marked with ``(E)``, the envelope principle."""
     match = _LENGTH.fullmatch(value) if isinstance(value, str) else None
     return match is not None and bool(match[7])
 
 
 def _value(digits: str, power: str | None) -> float:
-    """A number of its digits and its power of ten."""
+    """Return a number from its digits and its power of ten."""
     return float(f"{digits}e{power or 0}")

@@ -1,10 +1,11 @@
 """Convex zones of small screws: support function, random draws, covariance.
 
-A zone is the set of screws d [RX RY RZ TX TY TZ] of a feature, in its axes, with
-``|bound @ d| <= 1`` for each bound, and no component that no bound sees.  A bound of
-one row is an interval, of two rows a disc, of three a ball.  Bounds that are linearly
-independent are reached all at once: d = columns u, |u_k| <= 1.  The others cut that
-set, as do double cones ``|s @ d| + |S @ d| <= 1``, the zones of round faces.
+A zone is a set of screws d [RX RY RZ TX TY TZ] of a feature, in the feature's axes. It
+contains all d with ``|bound @ d| <= 1`` for each bound. Components to which no bound
+refers are zero.  A bound with one row is an interval, with two rows a disc, with three
+rows a ball.  Linearly independent bounds can reach their limits simultaneously, so
+their set is d = columns u, |u_k| <= 1.  Further bounds cut this set. Double cones
+``|s @ d| + |S @ d| <= 1``, the zones of round faces, also cut it.
 
 Sources:
     Mujezinovic, Davidson, Shah (2004), A new mathematical model for geometric
@@ -24,24 +25,24 @@ from forcefit.assembly.callouts.largest_product import largest_product
 from forcefit.assembly.callouts.unit_balls import VOLUMES, ball_variance, in_balls
 
 DISTRIBUTIONS = ("uniform", "normal", "truncated")
-_SAMPLE = 1 << 17  # draws for the covariance of a zone that is cut
-_RANK = 1e-9  # smallest singular value over the largest of independent bounds
-_MOST_ATTEMPTS = 10_000  # draws of one part until it is in the zone
+_SAMPLE = 1 << 17  # number of draws for the covariance of a zone that is cut
+_RANK = 1e-9  # smallest over largest singular value of independent bounds
+_MOST_ATTEMPTS = 10_000  # largest number of draws until a part is within the zone
 Numbers = Callable[[int], NDArray]  # attempt -> (k, words) uniform numbers
 
 
 @dataclass(frozen=True, eq=False)
 class Zone:
-    """A convex zone; see the head of this module.
+    """A convex zone of small screws, as defined at the beginning of this module.
 
     Attributes:
-        bounds: (k, 6) each, k = 1, 2, 3: rows on the screw [1/rad, 1/m].
+        bounds: matrices (k, 6), k = 1, 2, 3: rows on the screw [1/rad, 1/m].
         bonus: largest relative growth of the zone with the size of the feature (maximum
-            material condition); 0 for none.
-        cones: (3, 6) each: the row s along the axis of a double cone, and the two rows
-            S across it.  Bounds must limit the same components.
-        from_zero: whether the zone grows with a size from a point to the bounds, such
-            as the shift of a datum at maximum material.
+            material condition); 0 for no growth.
+        cones: matrices (3, 6): the row s along the axis of a double cone, and the two
+            rows S across it.  The bounds must limit the same components.
+        from_zero: whether the zone grows with a size from a point to the bounds, as for
+            the shift of a datum at maximum material.
     """
 
     bounds: tuple[NDArray, ...]
@@ -51,7 +52,7 @@ class Zone:
 
     @cached_property
     def _split(self) -> tuple[list[int], list[int]]:
-        """Indices of the independent bounds, and of those that cut."""
+        """Indices of the independent bounds, and of the bounds that cut their set."""
         kept: list[int] = []
         cutting: list[int] = []
         for i, bound in enumerate(self.bounds):
@@ -68,19 +69,19 @@ class Zone:
 
     @cached_property
     def columns(self) -> NDArray:
-        """(6, m) [rad, m] the screw of the coordinates u."""
+        """(6, m) [rad, m] map from the coordinates u to the screw."""
         rows = np.vstack([self.bounds[i] for i in self._split[0]])
         scale = _scale(rows)
         return np.asarray(np.linalg.pinv(rows / scale) / scale[:, None])
 
     @cached_property
     def cuts(self) -> tuple[NDArray, ...]:
-        """(k, m) each: the other bounds as rows on u."""
+        """Matrices (k, m): the bounds that cut, as rows on u."""
         return tuple(self.bounds[i] @ self.columns for i in self._split[1])
 
     @cached_property
     def cones_on_u(self) -> tuple[NDArray, ...]:
-        """(3, m) each: the double cones as rows on u."""
+        """Matrices (3, m): the double cones as rows on u."""
         return tuple(cone @ self.columns for cone in self.cones)
 
     @property
@@ -95,15 +96,15 @@ class Zone:
 
     @property
     def words(self) -> int:
-        """Uniform numbers of one draw: one for each coordinate, the last for a size."""
+        """Number of uniform numbers per draw: one per coordinate, then one for size."""
         return sum(self.dimensions) + self.grows
 
     def growth(self, size: NDArray) -> NDArray:
-        """Return the factors of the zone for sizes from least (0) to largest (1)."""
+        """Return the zone's scale factors for sizes from 0 (least) to 1 (largest)."""
         return size if self.from_zero else 1.0 + self.bonus * size
 
     def inside(self, u: NDArray, grown: NDArray | float = 1.0) -> NDArray:
-        """(k,) whether coordinates (k, m) are in the zone, by a factor of its size."""
+        """Return (k,) bool: whether coordinates (k, m) are in the scaled zone."""
         limits = [(part, grown) for part in self._balls(u)]
         limits += [(u @ cut.T, 1.0) for cut in self.cuts]
         marks = [np.linalg.norm(x, axis=-1) <= g * (1 + 1e-12) for x, g in limits]
@@ -111,20 +112,20 @@ class Zone:
         return np.asarray(np.all(marks, axis=0))
 
     def _cone_gauges(self, u: NDArray) -> list[NDArray]:
-        """(k,) for each double cone: 1 on its surface."""
+        """Return the gauge (k,) of each double cone, which is 1 on its surface."""
         return [
             abs(u @ c[0]) + np.linalg.norm(u @ c[1:].T, axis=-1)
             for c in self.cones_on_u
         ]
 
     def _balls(self, u: NDArray) -> list[NDArray]:
-        """The coordinates of each ball."""
+        """Return the coordinates of each ball."""
         ends = np.cumsum(self.dimensions)
         return np.split(u, ends[:-1], axis=-1)
 
     @cached_property
     def bounds_on_u(self) -> tuple[NDArray, ...]:
-        """(k, m) each: |bound @ u| <= 1 for all of them is the zone at its largest."""
+        """Matrices (k, m): the zone at its largest is |bound @ u| <= 1 for all."""
         rows = np.split(np.eye(sum(self.dimensions)), np.cumsum(self.dimensions)[:-1])
         return (*(row / (1.0 + self.bonus) for row in rows), *self.cuts)
 
@@ -132,21 +133,21 @@ class Zone:
         """Return the largest ``direction @ d`` over the screws of the zone.
 
         Args:
-            direction: (6,).
+            direction: (6,) coefficients.
 
         Returns:
-            The largest value: closed form of independent bounds; with others a
-            certified upper bound, about 3e-8 relative above the largest value.
+            The largest value. For independent bounds it has a closed form; otherwise it
+            is a certified upper bound, larger by about 3e-8 relative.
         """
         return self.farthest_u(np.asarray(direction, dtype=float) @ self.columns)[1]
 
     def farthest(self, direction: NDArray) -> NDArray:
-        """Return (6,) [rad, m] the screw of the zone farthest in a direction (6,)."""
+        """Return the screw (6,) [rad, m] of the zone farthest in a direction (6,)."""
         w = np.asarray(direction, dtype=float) @ self.columns
         return np.asarray(self.columns @ self.farthest_u(w)[0])
 
     def farthest_u(self, w: NDArray) -> tuple[NDArray, float]:
-        """Return coordinates u (m,) of the largest w @ u, and an upper bound of it."""
+        """Return the coordinates u (m,) that maximise w @ u, and an upper bound."""
         if self.is_cut:
             return largest_product(w, self.bounds_on_u, self.cones_on_u)
         grown, u = 1.0 + self.bonus, []
@@ -158,22 +159,23 @@ class Zone:
     def draw(
         self, numbers: Numbers, distribution: str = "uniform", cp: float = 1.0
     ) -> NDArray:
-        """Return random coordinates u of parts.
+        """Return coordinates u of random parts.
 
         Args:
-            numbers: function of the attempt, 0, 1, ..: (k, :attr:`words`) independent
-                uniform numbers.  A part outside the zone is drawn again, with the size
-                of its feature in attempt 0.
+            numbers: function from the number of the attempt, 0, 1, .., to independent
+                uniform numbers (k, :attr:`words`).  A part outside the zone is drawn
+                again; the size of its feature is kept from attempt 0.
             distribution: ``"uniform"`` in the zone; ``"normal"``, see
-                :meth:`deviation`; or ``"truncated"``, the normal one without the parts
-                outside the zone.
-            cp: capability of the normal distributions.
+                :meth:`deviation`; or ``"truncated"``, the normal distribution without
+                parts outside the zone.
+            cp: capability index of the normal distributions.
 
         Returns:
-            (k, m).
+            (k, m) coordinates.
 
         Raises:
-            RuntimeError: no draw of a part was in the zone, which has almost no volume.
+            RuntimeError: no draw of a part was within the zone, whose volume is almost
+                zero.
         """
         s = 0.0 if distribution == "uniform" else self.deviation(cp)
         first = numbers(0)
@@ -192,7 +194,7 @@ class Zone:
     def _attempt(
         self, uniform: NDArray, distribution: str, s: float, grown: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """Coordinates of one attempt, and whether they are in the zone."""
+        """Return coordinates of one attempt, and whether they are in the zone."""
         u = self._in_balls(uniform, distribution, s) * grown[:, None]
         if distribution == "normal":
             return u, np.ones(len(u), dtype=bool)
@@ -202,14 +204,15 @@ class Zone:
         return u, self.inside(u, grown)
 
     def _in_balls(self, uniform: NDArray, distribution: str, s: float) -> NDArray:
-        """(k, m) coordinates in the unit balls, without the cuts."""
+        """Return coordinates (k, m) in the unit balls, before the cuts."""
         return in_balls(uniform, self.dimensions, distribution, s)
 
     @cached_property
     def _tightest(self) -> tuple[tuple[int, ...], NDArray]:
-        """Of all sets of independent bounds that with the least volume, for drawing.
+        """Set of independent bounds with the least volume, used for drawing.
 
-        Dimensions of its balls, and the matrix from coordinates in them to u.
+        The set is described by the dimensions of its balls, and the matrix from
+        coordinates in the balls to u.
         """
         bounds = [bound @ self.columns for bound in self.bounds]
         m, best = sum(self.dimensions), np.inf
@@ -227,16 +230,16 @@ class Zone:
         return found
 
     def deviation(self, cp: float = 1.0) -> float:
-        """Return the standard deviation of each u of a normal distribution.
+        """Return the standard deviation of each u for a normal distribution.
 
-        The share outside the zone is that of one dimension, 2 Phi(-3 cp).
+        The probability outside the zone is as in one dimension, 2 Phi(-3 cp).
 
         Args:
-            cp: capability > 0.
+            cp: capability index > 0.
 
         Returns:
-            [-] in radii of the balls; exact for independent bounds, with others the
-            quantile of fixed draws (1 % accurate).
+            [-] standard deviation relative to the radii of the balls. It is exact for
+            independent bounds, otherwise a quantile of fixed draws (1 % accurate).
         """
         from scipy.optimize import brentq
         from scipy.special import gammainc, ndtr
@@ -261,18 +264,18 @@ class Zone:
 
         Args:
             distribution: see :meth:`draw`.
-            cp: capability of the normal distributions.
+            cp: capability index of the normal distributions.
 
         Returns:
-            (6, 6) [rad^2 .. m^2], closed form of independent bounds, otherwise of
-            131 072 fixed draws (1 % accurate).
+            (6, 6) [rad^2 .. m^2] covariance, in closed form for independent bounds,
+            otherwise from 131 072 fixed draws (1 % accurate).
         """
         return np.asarray(
             self.columns @ self.variance_of_u(distribution, cp) @ self.columns.T
         )
 
     def variance_of_u(self, distribution: str = "uniform", cp: float = 1.0) -> NDArray:
-        """Return (m, m) the covariance of the coordinates; see :meth:`covariance`."""
+        """Return the covariance (m, m) of the coordinates; see :meth:`covariance`."""
         if self.is_cut and distribution != "normal":
             u = self.draw(
                 lambda attempt: _sample(self.words, attempt), distribution, cp
@@ -286,18 +289,18 @@ class Zone:
 
 
 def intersection(zones: Sequence[Zone]) -> Zone:
-    """Return the zone that is within each of the zones; the first one's bonus holds."""
+    """Return the intersection of zones, with the bonus of the first zone."""
     bounds = tuple(bound for zone in zones for bound in zone.bounds)
     cones = tuple(cone for zone in zones for cone in zone.cones)
     return Zone(bounds, zones[0].bonus, cones)
 
 
 def _scale(rows: NDArray) -> NDArray:
-    """(6,) [1/rad, 1/m] the largest entries, so that rad and m weigh alike."""
+    """Return the largest entries (6,) [1/rad, 1/m], which scale rad and m equally."""
     sizes = [np.abs(rows[:, part]).max() for part in (slice(0, 3), slice(3, 6))]
     return np.repeat([size if size > 0 else 1.0 for size in sizes], 3)
 
 
 def _sample(words: int, attempt: int = 0) -> NDArray:
-    """Fixed uniform numbers, the same at each call."""
+    """Return fixed uniform numbers, which are equal at each call."""
     return np.random.default_rng([words, attempt]).random((_SAMPLE, words))

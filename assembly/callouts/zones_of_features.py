@@ -1,8 +1,8 @@
 """Zones of the callouts of a drawing, for axes, planes and points.
 
-The feature's z is its axis or its normal, its origin the middle of the feature.  Widths
-are those of the drawing: a diameter, or the distance between two planes.  The offset of
-an axis at height z is e(z) = (TX + z RY, TY - z RX).
+The z axis of a feature is its axis or its normal; the origin is the middle of the
+feature.  Widths are as on the drawing: a diameter, or the distance between two planes.
+The offset of an axis at height z is e(z) = (TX + z RY, TY - z RX).
 """
 
 import numpy as np
@@ -24,11 +24,12 @@ def axis_position(width: float, length: float, bonus: float = 0.0) -> Zone:
 
     Args:
         width: [m] diameter of the cylinder.
-        length: [m] of the bore, > 0.
-        bonus: [m] growth of the diameter from least to largest hole (M); 0 for none.
+        length: [m] length of the bore, > 0.
+        bonus: [m] growth of the diameter from the least to the largest hole (M); 0 for
+            no growth.
 
     Returns:
-        Two discs, at the two ends of the bore: shift and tilt are coupled.
+        Two discs, at the two ends of the bore, which couple shift and tilt.
     """
     ends = tuple(offset_rows(z) * 2 / width for z in (length / 2, -length / 2))
     return Zone(ends, bonus / width)
@@ -41,9 +42,10 @@ def axis_position_along(
 
     Args:
         width: [m] distance of the planes.
-        length: [m] of the bore.
-        direction: (2,) unit vector across the planes, in the feature's x and y.
-        bonus: [m] growth of the distance from least to largest hole (M); 0 for none.
+        length: [m] length of the bore.
+        direction: (2,) unit vector normal to the planes, in the feature's x and y.
+        bonus: [m] growth of the distance from the least to the largest hole (M); 0 for
+            no growth.
     """
     ends = (direction @ offset_rows(z) * 2 / width for z in (length / 2, -length / 2))
     return Zone(tuple(row[None] for row in ends), bonus / width)
@@ -55,9 +57,9 @@ def axis_orientation(
     """Return the zone of perpendicularity, parallelism or angularity of an axis.
 
     Args:
-        width: [m] diameter, or with a direction the distance of two planes.
-        length: [m] of the bore.
-        direction: (2,) unit vector in which the axis may lean; None for all.
+        width: [m] diameter; with a direction, the distance of two planes.
+        length: [m] length of the bore.
+        direction: (2,) unit vector in which the axis may tilt; None for all directions.
     """
     tilt = (offset_rows(1.0) - offset_rows(0.0)) * length / width
     return Zone((tilt if direction is None else (direction @ tilt)[None],))
@@ -68,8 +70,8 @@ def plane_position(width: float, size_x: float, size_y: float) -> Zone:
 
     Args:
         width: [m] distance of the two planes of the zone.
-        size_x: [m] full size of the face along its x.
-        size_y: [m] along its y.
+        size_x: [m] full size of the face along x.
+        size_y: [m] full size of the face along y.
 
     Returns:
         The octahedron |TZ| + size_y/2 |RX| + size_x/2 |RY| <= width/2.
@@ -91,7 +93,7 @@ def round_plane_position(width: float, diameter: float) -> Zone:
 
     Args:
         width: [m] distance of the two planes of the zone.
-        diameter: [m] of the face.
+        diameter: [m] diameter of the face.
 
     Returns:
         The double cone |TZ| + diameter/2 |(RX, RY)| <= width/2.
@@ -114,22 +116,22 @@ def datum_shift(hole: str) -> Zone:
     """Return the zone of the shift of a hole that is a datum at maximum material.
 
     Args:
-        hole: its size, such as ``"12 H7"``.
+        hole: size of the hole, such as ``"12 H7"``.
 
     Returns:
-        A disc across the hole's axis, whose diameter is the size of the hole less the
-        least one: a point at the least hole.
+        A disc across the hole's axis. Its diameter is the size of the hole minus the
+        least size, so the disc is a point for the smallest hole.
     """
     growth = float(np.ptp(parse_hole(hole)[1]))
     return Zone((offset_rows(0.0) * 2 / growth,), from_zero=True)
 
 
 def shift_along(tolerance: float, direction: NDArray) -> Zone:
-    """Return the zone of a shift within plus and minus a tolerance [m].
+    """Return the zone of a shift by at most a tolerance to each side.
 
     Args:
-        tolerance: [m] to each side.
-        direction: (3,) unit vector, in the feature's axes.
+        tolerance: [m] largest shift to each side.
+        direction: (3,) unit vector of the shift, in the feature's axes.
     """
     row = np.concatenate([np.zeros(3), np.asarray(direction, dtype=float)])
     return Zone((row[None] / tolerance,))

@@ -1,6 +1,6 @@
-"""Robots as they are drawn: bodies and joints by points and axes of the home pose.
+"""Robots as drawn: bodies and joints, given by points and axes in the home pose.
 
-Begin at ``drawing.py``, the data; ``frames.py`` makes the robot of frames and closures,
-``drawing_of_robot.py`` the drawing of any robot.
-Files of drawings are read in ``assembly/files/drawing_file.py``.
+Start with ``drawing.py``, which defines the data.  ``frames.py`` converts a drawing to
+a robot of frames and closures; ``drawing_of_robot.py`` converts a robot to a drawing.
+Drawing files are read in ``assembly/files/drawing_file.py``.
 """

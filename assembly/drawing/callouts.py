@@ -1,4 +1,4 @@
-"""Callouts of drawn bodies, on the frames that their joints become."""
+"""Callouts of drawn bodies, transferred to the frames of their joints."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -15,7 +15,7 @@ from forcefit.assembly.model.placed_frames import PlacedFrame, own_motion
 from forcefit.inputs.table import BadInput, quoted
 
 _ROUNDING = 1e-12
-# what a joint of each type holds as a datum; the others are axes
+# shape of the datum for each type of joint; all other types are axes
 _DATUM_SHAPES = {
     "planar": "plane",
     "spherical": "point",
@@ -28,15 +28,16 @@ Vector = tuple[float, float, float]
 def frame_callouts(
     drawing: Drawing, steps: Sequence[Step], placed: Sequence[PlacedFrame]
 ) -> tuple[Callout, ...]:
-    """Return the callouts of a drawing, on frames instead of joints.
+    """Return the callouts of a drawing, with frames in place of joints.
 
     Args:
-        drawing: of bodies and joints.
-        steps: of its tree.
+        drawing: bodies and joints.
+        steps: steps of the drawing's spanning tree.
         placed: the frames with their home poses.
 
     Returns:
-        In the order of the drawing; axes and directions in the axes of the frames.
+        The callouts in the order of the drawing; axes and directions are in the axes of
+        the frames.
     """
     passed = {s.edge.item.name: s for s in steps if isinstance(s.edge.item, DrawnJoint)}
     poses = {frame.name: (pose, pose @ own_motion(frame)) for frame, pose in placed}
@@ -46,7 +47,7 @@ def frame_callouts(
 def frame_fits(
     steps: Sequence[Step],
 ) -> tuple[dict[str, str], dict[str, FittedEnd]]:
-    """Return the fits of the joints of a tree, and their fitted ends, by frame."""
+    """Return the fit and the fitted end of each frame of the joints of a tree."""
     found = {
         part.name: part.numbers
         for step in steps if isinstance(step.edge.item, DrawnJoint)
@@ -60,14 +61,14 @@ def _of_frames(
     drawn: DrawnCallout, passed: Mapping[str, Step],
     poses: Mapping[str, tuple[NDArray, NDArray]],
 ) -> Callout:  # fmt: skip
-    """One callout on the side of a frame that is on its body."""
+    """Return one callout at the frame that is on the callout's body."""
     callout = drawn.callout
     step = passed[callout.feature]
     frame, after, joint = _side(step, drawn.body)
     pose = poses[frame][after]
     R = pose[:3, :3]
     across = None if drawn.direction is None else np.array(drawn.direction)
-    if callout.shape == "plane":  # the direction of the first of two sizes
+    if callout.shape == "plane":  # the callout's direction is that of its first size
         across = joint.across if len(callout.extent) == 2 else None
     datums = []
     for datum in callout.datums:
@@ -88,7 +89,7 @@ def _of_frames(
 
 
 def _hole_of(step: Step, drawn: DrawnCallout) -> str:
-    """The fit of a joint's hole on a body, or the joint without a fit."""
+    """Return the name of the fit of a joint's hole on a body, or of the joint."""
     joint = step.edge.item
     assert isinstance(joint, DrawnJoint)
     fitted = [p for p in parts_of(joint, step.reverse) if p.numbers.fit]
@@ -106,7 +107,7 @@ def _hole_of(step: Step, drawn: DrawnCallout) -> str:
 
 
 def _side(step: Step, body: str) -> tuple[str, bool, DrawnJoint]:
-    """The frame of a joint at a body, whether after its motion, and the joint."""
+    """Return the frame of a joint at a body, whether it is moved, and the joint."""
     joint = step.edge.item
     assert isinstance(joint, DrawnJoint)
     after = step.start[0] != body
@@ -114,20 +115,20 @@ def _side(step: Step, body: str) -> tuple[str, bool, DrawnJoint]:
 
 
 def _axis(joint: DrawnJoint, body: str) -> NDArray:
-    """(3,) the axis on a body, base axes at home."""
+    """Return the axis (3,) of a joint on a body, base axes at home."""
     second = joint.kind == "universal" and body == joint.second
     return joint.axis2 if second else joint.axis
 
 
 def _point(pose: NDArray, joint: DrawnJoint) -> Vector:
-    """The joint's point seen from a frame: not its origin where it is a contact."""
+    """Return the joint's point in a frame's axes; a contact's origin may differ."""
     point = pose[:3, :3].T @ (joint.at - pose[:3, 3])
     x, y, z = (float(v) + 0.0 for v in np.where(abs(point) < _ROUNDING, 0.0, point))
     return x, y, z
 
 
 def _vector(vector: NDArray) -> Vector:
-    """A vector without rounding of its zeros and ones; an axis has no sense."""
+    """Return a vector with zeros and ones exact; the sign of an axis is arbitrary."""
     rounded = np.where(abs(vector) < _ROUNDING, 0.0, vector)
     rounded = np.where(abs(abs(rounded) - 1) < _ROUNDING, np.sign(rounded), rounded)
     if np.array_equal(abs(rounded), [0.0, 0.0, 1.0]):

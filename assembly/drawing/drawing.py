@@ -1,7 +1,7 @@
 """Bodies and joints of a robot, by points and axes in base axes at home.
 
-Every name is that of the whole robot: the body ``tube`` of the copy ``leg1`` is
-``leg1.tube`` here.
+All names are unique within the robot: the body ``tube`` in the copy ``leg1`` of a leg
+is named ``leg1.tube``.
 """
 
 from dataclasses import dataclass, field, replace
@@ -14,8 +14,8 @@ from forcefit.assembly.callouts.fits import FittedEnd
 from forcefit.assembly.drawing.contacts import Contact
 from forcefit.assembly.model.robot import BeamLink, Clearance, Link, LockedAt, MeshLink
 
-# freedoms of each type: rows of the screw [RX RY RZ TX TY TZ] in the joint's axes; of a
-# universal joint its two turns have axes of their own
+# free components of each type: rows of the screw [RX RY RZ TX TY TZ] in the joint's
+# axes; the two rotations of a universal joint have separate axes
 FREE_ROWS: dict[str, tuple[int, ...]] = {
     "fixed": (),
     "revolute": (2,),
@@ -27,7 +27,7 @@ FREE_ROWS: dict[str, tuple[int, ...]] = {
     "planar": (2, 3, 4),
 }
 Direction = tuple[float, float, float] | None
-NEAR_X = 0.985  # cosine of 10 deg: nearer to the base's x an axis takes y instead
+NEAR_X = 0.985  # cosine of 10 deg: for an axis nearer to the base's x, y is used
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,15 +35,17 @@ class JointNumbers:
     """Error, clearance and stiffness of one bearing, in the joint's axes.
 
     Attributes:
-        clearance: bounds, or None.
-        stiffness: (6, 6) [N m/rad .. N/m] K_B, ``inf`` on the diagonal where rigid, 0
-            along free motions; or None.
-        error: (6,) [rad, m] delta l.
-        tolerance: (6,) [rad, m] standard deviations of it, or None.
+        clearance: bounds of the clearance, or None.
+        stiffness: (6, 6) [N m/rad .. N/m] K_B, with ``inf`` on the diagonal for rigid
+            components and 0 for free motions; or None.
+        error: (6,) [rad, m] geometric error delta l.
+        tolerance: (6,) [rad, m] standard deviations of the error, or None.
         fit: ISO 286 fit whose mean radial clearance is in ``clearance``, or empty.
-        fitted_end: how the tilt follows from the fit; None if ``radial`` does.
-        contacts: further clearance, by the sizes of the contacts.
-        locked_at: where a fixed joint is bolted, with its clearance before; or None.
+        fitted_end: how the tilt follows from the fit; None if the fit determines
+            ``radial``.
+        contacts: further clearance, given by the sizes of the contacts.
+        locked_at: pose at which a fixed joint is bolted, with its clearance before
+            bolting; or None.
     """
 
     clearance: Clearance | None = None
@@ -61,22 +63,23 @@ class DrawnJoint:
     """A joint between two bodies.
 
     Attributes:
-        name: of the joint.
+        name: name of the joint.
         kind: a key of :data:`FREE_ROWS`.
         first: name of the first body, or ``"base"``.
-        second: name of the second, which moves along +axis relative to the first when
-            the coordinate grows.
-        at: (3,) [m] its point, base axes at home.
-        axis: (3,) unit vector; of a universal joint fixed to the first body; of a
-            planar joint the normal.
-        across: (3,) unit vector of the x axis, at right angles to ``axis``.
-        axis2: (3,) unit vector of a universal joint's axis fixed to the second body,
-            for other types as ``across``.
-        actuated: whether a drive holds it.
+        second: name of the second body, which moves along +axis relative to the first
+            when the coordinate increases.
+        at: (3,) [m] point of the joint, base axes at home.
+        axis: (3,) unit vector of the axis; for a universal joint the axis fixed to the
+            first body, for a planar joint the normal.
+        across: (3,) unit vector of the x axis, perpendicular to ``axis``.
+        axis2: (3,) unit vector of the axis of a universal joint that is fixed to the
+            second body; equal to ``across`` for other types.
+        actuated: whether a drive holds the joint.
         position: [rad or m] coordinate at home.
-        limits: [rad or m] least and largest coordinate, or None.
-        pitch: [m] of a helical joint in a turn, 0 of others.
-        numbers: one for the joint; for a universal joint one for each bearing.
+        limits: [rad or m] smallest and largest coordinate, or None.
+        pitch: [m] translation per turn of a helical joint; 0 for other types.
+        numbers: error, clearance and stiffness: one entry for the joint, or one for
+            each bearing of a universal joint.
     """
 
     name: str
@@ -96,18 +99,19 @@ class DrawnJoint:
 
 @dataclass(frozen=True, eq=False)
 class DrawnBody:
-    """A body.
+    """A body of a robot.
 
     Attributes:
-        name: of the body.
-        mass: [kg] in addition to its link's.
-        centre: (3,) [m] of that mass, base axes at home.
-        inertia: (3, 3) [kg m^2] about the centre, base axes at home.
-        axes: (3, 3) the base's axes turned with the copy of the leg, as columns.
-        link: elasticity between two of its joints, directions in base axes at home; a
-            stiffness in the axes of the joint ``ends[1]``, at its point.
-        ends: names of the joints between which the link is; the second is None for the
-            platform's point.
+        name: name of the body.
+        mass: [kg] mass in addition to the mass of its link.
+        centre: (3,) [m] centre of that mass, base axes at home.
+        inertia: (3, 3) [kg m^2] inertia about this centre, base axes at home.
+        axes: (3, 3) base axes, rotated with the copy of the leg, as columns.
+        link: elasticity between two of the body's joints, with directions in base axes
+            at home; a stiffness matrix is in the axes of the joint ``ends[1]``, at its
+            point.
+        ends: names of the joints at the two ends of the link; the second is None for
+            the platform's point.
     """
 
     name: str
@@ -125,8 +129,8 @@ class DrawnCallout:
 
     Attributes:
         body: name of the body, or ``"base"``.
-        callout: with names of joints in place of frames.
-        direction: (3,) in which the zones are, base axes at home; None for all.
+        callout: the callout, with names of joints in place of frames.
+        direction: (3,) direction of the zones, base axes at home; None for all.
     """
 
     body: str
@@ -136,16 +140,17 @@ class DrawnCallout:
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """A robot of bodies and joints.
+    """A robot that consists of bodies and joints.
 
     Attributes:
-        name: of the robot.
+        name: name of the robot.
         platform: name of the body whose pose error is reported.
-        platform_at: (3,) [m] its reported point, base axes at home.
-        bodies: in the order of the file.
-        joints: likewise.
-        description: one line.
-        remarks: defaults of its file that are easily overlooked.
+        platform_at: (3,) [m] point of the platform whose error is reported, base axes
+            at home.
+        bodies: bodies in the order of the file.
+        joints: joints in the order of the file.
+        description: description in one line.
+        remarks: defaults of the robot's file that are easily overlooked.
         callouts: tolerances of features.
     """
 
@@ -160,17 +165,17 @@ class Drawing:
 
 
 def unit(vector: NDArray) -> NDArray:
-    """The vector divided by its length."""
+    """Return the vector divided by its length."""
     return vector / np.linalg.norm(vector)
 
 
 def perpendicular(axis: NDArray, near: NDArray | None = None) -> NDArray:
-    """A unit vector at right angles to an axis.
+    """Return a unit vector perpendicular to an axis.
 
     Args:
         axis: (3,) unit vector.
-        near: (3,) the direction whose part across the axis is taken; None: the base's
-            x, or its y where the axis is within 10 deg of x.
+        near: (3,) direction that is projected onto the plane perpendicular to the axis;
+            None for the base's x, or the base's y if the axis is within 10 deg of x.
 
     Returns:
         (3,) unit vector.
@@ -181,7 +186,7 @@ def perpendicular(axis: NDArray, near: NDArray | None = None) -> NDArray:
 
 
 def turned_joint(joint: DrawnJoint, T: NDArray) -> DrawnJoint:
-    """The joint moved by a (4, 4) transform; its numbers stay, in its own axes."""
+    """Return the joint moved by a (4, 4) transform; its numbers do not change."""
     R = T[:3, :3]
     return replace(
         joint, at=R @ joint.at + T[:3, 3], axis=R @ joint.axis,
@@ -190,7 +195,7 @@ def turned_joint(joint: DrawnJoint, T: NDArray) -> DrawnJoint:
 
 
 def turned_body(body: DrawnBody, T: NDArray) -> DrawnBody:
-    """The body moved by a (4, 4) transform, with its mass and its link."""
+    """Return the body moved by a (4, 4) transform, with its mass and its link."""
     R = T[:3, :3]
     return replace(
         body, centre=R @ body.centre + T[:3, 3], inertia=R @ body.inertia @ R.T,
@@ -199,14 +204,14 @@ def turned_body(body: DrawnBody, T: NDArray) -> DrawnBody:
 
 
 def turned_link(link: Link | None, R: NDArray) -> Link | None:
-    """The link with its directions turned by a (3, 3) rotation.
+    """Return the link with its directions expressed in rotated axes.
 
     Args:
-        link: any; a matrix and a library have no directions.
-        R: from the present axes to others.
+        link: any link; a matrix and a stiffness library contain no directions.
+        R: rotation from the present axes to the new axes.
 
     Returns:
-        The link.
+        The link in the new axes.
     """
     if isinstance(link, BeamLink):
         return replace(link, axis=_turned(link.axis, R), up=_turned(link.up, R))
@@ -217,7 +222,7 @@ def turned_link(link: Link | None, R: NDArray) -> Link | None:
 
 
 def _turned(vector: Direction, R: NDArray) -> Direction:
-    """A direction in other axes, None where it is not given."""
+    """Return a direction expressed in other axes, or None if no direction is given."""
     if vector is None:
         return None
     x, y, z = (R @ np.array(vector)).tolist()

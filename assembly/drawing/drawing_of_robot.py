@@ -1,6 +1,6 @@
-"""A robot of frames and closures as a drawing: bodies and joints at home.
+"""Conversion of a robot of frames and closures to a drawing of bodies and joints.
 
-Begin with :func:`drawing_of_robot`.  ``frames.py`` makes frames of a drawing again.
+Start with :func:`drawing_of_robot`.  ``frames.py`` contains the inverse conversion.
 """
 
 from collections.abc import Mapping
@@ -32,8 +32,8 @@ from forcefit.inputs.table import BadInput, quoted
 from forcefit.results.display import rounded
 from forcefit.stiffness.screws import rotation_vector, transform
 
-_SAME = 1e-12  # [lengths, rad] error below which points and axes are the same
-# fields of a frame that a drawing holds
+_SAME = 1e-12  # [lengths, rad] points and axes that differ by less are equal
+# fields of a frame that a drawing can represent
 _HELD = {
     "name", "parent", "translation", "rotation", "joint", "actuated", "position",
     "limits", "geometric_error", "tolerance", "clearance", "joint_stiffness", "link",
@@ -44,13 +44,14 @@ _HELD = {
 
 @dataclass(frozen=True, eq=False)
 class DrawnRobot:
-    """A robot as a drawing.
+    """A robot as a drawing, with what the drawing cannot represent.
 
     Attributes:
-        drawing: its bodies and joints.
-        frames: name that the frame of each joint has in the robot of the drawing;
-            those of balls, cylindrical and planar joints have other axes, and none.
-        left_out: in words what a drawing cannot hold.
+        drawing: bodies and joints of the robot.
+        frames: for each joint, the name that its frame gets in the robot of the
+            drawing. Ball, cylindrical and planar joints are not listed, because their
+            axes change.
+        left_out: descriptions of what a drawing cannot represent.
     """
 
     drawing: Drawing
@@ -65,17 +66,17 @@ def drawing_of_robot(robot: Robot) -> DrawnRobot:
         robot: any robot.
 
     Returns:
-        The drawing, and what it leaves out.
+        The drawing, and descriptions of what it omits.
 
     Raises:
-        BadInput: a drawing cannot hold the robot.
+        BadInput: a drawing cannot represent the robot.
     """
     posture = home_posture(robot)
     rigid = rigid_bodies(robot)
     end = rigid.after[robot.index(robot.platform)]
     if end == 0:
         raise BadInput(f"{robot.name}: found a platform fixed to the base")
-    # effects name frames
+    # effects refer to frames by name
     sheet = _Sheet(posture, rigid, found_joints(posture, rigid, not robot.has_effects))
     _add_bodies(sheet)
     for i, frame in enumerate(robot.frames):
@@ -97,15 +98,15 @@ def drawing_of_robot(robot: Robot) -> DrawnRobot:
 
 @dataclass(frozen=True, eq=False)
 class _Sheet:
-    """What is drawn so far.
+    """The incomplete drawing during the conversion.
 
     Attributes:
         posture: the robot at home.
-        rigid: its rigid bodies.
-        found: its joints.
-        bodies: those of the drawing by number; the base is not among them.
-        joints: of the drawing, with the numbers of their two bodies.
-        same: bodies at the near end of a link, and the body that has it.
+        rigid: rigid bodies of the robot.
+        found: joints of the robot.
+        bodies: bodies of the drawing by number, without the base.
+        joints: joints of the drawing, with the numbers of their two bodies.
+        same: for each body at the near end of a link, the body that contains the link.
     """
 
     posture: Posture
@@ -116,12 +117,12 @@ class _Sheet:
     same: dict[int, int] = field(default_factory=dict)
 
     def name_of(self, k: int) -> str:
-        """Name of a body by its number."""
+        """Return the name of a body from its number."""
         k = self.same.get(k, k)
         return self.bodies[k].name if k else BASE
 
     def new_name(self, name: str, joint: bool) -> str:
-        """The name, with an addition where another body or joint has it."""
+        """Return the name, with a suffix if another body or joint has the same name."""
         taken = {j.name for j, _, _ in self.joints} | {f.joint.name for f in self.found}
         if not joint:
             taken = {body.name for body in self.bodies.values()} | {BASE}
@@ -131,7 +132,7 @@ class _Sheet:
 
 
 def _frames(sheet: _Sheet) -> dict[str, str]:
-    """Return the name of each joint's frame in the new robot."""
+    """Return the name of each joint's frame in the robot of the drawing."""
     names = {}
     for found in sheet.found:
         if len(found.rows) == 1 or found.joint.kind == "universal":
@@ -142,7 +143,7 @@ def _frames(sheet: _Sheet) -> dict[str, str]:
 
 
 def _left_out(sheet: _Sheet) -> list[str]:
-    """Return in words what a drawing cannot hold."""
+    """Return descriptions of what a drawing cannot represent."""
     posture, robot = sheet.posture, sheet.posture.robot
     lost = []
     turned = rotation_vector(posture.platform[:3, :3])
@@ -177,7 +178,7 @@ def _left_out(sheet: _Sheet) -> list[str]:
 
 
 def _add_bodies(sheet: _Sheet) -> None:
-    """Name the bodies: the platform, then the frames at whose joints they end."""
+    """Name the bodies: first the platform, then others after their frames."""
     robot, rigid = sheet.posture.robot, sheet.rigid
     numbers = {rigid.after[robot.index(robot.platform)]: robot.platform}
     first = [i for i, frame in enumerate(robot.frames) if _holds(frame)]
@@ -204,7 +205,7 @@ def _add_bodies(sheet: _Sheet) -> None:
 
 
 def _holds(frame: Frame) -> bool:
-    """Whether a frame's body has a mass or a link."""
+    """Return whether a frame's body has a mass or a link."""
     return has_mass(frame) or frame.link is not None
 
 
@@ -229,7 +230,7 @@ def _new_body(sheet: _Sheet, name: str) -> int:
 
 
 def _at(point: NDArray) -> NDArray:
-    """(4, 4) a point, in axes of the base."""
+    """Return the (4, 4) pose at a point, parallel to the base axes."""
     return transform(point, np.eye(3))
 
 
@@ -245,7 +246,7 @@ def _fix(sheet: _Sheet, name: str, first: int, second: int, T: NDArray) -> Drawn
 
 
 def _add_link(sheet: _Sheet, i: int) -> None:
-    """Add a link between two joints of its body, fixed ones where there are none."""
+    """Add a link between two joints of its body; add fixed joints where none exist."""
     robot, rigid = sheet.posture.robot, sheet.rigid
     frame, T = robot.frames[i], sheet.posture.transforms[i]
     start, end = rigid.starts[i], rigid.before[i]
@@ -269,13 +270,13 @@ def _add_link(sheet: _Sheet, i: int) -> None:
 
 
 def _distance(sheet: _Sheet, joint: DrawnJoint, point: NDArray) -> float:
-    """Distance of a joint from a point, over the robot's size."""
+    """Return the distance of a joint from a point, divided by the robot's size."""
     gap = float(np.abs(joint.at - point).max())
     return gap / size_of(sheet.posture.robot)
 
 
 def _joint_at(sheet: _Sheet, i: int, body: int) -> DrawnJoint | None:
-    """The joint at the tip of a link, in whose axes it can be read."""
+    """Return the joint at the tip of a link if the link can use its axes, or None."""
     frame, T = sheet.posture.robot.frames[i], sheet.posture.transforms[i]
     for found in sheet.found:
         joint = found.joint
@@ -288,7 +289,7 @@ def _joint_at(sheet: _Sheet, i: int, body: int) -> DrawnJoint | None:
 
 
 def _only_joint(sheet: _Sheet, body: int, i: int) -> DrawnJoint | None:
-    """The joint of a body that has nothing else than it and a link's start."""
+    """Return the joint of a body that has only this joint and a link's start."""
     robot, rigid = sheet.posture.robot, sheet.rigid
     if (
         body == 0

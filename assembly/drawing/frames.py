@@ -1,8 +1,8 @@
-"""The robot of frames and closures that a drawing describes.
+"""Conversion of a drawing to a robot of frames and closures.
 
-A joint is a frame of its name, or one for each of its freedoms (``joint.first``).  A
-body is a fixed frame of its name if it has a mass or a link, is the platform, or is
-where a loop closes.
+A joint becomes one frame with its name, or one frame for each of its freedoms
+(``joint.first``).  A body becomes a fixed frame with its name if it has a mass or a
+link, if it is the platform, or if a loop closes at the body.
 """
 
 from collections.abc import Mapping
@@ -31,15 +31,15 @@ from forcefit.stiffness.screws import transform
 
 @dataclass(frozen=True, eq=False)
 class _Plan:
-    """Names and places of frames.
+    """Names and places of the frames of a robot.
 
     Attributes:
-        drawing: the bodies and joints.
-        joints: of it, by name.
-        bodies: of it, by name.
-        own: names of the frames that bodies have, by node.
-        carriers: name of the frame that carries what is on a node.
-        links: name of the frame of a link, by body, where that is not the body's own.
+        drawing: bodies and joints.
+        joints: joints of the drawing by name.
+        bodies: bodies of the drawing by name.
+        own: name of the frame of each body that has one, by node.
+        carriers: name of the frame that carries the objects on a node.
+        links: name of the frame of a body's link, if it differs from the body's frame.
         ends: name of the last frame of an edge that closes a loop.
         seats: name of the frame at which that loop closes.
     """
@@ -55,17 +55,17 @@ class _Plan:
 
 
 def robot_of_drawing(drawing: Drawing) -> Robot:
-    """The robot of a drawing, its closures holding at home.
+    """Return the robot of a drawing; its closures are closed at home.
 
     Args:
-        drawing: of bodies and joints.
+        drawing: bodies and joints.
 
     Returns:
-        The robot; its remarks name the joints after which the loops close.
+        The robot; its remarks list the joints after which the loops close.
 
     Raises:
-        BadInput: no joint leads to a body, the two ends of a link coincide, or a link
-            from a library would be passed from its tip.
+        BadInput: no joint connects a body to the base, the two ends of a link coincide,
+            or the tree traverses a link from a library from its tip to its base.
     """
     steps = steps_of(drawing)
     plan = _plan(drawing, steps)
@@ -89,14 +89,14 @@ def robot_of_drawing(drawing: Drawing) -> Robot:
 
 
 def _cuts(steps: list[Step]) -> tuple[str, ...]:
-    """A remark on the joints after which loops close."""
+    """Return a remark on the joints after which loops close; empty without loops."""
     closing = [step for step in steps if step.closes]
     names = [f"{quoted(s.edge.item.name)} (at {quoted(s.end[0])})" for s in closing]
     return (f"loops close after {', '.join(names)}",) if names else ()
 
 
 def _plan(drawing: Drawing, steps: list[Step]) -> _Plan:
-    """Names of the frames, the users' where no joint has them."""
+    """Return the names of the frames, changed only if a joint has the same name."""
     joints = {joint.name: joint for joint in drawing.joints}
     bodies = {body.name: body for body in drawing.bodies}
     taken = _part_names(drawing)
@@ -127,7 +127,7 @@ def _plan(drawing: Drawing, steps: list[Step]) -> _Plan:
 
 
 def _part_names(drawing: Drawing) -> set[str]:
-    """Names of the frames of all joints, which must be different."""
+    """Return the names of the frames of all joints, which must be unique."""
     owners: dict[str, str] = {}
     for joint in drawing.joints:
         for part in every_part(joint):
@@ -142,7 +142,7 @@ def _part_names(drawing: Drawing) -> set[str]:
 
 
 def _free_name(name: str, taken: set[str]) -> str:
-    """The name, with an addition where another frame has it, and then taken."""
+    """Return the name, with a suffix if it is taken, and add it to the taken names."""
     while name in taken:
         name += ".body"
     taken.add(name)
@@ -150,7 +150,7 @@ def _free_name(name: str, taken: set[str]) -> str:
 
 
 def _is_body(drawing: Drawing, step: Step) -> bool:
-    """Whether the frame of a link is that of its body as well."""
+    """Return whether the frame of a link is also the frame of its body."""
     body = step.edge.item
     if isinstance(body, DrawnJoint) or step.closes or step.reverse:
         return False
@@ -158,12 +158,12 @@ def _is_body(drawing: Drawing, step: Step) -> bool:
 
 
 def _tip(body: DrawnBody) -> str | None:
-    """Name of the joint at the end of a body's link, None for the platform's point."""
+    """Return the joint at the end of a body's link; None for the platform's point."""
     return body.ends[1] if body.ends else None
 
 
 def _last_name(step: Step, links: Mapping[str, str]) -> str:
-    """Name of the last frame of an edge."""
+    """Return the name of the last frame of an edge."""
     item = step.edge.item
     if isinstance(item, DrawnJoint):
         return parts_of(item, step.reverse)[-1].name
@@ -171,7 +171,7 @@ def _last_name(step: Step, links: Mapping[str, str]) -> str:
 
 
 def _frames_of(plan: _Plan, step: Step) -> list[PlacedFrame]:
-    """Frames of an edge, and of the body that it leads to."""
+    """Return the frames of an edge, and of the body at its end."""
     item, carrier = step.edge.item, plan.carriers[step.start]
     placed: list[PlacedFrame] = []
     if isinstance(item, DrawnJoint):
@@ -192,7 +192,7 @@ def _frames_of(plan: _Plan, step: Step) -> list[PlacedFrame]:
 
 
 def _frame(joint: DrawnJoint, part: Part, carrier: str) -> Frame:
-    """One frame of a joint."""
+    """Return one frame of a joint."""
     numbers = part.numbers
     motion = _motion(joint, part.position) if part.kind != "fixed" else {}
     return Frame(
@@ -204,13 +204,13 @@ def _frame(joint: DrawnJoint, part: Part, carrier: str) -> Frame:
 
 
 def _parallel(step: Step) -> Parallel | None:
-    """The second chain of contacts of an edge, None where it has none."""
+    """Return the second chain of contacts of an edge; None if there is none."""
     item = step.edge.item
     return parallel_parts(item, step.reverse) if isinstance(item, DrawnJoint) else None
 
 
 def _second_chain(step: Step, chain: Parallel) -> list[PlacedFrame]:
-    """Frames of the second chain of contacts of a joint."""
+    """Return the frames of the second chain of contacts of a joint."""
     joint, carrier = step.edge.item, chain.start
     assert isinstance(joint, DrawnJoint)
     placed = []
@@ -221,7 +221,7 @@ def _second_chain(step: Step, chain: Parallel) -> list[PlacedFrame]:
 
 
 def _motion(joint: DrawnJoint, position: float) -> dict:
-    """The keys of a frame for the motion of a joint."""
+    """Return the keys of a frame that describe the motion of a joint."""
     return {
         "pitch": joint.pitch, "actuated": joint.actuated, "position": position,
         "limits": joint.limits,
@@ -229,7 +229,7 @@ def _motion(joint: DrawnJoint, position: float) -> dict:
 
 
 def _mass(body: DrawnBody, pose: NDArray) -> dict:
-    """The keys of a frame for the mass and moments of inertia of a body."""
+    """Return the keys of a frame that describe the mass and inertia of a body."""
     if not _has_mass(body):
         return {}
     R = pose[:3, :3]
@@ -238,12 +238,12 @@ def _mass(body: DrawnBody, pose: NDArray) -> dict:
 
 
 def _has_mass(body: DrawnBody) -> bool:
-    """Whether a body has a mass or moments of inertia."""
+    """Return whether a body has a mass or moments of inertia."""
     return bool(body.mass or body.inertia.any())
 
 
 def _end_pose(plan: _Plan, body: DrawnBody, tip: bool) -> NDArray:
-    """(4, 4) of a link's end at home: the joint's axes, or the platform's."""
+    """Return the (4, 4) pose of a link's end at home: of a joint or the platform."""
     name = body.ends[tip] if body.ends else None
     if name is None:
         return transform(plan.drawing.platform_at, np.eye(3))
@@ -251,7 +251,7 @@ def _end_pose(plan: _Plan, body: DrawnBody, tip: bool) -> NDArray:
 
 
 def _pose(plan: _Plan, node: Node) -> NDArray:
-    """(4, 4) of a body's own frame at home."""
+    """Return the (4, 4) pose of a body's own frame at home."""
     name, far = node
     body = plan.bodies[name]
     if name == plan.drawing.platform and far:
@@ -263,14 +263,14 @@ def _pose(plan: _Plan, node: Node) -> NDArray:
 
 
 def _body_frame(plan: _Plan, node: Node, carrier: str) -> PlacedFrame:
-    """The fixed frame of a body, with its mass."""
+    """Return the fixed frame of a body, with its mass."""
     pose = _pose(plan, node)
     mass = _mass(plan.bodies[node[0]], pose) if node[1] else {}
     return Frame(plan.own[node], carrier, **mass), pose
 
 
 def _ends(plan: _Plan, step: Step) -> list[PlacedFrame]:
-    """The frame that must meet a body's, and a frame of the base to be met."""
+    """Return the frame that closes a loop at a body, and a base frame if needed."""
     end = Frame(plan.ends[step.edge], _last_name(step, plan.links))
     if step.end != ROOT:
         return [(end, _pose(plan, step.end))]

@@ -1,8 +1,8 @@
-"""Joints of several freedoms in a robot of frames, each of which has one.
+"""Recognition of joints with several freedoms in a robot whose frames have one each.
 
-Consecutive passive frames at one point, with nothing on the bodies between them, are a
-universal, spherical, cylindrical or planar joint, where its clearance and springs can
-be those of one joint at every posture.
+Consecutive passive frames at one point, without anything on the bodies between them,
+form a universal, spherical, cylindrical or planar joint. This requires that one joint
+can have the same clearance and springs at every posture.
 """
 
 from collections import Counter
@@ -26,10 +26,10 @@ from forcefit.assembly.kinematics.posture import Posture
 from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from forcefit.inputs.table import BadInput, quoted
 
-_SAME = 1e-12  # [lengths, sine] error below which points and directions are the same
-_PARALLEL = 1e-2  # sine of the angle below which a universal joint is not made
+_SAME = 1e-12  # [lengths, sine] points and directions that differ by less are equal
+_PARALLEL = 1e-2  # sine of the angle below which axes form no universal joint
 _TURNS = ("revolute", "revolute")
-# ends of the names that frames of a drawn joint have (``parts.py``)
+# suffixes in the names of the frames of a drawn joint (``parts.py``)
 _PARTS = {"first", "second", "third", "turn", "slide", "slide_x", "slide_y"}
 
 
@@ -38,9 +38,9 @@ class FoundJoint:
     """A joint between two rigid bodies.
 
     Attributes:
-        joint: as drawn; its bodies have no names yet.
-        rows: frames of which it is made, from the first body to the second; a joint
-            whose last frame has the clearance begins there, and its rows fall.
+        joint: the drawn joint, whose bodies have no names yet.
+        rows: indices of the joint's frames, from the first body to the second; they
+            decrease if the joint begins at its last frame, which has the clearance.
         bodies: numbers of the first and the second body.
     """
 
@@ -56,11 +56,11 @@ def found_joints(
 
     Args:
         posture: the robot at home.
-        bodies: its rigid bodies.
-        several: whether frames may be taken together as joints of several freedoms.
+        bodies: rigid bodies of the robot.
+        several: whether frames may be combined to joints of several freedoms.
 
     Returns:
-        The joints, each row of a frame in one of them.
+        The joints; each frame that is a joint belongs to one of them.
     """
     robot = posture.robot
     following = _following(posture, bodies) if several else {}
@@ -85,14 +85,14 @@ def found_joints(
 
 
 def _ends(bodies: RigidBodies, rows: list[int]) -> tuple[int, int]:
-    """Numbers of the first and the second body of a joint."""
+    """Return the numbers of the first and the second body of a joint."""
     if rows[0] > rows[-1]:
         return bodies.after[rows[0]], bodies.before[rows[-1]]
     return bodies.before[rows[0]], bodies.after[rows[-1]]
 
 
 def _following(posture: Posture, bodies: RigidBodies) -> dict[int, int]:
-    """Next frame at the same point, where the body between holds nothing else."""
+    """Return the next frame at the same point, if the body between carries nothing."""
     robot, size = posture.robot, size_of(posture.robot)
     held = Counter(bodies.before[robot.index(robot.platform)] for _ in range(2))
     for i, frame in enumerate(robot.frames):
@@ -120,7 +120,7 @@ def has_mass(body: Frame | DrawnBody) -> bool:
 
 
 def _single(posture: Posture, i: int) -> DrawnJoint:
-    """The joint of one frame."""
+    """Return the joint of one frame."""
     frame, T = posture.robot.frames[i], posture.transforms[i]
     return DrawnJoint(
         frame.name, frame.joint, "", "", T[:3, 3], T[:3, 2], T[:3, 0], T[:3, 0],
@@ -130,7 +130,7 @@ def _single(posture: Posture, i: int) -> DrawnJoint:
 
 
 def _numbers(frame: Frame) -> JointNumbers:
-    """Error, clearance and stiffness of a frame, in its axes."""
+    """Return error, clearance and stiffness of a frame, in its axes."""
     bolt, error = frame.locked_at, frame.geometric_error
     if bolt is not None:  # the drawing is of the robot before it is bolted
         if {"rx", "ry", "rz"} & set(bolt.pose):
@@ -146,7 +146,7 @@ def _numbers(frame: Frame) -> JointNumbers:
 
 
 def _several(posture: Posture, rows: list[int]) -> tuple[DrawnJoint, list[int]] | None:
-    """The joint of two or three frames, None if they are none of the known types."""
+    """Return the joint of two or three frames; None if the type is not known."""
     frames = [posture.robot.frames[i] for i in rows]
     kinds = tuple(frame.joint for frame in frames)
     axes = [posture.transforms[i][:3, :3] for i in rows]
@@ -176,7 +176,7 @@ def _several(posture: Posture, rows: list[int]) -> tuple[DrawnJoint, list[int]] 
     kind, R, numbers = found
     name = _common_name(posture.robot, rows)
     if R is not axes[0] and kind == "spherical":
-        rows = rows[::-1]  # the contact stays with the body that has it
+        rows = rows[::-1]  # the contact remains on the body that has it
     second = R[:, 0] if kind != "universal" else z[1]
     joint = DrawnJoint(
         name, kind, "", "", posture.transforms[rows[0]][:3, 3], R[:, 2],
@@ -189,7 +189,7 @@ _Found = tuple[str, NDArray, tuple[JointNumbers, ...]] | None
 
 
 def _universal(axes: list[NDArray], own: list[JointNumbers]) -> _Found:
-    """A universal joint, the numbers of each bearing in its axes; None if not exact."""
+    """Return a universal joint that has the same numbers, or None if none exists."""
     z = [R[:, 2] for R in axes]
     numbers = []
     for k, other in ((0, 1), (1, 0)):
@@ -203,7 +203,7 @@ def _universal(axes: list[NDArray], own: list[JointNumbers]) -> _Found:
 
 
 def _turned(own: JointNumbers, R: NDArray) -> JointNumbers | None:
-    """The numbers in axes turned about z, None where that is not exact."""
+    """Return the numbers in axes rotated about z, or None without an equivalent."""
     if np.abs(R - np.eye(3)).max() < _SAME:
         return own
     turn = np.kron(np.eye(2), R)
@@ -224,7 +224,7 @@ def _turned(own: JointNumbers, R: NDArray) -> JointNumbers | None:
 def _with_one_contact(
     kind: str, axes: list[NDArray], own: list[JointNumbers], bounds: Sequence[str]
 ) -> _Found:
-    """A joint whose numbers are those of its first frame; None if not exact."""
+    """Return a joint with its first frame's numbers, or None without an equivalent."""
     if not all(map(_empty, own[1:])):
         return None
     clearance = own[0].clearance or Clearance()
@@ -247,7 +247,7 @@ def _with_one_contact(
 
 
 def _isotropic(own: JointNumbers) -> bool:
-    """Whether only a contact is given that is the same about z from both bodies."""
+    """Return whether there is only a contact that is symmetric about z."""
     K = own.stiffness
     even = K is None or (
         not (np.where(np.isinf(K), 0.0, K) - np.diag(np.where(
@@ -258,7 +258,7 @@ def _isotropic(own: JointNumbers) -> bool:
 
 
 def _empty(own: JointNumbers) -> bool:
-    """Whether there is no error, clearance, spring or tolerance."""
+    """Return whether there is no error, clearance, spring or tolerance."""
     return (
         own.clearance is None and own.stiffness is None and own.tolerance is None
         and not own.error.any()
@@ -266,7 +266,7 @@ def _empty(own: JointNumbers) -> bool:
 
 
 def _common_name(robot: Robot, rows: list[int]) -> str:
-    """What the names of several frames have in common, or the first of them."""
+    """Return the common beginning of frame names, or the first name."""
     names = [robot.frames[i].name for i in rows]
     stems = {name.rpartition(".")[0] for name in names}
     if {name.rpartition(".")[2] for name in names} <= _PARTS and len(stems) == 1:
@@ -278,7 +278,7 @@ def _common_name(robot: Robot, rows: list[int]) -> str:
 
 
 def _while_equal(names: list[str]) -> Iterator[str]:
-    """The letters with which all names begin."""
+    """Yield the letters with which all names begin."""
     for letters in zip(*names, strict=False):
         if len(set(letters)) > 1:
             return

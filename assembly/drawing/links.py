@@ -1,4 +1,4 @@
-"""Links of drawn bodies, in the axes of the frame at their tip."""
+"""Links of drawn bodies, converted to the axes of the frame at their tip and back."""
 
 from dataclasses import replace
 
@@ -20,27 +20,27 @@ from forcefit.inputs.table import BadInput, quoted
 from forcefit.stiffness.beam.beam import section_axes
 from forcefit.stiffness.screws import screw_map
 
-_SAME_POINT = 1e-9  # [m] two points nearer than this are one
-_SAME_AXES = 1e-12  # difference below which two sets of axes are the same
-_PARALLEL = 1e-6  # sine of the angle below which an axis gives no direction across
+_SAME_POINT = 1e-9  # [m] points with a smaller distance count as equal
+_SAME_AXES = 1e-12  # axes with a smaller difference count as equal
+_PARALLEL = 1e-6  # sine of the angle below which an axis defines no lateral direction
 
 
 def link_at_tip(
     body: DrawnBody, base: NDArray, tip: NDArray, reverse: bool = False
 ) -> Link | None:
-    """The link of a drawn body as the frame at its tip holds it.
+    """Return the link of a drawn body in the form that the frame at its tip uses.
 
     Args:
-        body: with a link.
-        base: (4, 4) of the end nearer to the robot's base, at home.
-        tip: (4, 4) of the other, in whose axes the link is read.
-        reverse: ``tip`` is the end from which the body's link begins.
+        body: body with a link.
+        base: (4, 4) pose at home of the end nearer to the robot's base.
+        tip: (4, 4) pose at home of the other end, in whose axes the link is expressed.
+        reverse: whether ``tip`` is the end at which the body's link begins.
 
     Returns:
-        The link, its directions in the tip's axes; beams with length and axis.
+        The link with directions in the tip's axes; beams have a length and an axis.
 
     Raises:
-        BadInput: the two ends coincide, or a library's link is reversed.
+        BadInput: the two ends coincide, or a link from a library is reversed.
     """
     link, R = body.link, tip[:3, :3]
     place = f"body {quoted(body.name)}.link"
@@ -71,7 +71,7 @@ def link_at_tip(
 
 
 def _default_up(body: DrawnBody, along: NDArray) -> tuple[float, float, float]:
-    """The z axis of the copy of the leg; its x axis for a beam along that z."""
+    """Return the z axis of the leg's copy, or its x axis for a beam along z."""
     x, _, z = body.axes.T
     unit = along / np.linalg.norm(along)
     a, b, c = (x if np.linalg.norm(np.cross(unit, z)) < _PARALLEL else z).tolist()
@@ -79,7 +79,7 @@ def _default_up(body: DrawnBody, along: NDArray) -> tuple[float, float, float]:
 
 
 def _reversed_matrix(link: MatrixLink, base: NDArray, tip: NDArray) -> MatrixLink:
-    """A stiffness read at the end called base, read at the one called tip."""
+    """Return a stiffness matrix, given at the base end, expressed at the tip end."""
     turn = base[:3, :3].T @ tip[:3, :3]
     M = screw_map(base[:3, :3].T @ (tip[:3, 3] - base[:3, 3]), turn)
     K = M.T @ link.stiffness @ M
@@ -90,11 +90,11 @@ def beam_start(frame: Frame, T: NDArray) -> NDArray | None:
     """Return the point at which the beam of a frame begins.
 
     Args:
-        frame: of a robot.
-        T: (4, 4) the frame at home, seen from the base.
+        frame: frame of a robot.
+        T: (4, 4) home pose of the frame in base axes.
 
     Returns:
-        (3,) [m] base axes; None for links that have no length.
+        (3,) [m] point in base axes; None for links that have no length.
     """
     if isinstance(frame.link, BeamLink):
         length, axis = beam_axis(frame)
@@ -103,16 +103,17 @@ def beam_start(frame: Frame, T: NDArray) -> NDArray | None:
 
 
 def drawn_link(frame: Frame, T: NDArray, to: NDArray, spanned: bool) -> Link:
-    """Return the link of a frame as that of a drawn body.
+    """Return the link of a frame in the form that a drawn body uses.
 
     Args:
-        frame: with a link.
-        T: (4, 4) the frame at home, seen from the base.
-        to: (4, 4) the joint at the link's end, likewise; at the frame's origin.
-        spanned: whether a beam is between its two joints.
+        frame: frame with a link.
+        T: (4, 4) home pose of the frame in base axes.
+        to: (4, 4) home pose of the joint at the link's end, at the frame's origin.
+        spanned: whether a beam connects its two joints.
 
     Returns:
-        The link, its directions in base axes; a stiffness in the joint's axes.
+        The link with directions in base axes; a stiffness matrix is in the joint's
+        axes.
     """
     link, R = frame.link, T[:3, :3]
     if isinstance(link, MatrixLink):
@@ -135,6 +136,6 @@ def drawn_link(frame: Frame, T: NDArray, to: NDArray, spanned: bool) -> Link:
 
 
 def _mesh_axis(frame: Frame, link: MeshLink) -> tuple[float, float, float]:
-    """Direction of a mesh from base to tip, in the frame's axes."""
+    """Return the direction of a mesh from base to tip, in the frame's axes."""
     x, y, z = (link.axis or between_origins(frame))[:3]
     return float(x), float(y), float(z)

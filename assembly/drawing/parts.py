@@ -1,4 +1,4 @@
-"""A joint as frames of one freedom each, all at the same point."""
+"""The frames of a joint: one freedom each, all at the same point."""
 
 from dataclasses import dataclass, replace
 
@@ -9,7 +9,7 @@ from forcefit.assembly.drawing.contacts import Contact
 from forcefit.assembly.drawing.drawing import FREE_ROWS, DrawnJoint, JointNumbers
 from forcefit.stiffness.screws import transform
 
-_FLIP = np.diag([1.0, -1.0, -1.0])  # half a turn about x
+_FLIP = np.diag([1.0, -1.0, -1.0])  # rotation by 180 degrees about x
 _FLIP_SCREW = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 
 
@@ -18,12 +18,12 @@ class Part:
     """One frame of a joint.
 
     Attributes:
-        name: of the frame.
-        kind: ``"fixed"``, ``"revolute"`` or ``"prismatic"``, about or along own z.
-        pose: (4, 4) at home before its motion, seen from the base.
+        name: name of the frame.
+        kind: ``"fixed"``, ``"revolute"`` or ``"prismatic"``, about or along its z axis.
+        pose: (4, 4) home pose before the joint's motion, in base axes.
         position: [rad or m] coordinate at home.
         numbers: error, clearance and stiffness of this frame.
-        contact: whether it is a contact, not the joint's own frame.
+        contact: whether the frame is a contact instead of the joint's own frame.
     """
 
     name: str
@@ -39,8 +39,8 @@ class Parallel:
     """A second chain of frames between the same two bodies.
 
     Attributes:
-        start: name of the frame of the joint after which it begins.
-        parts: its frames; the last one meets a frame of the first chain.
+        start: name of the joint's frame after which the chain begins.
+        parts: frames of the chain; the last one meets a frame of the first chain.
         meets: name of that frame.
     """
 
@@ -50,35 +50,35 @@ class Parallel:
 
 
 def parts_of(joint: DrawnJoint, reverse: bool = False) -> list[Part]:
-    """The frames of a joint, from its first body to its second.
+    """Return the frames of a joint, from its first body to its second.
 
     Args:
-        joint: of any type.
-        reverse: from its second body to its first: axes and signs are such that the
-            coordinates, the errors and the springs are the same.
+        joint: joint of any type.
+        reverse: whether the frames lead from the second body to the first. Axes and
+            signs are then such that coordinates, errors and springs are the same.
 
     Returns:
-        At least one; each error, bound and spring is on one of them.
+        At least one frame; each error, bound and spring is on one of them.
     """
     every = _all_parts(joint)
     parts = _passed([part for part, chain in every if chain == 0], reverse)
     if any(chain == 1 for _, chain in every):
         at = 1 + max(i for i, part in enumerate(parts) if part.contact)
         parts.insert(at, _bare(joint, "contacts_end"))
-        if parts[0].contact:  # errors of the body before it move both chains
+        if parts[0].contact:  # errors of the preceding body move both chains
             parts.insert(0, _bare(joint, "contacts_start"))
     return parts
 
 
 def parallel_parts(joint: DrawnJoint, reverse: bool = False) -> Parallel | None:
-    """The frames of the second chain of a joint's contacts.
+    """Return the frames of the second chain of a joint's contacts.
 
     Args:
-        joint: of any type.
+        joint: joint of any type.
         reverse: as for :func:`parts_of`.
 
     Returns:
-        The chain, None where the contacts are in one chain.
+        The chain; None if the contacts form one chain.
     """
     chain = [part for part, k in _all_parts(joint) if k == 1]
     if not chain:
@@ -91,19 +91,19 @@ def parallel_parts(joint: DrawnJoint, reverse: bool = False) -> Parallel | None:
 
 
 def every_part(joint: DrawnJoint, reverse: bool = False) -> list[Part]:
-    """The frames of a joint, those of a second chain of contacts last."""
+    """Return the frames of a joint, followed by a second chain of contacts."""
     chain = parallel_parts(joint, reverse)
     return [*parts_of(joint, reverse), *(chain.parts if chain else ())]
 
 
 def _bare(joint: DrawnJoint, suffix: str) -> Part:
-    """A fixed frame at a joint's point, where two chains of contacts meet."""
+    """Return a fixed frame at a joint's point, where two chains of contacts meet."""
     name = f"{joint.name}.{suffix}"
     return Part(name, "fixed", joint_axes(joint), 0.0, JointNumbers())
 
 
 def _all_parts(joint: DrawnJoint) -> list[tuple[Part, int]]:
-    """The frames of a joint from its first body to its second, and their chains."""
+    """Return the frames of a joint from its first body on, with their chains."""
     parts: list[tuple[Part, int]] = []
     for row, numbers in zip(_motions(joint), _shares(joint), strict=True):
         part = _part(joint, *row, numbers)
@@ -118,14 +118,14 @@ def _all_parts(joint: DrawnJoint) -> list[tuple[Part, int]]:
 
 
 def _passed(parts: list[Part], reverse: bool) -> list[Part]:
-    """The frames in the order in which the tree passes them."""
+    """Return the frames in the order in which the tree traverses them."""
     return [_reversed(part) for part in reversed(parts)] if reverse else parts
 
 
 def _contact_part(
     joint: DrawnJoint, suffix: str, pose: NDArray, contact: Contact
 ) -> Part:
-    """One fixed frame with a contact, near the frame of this suffix and pose."""
+    """Return one fixed frame with a contact, placed near the given frame pose."""
     name = ".".join(filter(None, (joint.name, suffix, contact.suffix)))
     end = contact.end
     if end is not None:
@@ -136,17 +136,17 @@ def _contact_part(
 
 
 def joint_axes(joint: DrawnJoint) -> NDArray:
-    """(4, 4) point and axes of a joint, base axes at home: z = axis, x = across."""
+    """Return the (4, 4) pose of a joint at home: z along axis, x along across."""
     return _axes(joint.at, joint.axis, joint.across)
 
 
 def _axes(at: NDArray, z: NDArray, x: NDArray) -> NDArray:
-    """(4, 4) frame at a point; x is at right angles to z."""
+    """Return the (4, 4) frame at a point; x is perpendicular to z."""
     return transform(at, np.column_stack([x, np.cross(z, x), z]))
 
 
 def _motions(joint: DrawnJoint) -> list[tuple[str, str, NDArray, NDArray]]:
-    """Suffix, kind, z and x of each part, from the first body to the second."""
+    """Return suffix, kind, z and x of each frame, from the first body to the second."""
     z, x, second = joint.axis, joint.across, joint.axis2
     y = np.cross(z, x)
     if joint.kind == "cylindrical":
@@ -172,13 +172,13 @@ def _motions(joint: DrawnJoint) -> list[tuple[str, str, NDArray, NDArray]]:
 
 
 def _across(vector: NDArray, axis: NDArray) -> NDArray:
-    """(3,) unit vector along the part of a vector at right angles to an axis."""
+    """Return the unit vector (3,) along a vector's component normal to an axis."""
     rest = vector - (vector @ axis) * axis
     return rest / np.linalg.norm(rest)
 
 
 def _shares(joint: DrawnJoint) -> list[JointNumbers]:
-    """Numbers of each part: one of them carries those of the joint."""
+    """Return the numbers of each frame; one frame carries those of the joint."""
     own = joint.numbers[0]
     if joint.kind == "universal":
         return [joint.numbers[0], joint.numbers[-1]]
@@ -187,24 +187,24 @@ def _shares(joint: DrawnJoint) -> list[JointNumbers]:
     if joint.kind == "spherical":
         return [own, JointNumbers(), JointNumbers()]
     if joint.kind == "planar":
-        # the error places the plane, before the sliding; the contact is of the turn
+        # the error places the plane before the sliding; the contact is at the rotation
         placed = JointNumbers(error=_from_axes(own.error), tolerance=_size(own))
         contact = replace(own, error=np.zeros(6), tolerance=None)
         return [placed, JointNumbers(), contact]
     return [own]
 
 
-# of a planar joint's first frame, whose z is the joint's x and whose x is its y
+# axes of a planar joint's first frame: its z is the joint's x, its x the joint's y
 _TO_SLIDE = np.array([1, 2, 0, 4, 5, 3])
 
 
 def _from_axes(screw: NDArray) -> NDArray:
-    """(6,) a screw in a planar joint's axes, in those of its first frame."""
+    """Return a planar joint's screw (6,) in the axes of the joint's first frame."""
     return screw[_TO_SLIDE]
 
 
 def _size(numbers: JointNumbers) -> NDArray | None:
-    """(6,) the tolerance likewise, which has no sign."""
+    """Return the tolerance (6,) in these axes, without signs."""
     return None if numbers.tolerance is None else numbers.tolerance[_TO_SLIDE]
 
 
@@ -212,7 +212,7 @@ def _part(
     joint: DrawnJoint, suffix: str, kind: str, z: NDArray, x: NDArray,
     numbers: JointNumbers,
 ) -> Part:  # fmt: skip
-    """One part, its coordinate at home that of the joint if it is alone."""
+    """Return one frame; a single frame has the joint's coordinate at home."""
     name = f"{joint.name}.{suffix}" if suffix else joint.name
     position = 0.0 if suffix else joint.position
     if len(FREE_ROWS[joint.kind]) > 1 and joint.kind != "universal":
@@ -221,7 +221,7 @@ def _part(
 
 
 def _held(K: NDArray | None, kind: str) -> NDArray | None:
-    """K_B of the part that carries it: motions of the other parts are rigid there."""
+    """Return K_B for one frame, rigid along the motions of the other frames."""
     if K is None:
         return None
     K = K.copy()
@@ -233,7 +233,7 @@ def _held(K: NDArray | None, kind: str) -> NDArray | None:
 
 
 def _reversed(part: Part) -> Part:
-    """The part as its second body carries its first, z turned round."""
+    """Return the frame for passage from second to first body, with z reversed."""
     own = part.numbers
     K = own.stiffness
     numbers = JointNumbers(
@@ -250,6 +250,6 @@ def _reversed(part: Part) -> Part:
 
 
 def _flipped(K: NDArray) -> NDArray:
-    """(6, 6) K_B in axes turned by half a turn about x."""
+    """Return K_B (6, 6) in axes rotated by 180 degrees about x."""
     signs = np.outer(_FLIP_SCREW, _FLIP_SCREW)
     return np.where(np.isinf(K), K, np.where(np.isinf(K), 0.0, K) * signs)

@@ -1,7 +1,7 @@
 """The rigid bodies of a robot of frames and closures.
 
-Frames that nothing moves against each other are one body.  Joints, and fixed frames
-with an error, a clearance or a spring, connect two of them; so do links.
+Frames without relative motion form one body.  Two bodies are connected by a joint, by a
+fixed frame with an error, a clearance or a spring, or by a link.
 """
 
 from dataclasses import dataclass
@@ -12,12 +12,12 @@ from forcefit.inputs.table import BadInput, quoted
 
 @dataclass(frozen=True, eq=False)
 class RigidBodies:
-    """Bodies of a robot, by number; that of the base is 0.
+    """The rigid bodies of a robot, by number; the base is number 0.
 
     Attributes:
-        before: body that holds each frame's joint, at the tip of its link.
+        before: body that carries each frame's joint, at the tip of the frame's link.
         after: body that the joint moves.
-        starts: body from which each frame's link begins; ``before`` if it is rigid.
+        starts: body at which each frame's link begins; ``before`` if it is rigid.
     """
 
     before: tuple[int, ...]
@@ -38,10 +38,10 @@ def connects(frame: Frame) -> bool:
 
 
 def rigid_bodies(robot: Robot) -> RigidBodies:
-    """Return the rigid bodies of a robot, the frames of each closure in one.
+    """Return the rigid bodies of a robot; the frames of a closure share one body.
 
     Args:
-        robot: any.
+        robot: any robot.
 
     Returns:
         The bodies.
@@ -50,7 +50,7 @@ def rigid_bodies(robot: Robot) -> RigidBodies:
         BadInput: a closure, joint or link connects a rigid body with itself.
     """
     count = len(robot.frames)
-    group = list(range(2 * count + 1))  # before, after, base
+    group = list(range(2 * count + 1))  # nodes: before, after, base
 
     def root(node: int) -> int:
         while group[node] != node:
@@ -84,7 +84,7 @@ def rigid_bodies(robot: Robot) -> RigidBodies:
 
 
 def _same(place: str) -> str:
-    """Return the message on a connection between two frames of one body."""
+    """Return the message for a connection between two frames of one body."""
     return (
         f"{place}: found that it connects two frames of one rigid body, expected two "
         "bodies: a file of bodies and joints (format 2) cannot hold it"

@@ -1,8 +1,9 @@
 """The spanning tree of a drawing, and the edges that close its loops.
 
-Nodes are rigid bodies.  An elastic body is two of them, one at each end of its link:
-``(name, False)`` at the end from which the link begins, which holds only the joint
-there, and ``(name, True)``, which holds all else.  Edges are joints and links.
+The nodes are rigid bodies.  An elastic body has two nodes, one at each end of its link:
+``(name, False)`` at the end at which the link begins, which contains only the joint
+there, and ``(name, True)``, which contains everything else.  The edges are joints and
+links.
 """
 
 import heapq
@@ -19,12 +20,12 @@ ROOT: Node = (BASE, True)
 
 @dataclass(frozen=True, eq=False)
 class Edge:
-    """A joint, or the link of an elastic body.
+    """An edge of the graph: a joint, or the link of an elastic body.
 
     Attributes:
-        item: which of the two.
-        first: node where it begins: of a joint the first body.
-        second: node where it ends.
+        item: the joint or the body.
+        first: node at which the edge begins; for a joint, its first body.
+        second: node at which the edge ends.
     """
 
     item: DrawnJoint | DrawnBody
@@ -34,12 +35,12 @@ class Edge:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """An edge as the tree passes it.
+    """An edge as the spanning tree traverses it.
 
     Attributes:
         edge: the edge.
-        reverse: whether it is passed from its second node to its first.
-        closes: whether it ends at a node that the tree reaches in another way.
+        reverse: whether the edge is traversed from its second node to its first.
+        closes: whether the edge ends at a node that the tree reaches by another edge.
     """
 
     edge: Edge
@@ -48,29 +49,30 @@ class Step:
 
     @property
     def start(self) -> Node:
-        """The node nearer to the base."""
+        """The node that is nearer to the base."""
         return self.edge.second if self.reverse else self.edge.first
 
     @property
     def end(self) -> Node:
-        """The node that it leads to."""
+        """The node at the end of the traversed edge."""
         return self.edge.first if self.reverse else self.edge.second
 
 
 def steps_of(drawing: Drawing) -> list[Step]:
-    """Every edge of a drawing, in the order in which frames are made.
+    """Return every edge of a drawing, in the order in which frames are created.
 
-    Edges are passed from their first body to the second wherever a path from the base
-    does so; of such paths the shortest is the tree's.
+    Edges are traversed from their first to their second body if some path from the base
+    does so; the tree uses the shortest of such paths.
 
     Args:
-        drawing: any.
+        drawing: any drawing.
 
     Returns:
-        Branch by branch; those that close a loop follow the branch of their first body.
+        The edges branch by branch; edges that close a loop follow the branch of their
+        first body.
 
     Raises:
-        BadInput: no joint leads from the base to a body.
+        BadInput: no joint connects a body to the base.
     """
     edges = _edges(drawing)
     around: dict[Node, list[Edge]] = {ROOT: []}
@@ -97,7 +99,7 @@ def steps_of(drawing: Drawing) -> list[Step]:
 
 
 def _step(edge: Edge, node: Node, entered: Mapping[Node, Edge]) -> Step | None:
-    """The edge as it is passed from a node; None where it is passed from the other."""
+    """Return the edge as traversed from a node; None if it starts at the other node."""
     reverse = edge.second == node
     if entered.get(edge.first if reverse else edge.second) is edge:
         return Step(edge, reverse, False)
@@ -107,7 +109,7 @@ def _step(edge: Edge, node: Node, entered: Mapping[Node, Edge]) -> Step | None:
 
 
 def _edges(drawing: Drawing) -> list[Edge]:
-    """Joints in the order of the file, and links after the joint they begin at."""
+    """Return joints in the order of the file, each link after its first joint."""
     bodies = {body.name: body for body in drawing.bodies}
 
     def node(name: str, joint: DrawnJoint) -> Node:
@@ -126,10 +128,10 @@ def _edges(drawing: Drawing) -> list[Edge]:
 
 
 def _entered(around: Mapping[Node, list[Edge]]) -> dict[Node, Edge]:
-    """The edge by which the tree reaches each node: fewest against their direction."""
+    """Return the edge by which the tree reaches each node, reversing few edges."""
     entered: dict[Node, Edge] = {}
     reached: set[Node] = set()
-    count = 0  # of edges put in, which keeps the order of the file among equals
+    count = 0  # number of added edges, which keeps the file's order among equal paths
     waiting: list[tuple[int, int, int, Node, Edge | None]] = [(0, 0, 0, ROOT, None)]
     while waiting:
         against, length, _, node, by = heapq.heappop(waiting)

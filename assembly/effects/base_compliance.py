@@ -24,7 +24,8 @@ def on_foundation(conditions: Conditions) -> Conditions:
         conditions: R rows.
 
     Returns:
-        The conditions; the new frame is the first one, unless there was such a frame.
+        The conditions; the new frame is the first frame.  If the robot already has such
+        a frame, the conditions are unchanged.
     """
     feet = [f for f in conditions.robot.frames if f.parent == BASE]
     foot = feet[0]
@@ -35,7 +36,7 @@ def on_foundation(conditions: Conditions) -> Conditions:
 
 
 def _standing(conditions: Conditions, robot: Robot) -> Conditions:
-    """Return the rows with an additional first frame that does not move them."""
+    """Return the rows with an additional fixed frame at the beginning."""
     still = np.broadcast_to(np.eye(4), (len(conditions), 1, 4, 4))
     zero = np.zeros((len(conditions), 1, 6))
     rest = (
@@ -56,8 +57,8 @@ def with_foundation(robot: Robot, values: Values) -> Robot:
 
     Args:
         robot: robot on a rigid base.
-        values: ``stiffness.rx`` .. ``stiffness.tz`` [N m/rad, N/m]; absent ones are
-            rigid.
+        values: ``stiffness.rx`` .. ``stiffness.tz`` [N m/rad, N/m]; the foundation is
+            rigid in directions that are not given.
 
     Returns:
         The robot on its foundation.
@@ -73,7 +74,7 @@ def with_foundation(robot: Robot, values: Values) -> Robot:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Return stiffnesses from compliances; those below 0 mean a stiffer foundation."""
+    """Return stiffnesses from compliances; negative ones mean a stiffer foundation."""
     return {
         f"stiffness.{name.removeprefix('compliance.')}": 1 / c
         for name, c in values.items()

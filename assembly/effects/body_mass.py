@@ -1,8 +1,9 @@
 """Mass and centre of mass of a body that differ from the declared ones.
 
-With declared mass m and centre c, and true M and C, ``mass`` is M - m and ``moment`` is
-M C - m c.  The weight is linear in both; the true centre is (m c + moment)/M.  Moments
-of inertia, which no weight shows, remain as declared.
+Let m and c be the declared mass and centre, and M and C the true ones.  The parameter
+``mass`` is M - m, and ``moment`` is M C - m c.  The weight is linear in both; the true
+centre is (m c + moment)/M.  Moments of inertia do not influence the weight and remain
+as declared.
 """
 
 from dataclasses import replace
@@ -21,7 +22,7 @@ _LEAST = 1e-9  # [kg] smallest mass for which a centre is defined
 
 
 def heavy_bodies(robot: Robot) -> tuple[str, ...]:
-    """Return the frames whose bodies are declared to have a mass, including beams."""
+    """Return the frames whose bodies have a declared mass, including beams."""
     return tuple(
         f.name
         for f in robot.frames

@@ -1,7 +1,7 @@
-"""Combination of a declared effect with the difference that a diagnosis found.
+"""Combination of a declared effect with a difference that a diagnosis identified.
 
-Effects act in sequence: first the declared one, then the one that a diagnosis found.
-Both together are a single effect with other parameters: offsets and compliances are
+Effects act in sequence: first the declared one, then the identified one.  Both together
+are equivalent to a single effect with other parameters: offsets and compliances are
 added, factors multiplied, eccentricities added as vectors, rotations of frames
 composed.
 """
@@ -19,14 +19,15 @@ Effects = Mapping[str, Values]
 
 
 def combined(declared: Effects, found: Effects) -> dict[str, dict[str, float]]:
-    """Return the effects of a robot's file combined with effects found in addition.
+    """Return the effects of a robot's file combined with additional effects.
 
     Args:
         declared: for each effect of the file its parameters by public name.
-        found: the same for effects that act after the declared ones.
+        found: for each additional effect, which acts after the declared one, its
+            parameters by public name.
 
     Returns:
-        Parameters of every effect that is equivalent to both in sequence.
+        Parameters of the single effects that are equivalent to both in sequence.
 
     Raises:
         ValueError: no single effect is equivalent, as for two contact laws in one
@@ -43,12 +44,12 @@ def combined(declared: Effects, found: Effects) -> dict[str, dict[str, float]]:
 
 
 def _sum(declared: Values, found: Values) -> dict[str, float]:
-    """Return the sums of parameters."""
+    """Return the sum of declared and found value of each parameter."""
     return dict(declared) | {k: declared.get(k, 0.0) + v for k, v in found.items()}
 
 
 def _in_series(declared: Values, found: Values) -> dict[str, float]:
-    """Return the stiffnesses of springs in series; an absent one is rigid."""
+    """Return the stiffnesses of springs in series; a missing spring is rigid."""
     both = {k: 1 / v for k, v in declared.items()}
     for k, v in found.items():
         both[k] = both.get(k, 0.0) + 1 / v
@@ -56,12 +57,12 @@ def _in_series(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _product(declared: Values, found: Values) -> dict[str, float]:
-    """Return the products of factors."""
+    """Return the product of declared and found factor of each parameter."""
     return dict(declared) | {k: declared.get(k, 1.0) * v for k, v in found.items()}
 
 
 def _load(declared: Values, found: Values) -> dict[str, float]:
-    """Return the gains of the load: the found gain multiplies the declared result."""
+    """Return the load gains: the found gain acts on the result of the declared gain."""
     factor = found.get("factor", 1.0)
     offsets = {k: factor * v for k, v in declared.items() if k != "factor"}
     more = {k: v for k, v in found.items() if k != "factor"}
@@ -93,7 +94,7 @@ def _registration(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _drift(declared: Values, found: Values) -> dict[str, float]:
-    """Return the sums of amplitudes with one time constant."""
+    """Return the summed amplitudes, with the common time constant."""
     constant = declared["time_constant"]
     if not math.isclose(found["time_constant"], constant, rel_tol=1e-9):
         raise ValueError(
@@ -112,7 +113,7 @@ def _contact(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _delayed(declared: Values, found: Values) -> dict[str, float]:
-    """Return the expansions, which must differ in body or have one time constant."""
+    """Return the expansions; for one body, the time constants must be equal."""
     both = _sum(declared, found)
     for key in set(declared) & set(found):
         if key.endswith(".time_constant"):

@@ -1,8 +1,8 @@
-"""Thermal expansion of a body that lags behind the recorded temperature.
+"""Thermal expansion of a body whose temperature lags behind the recorded temperature.
 
-The body becomes longer along its beam, or along the line between its joints, by
-coefficient x length x its temperature.  In the first row of a session this is the
-temperature of the sensor; later it follows the sensor with a time constant.
+The body becomes longer by coefficient x length x its temperature, along its beam or
+along the line between its joints.  In the first row of a session, its temperature
+equals that of the sensor; later it follows the sensor with a time constant.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """Scale of the measuring device: measured lengths are a multiple of the true ones.
 
-Positions are measured from the device's origin: that of the registration or, without
-one, the base's.
+Positions are measured from the origin of the registration, or from the origin of the
+base if there is no registration.
 """
 
 from dataclasses import replace

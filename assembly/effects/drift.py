@@ -17,7 +17,7 @@ _SCAN = (0.03, 0.1, 0.3, 1.0, 3.0)
 
 def _apply(conditions: Conditions, values: Values) -> Conditions:
     amplitude = np.array([values.get(name, 0.0) for name in _AMPLITUDE])
-    with np.errstate(over="ignore"):  # a time constant near zero is a step
+    with np.errstate(over="ignore"):  # time / time constant can overflow
         settled = 1.0 - np.exp(-conditions.time / values["time_constant"])
     drift = settled[:, None] * amplitude
     return replace(conditions, reading=conditions.reading + drift)

@@ -12,17 +12,17 @@ RIGID = 1e-12  # [rad/(N m), m/N] fitted compliance below which a part counts as
 
 @dataclass(frozen=True)
 class Unknown:
-    """An unknown of the fit, in a form in which the model is nearly linear.
+    """An unknown of the fit, chosen so that the model is nearly linear in it.
 
     Attributes:
         name: name of a parameter, or of a part of a parameter.  For an effect that acts
-            at frames it is appended to the frame's name (``""`` if the frame's name is
-            sufficient).
+            at frames, the name is appended to the frame's name (``""`` if the frame's
+            name is sufficient).
         scale: plausible size, in the unit of the parameter or of its part.
         lower: physical lower bound.
         upper: physical upper bound.
-        start: value without the effect, at which the first derivative is taken.
-        scan: start values of the search, if the model is far from linear.
+        start: value without the effect, at which the first derivative is computed.
+        scan: start values of the search, if the model is strongly nonlinear.
         scan_by: name of a covariate whose range multiplies ``scan``, if any.
     """
 
@@ -36,7 +36,7 @@ class Unknown:
 
 
 def _as_they_are(robot: Robot, values: Values) -> dict[str, float]:
-    """Return the unknowns unchanged, because they are the parameters."""
+    """Return the unknowns unchanged, because the unknowns are the parameters."""
     return dict(values)
 
 
@@ -46,34 +46,37 @@ class Effect:
 
     Attributes:
         name: name of the effect in the public format.
-        apply: function from conditions without the effect, and its parameters by public
-            name (``<frame>``, ``<frame>.<component>`` or plain), to conditions with it.
+        apply: function that adds the effect to conditions.  Its arguments are the
+            conditions without the effect and the effect's parameters by public name
+            (``<frame>``, ``<frame>.<component>`` or plain).
         unit: function from the robot and a parameter's public name to the parameter's
             unit.
         frames: function from a robot to the frames at which the effect can act; None if
-            it does not act at frames.
-        device_alone: whether it is an error of the measuring device.  A function with
-            the same effect is attributed to the machine, and is more probable.
-        refines: name of the effect to which it reduces in a limit; ``""`` for none.
-        tried: function for the frames at which it is searched; all possible ones if
-            absent.
+            the effect does not act at frames.
+        device_alone: whether the effect is an error of the measuring device.  A
+            function with the same influence belongs to the machine, and is more
+            probable.
+        refines: name of the effect that is a limiting case of this one; ``""`` for
+            none.
+        tried: function for the frames at which the effect is searched; None for all
+            frames at which it can act.
         components: public parameters at each frame (``""`` for the frame's name
             itself), or of the effect as a whole.
         unknowns: unknowns of the fit, at each frame or for the effect as a whole.
         public: function from unknowns by name (a frame's name, a dot, the unknown's
             name) to parameters by public name.
-        needs: covariates without which it can be neither applied nor identified.
+        needs: covariates that are required to apply or identify the effect.
         linear: whether the platform's deviation is linear in the unknowns, to first
             order in all small motions.
-        by_row: whether it changes rows one by one, so that it can act in some of them
-            only; otherwise it changes the robot.
-        finite: whether it needs finite motions.
-        clearance: whether it adds clearance to joints.
+        by_row: whether the effect changes individual rows, and so can act in some of
+            them only; otherwise the effect changes the robot.
+        finite: whether the effect requires finite motions.
+        clearance: whether the effect adds clearance to joints.
         device: unknowns that move the measuring frame as a whole.
-        splits: whether each of its unknowns may act alone.
+        splits: whether each of its unknowns can act without the others.
         follows_load: whether its unknowns ``offset.<c>`` correspond to the components
             of the load that a campaign records.
-        weighs: whether it acts by gravity only.
+        weighs: whether the effect acts only by gravity.
     """
 
     name: str
@@ -98,5 +101,5 @@ class Effect:
 
 
 def at(frame: str, kind: str) -> str:
-    """Return the name of an unknown or a parameter that belongs to a frame."""
+    """Return the name of an unknown or a parameter of a frame."""
     return f"{frame}.{kind}" if kind else frame

@@ -1,7 +1,7 @@
 """Forms of a function of one or two variables.
 
-A form is linear in most of its coefficients: each of them multiplies one column, so
-that a fit finds them all together.  The other parameters, its *shapes* (a time
+A form is linear in most of its coefficients: each coefficient multiplies one column, so
+a fit determines all of them together.  The other parameters, called *shapes* (a time
 constant, a period), change the columns nonlinearly.
 
 ========== ============================== =====================================
@@ -58,13 +58,12 @@ class Form:
         name: name of the form in robot files.
         summary: description in one line.
         most: largest number of variables.
-        shapes: names of the parameters in which it is not linear, and whether each is
-            required.
+        shapes: names of the nonlinear parameters, and whether each is required.
         indices: smallest and largest integer at the beginning of a column's name; None
             if the name has none.
         words: possible ends of a column's name; ``""`` for no end.
         basis: function from column names, inputs (R,) and shapes to (R, p) columns.
-        remembers: whether the past of its first variable matters.
+        remembers: whether earlier values of the first variable influence the result.
         least: smallest number of variables.
     """
 
@@ -79,7 +78,7 @@ class Form:
     least: int = 1
 
     def is_column(self, name: str, variables: int) -> bool:
-        """Return whether a name is a column of the form with so many variables."""
+        """Return whether a name is a column of the form for a number of variables."""
         head, word = name, ""
         if self.words != ("",):
             head, _, word = name.rpartition(".")
@@ -170,7 +169,7 @@ def roughness(count: int) -> NDArray:
 
 
 def _remembered(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Return columns from the lagged variable and from the decaying initial state."""
+    """Return columns of the lagged variable and of the decaying initial state."""
     return np.column_stack([inputs[name == "start"] for name in names])
 
 
@@ -181,7 +180,7 @@ def _step(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
 
 
 def _reversal(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Return columns of a direction, times powers of a second input if present."""
+    """Return columns of a direction, multiplied by powers of a second input if any."""
     size = inputs[1] if len(inputs) > 1 else np.ones_like(inputs[0])
     return _stacked([inputs[0] * size ** int(name) for name in names], inputs)
 
@@ -197,7 +196,7 @@ def _reversal_waves(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDA
 
 
 def _slip(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Return the state of the slipping element, from -1 to 1."""
+    """Return the position of the slipping friction element, from -1 to 1."""
     return _stacked([inputs[0]] * len(names), inputs)
 
 

@@ -1,9 +1,9 @@
 """Formulas written by users: a small grammar, evaluated without executing code.
 
-It has numbers, names, ``+ - * / **``, brackets, ``pi`` and the functions below.  Units
-are checked: the terms of a sum must have equal units, and the argument of a function
-must be a pure number (rad counts as one).  The units of the parameters follow from
-this.
+The grammar allows numbers, names, ``+ - * / **``, brackets, ``pi`` and the functions
+below.  Units are checked: the terms of a sum must have equal units, and the argument of
+a function must be a pure number (rad counts as a pure number).  The units of the
+parameters follow from these conditions.
 
 Sources:
     Kennedy, Relational Parametricity and Units of Measure, POPL 1997 (units of
@@ -35,7 +35,7 @@ Unit = Mapping[str, float]  # exponents of m, N, s, K ..; rad has none
 
 
 def parse_formula(text: str) -> ast.expr:
-    """Return the tree of a formula.
+    """Return the syntax tree of a formula.
 
     Args:
         text: formula such as ``"a*sin(3*q) + b"``.
@@ -47,9 +47,7 @@ def parse_formula(text: str) -> ast.expr:
         BadInput: the text is not a formula; the message names the error.
     """
     if len(text) > _LONGEST:
-        raise BadInput(
-            f"found {len(text)} characters, expected a formula of at most {_LONGEST}"
-        )
+        raise BadInput(f"found {len(text)} characters, expected at most {_LONGEST}")
     try:
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, MemoryError, RecursionError):
@@ -102,11 +100,11 @@ def evaluate(tree: ast.expr, known: Mapping[str, NDArray]) -> NDArray:
     """Return the value of a formula.
 
     Args:
-        tree: tree of the formula.
-        known: numbers, or arrays (R,), by name.
+        tree: syntax tree of the formula.
+        known: values of variables and parameters by name: numbers, or arrays (R,).
 
     Returns:
-        (R,) values, or a number; inf or NaN where the formula has no value.
+        (R,) values, or a number; inf or NaN where the formula is not defined.
     """
     with np.errstate(all="ignore"):
         return _value(tree, known)
@@ -135,13 +133,13 @@ def parameter_units(
     """Return the units of a formula's parameters that make all its units consistent.
 
     Args:
-        tree: tree of the formula.
+        tree: syntax tree of the formula.
         variables: units of its variables by name.
-        result: unit that the formula must have; a pure number counts as a value in SI.
+        result: unit of the formula's value; a pure number counts as a value in SI.
 
     Returns:
-        Exponents by parameter; a parameter that may have any unit counts as a pure
-        number.
+        Exponents of the units by parameter; a parameter that can have any unit counts
+        as a pure number.
 
     Raises:
         BadInput: no units are consistent; the message names the conflict.
@@ -162,7 +160,7 @@ class _Units:
     known: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def of(self, node: ast.AST) -> dict[str, float]:
-        """Return the unit of a part of a formula; refuse conflicts within the part."""
+        """Return the unit of a part of a formula; raise BadInput for a conflict."""
         match node:
             case ast.Name(id=name) if name in self.variables:
                 return dict(self.variables[name])
@@ -195,7 +193,7 @@ class _Units:
         return {}
 
     def reduced(self, unit: Mapping[str, float]) -> dict[str, float]:
-        """Return a unit with the known units of parameters inserted."""
+        """Return a unit in which the known units of parameters are substituted."""
         reduction: dict[str, float] = {}
         for name, k in unit.items():
             reduction = _added(reduction, self.known.get(name, {name: 1.0}), k)
@@ -204,7 +202,7 @@ class _Units:
     def equal(
         self, one: Mapping[str, float], other: Mapping[str, float], where: str
     ) -> None:
-        """Equate two units, and store the consequence for a parameter."""
+        """Equate two units, and store the resulting unit of a parameter."""
         left = self.reduced(_added(one, other, -1.0))
         free = next((name for name in left if name.startswith("?")), None)
         if free is not None:
@@ -218,7 +216,7 @@ class _Units:
             )
 
     def of_parameters(self, names: list[str]) -> dict[str, Unit]:
-        """Return the units of parameters; an undetermined one is a pure number."""
+        """Return the units of parameters; undetermined ones are pure numbers."""
         reduced = {name: self.reduced({f"?{name}": 1.0}) for name in names}
         return {
             name: {k: v for k, v in unit.items() if not k.startswith("?")}
@@ -236,7 +234,7 @@ def _number(node: ast.AST) -> float | None:
 def _added(
     one: Mapping[str, float], other: Mapping[str, float], factor: float
 ) -> dict[str, float]:
-    """Return the exponents of the product of one unit and a power of another."""
+    """Return the exponents of one unit times a power of another."""
     names = dict.fromkeys([*one, *other])
     return {name: one.get(name, 0.0) + factor * other.get(name, 0.0) for name in names}
 

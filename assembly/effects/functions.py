@@ -1,8 +1,8 @@
 """Application of functions: general effects of a robot's file or of a diagnosis.
 
 A function changes the stress-free screws at a frame, the base, the reading or the load.
-A function that depends on a wrench, as every compliance does, makes its place
-compliant.  It is solved together with the equilibrium
+If the function depends on a wrench, as every compliance does, its place is compliant.
+Such a function is solved together with the equilibrium
 (:mod:`forcefit.assembly.measurement.yields`).
 """
 
@@ -56,16 +56,16 @@ def is_loaded(function: Function) -> bool:
 
 
 def covariates_of(robot: Robot, sessions: Iterable[str]) -> dict[str, str]:
-    """Return the covariates on which a robot's functions depend, with a title each.
+    """Return the covariates on which a robot's functions depend, with titles.
 
     Args:
         robot: robot with its functions.
         sessions: sessions to consider.
 
     Returns:
-        For each name without ``cov.`` the title of a function that depends on it;
-        ``time`` if a form depends on it; ``approach`` if the first rows have no earlier
-        direction.
+        For each covariate, named without ``cov.``, the title of a function that depends
+        on it.  ``time`` is included if a form depends on time, and ``approach`` if the
+        direction before the first rows is needed.
     """
     owners: dict[str, str] = {}
     for function in robot.functions:
@@ -131,8 +131,8 @@ def basis(conditions: Conditions, function: Function, names: Sequence[str]) -> N
 
     Args:
         conditions: R rows.
-        function: function with a form, not a formula, and without wrenches among its
-            variables; of its parameters only the shapes are used.
+        function: function with a form (no formula) whose variables are not wrenches;
+            among its parameters, only the shapes are used.
         names: p names of columns, such as ``"1.sine"``.
 
     Returns:
@@ -144,15 +144,15 @@ def basis(conditions: Conditions, function: Function, names: Sequence[str]) -> N
 
 
 def inputs_of(conditions: Conditions, function: Function) -> NDArray:
-    """Return the inputs of a function, which follow from its variables and their past.
+    """Return the inputs of a function, computed from its variables and their past.
 
     Args:
         conditions: R rows.
         function: the function.
 
     Returns:
-        (R, k) inputs: the variables, NaN for wrenches; for a form with memory the state
-        replaces the first variable.
+        (R, k) inputs: the variables, NaN for wrenches.  For a form with memory, the
+        state replaces the first variable.
     """
     first, *further = function.variables
     inputs = [_now(conditions, name) for name in further]
@@ -175,7 +175,7 @@ def inputs_of(conditions: Conditions, function: Function) -> NDArray:
         return np.column_stack([history.direction(first)[row], *sizes])
     shapes = parameters_of(function, function.components[0])
     late = shapes["time_constant"]
-    if first in CLOCKS:  # it settles by itself, like a step at time 0
+    if first in CLOCKS:  # time is the input: lag of a unit step at time 0
         return np.column_stack([1.0 - history.fading(late), history.fading(late)])[row]
     lagged = history.lagged(first, late, held=form.name == "creep")
     return np.column_stack([lagged[row], history.fading(late)[row]])
@@ -191,7 +191,7 @@ def _now(conditions: Conditions, name: str) -> NDArray:
 
 
 def value_of(function: Function, component: str, inputs: Sequence[NDArray]) -> NDArray:
-    """Return a function's value.
+    """Return the values of one component of a function.
 
     Args:
         function: the function.
@@ -199,7 +199,7 @@ def value_of(function: Function, component: str, inputs: Sequence[NDArray]) -> N
         inputs: (R,) values of each input, from :func:`inputs_of`.
 
     Returns:
-        (R,) values [rad, m, N m, N], or per wrench for a compliance.
+        (R,) values [rad, m, N m, N]; for a compliance, values per unit of the wrench.
     """
     numbers = parameters_of(function, component)
     if function.form == FORMULA:
@@ -220,8 +220,8 @@ def variable_names(variables: Sequence[str]) -> dict[str, int]:
         variables: public names of the variables.
 
     Returns:
-        Index of the variable by name; names are the last part, the first part if it is
-        unique, and the whole name with ``_`` for dots.
+        Index of the variable by name.  Names are the last part of the public name, the
+        first part if it is unique, and the whole name with ``_`` for dots.
     """
     indices: dict[str, list[int]] = {}
     for k, name in enumerate(variables):
@@ -244,7 +244,7 @@ def apply_functions(
         recorded: conditions before other effects, on which the functions depend.
 
     Returns:
-        The conditions with all of them.
+        The conditions with all functions.
 
     Raises:
         BadInput: a function has no finite value in some row.
@@ -259,7 +259,7 @@ def apply_functions(
 
 
 def in_session(conditions: Conditions, session: str | None) -> NDArray:
-    """Return (R,) bool: rows of a session; all rows for None."""
+    """Return (R,) bool, True for rows of a session; for None, True for all rows."""
     if session is None:
         return np.ones(len(conditions), dtype=bool)
     if conditions.session is None:
@@ -270,7 +270,7 @@ def in_session(conditions: Conditions, session: str | None) -> NDArray:
 def _with_function(
     conditions: Conditions, function: Function, inputs: NDArray, acts: NDArray
 ) -> Conditions:
-    """Return conditions with one more function, in the rows where it acts."""
+    """Return conditions with one more function, which acts in the given rows."""
     where = function.where
     named = [name.split(".")[1] for name in function.variables if "wrench" in name]
     if BASE in (where, *named):
@@ -308,8 +308,8 @@ def _yielding(
     inputs: NDArray,
     acts: NDArray,
 ) -> Conditions:
-    """Return conditions with a place that is compliant under the wrench through it."""
-    slots: dict[int, int] = {}  # of the inputs, by the index of the wrench
+    """Return conditions with a compliant place that depends on the wrench there."""
+    slots: dict[int, int] = {}  # column of the inputs, by the index of the wrench
     through: list[tuple[str, int]] = []
     for k, name in enumerate(function.variables):
         if name.startswith("wrench."):
@@ -343,15 +343,15 @@ def _yielding(
 def in_session_alone(
     conditions: Conditions, changed: Conditions, session: str
 ) -> Conditions:
-    """Return the conditions changed in the rows of one session only.
+    """Return the conditions with effects in the rows of one session only.
 
     Args:
-        conditions: R rows.
-        changed: the same conditions with effects that change them row by row.
+        conditions: R rows without the effects.
+        changed: the same R rows with effects that change individual rows.
         session: name of the session in which the effects act.
 
     Returns:
-        Changed conditions in these rows, unchanged ones in the others.
+        The rows of ``changed`` in this session, and those of ``conditions`` elsewhere.
     """
     acts = in_session(conditions, session)[:, None]
 

@@ -1,4 +1,4 @@
-"""Clearance in joints that are declared without clearance; the load takes it up."""
+"""Clearance in joints that are declared without clearance; loads close it."""
 
 from dataclasses import replace
 from functools import partial

@@ -10,7 +10,7 @@ from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, MeshLink,
 
 
 def links(robot: Robot) -> tuple[str, ...]:
-    """Return frames with an elastic body that has its own constants."""
+    """Return the frames whose elastic body has its own material constants."""
     own = BeamLink | MeshLink | MatrixLink
     return tuple(f.name for f in robot.frames if isinstance(f.link, own))
 

@@ -24,12 +24,12 @@ def turning_drives(robot: Robot) -> tuple[str, ...]:
 
 
 def beams(robot: Robot) -> tuple[str, ...]:
-    """Return frames whose bodies are beams, which have an axis."""
+    """Return the frames whose bodies are beams."""
     return tuple(f.name for f in robot.frames if isinstance(f.link, BeamLink))
 
 
 def bodies(robot: Robot) -> tuple[str, ...]:
-    """Return frames whose bodies have a length: beams, bodies between two origins."""
+    """Return the frames whose bodies have a length: beams, or two distinct origins."""
     return tuple(
         f.name
         for f in robot.frames
@@ -38,7 +38,7 @@ def bodies(robot: Robot) -> tuple[str, ...]:
 
 
 def growing(robot: Robot) -> tuple[str, ...]:
-    """Return frames whose length may differ: beams; without beams, all bodies."""
+    """Return the frames whose length can differ: beams, or all bodies if no beams."""
     return beams(robot) or bodies(robot)
 
 
@@ -49,9 +49,8 @@ def body_axis(frame: Frame) -> tuple[float, NDArray]:
         frame: the frame of the body.
 
     Returns:
-        Length [m], and (3,) unit vector in the frame's axes: those of the beam or,
-        without a beam, those of the line from the parent's origin to the frame's
-        origin.
+        Length [m], and (3,) unit vector in the frame's axes, of the beam.  Without a
+        beam, both are those of the line from the parent's origin to the frame's.
     """
     if isinstance(frame.link, BeamLink):
         return beam_axis(frame)

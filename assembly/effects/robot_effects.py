@@ -1,4 +1,4 @@
-"""The effects of a robot's file, applied at one posture."""
+"""Effects of a robot's file, applied at one posture."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -23,9 +23,9 @@ class AppliedEffects:
     Attributes:
         posture: posture of the robot with the errors, springs, clearances and
             foundation that result from the effects.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes; None without weight.
-        conditions: one row with all of these, and with the errors of the measuring
+        load: (6,) [N m, N] wrench on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] gravity vector in base axes; None without weight.
+        conditions: one row with all of these data and the errors of the measuring
             device.
     """
 
@@ -53,8 +53,9 @@ def apply_robot_effects(
 
     Args:
         posture: posture of the declared robot.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes, added to the gravity of the effects.
+        load: (6,) [N m, N] wrench on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] gravity vector in base axes, added to the gravity of the
+            effects.
         covariates: values by name: ``temperature`` [K] above calibration, ``time`` [s],
             ``approach``, other variables of functions, and ``session``.
         finite: whether the exact model is used.

@@ -1,4 +1,4 @@
-"""Units of functions: of their variables, their results and their parameters."""
+"""Units of a function's variables, results and parameters."""
 
 from forcefit.assembly.effects.forms import FORMS, column_indices, shape_names
 from forcefit.assembly.effects.formula import (
@@ -17,14 +17,14 @@ from forcefit.assembly.model.function import Function
 from forcefit.assembly.model.robot import Robot
 
 _COVARIATES: dict[str, Unit] = {"temperature": {"K": 1}, "time": {"s": 1}}
-_ANGLE: Unit = {}  # rad counts as a number
+_ANGLE: Unit = {}  # rad counts as a pure number
 
 
 def variable_unit(robot: Robot, name: str) -> Unit:
     """Return the exponents of m, N, s, K of a variable; for a covariate, its name.
 
     Args:
-        robot: robot that has the variable.
+        robot: robot with the variable.
         name: public name of the variable.
 
     Returns:
@@ -58,10 +58,10 @@ def result_unit(function: Function, component: str) -> Unit:
 
 
 def units_of(robot: Robot, function: Function) -> dict[str, str]:
-    """Return the units of a function's parameters, in which they are written.
+    """Return the units of a function's parameters as written in robot files.
 
     Args:
-        robot: the robot on which it acts.
+        robot: the robot on which the function acts.
         function: the function.
 
     Returns:

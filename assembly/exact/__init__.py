@@ -1,4 +1,4 @@
-"""The equilibrium with finite motions: closures hold on SE(3).
+"""Equilibrium with finite motions, whose closures hold on SE(3).
 
-Begin at ``exact.py``.
+Start with ``exact.py``.
 """

@@ -1,14 +1,14 @@
-r"""Quadratic energies of the clearances, convex or not, within their cones.
+r"""Minimum of a quadratic energy, convex or not, with clearances within their cones.
 
-A step of the exact equilibrium needs the change v of the clearances u that minimises
+A step of the exact equilibrium requires the change v of the clearances u that minimises
 
-        s . v + v . S v / 2   subject to   |u_k + v_k| <= 1,  H (u + v) = k,
+        s . v + v . S v / 2   subject to   |u_k + v_k| <= 1,  H (u + v) = k.
 
-    where S has directions of negative curvature: normal to the active constraint
-    boundaries, which is harmless, and sometimes elsewhere.  Far from the solution S is
-    made convex, and :mod:`forcefit.assembly.solvers.conic` solves the problem.  Near
-    the solution Newton's method on the active boundaries is exact to rounding, while
-    the conic solver stops at half of the digits.
+S has directions of negative curvature.  Those normal to the active constraint
+boundaries are harmless; sometimes there are others.  Far from the solution, S is made
+convex, and :mod:`forcefit.assembly.solvers.conic` solves the problem.  Near the
+solution, Newton's method on the active boundaries is accurate to rounding, while the
+conic solver reaches only half of the digits.
 
 ======  ===========  =========  =====================================================
 symbol  code         shape      meaning
@@ -34,13 +34,14 @@ from forcefit.assembly.solvers.cones import cone_sizes
 from forcefit.assembly.solvers.conic import minimise_energy
 from forcefit.assembly.solvers.method import Method
 
-AT_BOUNDARY = 1e-5  # [-] distance from size 1 within which a cone may be active
+AT_BOUNDARY = 1e-5  # [-] distance from size 1 within which a cone can be active
 _STEPS = 15  # largest number of Newton steps on the active boundaries
 # [-] size of the last step of a solution, relative to the size of the cones
 _STILL = 1e-6
-# relative to the largest multiplier: a cone with a smaller negative one stays active
+# relative to the largest multiplier: a cone with a smaller negative multiplier stays
+# active
 _ZERO_MULTIPLIER = 1e-11
-_LONGEST = 0.3  # [-] longest step along a boundary, because it is curved
+_LONGEST = 0.3  # [-] longest step along a boundary, which is curved
 _SHIFTS = (
     0.0,
     1e-9,
@@ -55,7 +56,7 @@ _LEAST_CURVATURE = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class ClearanceProblem:
-    """The quadratic problem of a step; symbols as in the module's docstring.
+    """Quadratic problem of a step; for the symbols see the head of the module.
 
     Attributes:
         S: (nu, nu) symmetric curvature of the energy.
@@ -77,7 +78,7 @@ class ClearanceProblem:
     def multipliers(self) -> tuple[NDArray, NDArray]:
         """(cones,) [J] multipliers of the cones at the start, 0 if inactive.
 
-        Also the (p,) multipliers of ``rows``.
+        The second array contains the (p,) multipliers of ``rows``.
         """
         touching = cone_sizes(self.start, self.group) >= 1.0 - AT_BOUNDARY
         normals = boundary_normals(self.start, touching, self.group)
@@ -91,14 +92,14 @@ class ClearanceProblem:
 
 
 def cone_multipliers(u: NDArray, gradient: NDArray, group: NDArray) -> NDArray:
-    """Return the (cones,) [J] multipliers of the cones from the energy's gradient."""
+    """Return the (cones,) [J] cone multipliers, computed from the energy's gradient."""
     force = -np.bincount(group, weights=gradient * u)
     at_boundary = cone_sizes(u, group) >= 1.0 - AT_BOUNDARY
     return np.where(at_boundary, np.maximum(force, 0.0), 0.0)
 
 
 def boundary_normals(u: NDArray, active: NDArray, group: NDArray) -> NDArray:
-    """Return the (nu, active) normals of the boundaries of the marked cones."""
+    """Return the (nu, active) normals of the boundaries of the active cones."""
     return np.where(group[:, None] == np.flatnonzero(active), u[:, None], 0.0)
 
 
@@ -109,7 +110,7 @@ def clearance_step(
 
     Args:
         problem: the quadratic problem.
-        near: whether the solution is near enough for Newton's method.
+        near: whether the solution is so close that Newton's method is tried first.
         method: method of :func:`forcefit.assembly.solvers.conic.minimise_energy`.
 
     Returns:
@@ -121,14 +122,14 @@ def clearance_step(
 
 
 def _convex(p: ClearanceProblem, method: Method) -> tuple[NDArray, NDArray] | None:
-    """Return the step with S made convex, if possible without changing the minimum."""
+    """Return the step for S made convex, if possible without changing the minimum."""
     least = float(np.linalg.eigvalsh(p.S).min(initial=0.0))
     force, _ = p.multipliers
     active = force[p.group]
     if least >= 0.0 or not active.any():
         return _conic(p, p.S, p.s, method)
-    # f (|u_k|^2 - 1) / 2 vanishes at the boundary, and its normal does not change to
-    # first order; adding it makes S convex where needed and keeps the minimum
+    # the term f (|u_k|^2 - 1) / 2 is zero at the boundary, and its normal is constant
+    # to first order; adding the term makes S convex where needed and keeps the minimum
     normals = boundary_normals(p.start, force > 0.0, p.group)
     held = 0.99 * active
     convex = p.S + np.diag(held) - 10.0 * least * normals @ normals.T
@@ -143,7 +144,7 @@ def _convex(p: ClearanceProblem, method: Method) -> tuple[NDArray, NDArray] | No
 def _conic(
     p: ClearanceProblem, S: NDArray, s: NDArray, method: Method
 ) -> tuple[NDArray, NDArray] | None:
-    """Return the step of the conic solver; a small curvature replaces negative ones."""
+    """Return the step by the conic solver, for S without negative curvatures."""
     values, vectors = np.linalg.eigh(S)
     floor = _LEAST_CURVATURE * max(float(np.abs(values).max(initial=0.0)), 1e-150)
     G = np.sqrt(np.maximum(values, floor))[:, None] * vectors.T
@@ -154,7 +155,7 @@ def _conic(
 
 
 def _newton(p: ClearanceProblem) -> tuple[NDArray, NDArray] | None:
-    """Return the step of Newton's method on the active boundaries; None if it fails."""
+    """Return the step by Newton's method on the active boundaries; None if it fails."""
     force, rigid = p.multipliers
     u, active = p.start, force > 0.0
     for _ in range(_STEPS):
@@ -180,7 +181,7 @@ def _newton(p: ClearanceProblem) -> tuple[NDArray, NDArray] | None:
 def _active_step(
     p: ClearanceProblem, S: NDArray, gradient: NDArray, u: NDArray, active: NDArray
 ) -> tuple[NDArray, NDArray, NDArray] | None:
-    """Return change, and multipliers of cones and rows; None without a minimum."""
+    """Return the step, and the multipliers of cones and rows; None without minimum."""
     C = np.hstack([boundary_normals(u, active, p.group), p.rows.T])
     count, boundaries = C.shape[1], int(active.sum())
     if count > len(u):

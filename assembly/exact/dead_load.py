@@ -1,24 +1,25 @@
 r"""Dead loads on finite motions: constant forces at points fixed to moving bodies.
 
 The work of a dead load is linear in the pose of its body, <G, T - T_nominal>, where T
-is the first three rows of the body's transform.  For a force f at the point a of the
-body, in its axes, G is f [a, 1]^T.  A couple m is two opposite forces, [m]x R_nominal /
-2, whose work is m . (axis sin angle).  The weight W of a beam acts at the middle of the
-cubic between its clamped ends, (p1 + p2) / 2 + (t1 - t2) / 12, with t the end tangents
-times the length.
+contains the first three rows of the body's transform.  For a force f at the point a of
+the body, in the body's axes, G is f [a, 1]^T.  A couple m consists of two opposite
+forces; its G is [m]x R_nominal / 2, and its work is m . (axis sin angle).  The weight W
+of a beam acts at the middle of the cubic curve between its clamped ends.  This point is
+(p1 + p2) / 2 + (t1 - t2) / 12, where t are the end tangents times the length.
 
 ======  =============  ==========  ==================================================
 symbol  code           shape       meaning
 ======  =============  ==========  ==================================================
 G       ``bodies`` ..  (n, 3, 4)   load on the body that reaches to each frame, before
-        its joint, and on all that its joint carries
+        its joint; and load on all parts that its joint carries
 w       ``load``       (6,)        on the platform, see :func:`.exact.solve_exact`
 M       --             (3, 3)      sum of the points times their forces
 ======  =============  ==========  ==================================================
 
-The force of a drive works on the own components of its joint's unknowns, f . q.
+The force f of a drive does the work f . q, where q are the motions along the axis of
+its joint.
 
-Linearised, these are the loads of :mod:`forcefit.assembly.linear.load`.
+The linear limit of these loads is :mod:`forcefit.assembly.linear.load`.
 """
 
 from dataclasses import dataclass, field
@@ -41,12 +42,13 @@ class DeadLoads:
     """All loads on a robot with finite motions.
 
     Attributes:
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        bodies: (n, 3, 4) [N m, N] on the body of each frame.
-        carried: (n, 3, 4) [N m, N] loads on all that each frame's joint carries.
-        distributed: (n, 3, 4) [N m, N] part of ``bodies`` that acts along beams, or
-            zero.
-        drives: (n, 6) [N m, N] of drives along the joints' motions, in frames' axes.
+        load: (6,) [N m, N] wrench on the platform at its origin, base axes.
+        bodies: (n, 3, 4) [N m, N] loads on the body of each frame.
+        carried: (n, 3, 4) [N m, N] loads on all parts that each frame's joint carries.
+        distributed: (n, 3, 4) [N m, N] part of ``bodies`` that is distributed along
+            beams; or zero.
+        drives: (n, 6) [N m, N] wrenches of drives along the joints' motions, in the
+            frames' axes.
     """
 
     load: NDArray
@@ -68,15 +70,16 @@ def dead_loads(
     gravity: ArrayLike | None = None,
     point: ArrayLike = (0.0, 0.0, 0.0),
 ) -> DeadLoads:
-    """Return loads as dead loads.
+    """Return the given loads as dead loads.
 
     Args:
-        posture: the robot's configuration, of n frames.
-        load: (6,) [N m, N] on the platform at a point, base axes.
-        bodies: (n, 6) [N m, N] loads on each frame's body, at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes.
-        point: (3,) [m] point at which the load acts, platform axes; the force moves
-            with it.
+        posture: configuration of a robot of n frames.
+        load: (6,) [N m, N] wrench on the platform at ``point``, base axes.
+        bodies: (n, 6) [N m, N] wrenches on each frame's body, at the frame's origin,
+            base axes.
+        gravity: (3,) [m/s^2] gravity vector in base axes.
+        point: (3,) [m] point of the platform at which the force acts, platform axes;
+            the force moves with this point.
 
     Returns:
         The dead loads; all zero if no load is given.
@@ -107,9 +110,9 @@ def dead_loads_of_rows(
     Args:
         postures: R postures in one object.
         errors: (R, n, 6) [rad, m] screws of the bodies in their unstressed shape.
-        load: (R, 6) [N m, N] on the platform at a point, base axes.
-        gravity: (R, 3) [m/s^2] base axes.
-        point: (3,) [m] point at which the load acts, platform axes.
+        load: (R, 6) [N m, N] wrenches on the platform at ``point``, base axes.
+        gravity: (R, 3) [m/s^2] gravity vectors in base axes.
+        point: (3,) [m] point of the platform at which the load acts, platform axes.
 
     Returns:
         Loads whose arrays have R rows.
@@ -129,7 +132,7 @@ def dead_loads_of_rows(
 def _add_weights(
     posture: Posture, errors: NDArray, g: NDArray, on_bodies: NDArray, carried: NDArray
 ) -> NDArray:
-    """Add the weights of bodies and links; return those along links, at their tips."""
+    """Add the weights of bodies and links; return the links' weights at their tips."""
     robot, nominal = posture.robot, nominally_carried(posture)
     distributed = np.zeros_like(on_bodies)
     for i, frame in enumerate(robot.frames):
@@ -146,8 +149,8 @@ def _add_weights(
         on_bodies[..., i, :, :] += at_tip
         parent = robot.parents[i]
         if parent >= 0:  # otherwise the base carries it
-            # the beam's start and tangent in the parent's frame after its joint; the
-            # beam is straight up to the tip with its geometric error
+            # the beam's start and tangent in the parent's frame after the parent's
+            # joint; the beam is straight up to the tip with its geometric error
             error = errors[..., i, :]
             off = transform(error[..., 3:], rotation_matrix(error[..., :3]))
             T = np.linalg.inv(nominal[..., parent, :, :])
@@ -178,7 +181,7 @@ def work_of(place: Placement, loads: DeadLoads) -> float:
 
 
 def work_gradient(place: Placement, loads: DeadLoads) -> NDArray:
-    """Return the (N,) [J] derivatives of the work by the unknowns."""
+    """Return the (N,) [J] derivatives of the work with respect to the unknowns."""
     gradient = place.platform_rows.T @ loads.load
     if loads.beyond_platform:
         wrenches, _ = _on_unknowns(place, loads)
@@ -197,7 +200,7 @@ def curvature_of(place: Placement, multipliers: NDArray, loads: DeadLoads) -> ND
         loads: loads on the robot.
 
     Returns:
-        (N, N) symmetric matrix, as exact as
+        (N, N) symmetric matrix, with the accuracy of
         :meth:`forcefit.assembly.exact.placement.Placement.curvature`.
     """
     H = place.curvature(multipliers, loads.load)
@@ -205,7 +208,7 @@ def curvature_of(place: Placement, multipliers: NDArray, loads: DeadLoads) -> ND
         return H
     wrenches, M = _on_unknowns(place, loads)
     turn, shift = place.moves[:3].T, place.moves[3:].T
-    # exp(A) exp(B) moves a point x, to second order in both, by a x (b x x + v_b)
+    # the term of exp(A) exp(B) with A and B moves a point x by a x (b x x + v_b)
     spread = np.trace(M, axis1=1, axis2=2)[:, None, None] * np.eye(3)
     later = np.einsum("nij,nj->ni", M - spread, turn)
     later -= np.cross(wrenches[:, 3:], shift)
@@ -214,7 +217,7 @@ def curvature_of(place: Placement, multipliers: NDArray, loads: DeadLoads) -> ND
 
 
 def load_magnitudes(place: Placement, loads: DeadLoads) -> NDArray:
-    """Return the (N,) [J] loads on the unknowns, as sums of absolute values."""
+    """Return the (N,) [J] sums of absolute values of the loads on each unknown."""
     sizes = np.abs(place.platform_rows).T @ np.abs(loads.load)
     if loads.beyond_platform:
         wrenches, _ = _on_unknowns(place, loads)
@@ -245,8 +248,8 @@ def wrenches_on_frames(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDA
         loads: loads on the robot.
 
     Returns:
-        (n, 6) [N m, N] wrenches on all that each frame's body carries, including the
-        body, and (n, 6) wrenches on all that its joint carries.
+        (n, 6) [N m, N] wrenches on each frame's body and on all parts that it carries;
+        and (n, 6) wrenches on all parts that its joint carries.
     """
     robot = place.model.posture.robot
     body, joint, *_ = _on_frames(place, loads)
@@ -262,7 +265,7 @@ def wrenches_on_frames(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDA
 
 
 def distributed_at_tips(place: Placement, loads: DeadLoads) -> NDArray:
-    """Return the (n, 6) [N m, N] weights of links as they act at the tips."""
+    """Return the (n, 6) [N m, N] distributed weights of links, reduced to the tips."""
     T = place.body_ends
     G = np.broadcast_to(loads.distributed, (len(T), 3, 4))
     moment, force, _ = _read(G, T, T[:, :3, 3])
@@ -279,12 +282,12 @@ def _on_motions(place: Placement, loads: DeadLoads) -> NDArray:
 
 
 def drive_wrenches(posture: Posture, loads: DeadLoads, carried: NDArray) -> NDArray:
-    """Return the (..., n, 6) [N m, N] of drives on what their joints carry.
+    """Return the (..., n, 6) [N m, N] wrenches of drives on the parts they move.
 
     Args:
-        posture: nominal.
-        loads: on the robot.
-        carried: (..., n, 4, 4) frames after their joint's coordinate.
+        posture: nominal posture.
+        loads: loads on the robot.
+        carried: (..., n, 4, 4) frames after the coordinate of their joint.
 
     Returns:
         Wrenches at the platform's nominal origin, base axes.
@@ -297,7 +300,7 @@ def drive_wrenches(posture: Posture, loads: DeadLoads, carried: NDArray) -> NDAr
 
 
 def _on_unknowns(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDArray]:
-    """Return the (N, 6) dead loads on all that each unknown moves, with their M."""
+    """Return (N, 6) dead loads on all parts that each unknown moves, and their M."""
     model = place.model
     body, joint, M_body, M_joint = _on_frames(place, loads)
     link = (model.motion == LINK)[:, None]
@@ -309,7 +312,7 @@ def _on_unknowns(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDArray]:
 def _on_frames(
     place: Placement, loads: DeadLoads
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Return the dead wrenches on all that bodies and joints carry, with their M."""
+    """Return dead wrenches on all parts that bodies and joints carry, and their M."""
     posture = place.model.posture
     return resultants(posture, loads, place.body_ends, place.carried)
 
@@ -317,19 +320,20 @@ def _on_frames(
 def resultants(
     posture: Posture, loads: DeadLoads, body_ends: NDArray, carried: NDArray
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Return the sums of the dead loads over all that each frame carries.
+    """Return the sums of the dead loads over all parts that each frame carries.
 
-    The wrenches are read at the platform's nominal origin.
+    The wrenches act at the platform's nominal origin.
 
     Args:
-        posture: nominal posture; all arrays may have leading dimensions, like its own.
+        posture: nominal posture; all arrays can have the same leading dimensions.
         loads: loads on the robot.
         body_ends: (..., n, 4, 4) ends of the bodies in the base frame.
         carried: (..., n, 4, 4) frames after the coordinate of their joint.
 
     Returns:
-        (..., n, 6) [N m, N] wrenches on all that bodies carry and that joints carry,
-        base axes, and (..., n, 3, 3) [N m] their matrices M.
+        (..., n, 6) [N m, N] wrenches on all parts that bodies carry; the same for all
+        parts that joints carry, both in base axes; and (..., n, 3, 3) [N m] their
+        matrices M.
     """
     robot, origin = posture.robot, posture.platform[..., None, :3, 3]
     below = (robot.on_path & ~np.eye(len(robot.frames), dtype=bool)).T
@@ -347,7 +351,7 @@ def resultants(
 
 
 def _read(G: NDArray, T: NDArray, origin: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Return moments and forces (..., n, 3) at the origin, and M (..., n, 9)."""
+    """Return moments and forces (..., n, 3) at the origin, and the M (..., n, 9)."""
     points = T[..., :3, :].copy()
     points[..., 3] -= origin
     moments = np.cross(points, G, axis=-2).sum(axis=-1)

@@ -1,17 +1,17 @@
 r"""One step towards the exact equilibrium: expand, solve, restore, accept or damp.
 
-Near a placement x the closures are linearised and the Lagrangian
+Near a placement x, the closures are linearised.  The Lagrangian
 
     L = |y|^2 / 2 - W(x) - lambda . r(x)
 
-is expanded to second order, with its true Hessian.  The curvature of the closures times
-the wrenches that they carry exceeds compliant springs; without this term Gauss-Newton
-steps stall.  Springs and free motions are eliminated, and
+is expanded to second order with its exact Hessian.  The curvature of the closures times
+their wrenches can exceed the stiffness of compliant springs; without this term,
+Gauss-Newton steps stall.  Springs and free motions are eliminated, and
 :mod:`forcefit.assembly.exact.contact_qp` solves the problem in the clearances.  A
-restoration (retraction) brings the step back onto the closures.  The step is accepted
-if it reduces the energy plus a penalty on the residual.  Otherwise a proximal term
-damps it, as in the method of Levenberg and Marquardt, measured in radians and reference
-lengths of every screw.
+restoration (retraction) moves the result of the step back onto the closures.  The step
+is accepted if it reduces the energy plus a penalty on the residual.  Otherwise a
+proximal term damps the next attempt, as in the method of Levenberg and Marquardt; the
+term measures every screw in radians and reference lengths.
 
 ======  =============  =============  ===============================================
 symbol  code           shape          meaning
@@ -51,21 +51,21 @@ from forcefit.results.display import numbers
 
 CLOSED = 1e-12  # [rad, reference lengths] largest residual of a solution
 LONGEST_STEP = 1.0  # [rad, reference lengths] largest change in a step
-# [rad, reference lengths] residual whose wrenches count as small
+# [rad, reference lengths] residual whose wrenches are considered small
 _SMALL_RESIDUAL = 1e-9
 _LEAST_DAMPING = 1e-9  # relative to the largest closure wrench: smallest damping
 # relative to the largest closure wrench: first damping of a rejected step
 _FIRST_DAMPING = 1e-8
-_ATTEMPTS = 40  # largest number of attempts at a step; each has eight times the damping
-_RESTORATIONS = 4  # number of corrections that bring a step back onto the closures
+_ATTEMPTS = 40  # largest number of attempts; each multiplies the damping by eight
+_RESTORATIONS = 4  # number of corrections that move a step back onto the closures
 
 
 class NotConverged(SolverFailed):
-    """Error: no equilibrium with finite motions was found near the linear one.
+    """Error: no equilibrium with finite motions was found near the linear solution.
 
     Attributes:
         problem: name of the problem.
-        status: description of the distance from equilibrium.
+        status: text on the remaining residual and imbalance.
     """
 
     def __init__(self, problem: str, status: str) -> None:
@@ -75,7 +75,7 @@ class NotConverged(SolverFailed):
 
 @dataclass(frozen=True, eq=False)
 class Expansion:
-    """The problem expanded at a placement.
+    """Problem expanded at a placement.
 
     Attributes:
         placement: placement at which the problem is expanded.
@@ -88,7 +88,7 @@ class Expansion:
         basis: (N, nu + nv) matrix B of the module's docstring.
         rigid_rows: (p, nu) closure rows without springs and free motions.
         rigid_right: (p,) right side of these rows.
-        rigid_basis: (6 K, p) combinations of the closures' rows that give these rows.
+        rigid_basis: (6 K, p) combinations of the closures' rows that form these rows.
     """
 
     placement: Placement
@@ -122,11 +122,11 @@ class Step:
 
     Attributes:
         placement: placement after the step.
-        gain: [J] decrease of the expansion, including the cost of closing.
-        decrement: [J] decrease of the energy without that cost, which is the possible
-            gain.
+        gain: [J] predicted decrease of the potential, including the cost of restoring
+            the closures.
+        decrement: [J] predicted decrease of the potential without that cost.
         length: [rad, reference lengths] size of the change.
-        rigid: (6 K,) multipliers of closures in clearances alone.
+        rigid: (6 K,) multipliers of the closures that depend only on clearances.
         damping: [J/rad^2] damping of the next step; 0 if this step was not damped.
     """
 
@@ -139,13 +139,14 @@ class Step:
 
 
 def expand(at: Placement, loads: DeadLoads, rigid: NDArray) -> Expansion:
-    """Return the closures expanded to first and the Lagrangian to second order.
+    """Expand the closures to first order and the Lagrangian to second order.
 
     Args:
         at: placement at which the problem is expanded.
         loads: loads on the robot.
-        rigid: (6 K,) estimate of the multipliers of closures in clearances alone; the
-            other multipliers are those that balance springs and free motions best.
+        rigid: (6 K,) estimate of the multipliers of closures that depend only on
+            clearances.  The other multipliers are computed from the equilibrium of
+            springs and free motions by least squares.
 
     Returns:
         The expansion.
@@ -159,8 +160,8 @@ def expand(at: Placement, loads: DeadLoads, rigid: NDArray) -> Expansion:
     U, S, Vt = svd(A[:, unbounded] * unit, full_matrices=True)
     tolerance = rank_tolerance(model.posture.mismatch)
     rank = int(np.sum(S > tolerance * S.max(initial=0.0)))
-    # left singular vectors of the range over their singular values, and those of the
-    # complement; right singular vectors in the units of the unknowns
+    # left singular vectors of the range divided by their singular values, left singular
+    # vectors of the complement, right singular vectors in the units of the unknowns
     range_, rigid_space, V = U[:, :rank] / S[:rank], U[:, rank:], unit[:, None] * Vt.T
     inverse = V[:, :rank] @ range_.T
     multipliers = inverse.T @ gradient[unbounded]
@@ -185,7 +186,7 @@ def expand(at: Placement, loads: DeadLoads, rigid: NDArray) -> Expansion:
 
 
 def _basis(unbounded: NDArray, closing: NDArray, null_space: NDArray) -> NDArray:
-    """Return the (N, nu + nv) basis B of an expansion."""
+    """Return the (N, nu + nv) basis B of an expansion, see the module's docstring."""
     nu = closing.shape[1]
     basis = np.zeros((len(unbounded), nu + null_space.shape[1]))
     basis[~unbounded, :nu] = np.eye(nu)
@@ -217,7 +218,7 @@ def advance(
     local: Expansion, penalty: float, damping: float, near: bool,
     method: Method = "compiled",
 ) -> Step:  # fmt: skip
-    """Return a step that reduces energy plus penalty.
+    """Return a step that reduces the potential plus the penalty.
 
     Args:
         local: the expanded problem.
@@ -242,7 +243,7 @@ def advance(
     # rounding errors of angles and positions, multiplied by the forces on them
     noise += 1e-14 * (penalty + pull)
     for attempt in range(_ATTEMPTS):
-        # a rejected Newton step is repeated by the conic solver before the step is
+        # if a Newton step is rejected, the conic solver repeats the step before it is
         # damped
         newton = near and attempt != 1
         step = _solve(local, damping + _LEAST_DAMPING * least, newton, method)
@@ -259,7 +260,7 @@ def advance(
             damping = max(8.0 * damping, _FIRST_DAMPING * least)
     raise NotConverged(
         problem_name(start, local.loads),
-        "no step lowers the energy; the closures are open by "
+        "no step decreases the energy; the closures are open by "
         f"{start.largest_gap:.2g} rad or m",
     )
 

@@ -1,6 +1,6 @@
 """Properties of an equilibrium: imbalance, stability, active clearances.
 
-All are computed from the expansion at the equilibrium,
+All properties are computed from the expansion at the equilibrium, see
 :func:`forcefit.assembly.exact.descent.expand`.
 """
 
@@ -17,26 +17,26 @@ from forcefit.assembly.exact.dead_load import load_magnitudes
 from forcefit.assembly.exact.descent import Expansion
 from forcefit.assembly.solvers.cones import cone_sizes
 
-_ANGLE_ROUNDING = 1e-5  # relative to a small residual: rounding error of an angle
+_ANGLE_ROUNDING = 1e-5  # rounding error of an angle, relative to a small residual
 
 
 def imbalance(local: Expansion) -> float:
-    """Return the distance of a placement from equilibrium.
+    """Return the relative imbalance of forces at a placement.
 
     Args:
         local: expansion at the placement.
 
     Returns:
-        [-] largest unbalanced generalised force on an unknown.  It is relative to the
-        sum of the forces on the unknown, or to the forces due to a residual of 1e-9 in
-        closures or in the unknown itself.
+        [-] largest unbalanced generalised force on an unknown.  Each force is divided
+        by the sum of the forces on the unknown, or by the forces due to a residual of
+        1e-9 in closures or in the unknown if these are larger.
     """
     at, A, model = local.placement, local.placement.rows, local.placement.model
     unbalanced = local.gradient - A.T @ local.multipliers
     wrench = float(np.linalg.norm(local.multipliers)) + local.small_wrench
     loads = load_magnitudes(at, local.loads)
     acting = np.linalg.norm(A, axis=0) * wrench + np.abs(local.gradient) + loads
-    # unloaded parts of an open chain have forces that are rounding only
+    # the forces on unloaded parts of an open chain are only rounding errors
     unit = np.sqrt(np.diag(model.metric))
     acting = np.maximum(acting, local.small_wrench * unit)
     # inside a cone the force is zero; at its boundary it is normal to the boundary
@@ -58,8 +58,8 @@ def least_curvature(local: Expansion) -> float:
     Returns:
         [J/rad^2] smallest second derivative of the potential along the motions that
         keep closures and active constraints, per squared rad and reference length of
-        all screws. It is positive at a strict minimum, and inf if no motion is
-        possible.
+        all screws.  The curvature is positive at a strict minimum, and inf if no motion
+        is possible.
     """
     D, H = tangent_space(local)
     if not D.shape[1]:
@@ -76,7 +76,7 @@ def tangent_space(
     Args:
         local: expansion at the equilibrium.
         hold_touching: whether clearances that touch their bound without a force are
-            held there too.
+            also fixed at the bound.
 
     Returns:
         (N, k) basis of the motions, and (k, k) [J] second derivative of the potential
@@ -121,7 +121,8 @@ def active_clearances(local: Expansion) -> tuple[NDArray, NDArray]:
         local: expansion at the equilibrium.
 
     Returns:
-        (cones,) bool, and (cones,) [J] the force on each bound times the bound.
+        (cones,) bool, and (cones,) [J] products of the force on each bound and the
+        bound.
     """
     at, model = local.placement, local.placement.model
     u, group = at.x[model.bounded], model.joints.group

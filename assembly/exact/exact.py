@@ -1,4 +1,4 @@
-r"""The forced assembly at least energy with finite motions: closures hold on SE(3).
+r"""Forced assembly of least energy with finite motions, whose closures hold on SE(3).
 
 Springs, clearance cones and geometric errors are those of the linear virtual-joint
 model (:mod:`forcefit.assembly.linear.energy`).  Only the closures differ, because
@@ -6,16 +6,17 @@ finite motions are composed as in :mod:`forcefit.assembly.exact.finite_robot`.  
 springs' energy minus the work of the loads is minimised,
 
     minimise  |y|^2 / 2 - w . x_p(y, u, q) - W(y, u, q)
-    subject to  r(y, u, q) = 0,   |u_k| <= 1 for each cone k,
+    subject to  r(y, u, q) = 0,   |u_k| <= 1 for each cone k.
 
-by the steps of :mod:`forcefit.assembly.exact.descent`, from the linear solution.
+The iteration starts from the linear solution and makes the steps of
+:mod:`forcefit.assembly.exact.descent`.
 
 ======  ====================  ========  ==============================================
 symbol  code                  shape     meaning
 ======  ====================  ========  ==============================================
 x_p     ``platform_screw``    (6,)      rotation vector of R R_nominal^T and shift of
                                         the platform's origin, base axes
-w       ``load``              (6,)      force: dead; moment: of the work m . theta
+w       ``load``              (6,)      dead force; moment whose work is m . theta
 W       ``loads``             J         work of weights and of loads on bodies
 r       ``closure_residual``  (6 K,)    logarithms of the open closures
 ======  ====================  ========  ==============================================
@@ -78,25 +79,25 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_STEPS = 160  # largest number of steps; 3 to 5 are usual, metres of travel take 80
-# relative energy that can still be gained, below which Newton's method is tried
+_STEPS = 160  # largest number of steps; usually 3 to 5, 80 for metres of travel
+# relative energy that can still be gained: below it, Newton's method is tried
 _NEAR = 1e-2
 _DECREMENT = 1e-14  # relative energy that can still be gained at the last step
-# number of steps after which a balanced state is accepted although clearances move
+# number of steps after which a state in equilibrium is accepted with moving clearances
 _RESTLESS = 100
 _STILL = 1e-9  # [rad, reference lengths] size of a last step without damping
 _STATIONARY = 1e-7  # largest relative imbalance of a solution; 1e-12 is usual
-# [J] energies below this are rounding; without errors they are about 1e-48 J
+# [J] energies below this are rounding errors; without errors they are about 1e-48 J
 _ROUNDING = 1e-30
 
 
 @dataclass(frozen=True, eq=False)
 class LinearisationError:
-    """Error of the linear model: linear minus exact.
+    """Error of the linear model: linear minus exact result.
 
     Attributes:
         rotation: (3,) [rad] difference of the platform's rotation.
-        translation: (3,) [m] difference of its origin's displacement.
+        translation: (3,) [m] difference of the displacement of the platform's origin.
         energy: [J] difference of the energy.
         relative_energy: [-] difference relative to the exact energy.
     """
@@ -109,11 +110,11 @@ class LinearisationError:
 
 @dataclass(frozen=True, eq=False)
 class ExactAssembly:
-    """A manipulator assembled with finite motions; exists only if converged.
+    """Converged solution of a manipulator assembled with finite motions.
 
-    It is an equilibrium: stationary, closed and within the cones as reported.  The sign
-    of ``least_curvature`` shows whether it is a local minimum.  A lower minimum is not
-    excluded.
+    The solution is an equilibrium: stationary, closed and within the cones, with the
+    reported residuals.  The sign of ``least_curvature`` shows whether the equilibrium
+    is a local minimum.  A lower minimum can exist elsewhere.
 
     Attributes:
         whole: the robot's nominal configuration, with uncut beams.
@@ -123,8 +124,9 @@ class ExactAssembly:
             scaled closures.
         stationarity: [-] largest relative imbalance of an unknown.
         iterations: number of steps.
-        method: method of all cone programmes: ``"compiled"``, with Clarabel if in
-            doubt; or ``"reference"``, with numpy and Clarabel only.
+        method: method of all cone programmes: ``"compiled"``, with Clarabel if the
+            compiled solution is not proved; or ``"reference"``, with numpy and Clarabel
+            only.
     """
 
     whole: Posture
@@ -148,13 +150,13 @@ class ExactAssembly:
         }
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return frames, closures and platform, by ``assembly.model.tables``."""
+        """Return frames, closures and platform, see ``assembly.model.tables``."""
         from forcefit.assembly.model.tables import assembly_dataset
 
         return assembly_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a row for each frame, columns (variable, component)."""
+        """Return a table with one row per frame, by variable and component."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "frame")
@@ -166,7 +168,7 @@ class ExactAssembly:
 
     @property
     def load(self) -> NDArray:
-        """(6,) [N m, N] on the platform at its origin, base axes."""
+        """(6,) [N m, N] wrench on the platform at its origin, base axes."""
         return self.linear.load
 
     @property
@@ -191,7 +193,7 @@ class ExactAssembly:
 
     @cached_property
     def energy(self) -> float:
-        """[J] elastic energy; 0 if the residual of the closures may explain it."""
+        """[J] elastic energy; 0 if the closure residual alone could cause it."""
         energy, residual = energy_of(self.placement), self.closure_residual()
         differs = differs_from_zero(energy, 0.0, self.multipliers, residual)
         return energy if differs else 0.0
@@ -215,7 +217,8 @@ class ExactAssembly:
     def link_screws(self) -> NDArray:
         """(n, 6) [rad, m] deformations of the bodies, as logarithms.
 
-        For a beam in pieces it is the screw of its end relative to its base.
+        For a beam in pieces, the deformation is the screw of its end relative to its
+        base.
         """
         screws = self.placement.screws[LINK, self.cut.last]
         pieces = np.bincount(self.cut.owner)
@@ -238,7 +241,7 @@ class ExactAssembly:
 
     @cached_property
     def clearance_screws(self) -> NDArray:
-        """(n, 6) [rad, m] clearances, with motions of passive joints."""
+        """(n, 6) [rad, m] clearances and motions of passive joints."""
         screws = self.placement.screws[CLEARANCE, self.cut.last]
         own = self.placement.own[self.cut.last, None]
         return screws + own * own_screws(self.posture.robot)
@@ -247,7 +250,7 @@ class ExactAssembly:
     def closure_wrenches(self) -> NDArray:
         """(closures, 6) [N m, N] wrench of each closure's second chain on its first.
 
-        It is read at the platform's nominal origin, in base axes.
+        The wrenches act at the platform's nominal origin, in base axes.
         """
         return self.multipliers.reshape(-1, 6) * self.placement.model.scale
 
@@ -255,13 +258,13 @@ class ExactAssembly:
     def wrenches(self) -> NDArray:
         """(n, 6) [N m, N] wrench of each link's spring: K_E times its deformation.
 
-        It is read at the displaced frame's origin, in its axes.
+        The wrench acts at the displaced frame's origin, in the frame's axes.
         """
         return self._through[0]
 
     @property
     def tip_wrenches(self) -> NDArray:
-        """(n, 6) [N m, N] wrench of the outer part on each body, at the body's tip."""
+        """(n, 6) [N m, N] wrench that the next part exerts on each body's tip."""
         own = distributed_at_tips(self.placement, self.loads)
         return self.wrenches - own[self.cut.last]
 
@@ -269,7 +272,8 @@ class ExactAssembly:
     def joint_wrenches(self) -> NDArray:
         """(n, 6) [N m, N] wrench through each joint.
 
-        It differs from :attr:`tip_wrenches` by loads on the body at the frame.
+        The difference from :attr:`tip_wrenches` equals the loads that act on the body
+        at the frame.
         """
         return self._through[1]
 
@@ -285,19 +289,19 @@ class ExactAssembly:
 
     @cached_property
     def linearisation_error(self) -> LinearisationError:
-        """Linear minus exact platform screw and energy."""
+        """Difference of platform screw and energy: linear minus exact result."""
         screw = self.linear.platform_screw - self.platform_screw
         energy = self.linear.energy - self.energy
-        # inside an assembly zone both are zero except for rounding
+        # inside an assembly zone both energies are zero except for rounding errors
         scale = max(self.energy, 1e-6 * self.linear.energy_without_clearance, _ROUNDING)
         return LinearisationError(screw[:3], screw[3:], energy, energy / scale)
 
     def closure_residual(self) -> float:
-        """Return the largest closure residual: abs(rad), abs(m) / reference length."""
+        """Return the largest closure residual in rad, or m / reference length."""
         return float(np.abs(self.placement.residual).max(initial=0.0))
 
     def clearance_excess(self) -> float:
-        """Return the largest excess [-] of a clearance over its cone, relative."""
+        """Return the largest relative excess [-] of a clearance over its cone."""
         robot = self.posture.robot
         bounded = clearance_components(robot, self.clearance_screws)
         return float(clearance_excess(bounded, clearance_bounds(robot)))
@@ -314,27 +318,29 @@ def solve_exact(
     progress: Callable[[int, int], None] = lambda done, most: None,
     method: Method = "compiled",
 ) -> ExactAssembly:
-    """Close a manipulator at least energy with finite motions, from the linear model.
+    """Close a manipulator with least energy and finite motions, from the linear model.
 
     Args:
         posture: configuration of the robot, with its errors, clearances, links and
             joint springs.
-        load: (6,) [N m, N] on the platform at ``point``, base axes, or by component,
-            ``{"fz": -50}``.  The force is dead; the work of the moment is its product
-            with the rotation vector.
+        load: (6,) [N m, N] wrench on the platform at ``point``, base axes; or a mapping
+            of components such as ``{"fz": -50}``.  The force is dead; the work of the
+            moment is its product with the rotation vector.
         start: the linear solution for this posture and these loads, if known.
         bodies: (n, 6) [N m, N] dead loads on the bodies of all frames, each at its
             frame's origin, base axes; moments are couples of dead forces.
-        gravity: (3,) [m/s^2] base axes; see :mod:`forcefit.assembly.exact.dead_load`
-            for links.
-        point: (3,) [m] point of the platform, in its axes; the force moves with it.
+        gravity: (3,) [m/s^2] gravity vector in base axes; for links see
+            :mod:`forcefit.assembly.exact.dead_load`.
+        point: (3,) [m] point of the platform, in platform axes; the force moves with
+            it.
         near: equilibrium of the same posture under another load, used as the start.
         progress: function called with the number of steps and the largest number.
         method: method of the linear solution and of every step: ``"compiled"``, with
-            Clarabel if in doubt; or ``"reference"``, with numpy and Clarabel only.
+            Clarabel if the compiled solution is not proved; or ``"reference"``, with
+            numpy and Clarabel only.
 
     Returns:
-        The assembled manipulator: closed, stationary, within its cones.
+        The assembled manipulator: closed, stationary and within its cones.
 
     Raises:
         CannotAssemble: the linear model has no solution to start from.
@@ -374,7 +380,7 @@ def solve_exact(
 
     assembly = search(start.joints)
     if assembly.clearance_excess() > 1e-9 and has_bounded_motion(posture.robot):
-        # a bound of a passive joint was left out, but it is active
+        # an omitted bound of a passive joint is active: solve with all bounds
         assembly = search(virtual_joints(cut.robot, bounded_motion=True))
     return assembly
 
@@ -398,7 +404,7 @@ def _search(
     joints: VirtualJoints, linear: Assembly, loads: DeadLoads, first: NDArray | None,
     progress: Callable[[int, int], None], method: Method,
 ) -> tuple[Expansion, float, int]:  # fmt: skip
-    """Iterate from a guess; return the last expansion, imbalance, number of steps."""
+    """Iterate from a guess; return the expansion, imbalance and number of steps."""
     model = FiniteRobot(linear.posture, joints)
     current = place(model, _first_guess(model, linear) if first is None else first)
     rigid = np.zeros(len(current.residual))
@@ -438,7 +444,7 @@ def _first_guess(model: FiniteRobot, linear: Assembly) -> NDArray:
 
 
 def _energy_scale(at: Placement, linear: Assembly, loads: DeadLoads) -> float:
-    """Return the [J] scale of the problem's energies."""
+    """Return a typical energy [J] of the problem, as a scale for tolerances."""
     return max(
         energy_of(at), abs(work_of(at, loads)), 1e-3 * linear.energy_without_clearance
     )

@@ -1,12 +1,14 @@
-r"""A robot at a posture, with unknowns that move its frames by finite screws.
+r"""Robot at a posture, with unknowns that move its frames by finite screws.
 
-At a frame, in its axes, motions follow each other, each the exponential of a screw:
+The motions at a frame are composed in its axes.  Each motion is the exponential of a
+screw:
 
-    T_i = T_parent  F_i  exp(dl)^  exp(de)  exp(dc)  exp(db),   then the joint's own,
+    T_i = T_parent  F_i  exp(dl)^  exp(de)  exp(dc)  exp(db)  (motion of the joint).
 
-where F_i is the nominal body, exp(dl)^ the geometric error (rotation vector and
-translation, both in the frame's axes).  The joint's own motion is a rotation about z,
-or a translation along z, by its coordinate plus the motion of a passive joint.
+F_i is the nominal body.  exp(dl)^ is the geometric error: a rotation vector and a
+translation, both in the frame's axes.  The motion of the joint is a rotation about z or
+a translation along z; its size is the joint's coordinate plus the motion of a passive
+joint.
 """
 
 from dataclasses import dataclass
@@ -24,18 +26,18 @@ from forcefit.assembly.model.links import own_screws
 from forcefit.assembly.model.robot import Robot
 from forcefit.stiffness.screws import rotation_matrix, transform
 
-# the motions at a frame, in this order
+# the motions at a frame, in this order; OWN is the motion of the joint
 LINK, CLEARANCE, SPRING, OWN = range(4)
 
 
 @dataclass(frozen=True, eq=False)
 class FiniteRobot:
-    """A robot at a posture, prepared for finite screws.
+    """Robot at a posture, with its unknowns as columns of finite screws.
 
     Attributes:
         posture: nominal posture of the robot.
-        joints: virtual joints of the robot; their columns are the unknowns y, u, q in
-            this order.
+        joints: virtual joints of the robot; their columns are the unknowns y, u and q,
+            in this order.
     """
 
     posture: Posture
@@ -43,14 +45,14 @@ class FiniteRobot:
 
     @cached_property
     def _blocks(self) -> NDArray:
-        """(n, 6, N) all columns by frame and component."""
+        """(n, 6, N) columns of all unknowns by frame and component."""
         j = self.joints
         every = np.hstack([j.elastic, j.cones, j.free])
         return every.reshape(len(self.posture.robot.frames), 6, every.shape[1])
 
     @cached_property
     def frame(self) -> NDArray:
-        """(N,) row of the frame at which each unknown acts."""
+        """(N,) index of the frame at which each unknown acts."""
         return np.argmax(np.abs(self._blocks).max(axis=1), axis=0)
 
     @cached_property
@@ -88,7 +90,7 @@ class FiniteRobot:
 
     @cached_property
     def units(self) -> NDArray:
-        """(N,) scale of the unknowns: 1 for springs; free motions have size 1."""
+        """(N,) scale of the unknowns: 1 for springs; screws of motions get size 1."""
         units = np.ones(len(self.frame))
         units[self.bounded.stop :] /= np.linalg.norm(
             self.columns[self.bounded.stop :] * self.scale, axis=1
@@ -107,7 +109,7 @@ class FiniteRobot:
 
     @cached_property
     def metric(self) -> NDArray:
-        """(N, N) squared size of the screws of the unknowns, in rad and lengths."""
+        """(N, N) scalar products of the unknowns' screws, in rad and lengths."""
         together = self.same_motion & (self.frame[:, None] == self.frame)
         scaled = self.columns * self.scale
         return (scaled @ scaled.T) * together
@@ -124,12 +126,12 @@ class FiniteRobot:
 
     @cached_property
     def signs(self) -> NDArray:
-        """(K, N) +1 on a closure's first chain, -1 on its second, 0 where shared."""
+        """(K, N) +1 on a closure's first chain, -1 on its second, 0 on both or none."""
         return closure_signs(self.posture.robot)[:, self.frame]
 
     @cached_property
     def chains(self) -> tuple[NDArray, NDArray]:
-        """(K, N) bool for each of the two chains: unknowns on the closure's chain."""
+        """(K, N) bool for each of a closure's two chains: unknowns on that chain."""
         robot = self.posture.robot
         ends = self.closed_frames
         first, second = (robot.on_path[ends[:, k]][:, self.frame] for k in (0, 1))
@@ -137,7 +139,7 @@ class FiniteRobot:
 
     @cached_property
     def closed_frames(self) -> NDArray:
-        """(K, 2) rows of the frames that each closure joins."""
+        """(K, 2) indices of the frames that each closure joins."""
         robot = self.posture.robot
         rows = [[robot.index(name) for name in pair] for pair in robot.closures]
         return np.array(rows, dtype=int).reshape(-1, 2)
@@ -150,7 +152,7 @@ class FiniteRobot:
 
     @cached_property
     def precedence(self) -> NDArray:
-        """(K, N, N) +1 where the second unknown acts later around the loop, else -1.
+        """(K, N, N) +1 if the second unknown acts later around the loop, else -1.
 
         The order is outward along the first chain and back along the second chain.
         """
@@ -159,7 +161,7 @@ class FiniteRobot:
 
     @cached_property
     def comes_before(self) -> NDArray:
-        """(N, N) 1 where the first unknown moves the second, 1/2 within one motion."""
+        """(N, N) 1 if the first unknown moves the second, 1/2 within one motion."""
         above = self.posture.robot.on_path[self.frame][:, self.frame].T
         return above * (1.0 - np.sign(self._order[:, None] - self._order)) / 2
 
@@ -175,11 +177,11 @@ class FiniteRobot:
     def nominal_closures(self) -> NDArray:
         """(K, 4, 4) nominal second frame of each closure relative to the first."""
         first, second = self.posture.transforms[self.closed_frames.T]
-        return inverse(first) @ second  # not exactly 1 for rounded files
+        return inverse(first) @ second  # not exactly 1 for rounded robot files
 
 
 def along_own(robot: Robot, coordinates: NDArray) -> NDArray:
-    """Return the (..., n, 4, 4) motions about or along each joint's z by (..., n)."""
+    """Return (..., n, 4, 4) motions about or along each joint's z axis."""
     return exponential(coordinates[..., None] * own_screws(robot))
 
 

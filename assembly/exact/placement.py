@@ -10,10 +10,9 @@ P       ``platform_rows``  (6, N)      derivative of the platform screw
 V       ``moves``          (6, N)      small motion that each unknown makes
 ======  =================  ==========  =============================================
 
-The logarithm of a product of motions exp(V_1 h_1) exp(V_2 h_2) ... is, to second order,
-the sum of V_i h_i plus half of the brackets [V_i h_i, V_j h_j] of each pair in its
-order.  The second derivative consists of these brackets and the curvature of each
-exponential.
+To second order, the logarithm of a product of motions exp(V_1 h_1) exp(V_2 h_2) ... is
+the sum of V_i h_i plus half of the brackets [V_i h_i, V_j h_j] of all ordered pairs.
+The second derivative consists of these brackets and the curvature of each exponential.
 
 Sources:
     Selig (2005), Geometric Fundamentals of Robotics, chapter 4 (brackets of screws,
@@ -41,7 +40,7 @@ from forcefit.stiffness.screws import rotation_vector, screw_map, skew
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """A robot moved by finite screws; its closures may be open.
+    """Robot moved by finite screws; its closures can be open.
 
     Attributes:
         model: the prepared robot.
@@ -120,7 +119,7 @@ class Placement:
 
     @cached_property
     def _open(self) -> NDArray:
-        """(K, 4, 4) open closures as motions, read at the platform's origin."""
+        """(K, 4, 4) residual motion of each closure, at the platform's origin."""
         first, second = self.transforms[self.model.closed_frames.T]
         G = first @ self.model.nominal_closures @ inverse(second)
         origin = self.model.posture.platform[:3, 3]
@@ -152,7 +151,7 @@ class Placement:
 
     @cached_property
     def moves(self) -> NDArray:
-        """(6, N) small motion that follows, read at the platform's nominal origin."""
+        """(6, N) small motion due to each unknown, at the platform's nominal origin."""
         m = self.model
         sprung = np.concatenate([left_jacobian(self.screws), self._identity])
         local = sprung[m.motion, m.frame] @ m.columns[:, :, None]
@@ -160,7 +159,7 @@ class Placement:
 
     @property
     def _identity(self) -> NDArray:
-        """(1, n, 6, 6) identities: own motions are linear in their coordinate."""
+        """(1, n, 6, 6) identities: joint motions are linear in their coordinate."""
         return np.broadcast_to(np.eye(6), (1, len(self.own), 6, 6))
 
     @cached_property
@@ -177,7 +176,7 @@ class Placement:
 
     @cached_property
     def _at_origin(self) -> NDArray:
-        """(6, N) motions of the platform, read at its present origin."""
+        """(6, N) motions of the platform, at its current origin."""
         away = self.model.posture.platform[:3, 3] - self.platform[:3, 3]
         return screw_map(away) @ (self.moves * self.model.on_platform)
 
@@ -191,12 +190,12 @@ class Placement:
     def curvature(self, multipliers: NDArray, load: NDArray) -> NDArray:
         """Return second derivative of multipliers . residual + load . platform screw.
 
-        It is exact if the closures hold; otherwise its error is of the order of the
-        residual.
+        The result is exact if the closures hold.  Otherwise its error is of the order
+        of the residual.
 
         Args:
             multipliers: (6 K,) multipliers of the scaled residual.
-            load: (6,) [N m, N] on the platform at its origin, base axes.
+            load: (6,) [N m, N] wrench on the platform at its origin, base axes.
 
         Returns:
             (N, N) symmetric matrix.
@@ -215,11 +214,11 @@ class Placement:
         return H + self.exponential_curvature(through)
 
     def exponential_curvature(self, through: NDArray) -> NDArray:
-        """Return the part of the curvature that is due to each single exponential.
+        """Return the curvature that is due to the individual exponentials.
 
         Args:
-            through: (N, 6) wrench on all that each unknown moves, at the platform's
-                nominal origin, base axes.
+            through: (N, 6) wrench on all parts that each unknown moves, at the
+                platform's nominal origin, base axes.
 
         Returns:
             (N, N) symmetric matrix.
@@ -234,13 +233,13 @@ class Placement:
         return (rows @ m.columns.T) * m.same_motion
 
     def load_wrench(self, load: NDArray) -> NDArray:
-        """Return (6,) wrench at the nominal origin that does the work of the load."""
+        """Return the (6,) wrench at the nominal origin that does the load's work."""
         moment = np.linalg.solve(turn_jacobian(self.platform_screw[:3]).T, load[:3])
         arm = self.platform_screw[3:]
         return np.concatenate([moment + np.cross(arm, load[3:]), load[3:]])
 
     def _load_curvature(self, load: NDArray) -> NDArray:
-        """Return the load's curvature without the part of its wrench's brackets."""
+        """Return the load's curvature without the bracket terms of its wrench."""
         W, turn = self._at_origin, self.platform_screw[:3]
         order = self.model._order
         V = self.moves * self.model.on_platform
@@ -261,10 +260,10 @@ def place(model: FiniteRobot, x: NDArray) -> Placement:
     """Return the robot moved by finite screws.
 
     Args:
-        model: the prepared robot.
+        model: robot with its unknowns.
         x: (N,) values of the unknowns.
 
     Returns:
-        The placement, with positions of all frames.
+        The placement, which computes the positions of all frames.
     """
     return Placement(model, np.array(x, dtype=float))

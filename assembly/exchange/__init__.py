@@ -1,5 +1,5 @@
-"""Import and export of robots of other programs: URDF, MJCF, SDF.
+"""Import and export of robots from and to other programs: URDF, MJCF, SDF.
 
-Begin at ``robot_files.py`` and ``convert.py``; ``mechanism.py`` defines the
-representation common to all formats.
+Start with ``robot_files.py`` and ``convert.py``; ``mechanism.py`` defines the
+representation that all formats share.
 """

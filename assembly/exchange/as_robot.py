@@ -1,9 +1,9 @@
 """Conversion of a mechanism to a robot of frames, and back.
 
 A moving joint becomes a frame with the joint's name; a body on a fixed joint becomes a
-frame with that body's name.  A body on a moving joint gets its own frame if it has a
-mass, ends a chain, or is an end of a loop, because its axes may differ from the
-joint's.
+frame with the body's name.  A body on a moving joint gets its own frame if the body has
+a mass, ends a chain, or is an end of a loop, because its axes may differ from the
+joint's axes.
 """
 
 from collections.abc import Mapping
@@ -40,13 +40,13 @@ Places = Mapping[str, tuple[str, NDArray]]
 
 @dataclass(frozen=True, eq=False)
 class RobotAndMechanism:
-    """A robot together with the mechanism from which it was made.
+    """A robot together with the mechanism that it was converted from or to.
 
     Attributes:
         robot: the robot of frames.
         mechanism: the mechanism of bodies.
-        places: for each body its frame, ``"base"`` for the root, and its pose (4, 4) in
-            it after that frame's motion.
+        places: for each body, its frame (``"base"`` for the root) and the pose (4, 4)
+            of the body in this frame after the frame's motion.
     """
 
     robot: Robot
@@ -55,15 +55,15 @@ class RobotAndMechanism:
 
 
 def points_as_joints(mechanism: Mechanism, home: NDArray) -> Mechanism:
-    """Return a mechanism with a ball joint in each loop that meets in a point.
+    """Return a mechanism with a ball joint in each loop that closes in a point only.
 
     Args:
         mechanism: mechanism of n joints.
-        home: (n,) [rad or m] coordinates at which its loops close.
+        home: (n,) [rad or m] coordinates for which its loops close.
 
     Returns:
-        The mechanism at home; the ball joints are at rest, and every loop constrains
-        all six directions.
+        The mechanism at home. The ball joints have zero coordinates, and every loop
+        constrains all six directions.
     """
     poses = body_poses(mechanism, home)
     bodies = dict(mechanism.bodies)
@@ -97,7 +97,7 @@ def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
         mechanism: mechanism at home, with loops that constrain all six directions.
 
     Returns:
-        The robot, with the mechanism and the bodies' places.
+        The robot, with the mechanism and the places of its bodies.
 
     Raises:
         BadInput: no body can be the platform.
@@ -155,7 +155,7 @@ def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
 
 
 def _without_base(mechanism: Mechanism) -> Mechanism:
-    """Return the mechanism with another name for a joint called as the base."""
+    """Return the mechanism with a joint renamed if its name is that of the base."""
     names = {joint.name for joint in mechanism.joints}
     if BASE not in names:
         return mechanism
@@ -171,13 +171,13 @@ def _without_base(mechanism: Mechanism) -> Mechanism:
 
 
 def guess_platform(mechanism: Mechanism) -> str:
-    """Return the body at the end of the longest chain that is not only part of a loop.
+    """Return the body at the end of the longest chain that does not only close a loop.
 
     Args:
         mechanism: any mechanism.
 
     Returns:
-        The name of a body that carries none; the first of equally long chains.
+        The name of a body that carries no other body; the first of equally long chains.
 
     Raises:
         BadInput: the mechanism has no joint.
@@ -199,7 +199,7 @@ def guess_platform(mechanism: Mechanism) -> str:
 
 
 def _closes(joint: Joint, mechanism: Mechanism) -> bool:
-    """Return whether a joint is part of a joint that closes a loop."""
+    """Return whether a joint belongs to a joint of several freedoms in a loop."""
     return any(
         loop.first == f"{loop.name}.tip"
         and (joint.name == loop.name or joint.name.startswith(f"{loop.name}."))
@@ -208,7 +208,7 @@ def _closes(joint: Joint, mechanism: Mechanism) -> bool:
 
 
 def _with_ends(mechanism: Mechanism) -> Mechanism:
-    """Return the mechanism with a body without mass at each loop's end."""
+    """Return the mechanism with a massless body added at each end of a loop."""
     bodies, joints, loops = dict(mechanism.bodies), list(mechanism.joints), []
     for loop in mechanism.loops:
         ends = []
@@ -227,15 +227,15 @@ def _with_ends(mechanism: Mechanism) -> Mechanism:
 
 
 def mechanism_of_robot(robot: Robot, home: NDArray) -> RobotAndMechanism:
-    """Return the mechanism of a robot: rigid, without clearance and errors.
+    """Return the mechanism of a robot: rigid bodies, without clearance and errors.
 
     Args:
         robot: robot of n frames.
         home: (n,) [rad or m] coordinates at home.
 
     Returns:
-        The mechanism.  The body of a fixed frame has its name, that of a moving one has
-        the suffix ``.link``.
+        The mechanism.  The body of a fixed frame has the frame's name; the name of a
+        moving body has the suffix ``.link``.
     """
     names = {f.name for f in robot.frames}
     root = _unlike(BASE, names)

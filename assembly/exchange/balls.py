@@ -1,4 +1,4 @@
-"""Ball joints as three rotations that are zero at home, so that they are regular."""
+"""Ball joints as three rotations that are zero at home, where they are not singular."""
 
 from dataclasses import replace
 
@@ -8,17 +8,17 @@ from forcefit.assembly.exchange.mechanism import Joint, motion
 
 
 def balls_at_rest(joints: tuple[Joint, ...]) -> tuple[Joint, ...]:
-    """Return joints in which passive balls have zero coordinates at home.
+    """Return joints in which passive ball joints have zero coordinates at home.
 
-    A ball joint is three rotations, which lose a freedom if the second is a right
-    angle. The rotation at home therefore goes into the joint's placement.
+    A ball joint consists of three rotations, which lose a freedom if the second angle
+    is 90 degrees. The rotation at home is therefore included in the joint's placement.
 
     Args:
         joints: joints at home.
 
     Returns:
-        The same joints in the same pose.  Only the coordinates of balls differ that a
-        reader made of three consecutive rotations.
+        The joints in the same pose.  Only the coordinates of ball joints change that
+        were converted to three consecutive rotations.
     """
     at_rest = list(joints)
     for i in range(len(joints) - 2):
@@ -35,7 +35,7 @@ def balls_at_rest(joints: tuple[Joint, ...]) -> tuple[Joint, ...]:
 def _is_ball(turns: tuple[Joint, ...]) -> bool:
     """Return whether three joints are the rotations of a file's passive ball joint."""
     name = turns[0].name.removesuffix(".rx")
-    made = {f"{name}.after_rx", f"{name}.rx.after"}  # names made by chain() and by MJCF
+    made = {f"{name}.after_rx", f"{name}.rx.after"}  # names from chain() and from MJCF
     return (
         turns[0].child in made
         and [turn.name for turn in turns] == [f"{name}.r{axis}" for axis in "xyz"]

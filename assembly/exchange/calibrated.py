@@ -1,4 +1,4 @@
-"""A robot with its known geometric errors built in, for programs without errors."""
+"""A robot whose known geometric errors are part of its nominal geometry."""
 
 from dataclasses import replace
 
@@ -11,22 +11,22 @@ from forcefit.assembly.measurement.conditions import as_declared
 from forcefit.assembly.model.robot import BeamLink, MatrixLink, Robot
 from forcefit.stiffness.screws import rotation_matrix, rotation_vector, transform
 
-# effects that do not depend on pose, temperature and load
+# effects that do not depend on pose, temperature or load
 CONSTANT = ("encoder_offset", "link_length")
 
 
 def with_calibration(home: Posture) -> Robot:
-    """Return the robot whose nominal geometry is the calibrated one.
+    """Return a robot whose nominal geometry includes the calibrated errors.
 
     Args:
-        home: home pose of the declared robot, with its geometric errors and effects.
+        home: home pose of the robot of a file, with its geometric errors and effects.
 
     Returns:
-        The robot with geometric errors and constant effects included in its frames, and
-        removed from its errors and effects.
+        The robot with geometric errors and constant effects included in its frames.
+        They are removed from its errors and effects.
 
     Raises:
-        BadInput: an effect breaks one of its rules.
+        BadInput: an effect violates one of its rules.
     """
     robot = home.robot
     constant = {k: v for k, v in robot.effects.items() if k in CONSTANT}
@@ -48,7 +48,7 @@ def with_calibration(home: Posture) -> Robot:
 
 
 def not_rigid(robot: Robot) -> tuple[str, ...]:
-    """Return, in words, the properties of a robot that a rigid one lacks."""
+    """Return descriptions of the properties that a rigid robot cannot represent."""
     frames = robot.frames
     kinds = {
         "elastic links": [f.name for f in frames if f.link is not None],

@@ -1,7 +1,7 @@
-"""Comparison of a robot's file as read here with its reading by MuJoCo.
+"""Comparison of a robot file as read by forcefit with the same file read by MuJoCo.
 
-MuJoCo is optional.  If it is installed it reads URDF and MJCF in a separate process, so
-that no file can crash this one or block it for long.
+MuJoCo is optional.  If it is installed, it reads URDF and MJCF files in a separate
+process, so that no file can crash or block this process.
 """
 
 import importlib.util
@@ -18,9 +18,9 @@ from typing import Any
 from forcefit.assembly.exchange.mechanism import Mechanism
 from forcefit.assembly.model.inertia import MassProperties
 
-AGREED = 1e-9  # [rad, m, kg over the largest] accepted difference
+AGREED = 1e-9  # [rad, m, relative mass] largest difference that counts as agreement
 POSTURES = 20
-_LONGEST = 60.0  # [s] longest time of the other program
+_LONGEST = 60.0  # [s] time limit of the other program
 _WORKER = "from forcefit.assembly.exchange.mujoco_reading import main; main()"
 
 
@@ -29,16 +29,16 @@ class Comparison:
     """Comparison of a file's content as read by another program and by forcefit.
 
     Attributes:
-        reader: its name and version.
-        file: the file that both read.
-        why_not: the reason why it could not be compared, else empty.
+        reader: name and version of the other program.
+        file: the file that both programs read.
+        why_not: reason why the file could not be compared; otherwise empty.
         bodies: number of bodies compared.
         masses: number of bodies whose mass and moments of inertia were compared.
         loops: number of loops compared.
-        difference: the largest, [rad, m] or relative mass; lengths are divided by the
-            robot's size if that is above 1 m.
-        where: place of the largest difference, in words.
-        weights: mass properties of bodies whose mass only the other program knows.
+        difference: largest difference, [rad, m] or relative mass; lengths are divided
+            by the robot's size if the size exceeds 1 m.
+        where: description of where the largest difference occurs.
+        weights: mass properties of bodies whose mass only the other program can read.
     """
 
     reader: str
@@ -53,7 +53,7 @@ class Comparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether no difference was found."""
+        """Whether the programs agree."""
         return self.difference <= AGREED
 
     def table(self) -> dict[str, Any]:
@@ -69,7 +69,7 @@ class Comparison:
         what = f"bodies {self.bodies}, masses {self.masses}, loops {self.loops}"
         if not self.agrees:
             return (
-                f"{self.reader} reads {self.file} otherwise: {self.where} "
+                f"{self.reader} reads {self.file} differently: {self.where} "
                 f"differs by {self.difference:.2g}; check which of the two "
                 "programs reads the file correctly"
             )
@@ -80,7 +80,7 @@ class Comparison:
 
 
 def compare(mechanism: Mechanism, path: Path) -> Comparison:
-    """Compare a mechanism with what another program reads in its file.
+    """Compare a mechanism with its file as read by another program.
 
     Args:
         mechanism: mechanism as it was read or written.
@@ -107,6 +107,6 @@ def compare(mechanism: Mechanism, path: Path) -> Comparison:
         except subprocess.TimeoutExpired:
             return Comparison("", name, f"MuJoCo took longer than {_LONGEST:g} s")
         if not made.is_file():
-            return Comparison("", name, "MuJoCo ended without an answer")
+            return Comparison("", name, "MuJoCo terminated without a result")
         answer = pickle.loads(made.read_bytes())
     return answer if isinstance(answer, Comparison) else Comparison("", name, "none")

@@ -12,19 +12,19 @@ from forcefit.inputs.errors import quoted
 
 @dataclass(frozen=True, eq=False)
 class Conversion:
-    """Result of the conversion of a robot.
+    """Result of the conversion of a robot file.
 
     Attributes:
-        robot: robot of the robot file that was written or read.
-        files: the files written.
-        open_before: [rad, m] mismatch of the loops at the file's own home.
-        open_after: [rad, m] mismatch of the loops at the home that was computed.
+        robot: robot that was written or read.
+        files: files that were written.
+        open_before: [rad, m] mismatch of the loops at the home pose of the file.
+        open_after: [rad, m] mismatch of the loops at the computed home pose.
         drives_held: whether the drives have the coordinates of the file.
-        difference: largest of any body's pose in 100 random postures, after reading
-            back.
-        comparisons: with readings of the files by another program.
-        left_out: parts that the new file cannot represent, in words.
-        taken: assumptions where the files are incomplete, in words.
+        difference: largest difference of any body's pose after reading back, in 100
+            random postures.
+        comparisons: comparisons of the files as read by another program.
+        left_out: descriptions of parts that the new file cannot represent.
+        taken: descriptions of assumptions where the files are incomplete.
     """
 
     robot: Robot
@@ -39,7 +39,7 @@ class Conversion:
 
     @property
     def agrees(self) -> bool:
-        """Whether no other program read a different robot."""
+        """Whether no other program disagrees with forcefit's reading."""
         return all(comparison.agrees for comparison in self.comparisons)
 
     def table(self) -> dict[str, Any]:
@@ -62,7 +62,7 @@ class Conversion:
         }
 
     def text(self) -> str:
-        """Return a few lines for people."""
+        """Return a few lines of text."""
         robot = self.robot
         count = len(loops(robot))
         lines = [

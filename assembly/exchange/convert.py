@@ -1,4 +1,4 @@
-"""``forcefit convert``: import and export of robots, checked by reading back.
+"""``forcefit convert``: import and export of robots, verified by reading back.
 
 ============  ==========================================================  ==========
 kind          read                                                        written
@@ -76,14 +76,15 @@ def convert(
         source: a ``.urdf``, ``.xml`` (MJCF), ``.sdf`` or ``.toml`` file, or the name of
             a built-in robot.
         target: a ``.toml``, ``.urdf`` or ``.xml`` file.
-        loops: YAML with ``closed_loop``, for files without one next to them.
-        overlay: TOML with elasticity, clearances, errors of frames by name.
-        points: names of loops that meet only in a point, in addition to those of type
-            3d; if empty, the types are used unchanged.  Without it they are used too,
-            unless every loop is declared 6d and they cannot close: then all loops
-            become points, and the result reports it.
-        close: for a robot file or built-in robot, as
-            :func:`forcefit.assembly.kinematics.closing.closing_of`; none if absent.
+        loops: YAML file with ``closed_loop``; None for the file next to the source.
+        overlay: TOML file with elasticity, clearances and errors of frames by name.
+        points: names of loops that close only in a point, in addition to those of type
+            3d; an empty list to use the types unchanged.  None to use the types unless
+            every loop is declared 6d and the loops cannot close: then all loops become
+            points, and the result reports this.
+        close: for a robot file or built-in robot, the result of
+            :func:`forcefit.assembly.kinematics.closing.closing_of`; None for no
+            closing.
         version: format of a robot file that is written: 1 for frames and closures, 2
             for bodies and joints.
 
@@ -91,8 +92,8 @@ def convert(
         The files written, and their difference from the source.
 
     Raises:
-        BadInput: a file breaks a rule, a loop cannot close, or the written robot
-            differs; then no file is written.
+        BadInput: a file violates a rule, a loop cannot close, or the written robot
+            differs from the source; no file is then written.
     """
     source, target = Path(source), Path(target)
     check_target(target)
@@ -124,13 +125,13 @@ def convert(
 
 
 def check_target(target: Path) -> None:
-    """Reject a file that could not be written, before the computation.
+    """Raise an error before the conversion if the target file cannot be written.
 
     Args:
-        target: path of the file; for a URDF a YAML is written next to it.
+        target: path of the file; next to a URDF, a YAML file is also written.
 
     Raises:
-        BadInput: its suffix is not that of a robot file, or it or the YAML exists and
+        BadInput: the suffix is not supported; or the file, or the YAML file, exists and
             belongs to another program, or cannot be written.
     """
     ending = target.suffix.lower()
@@ -154,7 +155,7 @@ def write_converted(robot: Robot, target: Path, version: int = 1) -> Conversion:
         The files written, and their difference from the robot.
 
     Raises:
-        BadInput: the file cannot be written, or would be another robot.
+        BadInput: the file cannot be written, or would describe another robot.
     """
     mismatch = home_posture(robot).mismatch
     conversion = Conversion(
@@ -219,7 +220,7 @@ def _written(
 
 
 def _built_in(conversion: Conversion) -> tuple[Conversion, RobotAndMechanism]:
-    """Return the rigid mechanism of a robot, its calibration included, loops closed."""
+    """Return a robot's rigid mechanism with its calibration and with closed loops."""
     threads = [quoted(f.name) for f in conversion.robot.frames if f.pitch]
     if threads:
         raise BadInput(
@@ -233,7 +234,7 @@ def _built_in(conversion: Conversion) -> tuple[Conversion, RobotAndMechanism]:
     mechanism = placed.mechanism
     left_out = [*conversion.left_out, *not_rigid(conversion.robot)]
     after, held = loop_residual(mechanism, home), conversion.drives_held
-    if after >= CLOSED:  # errors open the loops
+    if after >= CLOSED:  # the calibrated errors open the loops
         home, after, held = nearest_closed(mechanism, 0)
         pairs = zip(mechanism.joints, home, strict=True)
         joints = tuple(replace(j, position=float(q)) for j, q in pairs)
@@ -262,7 +263,7 @@ def _texts(mechanism: Mechanism, target: Path) -> dict[Path, str]:
 
 
 def _read_back(path: Path) -> Mechanism:
-    """Return the mechanism of files just written."""
+    """Return the mechanism of the files that were just written."""
     if path.suffix.lower() == ".xml":
         return read_mjcf(path)
     return read_urdf(path, read_loops(path.with_suffix(".yaml")))

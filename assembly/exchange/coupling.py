@@ -11,11 +11,11 @@ class Coupling:
     """A joint that follows another: q = rest + sum of c_k (q_leader - leader_rest)^k.
 
     Attributes:
-        follower: name of the joint.
-        leader: name of the other, None where the follower is held.
-        coefficients: c_0, c_1, ..
-        rest: [rad or m] of the follower.
-        leader_rest: [rad or m] of the leader.
+        follower: name of the joint that follows.
+        leader: name of the joint that is followed; None if the follower is fixed.
+        coefficients: coefficients c_0, c_1, ..
+        rest: [rad or m] rest coordinate of the follower.
+        leader_rest: [rad or m] rest coordinate of the leader.
     """
 
     follower: str
@@ -25,7 +25,7 @@ class Coupling:
     leader_rest: float = 0.0
 
     def at(self, leader: float) -> tuple[float, float]:
-        """Return follower's coordinate at a leader's coordinate, and its derivative."""
+        """Return the follower's coordinate and its derivative by the leader's."""
         x = leader - self.leader_rest
         value = slope = 0.0
         for c in reversed(self.coefficients):
@@ -34,7 +34,7 @@ class Coupling:
         return self.rest + value, slope
 
     def text(self) -> str:
-        """Return the rule in words, with the names of both joints."""
+        """Return the rule as text, with the names of both joints."""
         c = [*self.coefficients, 0.0, 0.0]
         if self.leader is None:
             return f"{self.follower} = {self.rest + c[0]:g}"
@@ -48,14 +48,14 @@ class Coupling:
 
 
 def leaders_first(couplings: Sequence[Coupling], file: str) -> tuple[Coupling, ...]:
-    """Return the couplings sorted so that a leader's own coupling comes first.
+    """Return the couplings in an order in which a leader's own coupling comes first.
 
     Args:
         couplings: couplings in any order.
         file: name of the file, for error messages.
 
     Returns:
-        The couplings.
+        The sorted couplings.
 
     Raises:
         BadInput: a joint follows two others, itself, or one of its followers.

@@ -1,4 +1,4 @@
-"""Data that a loops file adds to a robot: loops, drives, ball joints, a home."""
+"""Data that a loops file adds to a robot: loops, drives, ball joints, a home pose."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -20,20 +20,20 @@ def with_loops(
     mechanism: Mechanism, loops: LoopsFile | None, parts: Mapping[str, Sequence[str]],
     driven: set[str],
 ) -> Mechanism:  # fmt: skip
-    """Return the mechanism with loops, drives, platform and home of a loops file.
+    """Return the mechanism with the loops, drives, platform and home of a loops file.
 
     Args:
-        mechanism: mechanism of the file.
-        loops: the loops file, None without one.
-        parts: the file's joints, with the names of the joints made of each.
-        driven: joints that the robot's own file declares as driven.
+        mechanism: mechanism of the robot's file.
+        loops: the loops file; None if there is none.
+        parts: joints of the robot's file, each with the names of its parts.
+        driven: joints that the robot's file declares as driven.
 
     Returns:
-        The mechanism.  Its drives are those of the loops file, else ``driven``, else,
-        in a robot without loops, all joints.
+        The mechanism.  Its drives are those of the loops file; if the loops file lists
+        none, ``driven``; if this is also empty and there are no loops, all joints.
 
     Raises:
-        BadInput: a name that the robot does not have.
+        BadInput: a name is not a joint or link of the robot.
     """
     loops = loops or LoopsFile()
     for name in (*loops.turns, *loops.home, *(loops.drives or ())):
@@ -44,9 +44,9 @@ def with_loops(
     mechanism, parts = _retyped(mechanism, loops.turns, parts)
     ends = {name: name for name in mechanism.bodies}
     children = {joint.name: joint.child for joint in mechanism.joints}
-    # the end of a joint of several freedoms is that of its last part
+    # a joint of several freedoms ends at its last part
     ends |= {name: children[several[-1]] for name, several in parts.items()}
-    # a link on a fixed joint may have the joint's name: both are the same place
+    # a link on a fixed joint may have the joint's name: both denote the same place
     count, closed = len(mechanism.loops), list(mechanism.loops)
     for i, (pair, point) in enumerate(zip(loops.pairs, loops.points, strict=True), 1):
         for name in pair:
@@ -96,7 +96,7 @@ def with_loops(
 def _followed(
     joints: tuple[Joint, ...], couplings: Sequence[Coupling], loops: LoopsFile
 ) -> tuple[Joint, ...]:
-    """Return the joints, with followers at the home coordinates by their rule."""
+    """Return the joints, in which followers have the coordinates of their couplings."""
     at = {joint.name: joint.position for joint in joints}
     for coupling in couplings:
         name = coupling.follower
@@ -115,7 +115,7 @@ def _followed(
 def _couplings_said(
     joints: tuple[Joint, ...], couplings: Sequence[Coupling]
 ) -> Iterator[str]:
-    """Report joints with a rule that become independent drives."""
+    """Yield a text for each coupled joint that becomes an independent drive."""
     driven = {joint.name for joint in joints if joint.actuated}
     for coupling in couplings:
         line = (
@@ -133,7 +133,7 @@ def _couplings_said(
 def _retyped(
     mechanism: Mechanism, turns: Mapping[str, str], parts: Mapping[str, Sequence[str]]
 ) -> tuple[Mechanism, dict[str, list[str]]]:
-    """Return joints with their declared types, which a CAD export had lost."""
+    """Return joints with their declared types, which a CAD export may have lost."""
     bodies, joints = dict(mechanism.bodies), list[Joint]()
     now = {name: list(several) for name, several in parts.items()}
     for joint in mechanism.joints:

@@ -13,24 +13,25 @@ from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.model.robot import BASE, Robot
 from forcefit.inputs.errors import BadInput
 
-FAITHFUL = 1e-12  # [rad, lengths] largest difference of a body's pose
+FAITHFUL = 1e-12  # [rad, lengths] largest accepted difference of a body's pose
 _POSTURES = 100
 
 
 def largest_difference(placed: RobotAndMechanism) -> float:
-    """Return the largest difference of bodies' poses, in random postures.
+    """Return the largest difference of the bodies' poses in random postures.
 
-    All joints of the trees are moved, within 1 rad or m of home; loops need not close.
+    All joints of both trees are moved by up to 1 rad or m from home; loops need not
+    close.
 
     Args:
-        placed: robot and mechanism, one of them read back from a file.
+        placed: robot and mechanism, one of which was read back from a file.
 
     Returns:
         Largest difference of any entry of a body's transform; lengths are divided by
         the largest distance from the base if that is above 1 m.
 
     Raises:
-        BadInput: one of the two has joints that the other lacks.
+        BadInput: one of the two lacks a joint of the other.
     """
     robot, mechanism = placed.robot, placed.mechanism
     moving = [joint.name for joint in mechanism.joints if joint.kind != "fixed"]
@@ -51,7 +52,7 @@ def largest_difference(placed: RobotAndMechanism) -> float:
         reach = max(1.0, max(np.abs(T[:3, 3]).max() for T in poses.values()))
         scale = np.array([[1.0, 1.0, 1.0, 1 / reach]])
         for name, (frame, at) in placed.places.items():
-            if frame == BASE:  # the root, independent of its name
+            if frame == BASE:  # the root, whatever its name
                 continue
             gap = (poses[name] - frames[frame] @ at)[:3] * scale
             worst = max(worst, float(np.abs(gap).max()))
@@ -59,19 +60,19 @@ def largest_difference(placed: RobotAndMechanism) -> float:
 
 
 def drawn_difference(robot: Robot, back: Robot, frames: Mapping[str, str]) -> float:
-    """Return the largest difference of a robot from that of its drawing.
+    """Return the largest difference between a robot and the robot of its drawing.
 
-    Joints that both trees pass in the same order are moved at random, as in
+    Joints that occur in both trees in the same order are moved at random, as in
     :func:`largest_difference`; ball, cylindrical and planar joints stay at home.
 
     Args:
-        robot: that was written.
-        back: the robot of the drawing.
-        frames: names of the frames of joints in it, by their names in the robot.
+        robot: robot that was written as a drawing.
+        back: robot that was read back from the drawing.
+        frames: names of joint frames in ``back``, by their names in ``robot``.
 
     Returns:
-        Largest difference of a joint's point, over the largest distance from the base
-        if that is above 1 m, and of its axis; of the platform's point likewise.
+        Largest difference of a joint's point or axis, or of the platform's point;
+        points are divided by the largest distance from the base if it exceeds 1 m.
     """
     homes = home_posture(robot).coordinates, home_posture(back).coordinates
     rows = [(robot.index(a), back.index(b)) for a, b in frames.items()]
@@ -100,7 +101,7 @@ def drawn_difference(robot: Robot, back: Robot, frames: Mapping[str, str]) -> fl
 def _passes(
     robot: Robot, row: int, pairs: Sequence[tuple[int, int]], which: int
 ) -> tuple[object, ...]:
-    """Return the joints before a frame: numbers of pairs, other joints by name."""
+    """Return the joints that precede a frame: pairs by number, others by name."""
     numbers = {pair[which]: k for k, pair in enumerate(pairs)}
     passed = np.flatnonzero(robot.on_path[row]).tolist()
     moving = [i for i in passed if i != row and robot.frames[i].joint != "fixed"]
@@ -108,7 +109,7 @@ def _passes(
 
 
 def _placed(robot: Robot, q: NDArray) -> NDArray:
-    """Return (n, 4, 4) frames before their joints' motions."""
+    """Return the poses (n, 4, 4) of the frames before their joints' motions."""
     kinds = np.array([KINDS[f.joint] for f in robot.frames])
     leads = np.array([f.lead for f in robot.frames])
     return place_frames(robot.parents, kinds, robot.fixed_transforms, q, leads)[0]

@@ -1,4 +1,4 @@
-"""Robots of other programs' files, with a home pose in which their loops close."""
+"""Robots from files of other programs, with a home pose in which their loops close."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -46,16 +46,16 @@ def robot_of_file(
 
     Args:
         source: a URDF, MJCF or SDF file.
-        loops: YAML with ``closed_loop``; None: the one next to a URDF.
-        overlay: TOML with elasticity, clearances, errors of frames by name.
-        points: names of loops that meet only in a point.
+        loops: YAML file with ``closed_loop``; None for the file next to a URDF.
+        overlay: TOML file with elasticity, clearances and errors of frames by name.
+        points: names of loops that close only in a point.
         ask: whether another installed program also reads the file, for comparison.
 
     Returns:
-        The robot with the report of its conversion (no files), and its mechanism.
+        The robot with the report of its conversion (without files), and its mechanism.
 
     Raises:
-        BadInput: a file breaks a rule, or a loop cannot close.
+        BadInput: a file violates a rule, or a loop cannot close.
     """
     if loops is None and source.suffix.lower() == ".urdf":
         loops = find_loops_file(source)
@@ -108,17 +108,17 @@ def robot_of_file(
 def _closed(
     mechanism: Mechanism, source: Path, beside: LoopsFile | None
 ) -> tuple[Mechanism, NDArray, bool, tuple[str, ...]]:
-    """Return the mechanism with a home in which its loops close.
+    """Return the mechanism with a home pose in which its loops close.
 
     Args:
         mechanism: mechanism as it was read.
         source: path of the mechanism's file.
-        beside: the loops file if its types may be generated defaults: its loops become
-            points if they cannot close otherwise.  Else None.
+        beside: loops file whose types may be generated defaults: if the loops cannot
+            close otherwise, they become points.  None if the types are certain.
 
     Returns:
-        The mechanism, its home (n,) [rad or m], whether the drives have the file's
-        coordinates, and the assumptions made, in words.
+        The mechanism, its home coordinates (n,) [rad or m], whether the drives have the
+        coordinates of the file, and descriptions of the assumptions.
 
     Raises:
         BadInput: the loops cannot close.
@@ -148,7 +148,7 @@ def _closed(
 
 
 def _named_platform(overlay: Path | str) -> str | None:
-    """Return the platform that an overlay names, None if it names none."""
+    """Return the platform that an overlay names; None if it names none."""
     given = read_toml(overlay)
     if not given.has("platform"):
         return None
@@ -159,7 +159,7 @@ def _laid_over(
     placed: RobotAndMechanism, source: Path, overlay: Path | str | None,
     named: str | None,
 ) -> Robot:  # fmt: skip
-    """Return the robot with an overlay; a platform may be named by body."""
+    """Return the robot with an overlay, in which the platform may be a body's name."""
     content = robot_table(placed.robot)
     if overlay is None:
         return robot_of(Table(content, str(source), ""), source.stem)
@@ -170,7 +170,7 @@ def _laid_over(
 
 
 def _left_out(placed: RobotAndMechanism, named: str | None) -> tuple[str, ...]:
-    """Return, in words, the parts of the file that no robot of frames has."""
+    """Return descriptions of parts that a robot of frames cannot represent."""
     mechanism = placed.mechanism
     weight = mechanism.bodies[mechanism.root].mass
     lines = list(mechanism.left_out)
@@ -186,7 +186,7 @@ def _left_out(placed: RobotAndMechanism, named: str | None) -> tuple[str, ...]:
 
 
 def _weighed(mechanism: Mechanism, comparison: Comparison) -> Mechanism:
-    """Return bodies with the other program's masses of meshes, or report the lack."""
+    """Return bodies with mesh masses from the other program, or report their lack."""
     known = comparison.weights
     bodies = dict(mechanism.bodies)
     for name, (mass, centre, J) in known.items():

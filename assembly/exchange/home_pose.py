@@ -1,4 +1,4 @@
-"""A home pose in which loops close, near that of the file."""
+"""Search for a home pose in which all loops close, near the home pose of the file."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -16,38 +16,40 @@ from forcefit.assembly.exchange.tree import place_frames
 from forcefit.inputs.errors import BadInput, quoted
 from forcefit.stiffness.screws import rotation_vector, skew, transform
 
-CLOSED = 1e-10  # [rad, m] largest mismatch of a closed loop
-_SCREWED_TIGHT = 1e-14  # scaled residual below which only rounding remains
-_STARTS = 20  # number of random starts, at increasing distance from the file's own
+CLOSED = 1e-10  # [rad, m] largest mismatch of a loop that counts as closed
+_SCREWED_TIGHT = 1e-14  # scaled residual below which only rounding errors remain
+_STARTS = 20  # number of random starts, at increasing distance from the file's home
 _STARTS_ALONE = 12  # number of starts for a single loop, to find one that cannot close
 _STEPS = 200  # largest number of steps from a start
-_LONGEST_STEP = 0.3  # [rad or lengths]
-# ratio of the sums of squares over ten steps above which a search has stalled
+_LONGEST_STEP = 0.3  # [rad or lengths] largest step
+# ratio of the sums of squares over ten steps above which a search counts as stalled
 _STALLED = 0.999
 
 
 def loop_residual(mechanism: Mechanism, coordinates: NDArray) -> float:
-    """Return the largest component [rad, m] of all loops' mismatch."""
+    """Return the largest component [rad, m] of the mismatch of all loops."""
     residual = _Loops(mechanism, 1.0).equations(coordinates)[0]
     return float(np.abs(residual).max(initial=0.0))
 
 
 def close_loops(mechanism: Mechanism, file: str) -> tuple[NDArray, bool]:
-    """Return the coordinates near the file's own at which all loops close.
+    """Return coordinates for which all loops close, near those of the file.
 
-    First the drives are held.  If the loops do not close the drives move too.  Then
-    random starts (always the same) follow, each farther away.
+    The first search holds the drives.  If the loops do not close, the next search also
+    moves the drives.  Then searches follow from random starts, each farther away; the
+    random starts are the same at every call.
 
     Args:
         mechanism: mechanism of n joints.
         file: name of the file, for error messages.
 
     Returns:
-        (n,) [rad or m] the coordinates, and whether the drives have the file's
-        coordinates.
+        (n,) [rad or m] coordinates, and whether the drives have the coordinates of the
+        file.
 
     Raises:
-        BadInput: no start closes; the message has the loop at fault and its mismatch.
+        BadInput: no search closes the loops; the message names the loop at fault and
+            its mismatch.
     """
     coordinates, residual, held = nearest_closed(mechanism, 0)
     if residual >= CLOSED:
@@ -64,28 +66,28 @@ def close_loops(mechanism: Mechanism, file: str) -> tuple[NDArray, bool]:
 
 
 def _check_alone(mechanism: Mechanism, file: str) -> None:
-    """Reject a loop that does not close even without the other loops."""
+    """Reject a loop that cannot close even without the other loops."""
     (loop,) = mechanism.loops
     residual = nearest_closed(mechanism, _STARTS_ALONE)[1]
     if residual >= CLOSED:
         ends = f"({quoted(loop.first)}, {quoted(loop.second)})"
         raise BadInput(
-            f"{file}: {loop.name} {ends} cannot close even alone: the smallest "
+            f"{file}: {loop.name} {ends} cannot close even by itself: the smallest "
             f"gap found is {residual:.3g} rad or m; expected more joints, or "
             "type 3d (--points)"
         )
 
 
 def nearest_closed(mechanism: Mechanism, starts: int) -> tuple[NDArray, float, bool]:
-    """Return coordinates near the file's own with the least mismatch of the loops.
+    """Return coordinates near those of the file with the least mismatch of the loops.
 
     Args:
         mechanism: mechanism of n joints.
-        starts: number of random starts, in addition to the file's own coordinates.
+        starts: number of random starts, in addition to the coordinates of the file.
 
     Returns:
-        (n,) [rad or m] the coordinates, their mismatch [rad, m], and whether the drives
-        have the file's coordinates.
+        (n,) [rad or m] coordinates, their mismatch [rad, m], and whether the drives
+        have the coordinates of the file.
     """
     loops = _Loops(mechanism, _size(mechanism))
     coordinates, residual, held = mechanism.home, np.inf, True
@@ -100,7 +102,7 @@ def nearest_closed(mechanism: Mechanism, starts: int) -> tuple[NDArray, float, b
 
 
 def _attempts(mechanism: Mechanism, starts: int) -> Iterator[tuple[NDArray, bool]]:
-    """Yield starts, and whether the drives are held."""
+    """Yield starting coordinates, and whether the drives are held."""
     start = mechanism.home
     yield start, True
     yield start, False
@@ -113,10 +115,10 @@ def _attempts(mechanism: Mechanism, starts: int) -> Iterator[tuple[NDArray, bool
 
 
 def _solve(loops: "_Loops", start: NDArray, hold: bool) -> NDArray:
-    """Return the end of a Levenberg-Marquardt search from one start."""
+    """Return the result of a Levenberg-Marquardt search from one start."""
     followers = [follower for follower, *_ in loops.coupled]
     driven = loops.actuated.copy()
-    driven[followers] = False  # their leaders determine them
+    driven[followers] = False  # leaders determine the followers
     free = loops.moving & loops.concerned & ~(hold & driven)
     unit = np.where(loops.kinds == 2, loops.size, 1.0)
     q, damping = start.astype(float), 1e-3
@@ -130,7 +132,7 @@ def _solve(loops: "_Loops", start: NDArray, hold: bool) -> NDArray:
                 break
             before = r @ r
         A = (J * unit)[:, free]
-        # damping as added rows, so that the condition number is not squared
+        # damping as additional rows does not square the condition number
         damped = np.vstack([A, np.sqrt(damping) * np.eye(A.shape[1])])
         x = np.linalg.lstsq(damped, np.append(r, np.zeros(A.shape[1])), rcond=None)[0]
         x *= min(1.0, _LONGEST_STEP / max(np.abs(x).max(initial=0.0), 1e-300))
@@ -148,16 +150,16 @@ def _solve(loops: "_Loops", start: NDArray, hold: bool) -> NDArray:
 
 
 def _size(mechanism: Mechanism) -> float:
-    """Return the longest distance [m] of neighbouring joints, 1 if all are points."""
+    """Return the longest distance [m] between neighbouring joints; 1 if it is zero."""
     lengths = [np.linalg.norm(joint.placement[:3, 3]) for joint in mechanism.joints]
     return float(max(lengths, default=0.0)) or 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class _Loops:
-    """The equations of loops and of joints that follow others.
+    """The closure equations of loops and of joints that follow others.
 
-    Here every joint rotates about or slides along its own z.
+    In these equations, every joint rotates about or translates along its own z axis.
     """
 
     mechanism: Mechanism
@@ -165,28 +167,28 @@ class _Loops:
 
     @cached_property
     def kinds(self) -> NDArray:
-        """(n,) 0 fixed, 1 revolute or helical, 2 prismatic."""
+        """(n,) kind of each joint: 0 fixed, 1 revolute or helical, 2 prismatic."""
         kinds = {"fixed": 0, "revolute": 1, "helical": 1, "prismatic": 2}
         return np.array([kinds[j.kind] for j in self.mechanism.joints], int)
 
     @cached_property
     def leads(self) -> NDArray:
-        """(n,) [m/rad] translations of helical joints per angle, 0 of others."""
+        """(n,) [m/rad] translation per angle of helical joints; 0 for others."""
         return np.array([j.lead for j in self.mechanism.joints], float)
 
     @property
     def moving(self) -> NDArray:
-        """(n,) bool."""
+        """(n,) bool, whether a joint can move."""
         return self.kinds > 0
 
     @cached_property
     def actuated(self) -> NDArray:
-        """(n,) bool."""
+        """(n,) bool, whether a joint is driven."""
         return np.array([j.actuated for j in self.mechanism.joints], dtype=bool)
 
     @cached_property
     def tree(self) -> tuple[NDArray, NDArray, dict[str, tuple[int, NDArray]]]:
-        """Parents (n,), frames in them (n, 4, 4); by body its joint and pose on it."""
+        """Parents (n,), their frames (n, 4, 4); and joint and pose of each body."""
         on: dict[str, tuple[int, NDArray]] = {self.mechanism.root: (-1, np.eye(4))}
         parents, fixed = [], []
         for row, joint in enumerate(self.mechanism.joints):
@@ -200,7 +202,7 @@ class _Loops:
 
     @cached_property
     def ends(self) -> list[tuple[tuple[int, NDArray], tuple[int, NDArray], NDArray]]:
-        """Both ends of each loop, joint and pose on it; and its constrained rows."""
+        """Joint and pose of both ends of each loop, and its constrained rows."""
         on, places = self.tree[2], []
         for loop in self.mechanism.loops:
             (i, A), (j, B) = on[loop.first], on[loop.second]
@@ -210,7 +212,7 @@ class _Loops:
 
     @cached_property
     def carried(self) -> NDArray:
-        """(n + 1, n) bool, joints that move the bodies on each joint; last, root."""
+        """(n + 1, n) bool, joints that move the bodies on each joint; last: root."""
         parents = self.tree[0]
         marks = np.zeros((len(parents) + 1, len(parents)))
         for i, parent in enumerate(parents):
@@ -220,11 +222,11 @@ class _Loops:
 
     @cached_property
     def concerned(self) -> NDArray:
-        """(n,) bool, joints on one side of a loop and not on the other."""
+        """(n,) bool, whether a joint is on one side of a loop but not on the other."""
         marks = np.zeros(len(self.kinds), dtype=bool)
         for (i, _), (j, _), _ in self.ends:
             marks |= self.carried[i] != self.carried[j]
-        # followers come after their leaders
+        # couplings are sorted such that followers come after their leaders
         for follower, leader, _ in reversed(self.coupled):
             if leader >= 0:
                 marks[leader] |= marks[follower]
@@ -234,7 +236,7 @@ class _Loops:
 
     @cached_property
     def coupled(self) -> list[tuple[int, int, Coupling]]:
-        """Rows of follower and leader, -1 without a leader, and their rule."""
+        """Indices of follower and leader (-1 without a leader), and their rule."""
         row = {joint.name: k for k, joint in enumerate(self.mechanism.joints)}
         return [
             (row[one.follower], row.get(one.leader or "", -1), one)
@@ -242,7 +244,7 @@ class _Loops:
         ]
 
     def equations(self, q: NDArray) -> tuple[NDArray, NDArray]:
-        """Return the mismatch, translations over the size, and its derivatives by q."""
+        """Return the mismatch, with scaled translations, and its derivatives by q."""
         parents, fixed, _ = self.tree
         before, after = place_frames(parents, self.kinds, fixed, q, self.leads)
         p = before[:, :3, 3]
@@ -255,7 +257,7 @@ class _Loops:
             poses, moved = [], []
             for joint, place in places:
                 T = place if joint < 0 else after[joint] @ place
-                # z x (origin of T - p), and the lead of a thread along z
+                # z x (origin of T - p), and the translation of a thread along z
                 arm = np.where(turning, z @ skew(T[:3, 3]) - past_axes, z)
                 screws = np.concatenate([z * turning, arm], axis=1)
                 poses.append(T)

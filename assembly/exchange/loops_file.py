@@ -1,14 +1,15 @@
-"""``robot.yaml``: loops and drives of a URDF, which the format itself lacks.
+"""``robot.yaml``: loops and drives of a URDF, which URDF itself cannot represent.
 
-The convention of the example_parallel_robots: ``closed_loop`` pairs names of joints or
-links that coincide, ``type`` is ``6d`` or ``3d`` (only the points), ``name_mot`` names
-the drives.  ``joint_name`` and ``joint_type`` make a joint SPHERICAL, FIXED or a UJOINT
-about two axes (_XY, _YX, ..), which CAD exports write as one rotation.  ``home``
-(coordinates by joint) and ``platform`` are our additions; other readers ignore them.
+The format is that of the project example-parallel-robots. ``closed_loop`` lists pairs
+of joints or links that coincide; ``type`` is ``6d``, or ``3d`` if only the points
+coincide; ``name_mot`` lists the drives.  ``joint_name`` and ``joint_type`` declare a
+joint as SPHERICAL, as FIXED or as a UJOINT about two axes (_XY, _YX, ..), because CAD
+programs export such joints as one rotation.  The keys ``home`` (coordinates by joint)
+and ``platform`` are additions of forcefit, which other readers ignore.
 
-The authors' generator writes ``6d`` for every loop, "that is not very general", to be
-corrected by hand.  So a file with only ``6d`` may be uncorrected: its loops become
-points if they cannot close otherwise.
+The generator of that project writes ``6d`` for every loop, and users correct the types
+by hand.  A file that contains only ``6d`` may therefore be uncorrected: its loops
+become points if they cannot close otherwise.
 
 Sources:
     Batto, de Matteis, example-parallel-robots: ``loader_tools.py``, ``generateYAML``.
@@ -36,14 +37,14 @@ class LoopsFile:
     """The content of a loops file.
 
     Attributes:
-        file: its name, for messages.
-        pairs: names of joints or links that meet.
-        points: for each pair, whether only the points meet.
-        drives: names of the driven joints; None if the file has none.
+        file: name of the file, for messages.
+        pairs: names of joints or links that coincide.
+        points: for each pair, whether only the points coincide.
+        drives: names of the driven joints; None if the file does not list them.
         turns: actual axes of a joint, such as ``"xyz"``, by joint.
         home: [rad or m] coordinates at home by joint.
         platform: name of a link, or None.
-        passed_over: unknown keys.
+        passed_over: keys that are unknown and ignored.
     """
 
     file: str = ""
@@ -57,12 +58,12 @@ class LoopsFile:
 
     @property
     def as_generated(self) -> bool:
-        """Whether no loop is declared a point, as in a generated file."""
+        """Whether no loop is declared as a point, as in a generated file."""
         return bool(self.pairs) and not any(self.points)
 
 
 def find_loops_file(robot: Path) -> Path | None:
-    """Return the loops file of a robot: its name with ``.yaml``, or ``robot.yaml``."""
+    """Return the path of a loops file: the robot's name + ``.yaml``, or robot.yaml."""
     for path in (robot.with_suffix(".yaml"), robot.parent / "robot.yaml"):
         if path.is_file():
             return path
@@ -73,7 +74,7 @@ def read_loops(path: Path | str) -> LoopsFile:
     """Read a loops file.
 
     Args:
-        path: a YAML file.
+        path: YAML file.
 
     Returns:
         The content of the file.
@@ -108,17 +109,17 @@ def read_loops(path: Path | str) -> LoopsFile:
 
 
 def with_points(loops: LoopsFile, names: Sequence[str]) -> LoopsFile:
-    """Return loops with some declared as points, independent of their type.
+    """Return loops of which some are declared as points, whatever their type.
 
     Args:
         loops: loops of a file.
-        names: ``loop1`` for the first, or the name of either end; ``all``.
+        names: ``loop1`` for the first loop, or the name of either end; ``all`` for all.
 
     Returns:
-        The loops.
+        The loops with the new types.
 
     Raises:
-        BadInput: a name is of no loop.
+        BadInput: a name does not belong to any loop.
     """
     of_loop: dict[str, set[int]] = {"all": set(range(len(loops.pairs)))}
     for i, pair in enumerate(loops.pairs):
@@ -175,7 +176,7 @@ def _yaml(path: Path | str) -> dict[str, Any]:
 
 
 def _list(table: Table, key: str) -> list[Any]:
-    """Return a list, which may be empty."""
+    """Return a list from a table; the list may be empty."""
     value = table.get(key)
     if value is None:
         return []
@@ -185,7 +186,7 @@ def _list(table: Table, key: str) -> list[Any]:
 
 
 def _names(table: Table, key: str) -> tuple[str, ...]:
-    """Return a list of names."""
+    """Return a list of names from a table."""
     values = _list(table, key)
     for value in values:
         if not isinstance(value, str):
@@ -194,7 +195,7 @@ def _names(table: Table, key: str) -> tuple[str, ...]:
 
 
 def _turns(table: Table) -> dict[str, str]:
-    """Return ``joint_name`` and ``joint_type``, one type for each name."""
+    """Return the type of each joint from ``joint_name`` and ``joint_type``."""
     names, kinds = _names(table, "joint_name"), _names(table, "joint_type")
     if len(names) != len(kinds):
         message = f"found {len(kinds)}, expected one for each of {len(names)} joints"
@@ -207,7 +208,7 @@ def _turns(table: Table) -> dict[str, str]:
 
 
 def _pair(table: Table, index: int, pair: object) -> tuple[str, str]:
-    """Return two names that differ."""
+    """Return a pair of different names."""
     names = pair if isinstance(pair, list) else []
     names = [name for name in names if isinstance(name, str)]
     if len(names) != 2 or pair != names or names[0] == names[1]:
@@ -217,7 +218,7 @@ def _pair(table: Table, index: int, pair: object) -> tuple[str, str]:
 
 
 def unknown_name(loops: LoopsFile, key: str, name: str, valid: list[str]) -> str:
-    """Return the message for a name that the robot does not have."""
+    """Return the message for a name that is not a joint or link of the robot."""
     return (
         f"{loops.file}: {key}: found {quoted(name)}, expected a joint or link of the "
         f"robot{nearest(name, valid)}"
@@ -232,7 +233,7 @@ def _word(text: str) -> str:
 
 
 def _number(value: float) -> str:
-    """Return a number in a form that YAML reads as one: a point before the exponent."""
+    """Return a number as text that YAML reads as a number (a point before "e")."""
     text = repr(float(value))
     mantissa, e, exponent = text.partition("e")
     if e and "." not in mantissa:

@@ -1,8 +1,8 @@
 """Common representation of URDF, MJCF and SDF: bodies, joints of one freedom, loops.
 
-A joint carries its child: the pose of the child in its parent is ``placement @ motion @
-after``, with the motion about or along ``axis``.  Joints of several freedoms are chains
-of these, with bodies without mass between them.  Units are metres, radians, kg.
+A joint carries a child body, whose pose in the parent body is ``placement @ motion @
+after``; the motion is about or along ``axis``.  A joint of several freedoms is a chain
+of such joints with massless bodies between them.  Units are metres, radians, kilograms.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,7 +15,7 @@ from forcefit.assembly.exchange.coupling import Coupling
 from forcefit.inputs.table import BadInput, nearest, quoted
 from forcefit.stiffness.screws import UNIT_VECTORS, rotation_matrix, transform
 
-WORLD = "world"  # name of the fixed link
+WORLD = "world"  # name of the fixed body
 HERE = np.eye(4)
 HERE.setflags(write=False)
 
@@ -25,10 +25,10 @@ class Body:
     """A rigid body.
 
     Attributes:
-        name: unique among bodies.
-        mass: [kg].
-        centre: (3,) [m] of mass, in the body's axes.
-        inertia: (3, 3) [kg m^2] about that centre, in the body's axes.
+        name: name, unique among bodies.
+        mass: [kg] mass.
+        centre: (3,) [m] centre of mass, in the body's axes.
+        inertia: (3, 3) [kg m^2] inertia about the centre of mass, in the body's axes.
     """
 
     name: str
@@ -42,19 +42,19 @@ class Joint:
     """A joint between a body and its parent; see the module's docstring.
 
     Attributes:
-        name: unique among joints.
+        name: name, unique among joints.
         kind: ``"fixed"``, ``"revolute"``, ``"prismatic"`` or ``"helical"``.
-        parent: name of the body that carries it.
-        child: name of the body it carries.
-        placement: (4, 4) of the joint, seen from the parent.
+        parent: name of the body that carries the joint.
+        child: name of the body that the joint carries.
+        placement: (4, 4) pose of the joint in the parent.
         axis: (3,) unit vector in the joint's axes.
-        after: (4, 4) of the child, seen from the joint after its motion.
+        after: (4, 4) pose of the child in the joint's axes after its motion.
         position: [rad or m] coordinate at home.
-        actuated: whether a drive holds it.
-        limits: [rad or m] least and largest coordinate, None where it has none.
-        stiffness: [N m/rad or N/m] of a spring along its motion, 0 without one.
-        rest: [rad or m] coordinate at which that spring is without load.
-        lead: [m/rad] translation of a helical joint per angle, 0 of others.
+        actuated: whether a drive holds the joint.
+        limits: [rad or m] smallest and largest coordinate; None without limits.
+        stiffness: [N m/rad or N/m] stiffness of a spring along the motion; 0 for none.
+        rest: [rad or m] coordinate at which this spring has no load.
+        lead: [m/rad] translation per angle of a helical joint; 0 for others.
     """
 
     name: str
@@ -74,15 +74,15 @@ class Joint:
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """Two places on two bodies that coincide.
+    """A loop: two places on two bodies that coincide.
 
     Attributes:
         name: name of the loop.
-        first: name of the one body.
-        second: name of the other.
+        first: name of the first body.
+        second: name of the second body.
         at_first: (4, 4) pose of the place in the first body.
         at_second: (4, 4) pose of the place in the second body.
-        point: whether only the origins coincide and the axes are free: a ball joint.
+        point: whether only the origins coincide, as in a ball joint.
     """
 
     name: str
@@ -95,20 +95,20 @@ class Loop:
 
 @dataclass(frozen=True, eq=False)
 class Mechanism:
-    """A tree of bodies from its root, and loops.
+    """A robot as a tree of bodies and loops.
 
     Attributes:
         name: name of the robot.
         root: name of the fixed body.
-        bodies: bodies by name; the root is one of them.
-        joints: parents first.
-        loops: pairs of places that meet.
-        platform: name of a body, None if the file has none.
-        left_out: parts of the file that a mechanism cannot represent, in words.
-        taken: assumptions where the file is incomplete, in words.
-        couplings: joints that follow others; a leader's coupling comes before its
-            followers'.
-        unweighed: names of bodies with masses of meshes, which are not read.
+        bodies: bodies by name, including the root.
+        joints: joints, sorted such that parents come first.
+        loops: pairs of places that coincide.
+        platform: name of a body; None if the file names none.
+        left_out: descriptions of parts of the file that a mechanism cannot represent.
+        taken: descriptions of assumptions where the file is incomplete.
+        couplings: joints that follow others, sorted such that a leader's own coupling
+            comes before its followers'.
+        unweighed: names of bodies whose mass comes from meshes, which are not read.
     """
 
     name: str
@@ -131,19 +131,18 @@ class Mechanism:
 def parents_first(joints: Sequence[Joint], bodies: Mapping[str, Body], file: str) -> (
     tuple[str, tuple[Joint, ...]]
 ):  # fmt: skip
-    """Return the root of a tree, and its joints sorted so that parents come first.
+    """Return the root of a tree of bodies, and the joints with parents first.
 
     Args:
         joints: joints in any order.
-        bodies: all of them.
+        bodies: all bodies by name.
         file: name of the file, for error messages.
 
     Returns:
-        Name of the root, and the joints.
+        Name of the root, and the sorted joints.
 
     Raises:
-        BadInput: a body is missing, has two parents, or is connected to no root or to
-            several.
+        BadInput: a body is missing or has two parents; or there is no root, or several.
     """
     carried: dict[str, Joint] = {}
     below: dict[str, list[Joint]] = {name: [] for name in bodies}
@@ -191,10 +190,10 @@ def body_poses(mechanism: Mechanism, coordinates: NDArray) -> dict[str, NDArray]
 
     Args:
         mechanism: mechanism of n joints.
-        coordinates: (n,) [rad or m] of all joints, in their order.
+        coordinates: (n,) [rad or m] coordinates of all joints, in their order.
 
     Returns:
-        (4, 4) pose seen from the root, by the body's name.
+        (4, 4) pose relative to the root, by the body's name.
     """
     poses = {mechanism.root: np.eye(4)}
     for joint, q in zip(mechanism.joints, coordinates, strict=True):
@@ -204,7 +203,7 @@ def body_poses(mechanism: Mechanism, coordinates: NDArray) -> dict[str, NDArray]
 
 
 def motion(joint: Joint, coordinate: float) -> NDArray:
-    """Return the (4, 4) motion of a joint at a coordinate [rad or m]."""
+    """Return the (4, 4) motion of a joint for a coordinate [rad or m]."""
     along = coordinate * joint.axis
     if joint.kind in {"revolute", "helical"}:
         return transform(joint.lead * along, rotation_matrix(along))
@@ -215,18 +214,18 @@ def chain(
     name: str, parent: str, child: str, placement: NDArray, after: NDArray,
     freedoms: Sequence[tuple[str, str, NDArray]],
 ) -> tuple[list[Joint], list[Body]]:  # fmt: skip
-    """Return a joint of several freedoms as joints of one, with bodies without mass.
+    """Return a joint of several freedoms as joints of one, with massless bodies.
 
     Args:
-        name: name of the whole joint; each part adds its own name to it.
-        parent: parent body.
-        child: body it carries.
-        placement: (4, 4) seen from the parent.
-        after: (4, 4) of the child, seen from the last part after its motion.
-        freedoms: for each part its own name, kind and axis (3,).
+        name: name of the joint, to which the name of each part is appended.
+        parent: name of the parent body.
+        child: name of the body that the joint carries.
+        placement: (4, 4) pose of the joint in the parent.
+        after: (4, 4) pose of the child in the axes of the last part after its motion.
+        freedoms: name, kind and axis (3,) of each part.
 
     Returns:
-        The joints and the bodies between them.
+        The joints, and the bodies between them.
     """
     between = [Body(f"{name}.after_{part}") for part, _, _ in freedoms[:-1]]
     ends = [parent, *(body.name for body in between), child]
@@ -248,5 +247,5 @@ def ball(turns: str = "xyz") -> list[tuple[str, str, NDArray]]:
 
 
 def slides() -> list[tuple[str, str, NDArray]]:
-    """Return a translation in space as three slides."""
+    """Return a translation in space as three prismatic joints."""
     return [(f"t{axis}", "prismatic", np.array(UNIT_VECTORS[axis])) for axis in "xyz"]

@@ -1,9 +1,9 @@
-"""Import of MJCF: MuJoCo's bodies, joints, and equality constraints as loops.
+"""Import of MJCF: MuJoCo's bodies and joints, and equality constraints as loops.
 
 Sources:
-    MuJoCo documentation, XML reference: angles are in degrees unless the compiler says
-    radian; joints act at ``pos`` in the body, in the order written; a ``frame`` places
-    its elements and is no body.
+    MuJoCo documentation, XML reference: angles are in degrees unless the compiler
+    element specifies radian; joints act at ``pos`` in the body, in the order of the
+    file; a ``frame`` places its elements but is not a body.
 """
 
 from collections.abc import Iterator
@@ -43,16 +43,16 @@ _REFUSED = ("composite", "flexcomp", "flex")
 _SECTIONS = ("compiler", "option", "size", "statistic", "visual", "asset", "default",
              "custom", "keyframe", "contact", "sensor", "worldbody", "equality",
              "tendon", "actuator")  # fmt: skip
-# attributes of a joint that are read
+# attributes of a joint that forcefit reads
 _READ = ("name", "type", "pos", "axis", "ref", "class")
 _SPRING = ("stiffness", "springref")
 _RANGE = ("range", "limited")
-_COUNTS = {"ball": 4, "free": 7}  # number of a joint's values in a key
+_COUNTS = {"ball": 4, "free": 7}  # number of values per joint in a keyframe
 
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """Place of elements: their body, (4, 4) in it, defaults and unit of angles."""
+    """Place of an element: body, pose (4, 4) in it, defaults and unit of angles."""
 
     body: str
     offset: NDArray
@@ -80,14 +80,14 @@ def read_mjcf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
     """Return the mechanism of an MJCF file.
 
     Args:
-        path: the file; others that it includes or attaches are read too.
-        loops: a file with further loops and drives, or None.
+        path: path of the file; files that it includes or attaches are also read.
+        loops: loops file with further loops and drives, or None.
 
     Returns:
-        The mechanism; its home is the key ``home`` if there is one.
+        The mechanism, at the keyframe ``home`` if the file contains one.
 
     Raises:
-        BadInput: a rule of the format is broken, or an element is unknown.
+        BadInput: the file violates a rule of the format, or an element is unknown.
     """
     root = expanded(read_xml(path, "mujoco"))
     for node in root.descendants():
@@ -113,7 +113,7 @@ def read_mjcf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
     rests = {j.name: j.position for j in order if j.name in reading.coordinates}
     equality = reading.defaults["main"].get("equality", {})
     ties = Ties(root, equality, reading.sites, rests, reading.parts, reading.extra)
-    # constraints hold in the pose of the file, before any key
+    # constraints refer to the initial pose of the file, not to a keyframe
     closed = tuple(ties.loops(body_poses(mechanism, mechanism.home)))
     driven = ties.driven()
     couplings = leaders_first(list(ties.couplings(driven)), str(path))
@@ -123,7 +123,7 @@ def read_mjcf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
     free = [name for name, kind in reading.coordinates.items() if kind == "free"]
     floating = counted("free joints that no loop ties to the ground", free)
     unweighed = tuple(reading.unweighed)
-    if unweighed and reading.rules.total > 0:  # all masses depend on the missing ones
+    if unweighed and reading.rules.total > 0:  # scaling would need all masses
         unweighed = tuple(name for name in reading.bodies if name != WORLD)
     mechanism = replace(
         mechanism, joints=joints, loops=closed, left_out=left_out, couplings=couplings,
@@ -143,14 +143,14 @@ def _platform(root: Node, reading: _Reading) -> str | None:
 
 
 def _defaults(root: Node) -> dict[str, dict[str, dict[str, str]]]:
-    """Return attributes by class and element; each class inherits from its parents."""
+    """Return attributes by class and element; each class inherits from its parent."""
     classes: dict[str, dict[str, dict[str, str]]] = {"main": {}}
 
     def gather(node: Node, inherited: dict[str, dict[str, str]], name: str) -> None:
         own = {tag: dict(values) for tag, values in inherited.items()}
         for inner in node.children():
             if inner.tag != "default":
-                # connect, weld and joint constraints have the same defaults
+                # connect, weld and joint constraints share their defaults
                 own.setdefault(inner.tag, {}).update(inner.element.attrib)
         classes[name] = own
         for inner in node.children("default"):
@@ -160,13 +160,13 @@ def _defaults(root: Node) -> dict[str, dict[str, dict[str, str]]]:
         name = node.text("class", "main")
         attached = node.has("attached")
         gather(node, {} if attached else classes["main"], name)
-        if not attached:  # the outermost class is main, independent of its name
+        if not attached:  # the outermost class is "main", whatever its name
             classes["main"] = classes[name]
     return classes
 
 
 def _filled(node: Node, childclass: str, reading: _Reading) -> Node:
-    """Return an element with the defaults of its class filled in."""
+    """Return an element completed by the defaults of its class."""
     name = node.text("class", childclass)
     if name not in reading.defaults:
         hint = nearest(name, reading.defaults)
@@ -178,16 +178,16 @@ def _filled(node: Node, childclass: str, reading: _Reading) -> Node:
 
 
 def _inside(frame: Node, place: _Place) -> _Place:
-    """Return the place of the elements of a frame."""
+    """Return the place of the elements inside a frame."""
     T = place.offset @ _pose(frame, place.angles)
     angles = place.angles
-    if frame.has(UNIT):  # from another model
+    if frame.has(UNIT):  # the frame comes from an attached model
         angles = Angles(frame.number(UNIT, "rad"), frame.text(SEQUENCE))
     return _Place(place.body, T, frame.text("childclass", place.childclass), angles)
 
 
 def _elements(node: Node, place: _Place) -> Iterator[tuple[Node, _Place]]:
-    """Yield elements of a body in their order, in frames too, without nested bodies."""
+    """Yield the elements of a body in order, including those in frames."""
     for inner in node.children():
         if inner.tag == "frame":
             yield from _elements(inner, _inside(inner, place))
@@ -215,7 +215,7 @@ def _add_body(node: Node, at: _Place, reading: _Reading) -> None:
     reading.number += 1
     name = node.optional("name") or f"body{reading.number}"
     if name in reading.bodies:
-        raise node.bad("name", "found it twice; expected names that differ")
+        raise node.bad("name", "found this name twice; expected unique names")
     childclass = node.text("childclass", at.childclass)
     place = _Place(name, np.eye(4), childclass, at.angles)
     reading.bodies[name] = _massive(node, place, reading)
@@ -238,7 +238,7 @@ def _add_body(node: Node, at: _Place, reading: _Reading) -> None:
 
 
 def _massive(node: Node, place: _Place, reading: _Reading) -> Body:
-    """Return a body with its mass, as written or from its shapes."""
+    """Return a body with its mass, either written or computed from its shapes."""
     written, shapes = None, []
     for inner, at in _elements(node, place):
         if inner.tag == "inertial":
@@ -258,7 +258,7 @@ def _massive(node: Node, place: _Place, reading: _Reading) -> Body:
 
 
 def _freedoms(node: Node, place: _Place, reading: _Reading) -> Iterator[Joint]:
-    """Return the joints of a body, of one freedom each, in the body's axes."""
+    """Yield the joints of a body with one freedom each, in the body's axes."""
     number = 0
     for inner, at in _elements(node, place):
         if inner.tag not in {"joint", "freejoint"}:
@@ -267,7 +267,7 @@ def _freedoms(node: Node, place: _Place, reading: _Reading) -> Iterator[Joint]:
         given = _filled(inner, at.childclass, reading)
         name = given.optional("name") or f"{place.body}.joint{number}"
         if name in reading.parts:
-            raise inner.bad("name", "found it twice; expected names that differ")
+            raise inner.bad("name", "found this name twice; expected unique names")
         kind = "free"
         if inner.tag == "joint":
             kind = _KINDS[given.choice("type", tuple(_KINDS), "hinge")]
@@ -288,14 +288,14 @@ def _freedoms(node: Node, place: _Place, reading: _Reading) -> Iterator[Joint]:
 
 
 def _pose(node: Node, angles: Angles) -> NDArray:
-    """Return the (4, 4) pose of an element with ``pos`` and any kind of orientation."""
+    """Return the (4, 4) pose of an element from ``pos`` and its orientation."""
     return placed(node.numbers("pos", 3, "m", _ZERO), orientation(node, angles))
 
 
 def _at_key(
     root: Node, reading: _Reading, joints: tuple[Joint, ...]
 ) -> tuple[Joint, ...]:
-    """Return the joints at the positions of the key named home."""
+    """Return the joints at the positions of the keyframe named home."""
     keys = [k for group in root.children("keyframe") for k in group.children("key")]
     counts = {name: _COUNTS.get(kind, 1) for name, kind in reading.coordinates.items()}
     for key in keys:

@@ -1,14 +1,14 @@
 """Expansion of MJCF: included files, replicated bodies, attached models.
 
-MuJoCo could do this (``MjSpec``), but it is optional, and it is the second reader with
-which this one is compared.  Its error positions lack the included file, and its XML has
-six digits (MuJoCo 3.17).
+MuJoCo could expand files (``MjSpec``), but MuJoCo is optional, and forcefit compares
+its own reading with MuJoCo's.  Moreover, MuJoCo's error messages do not name the
+included file, and its XML has six digits (MuJoCo 3.17).
 
 Sources:
-    MuJoCo documentation, XML reference: ``include`` inserts the elements of a file;
-    copy i of ``replicate`` is moved by i offsets and rotations, and its names end in i
-    with as many digits as the count has; ``attach`` inserts a body of another model,
-    with that model's angles, defaults and constraints, all names with a prefix.
+    MuJoCo documentation, XML reference: ``include`` inserts the elements of a file.
+    Copy i of ``replicate`` is moved by i offsets and rotations; its names end in i with
+    as many digits as the count.  ``attach`` inserts a body of another model, with the
+    angles, defaults and constraints of that model; all names get a prefix.
 """
 
 import copy
@@ -27,7 +27,7 @@ from forcefit.inputs.errors import BadInput, quoted
 _DEEPEST = 10  # largest depth of nested files
 _MOST_COPIES = 10_000
 _MOST_ELEMENTS = 200_000
-# keys whose values are names, of an element or of one it refers to
+# attributes whose values are names, of the element or of one that it refers to
 _NAMES = ("name", "class", "childclass", "joint", "joint1", "joint2", "jointinparent",
           "body", "body1", "body2", "site", "site1", "site2", "refsite", "slidersite",
           "cranksite", "tendon", "tendon1", "tendon2", "geom", "mesh")  # fmt: skip
@@ -36,18 +36,18 @@ UNIT, SEQUENCE = "attached.unit", "attached.sequence"
 
 
 def expanded(root: Node, depth: int = 0) -> Node:
-    """Return an MJCF file as one in which every body is written out.
+    """Return an MJCF file in which every body is written out.
 
     Args:
-        root: root of the file, changed in place.
-        depth: number of files that include it.
+        root: root element of the file, which is changed in place.
+        depth: number of files that include this file, directly or indirectly.
 
     Returns:
-        The root.
+        The root element.
 
     Raises:
-        BadInput: a file is missing or is no MJCF, files are nested too deep, copies are
-            too many, or a model or body to be attached is not there.
+        BadInput: a file is missing or not MJCF, files are nested too deeply, there are
+            too many copies, or a model or body to be attached does not exist.
     """
     if depth > _DEEPEST:
         raise BadInput(
@@ -68,7 +68,7 @@ def expanded(root: Node, depth: int = 0) -> Node:
 
 
 def _include(element: Any, root: Node, folder: Path, depth: int) -> None:
-    """Replace ``include`` by the elements of the file."""
+    """Replace ``include`` by the elements of the included file."""
     inside: list[Any] = []
     for inner in element:
         if inner.tag != "include":
@@ -89,7 +89,7 @@ def _include(element: Any, root: Node, folder: Path, depth: int) -> None:
 
 
 def _replicate(element: Any, root: Node, angles: Angles) -> None:
-    """Replace ``replicate`` by frames with copies, the innermost first."""
+    """Replace ``replicate`` by frames with copies, innermost elements first."""
     inside: list[Any] = []
     for inner in element:
         _replicate(inner, root, angles)
@@ -106,7 +106,7 @@ def _replicate(element: Any, root: Node, angles: Angles) -> None:
 def _copies(
     node: Node, angles: Angles, ties: list[tuple[Any, Any]]
 ) -> Iterator[Any]:  # fmt: skip
-    """Return the frames of one ``replicate``, with copied constraints."""
+    """Yield the frames of one ``replicate``, and copy the constraints."""
     count = node.number("count", "copies")
     if not 1 <= count <= _MOST_COPIES or count % 1:
         expected = f"expected a whole number from 1 to {_MOST_COPIES}"
@@ -130,7 +130,7 @@ def _copies(
 
 
 def _end(element: Any, keys: tuple[str, ...], ending: str) -> None:
-    """Append an ending to the names of an element and of all elements inside it."""
+    """Append an ending to the names of an element and of all elements in it."""
     for one in element.iter():
         for key in keys:
             if key in one.attrib:
@@ -138,7 +138,7 @@ def _end(element: Any, keys: tuple[str, ...], ending: str) -> None:
 
 
 def _words(values: Any) -> str:
-    """Return the numbers as text, with all their digits."""
+    """Return numbers as text with all digits."""
     return " ".join(repr(float(value)) for value in values)
 
 
@@ -152,7 +152,7 @@ def _attach(root: Node, depth: int) -> None:
     ]  # fmt: skip
     if not places:
         return
-    # copies, as each is changed; of this model in its written form
+    # copied, because each copy is changed; this model is used as written
     own = copy.deepcopy(root.element)
     others = {
         name: (file, element)
@@ -176,14 +176,14 @@ def _attach(root: Node, depth: int) -> None:
 
 
 def _other(model: Node, root: Node, depth: int) -> tuple[str, str, Any]:
-    """Return name, file and expanded element of a model asset."""
+    """Return the name, file and expanded element of a model asset."""
     other = read_xml(Path(root.file).parent / model.text("file"), "mujoco")
     name = model.optional("name") or other.optional("model") or Path(other.file).stem
     return name, other.file, expanded(other, depth + 1).element
 
 
 def _attached(node: Node, root: Node, other: Node) -> Any:
-    """Return a frame with a part of a model; add its constraints to the root."""
+    """Return a frame with a part of a model, and add the constraints to the root."""
     prefix, angles = node.optional("prefix"), Angles.of(other)
     for element in other.element.iter():
         for key in _NAMES:
@@ -201,7 +201,7 @@ def _attached(node: Node, root: Node, other: Node) -> Any:
                     f"found {quoted(node.text(tag))}, expected the name of a "
                     f"{tag} of the attached model",
                 )
-    # its own defaults; without them none of this model's
+    # the attached model's own defaults; the defaults of this model do not apply
     for default in [d.element for d in other.children("default")] or [
         Element("default")
     ]:
@@ -218,7 +218,7 @@ def _attached(node: Node, root: Node, other: Node) -> Any:
 
 
 def _ties_within(root: Node, part: Any) -> list[tuple[Any, Any]]:
-    """Return constraints, tendons and actuators within a part, with their sections."""
+    """Return constraints, tendons and actuators within a part, by section."""
     names, ties = {one.get("name") for one in part.iter()}, []
     for section in root.children("tendon", "equality", "actuator"):
         for tie in section.element:

@@ -1,4 +1,4 @@
-"""MJCF's joints as joints of one freedom, and their values in a key."""
+"""Conversion of MJCF joints to joints of one freedom, and their keyframe values."""
 
 from dataclasses import replace
 
@@ -15,16 +15,16 @@ _ZERO = np.zeros(3)
 
 
 def several_freedoms(given: Node, name: str, kind: str, offset: NDArray) -> list[Joint]:
-    """Return a ball joint, or the six freedoms of a free body.
+    """Return the joints of a ball joint or of a free body.
 
     Args:
-        given: the element, defaults filled in.
+        given: element, completed by its defaults.
         name: name of the joint.
         kind: ``"ball"`` or ``"free"``.
-        offset: (4, 4) of the frame in which it is written, seen from the body.
+        offset: (4, 4) pose of the element's frame in the body.
 
     Returns:
-        Joints of one freedom, in order, without their bodies.
+        Joints of one freedom in order, whose bodies are not set yet.
 
     Raises:
         BadInput: a number is invalid.
@@ -47,17 +47,17 @@ def several_freedoms(given: Node, name: str, kind: str, offset: NDArray) -> list
 def one_freedom(
     given: Node, name: str, kind: str, offset: NDArray, angles: Angles
 ) -> Joint:
-    """Return a hinge or a slide, with its spring.
+    """Return a hinge or slide joint with its spring.
 
     Args:
-        given: the element, defaults filled in.
+        given: element, completed by its defaults.
         name: name of the joint.
         kind: ``"revolute"`` or ``"prismatic"``.
-        offset: (4, 4) of the frame in which it is written, seen from the body.
+        offset: (4, 4) pose of the element's frame in the body.
         angles: unit of angles in the file.
 
     Returns:
-        The joint, without its bodies.
+        The joint, whose bodies are not set yet.
 
     Raises:
         BadInput: a number is invalid, or the axis has no direction.
@@ -74,7 +74,7 @@ def one_freedom(
         stiffness = given.number("stiffness", "N m/rad or N/m")
         rest = given.number("springref", "angle or m", 0.0)
         rest *= unit if kind == "revolute" else 1.0
-    # the rest coordinate is ref, so the joint's own zero is shifted by it
+    # the spring's rest coordinate includes ref, by which the joint's zero is shifted
     return replace(
         joint, placement=anchor @ motion(joint, -ref), position=ref,
         stiffness=stiffness, rest=rest, limits=_limits(given, kind, angles),
@@ -82,7 +82,7 @@ def one_freedom(
 
 
 def _limits(node: Node, kind: str, angles: Angles) -> tuple[float, float] | None:
-    """Return the range of a hinge or slide; without ``limited`` a range is binding."""
+    """Return the range of a hinge or slide; without ``limited`` a range applies."""
     limited = node.optional("limited") or "auto"
     binds = limited == "true" or (limited == "auto" and angles.range_limits)
     if not node.has("range") or not binds:
@@ -95,18 +95,20 @@ def _limits(node: Node, kind: str, angles: Angles) -> tuple[float, float] | None
 
 
 def at_key(key: Node, joint: Joint, values: NDArray) -> Joint:
-    """Return a joint at its values of a key; the first of several takes their motion.
+    """Return a joint at its keyframe values.
+
+    For a ball or free joint, the first of its joints gets the whole motion.
 
     Args:
-        key: the element.
-        joint: joint of one freedom, or the first of a ball or free joint.
+        key: keyframe element.
+        joint: joint of one freedom, or the first joint of a ball or free joint.
         values: one number, a quaternion, or a position and a quaternion.
 
     Returns:
         The joint at home.
 
     Raises:
-        BadInput: a quaternion of zero.
+        BadInput: a quaternion is zero.
     """
     if len(values) == 1:
         return replace(joint, position=float(values[0]))
@@ -116,7 +118,7 @@ def at_key(key: Node, joint: Joint, values: NDArray) -> Joint:
     turn = placed(
         values[:-4] if len(values) == 7 else _ZERO, from_quaternion(quaternion)
     )
-    # values of a free body are its pose in the world, of a ball its turn from rest
+    # a free body's values are its pose in the world, a ball's its rotation from rest
     return replace(
         joint, placement=turn if len(values) == 7 else joint.placement @ turn
     )

@@ -1,11 +1,11 @@
-"""Masses and moments of inertia of MJCF's bodies: written, or those of shapes.
+"""Masses and moments of inertia of MJCF bodies, either written or from shapes.
 
 Sources:
     MuJoCo documentation, XML reference, compiler (``inertiafromgeom``,
     ``inertiagrouprange``, ``boundmass``, ``boundinertia``, ``balanceinertia``,
     ``settotalmass``), inertial (``diaginertia``, ``fullinertia``) and geom (sizes,
-    ``fromto``, ``mass``, ``density``, ``shellinertia``); the area of an ellipsoid by
-    Thomsen's formula, which MuJoCo uses.
+    ``fromto``, ``mass``, ``density``, ``shellinertia``). The area of an ellipsoid is
+    computed by Thomsen's formula, as in MuJoCo.
 """
 
 import math
@@ -26,22 +26,23 @@ from forcefit.assembly.model.inertia import (
 )
 
 _SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
-# [kg, kg m^2] smaller bounds only allow bodies without mass to move
+# [kg, kg m^2] smaller lower bounds only let massless bodies move in MuJoCo
 _REGULAR, _REGULAR_INERTIA = 1e-6, 1e-9
 _KINDS = (*_SIZES, "plane", "hfield", "mesh", "sdf")
 
 
 @dataclass(frozen=True, eq=False)
 class MassRules:
-    """The compiler's rules for masses.
+    """The rules of a file's compiler element for masses.
 
     Attributes:
-        from_shapes: ``true``, ``false`` or ``auto``: only if no mass is written.
-        groups: least and largest group of the shapes that count.
-        least: [kg] least mass of every body.
+        from_shapes: ``true``, ``false``, or ``auto`` to use shapes only if no mass is
+            written.
+        groups: smallest and largest group of the shapes that contribute.
+        least: [kg] lower bound of the mass of every body.
         total: [kg] sum to which all masses are scaled, if above zero.
-        least_inertia: [kg m^2] least principal moment of every body.
-        balanced: whether moments that no body has become their mean.
+        least_inertia: [kg m^2] lower bound of the principal moments of every body.
+        balanced: whether impossible moments are replaced by their mean.
     """
 
     from_shapes: str = "auto"
@@ -53,7 +54,7 @@ class MassRules:
 
     @staticmethod
     def of(root: Node) -> "MassRules":
-        """Return the rules of the file's compilers; the last one counts."""
+        """Return the rules of the file's compiler elements; the last one applies."""
         rules = MassRules()
         for node in root.children("compiler"):
             groups = node.numbers(
@@ -75,7 +76,7 @@ class MassRules:
         return rules
 
     def applied(self, bodies: Mapping[str, Body]) -> dict[str, Body]:
-        """Return the bodies of a file, with least masses, scaled to the total."""
+        """Return the bodies of a file after applying bounds and the total mass."""
         bounded = {
             name: self._bounded(body) if name != WORLD else body
             for name, body in bodies.items()
@@ -104,15 +105,15 @@ class MassRules:
 
 
 def written_mass(inertial: Node, offset: NDArray, angles: Angles) -> MassProperties:
-    """Return the mass properties of ``inertial``, seen from its body.
+    """Return the mass properties of an ``inertial`` element, in its body's axes.
 
     Args:
         inertial: the element.
-        offset: (4, 4) of its frame, seen from the body.
-        angles: conventions of the file.
+        offset: (4, 4) pose of the element's frame in the body.
+        angles: angle conventions of the file.
 
     Returns:
-        Mass, centre and moments of inertia; these are zero if they are not written.
+        Mass, centre and moments of inertia; moments that are not written are zero.
 
     Raises:
         BadInput: the mass is negative, or a number is invalid.
@@ -132,11 +133,11 @@ def written_mass(inertial: Node, offset: NDArray, angles: Angles) -> MassPropert
 
 
 def shape_mass(geom: Node, T: NDArray, rules: MassRules) -> MassProperties | None:
-    """Return the mass properties of a shape; None for a mesh, of unknown volume.
+    """Return the mass properties of a shape; None for a mesh of unknown volume.
 
     Args:
-        geom: the element, defaults filled in.
-        T: (4, 4) pose in its body.
+        geom: element, completed by its defaults.
+        T: (4, 4) pose of the shape in its body.
         rules: rules of the file.
 
     Returns:
@@ -153,7 +154,7 @@ def shape_mass(geom: Node, T: NDArray, rules: MassRules) -> MassProperties | Non
     given = geom.number("mass", "kg") if geom.has("mass") else None
     if given is not None and given < 0:
         raise geom.bad("mass", f"found {given:g}, expected >= 0 [kg]")
-    if kind not in _SIZES or geom.has("mesh"):  # or a shape fitted to a mesh
+    if kind not in _SIZES or geom.has("mesh"):  # with "mesh", a shape fitted to a mesh
         return nothing if given == 0.0 else None
     density, sizes = geom.number("density", "kg/m^3", 1000.0), _sizes(geom, kind)
     if geom.optional("shellinertia") == "true":
@@ -166,7 +167,7 @@ def shape_mass(geom: Node, T: NDArray, rules: MassRules) -> MassProperties | Non
 
 
 def _sizes(geom: Node, kind: str) -> list[float]:
-    """Return the [m] sizes of a shape, with full lengths and edges."""
+    """Return the sizes [m] of a shape, as full lengths and full edges."""
     given = geom.optional("size").split()
     count = _SIZES[kind]
     if geom.has("fromto"):
@@ -175,7 +176,7 @@ def _sizes(geom: Node, kind: str) -> list[float]:
         radius = _first(geom, len(given))
         sizes = [radius, half] if count == 2 else [radius, radius, half]
     else:
-        # numbers beyond those of the shape are ignored
+        # ignore additional numbers that the shape does not use
         sizes = geom.numbers("size", max(count, len(given)), "m").tolist()[:count]
     if min(sizes) <= 0:
         raise geom.bad("size", f"found {min(sizes):g}, expected > 0 [m]")
@@ -190,7 +191,7 @@ def _first(geom: Node, count: int) -> float:
 
 
 def _thomsen(half_axes: list[float]) -> float:
-    """Return the [m^2] area of an ellipsoid, to 1 %."""
+    """Return the area [m^2] of an ellipsoid, accurate to about 1 %."""
     a, b, c = (x**1.6075 for x in half_axes)
     return 4 * math.pi * ((a * b + b * c + c * a) / 3) ** (1 / 1.6075)
 
@@ -203,12 +204,12 @@ def body_of(
 
     Args:
         name: name of the body.
-        written: mass properties, None without ``inertial``.
+        written: mass properties that are written; None without ``inertial``.
         shapes: mass properties of each shape.
         rules: rules of the file.
 
     Returns:
-        The body.
+        The body with its mass properties.
     """
     use_shapes = rules.from_shapes == "true" and bool(shapes)
     if written is not None and not use_shapes:

@@ -1,4 +1,4 @@
-"""Orientations of MJCF: five forms, in degrees or radians."""
+"""Orientations in MJCF, which have five forms, in degrees or radians."""
 
 import math
 from dataclasses import dataclass
@@ -13,11 +13,11 @@ from forcefit.stiffness.screws import rotation_matrix
 
 @dataclass(frozen=True)
 class Angles:
-    """The conventions of a file for angles.
+    """The angle conventions of a file.
 
     Attributes:
-        unit: [rad] of its unit.
-        sequence: axes of its Euler angles; capitals are fixed axes.
+        unit: [rad] one unit of the file's angles.
+        sequence: axes of the Euler angles; capital letters denote fixed axes.
         range_limits: whether a joint with a range is limited by default.
     """
 
@@ -27,7 +27,7 @@ class Angles:
 
     @staticmethod
     def of(root: Node) -> "Angles":
-        """Return the conventions of the file's compilers."""
+        """Return the conventions that the file's compiler elements define."""
         unit, sequence, automatic = "degree", "xyz", "true"
         for compiler in root.children("compiler"):
             unit = compiler.choice("angle", ("degree", "radian"), unit)
@@ -43,17 +43,17 @@ class Angles:
 
 
 def orientation(node: Node, angles: Angles) -> NDArray:
-    """Return the (3, 3) orientation of an element; the identity if it has none.
+    """Return the (3, 3) orientation of an element; the identity if none is given.
 
     Args:
-        node: node with one of quat, axisangle, euler, xyaxes, zaxis.
-        angles: conventions of its file.
+        node: element with one of quat, axisangle, euler, xyaxes, zaxis.
+        angles: angle conventions of the file.
 
     Returns:
-        The rotation.
+        The rotation matrix.
 
     Raises:
-        BadInput: a direction of zero length, or a wrong number of values.
+        BadInput: a direction has zero length, or the number of values is wrong.
     """
     if node.has("quat"):
         q = node.numbers("quat", 4, "-")
@@ -84,18 +84,18 @@ def orientation(node: Node, angles: Angles) -> NDArray:
 
 
 def site_pose(node: Node, angles: Angles) -> NDArray:
-    """Return the (4, 4) pose of a site or shape, which two ends may define.
+    """Return the (4, 4) pose of a site or shape, which two end points may define.
 
     Args:
-        node: node with ``pos`` and an orientation, or ``fromto``.
-        angles: conventions of its file.
+        node: element with ``pos`` and an orientation, or with ``fromto``.
+        angles: angle conventions of the file.
 
     Returns:
-        Its pose; for two ends the middle between them, with z from the second to the
-        first.
+        The pose. For two end points, the origin is halfway between them, and z points
+        from the second to the first.
 
     Raises:
-        BadInput: both ``pos`` and ``fromto``, or two ends that coincide.
+        BadInput: both ``pos`` and ``fromto`` are given, or the two end points coincide.
     """
     if not node.has("fromto"):
         return placed(

@@ -1,10 +1,11 @@
-"""Connections of MJCF's bodies other than joints: equalities, tendons, actuators.
+"""Connections of MJCF bodies other than joints: equalities, tendons, actuators.
 
 Sources:
     MuJoCo documentation, XML reference, equality: ``connect`` and ``weld`` constrain
     places that coincide in the initial configuration, unless sites or ``relpose`` are
-    given; in a weld ``anchor`` is a place of body2, which coincides with the place of
-    ``relpose`` in body1; joint1 = rest1 + polynomial in (joint2 - rest2).
+    given. In a weld, ``anchor`` is a place of body2 that coincides with the place
+    ``relpose`` in body1. A joint constraint is joint1 = rest1 + polynomial in (joint2 -
+    rest2).
 """
 
 from collections.abc import Iterator, Mapping
@@ -31,15 +32,15 @@ _DRIVEN_BY = ("joint", "jointinparent")
 
 @dataclass
 class Ties:
-    """Constraints of a file, and its parts that are left out.
+    """Constraints of a file, and parts of the file that are not converted.
 
     Attributes:
-        root: ``<mujoco>``.
+        root: root element ``<mujoco>``.
         defaults: default attributes of ``equality``.
-        sites: body and (4, 4) place in it, by name.
-        rests: [rad or m] coordinate in the initial configuration by joint.
-        parts: joints of one freedom by the name of the whole joint.
-        extra: parts that are left out, with names; extended while reading.
+        sites: body of each site and pose (4, 4) in it, by name.
+        rests: [rad or m] coordinate of each joint in the initial configuration.
+        parts: joints of one freedom by the name of the joint in the file.
+        extra: kinds and names of parts that are not converted; extended while reading.
     """
 
     root: Node
@@ -55,7 +56,7 @@ class Ties:
 
     @cached_property
     def equalities(self) -> list[Node]:
-        """Active constraints, also by default; others are left out."""
+        """Active constraints; inactive ones are recorded as not converted."""
         given = [n for g in self.root.children("equality") for n in g.children()]
         default = self.defaults.get("active", "true")
         off = [node for node in given if node.element.get("active", default) == "false"]
@@ -64,10 +65,10 @@ class Ties:
         return [node for node in given if node not in off]
 
     def loops(self, poses: Mapping[str, NDArray]) -> Iterator[Loop]:
-        """Yield ``connect`` and ``weld`` as loops.
+        """Yield the loops of ``connect`` and ``weld`` constraints.
 
         Args:
-            poses: (4, 4) of all bodies in the initial configuration.
+            poses: (4, 4) poses of all bodies in the initial configuration.
 
         Yields:
             The loops.
@@ -83,7 +84,7 @@ class Ties:
                 raise node.bad("", "found it, expected connect, weld, joint or tendon")
             name = node.optional("name") or f"loop{count}"
             if name in names:
-                raise node.bad("name", "found it twice; expected names that differ")
+                raise node.bad("name", "found this name twice; expected unique names")
             names.add(name)
             loop = self._loop(node, name, poses)
             if loop.first == loop.second:
@@ -94,7 +95,7 @@ class Ties:
     def _loop(self, node: Node, name: str, poses: Mapping[str, NDArray]) -> Loop:
         """Return one ``connect`` or ``weld`` as a loop."""
         point = node.tag == "connect"
-        # a weld without torque scale constrains its anchor only
+        # a weld without torque scale constrains only its anchor point
         point |= node.number("torquescale", "-", 1.0) == 0.0
         if node.has("site1"):
             (a, A), (b, B) = (
@@ -117,14 +118,14 @@ class Ties:
         return Loop(name, a, b, A, B, point)
 
     def couplings(self, driven: set[str]) -> Iterator[Coupling]:
-        """Yield ``joint`` constraints: joints that follow others.
+        """Yield the couplings of ``joint`` constraints.
 
         Args:
             driven: joints with an actuator.
 
         Yields:
-            The couplings.  If the follower is driven and the leader is not, the
-            inverse, for linear rules.
+            The couplings.  If the follower is driven and the leader is not, a linear
+            rule is inverted.
 
         Raises:
             BadInput: a joint does not exist, or has several freedoms.
@@ -152,7 +153,7 @@ class Ties:
                 yield Coupling(first, leader, tuple(rules), rest, other)
 
     def driven(self) -> set[str]:
-        """Return the joints with an actuator; other actuators are left out."""
+        """Return the joints with an actuator; record other actuators."""
         names = set()
         for group in self.root.children("actuator"):
             for node in group.children():
@@ -173,7 +174,7 @@ class Ties:
         return names
 
     def tendons(self) -> None:
-        """Record tendons and their constraints as left out, by name."""
+        """Record tendons and their constraints as not converted."""
         for group in self.root.children("tendon"):
             for node in group.children():
                 self.leave_out(f"tendon{LOADED}", f"{node.tag} {_name(node)}".strip())
@@ -183,7 +184,7 @@ class Ties:
 
 
 def _polynomial(node: Node) -> list[float]:
-    """Return five coefficients; missing ones have the format's default."""
+    """Return five coefficients; missing ones have the default of the format."""
     count = len(node.optional("polycoef").split())
     default = [0.0, 1.0, 0.0, 0.0, 0.0]
     if not count:
@@ -193,13 +194,13 @@ def _polynomial(node: Node) -> list[float]:
 
 
 def _name(node: Node, keys: "list[str] | tuple[str, ...]" = ()) -> str:
-    """Return the name of an element, or of an element in it."""
+    """Return the name of an element or of an element inside it."""
     found = (node.optional(key) for key in ("name", *keys))
     return next((name for name in found if name), "")
 
 
 def _known(node: Node, key: str, valid: Mapping[str, Any]) -> Any:
-    """Return the object of a name."""
+    """Return the object with the name in an attribute; reject unknown names."""
     name = node.text(key)
     if name not in valid:
         raise node.bad(key, f"found {quoted(name)}{nearest(name, valid)}")

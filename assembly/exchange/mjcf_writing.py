@@ -1,4 +1,4 @@
-"""Export of MJCF: nested bodies, loops as weld constraints, the home as a key."""
+"""Export of MJCF: nested bodies, loops as weld constraints, home as a keyframe."""
 
 from xml.sax.saxutils import quoteattr
 
@@ -8,7 +8,7 @@ from forcefit.assembly.exchange.mechanism import Joint, Mechanism
 from forcefit.assembly.exchange.orientation import to_quaternion
 from forcefit.assembly.exchange.urdf_writing import XML_MARK, numbers
 
-_SMALLEST_INERTIA = 1e-9  # [kg m^2]
+_SMALLEST_INERTIA = 1e-9  # [kg m^2] smallest moment that is written
 _KINDS = {"revolute": "hinge", "prismatic": "slide"}
 
 
@@ -16,11 +16,11 @@ def mjcf_text(mechanism: Mechanism) -> str:
     """Return the text of an MJCF file.
 
     Args:
-        mechanism: mechanism with children in their joints' own frames.
+        mechanism: mechanism in which each child has its joint's frame.
 
     Returns:
-        The text.  In MuJoCo a moving body needs a mass, so the compiler sets the
-        smallest possible one for bodies without mass.
+        The text.  MuJoCo requires a mass for moving bodies, so the compiler element
+        sets the smallest possible mass for massless bodies.
     """
     moving = [joint for joint in mechanism.joints if joint.kind != "fixed"]
     lines = [
@@ -54,7 +54,7 @@ def mjcf_text(mechanism: Mechanism) -> str:
 
 
 def depth_first(mechanism: Mechanism, moving: bool = False) -> list[Joint]:
-    """Return joints in the order of nested bodies; only moving ones on request."""
+    """Return joints in the order of nested bodies, optionally only moving ones."""
     below: dict[str, list[Joint]] = {}
     for joint in mechanism.joints:
         below.setdefault(joint.parent, []).append(joint)
@@ -67,7 +67,7 @@ def depth_first(mechanism: Mechanism, moving: bool = False) -> list[Joint]:
 
 
 def _bodies(mechanism: Mechanism) -> list[str]:
-    """Return nested bodies; by a loop, as chains may exceed Python's recursion."""
+    """Return nested bodies as lines; not recursive, because chains may be long."""
     lines: list[str] = []
     open_bodies = [mechanism.root]
 
@@ -94,8 +94,8 @@ def _bodies(mechanism: Mechanism) -> list[str]:
             )
         if body.mass or body.inertia.any():
             J = body.inertia
-            # the format refuses collinear masses, which have no inertia about their
-            # line
+            # the format rejects collinear masses, which have no inertia about their
+            # common line
             if np.linalg.eigvalsh(J)[0] < _SMALLEST_INERTIA:
                 J = J + _SMALLEST_INERTIA * np.eye(3)
             full = numbers(np.array([J[0, 0], J[1, 1], J[2, 2],

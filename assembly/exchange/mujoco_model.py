@@ -1,12 +1,13 @@
-"""Import of a model of MuJoCo that is in memory: ``MjModel`` or ``MjSpec``.
+"""Import of a MuJoCo model in memory: ``MjModel`` or ``MjSpec``.
 
-The compiled model is written as MJCF, which is read as a file is: bodies with their
-masses, joints, equalities between sites, actuators and the key ``home``.
+The compiled model is converted to MJCF text, which is then read like a file: bodies
+with their masses, joints, equalities between sites, actuators and the keyframe
+``home``.
 
 Sources:
-    MuJoCo documentation, mjModel: body_pos .. and jnt_pos are in the parent's and the
-    body's frame; eq_data of a connect has the anchors in both bodies, of a weld the
-    anchor in body2, the pose in body1, and the torque scale.
+    MuJoCo documentation, mjModel: body_pos and similar are in the parent's frame,
+    jnt_pos in the body's frame. For a connect, eq_data contains the anchors in both
+    bodies; for a weld, the anchor in body2, the pose in body1, and the torque scale.
 """
 
 from collections.abc import Iterator
@@ -28,7 +29,7 @@ _DRIVEN = {"mjTRN_JOINT": "joint", "mjTRN_JOINTINPARENT": "jointinparent",
 
 
 def is_mujoco(model: object) -> bool:
-    """Return whether an object is a model of MuJoCo, compiled or not."""
+    """Return whether an object is a MuJoCo model, compiled or not."""
     kind = type(model)
     return kind.__module__.startswith("mujoco") and kind.__name__ in {
         "MjModel", "MjSpec",
@@ -42,7 +43,7 @@ def mjcf_of_model(model: Any) -> str:
         model: ``mujoco.MjModel``, or ``mujoco.MjSpec``, which is compiled.
 
     Returns:
-        The text, angles in radians; unnamed parts have the names that files give them.
+        The text, with angles in radians; unnamed parts are named as in files.
 
     Raises:
         BadInput: the model is not valid, or has flexible bodies.
@@ -79,7 +80,7 @@ def mjcf_of_model(model: Any) -> str:
 
 
 def _model_name(model: Any) -> str:
-    """Return the name of a model, the first of all its names."""
+    """Return the name of a model, which is the first of all names in it."""
     name: str = model.names[: model.names.index(b"\0")].decode()
     return name or "mujoco model"
 
@@ -105,7 +106,7 @@ def _bodies(mujoco: Any, model: Any, root: Element) -> list[Element]:
 
 
 def _joints_of(model: Any, body: int) -> Iterator[int]:
-    """Return the joints of a body, in their order."""
+    """Return the indices of the joints of a body, in order."""
     first = int(model.body_jntadr[body])
     return iter(range(first, first + int(model.body_jntnum[body])))
 
@@ -132,9 +133,9 @@ def _add_joint(mujoco: Any, model: Any, element: Element, j: int, name: str) -> 
 
 
 def _ties(mujoco: Any, model: Any, root: Element, bodies: list[Element]) -> None:
-    """Add the equalities, those of bodies between sites of their own."""
+    """Add the equalities; equalities of bodies get their own sites."""
     group = SubElement(root, "equality")
-    names = np.cumsum(model.eq_active0)  # as files number those without a name
+    names = np.cumsum(model.eq_active0)  # numbers for unnamed equalities, as in files
     for i in range(model.neq):
         kind = _TIES.get(mujoco.mjtEq(int(model.eq_type[i])).name)
         if kind is None:
@@ -165,7 +166,7 @@ def _ties(mujoco: Any, model: Any, root: Element, bodies: list[Element]) -> None
 
 
 def _places(kind: str, data: Any) -> list[tuple[Any, Any]]:
-    """Return position and quaternion of a constraint's place in both bodies."""
+    """Return position and quaternion of a constraint in each of its two bodies."""
     straight = (1.0, 0.0, 0.0, 0.0)
     if kind == "connect":
         return [(data[:3], straight), (data[3:6], straight)]
@@ -173,7 +174,7 @@ def _places(kind: str, data: Any) -> list[tuple[Any, Any]]:
 
 
 def _drives(mujoco: Any, model: Any, root: Element) -> None:
-    """Add the actuators, by what they move."""
+    """Add the actuators, according to what they move."""
     group = SubElement(root, "actuator")
     for i in range(model.nu):
         kind = _DRIVEN.get(mujoco.mjtTrn(int(model.actuator_trntype[i])).name, "site")
@@ -197,7 +198,7 @@ def _site(model: Any, i: int) -> str:
 
 
 def _joint(model: Any, j: int, number: int) -> str:
-    """Return the name of the joint that is this one of its body, counted from 1."""
+    """Return the name of a joint, whose number in its body is counted from 1."""
     body = _body(model, int(model.jnt_bodyid[j]))
     return str(model.joint(j).name or f"{body}.joint{number}")
 
@@ -208,5 +209,5 @@ def _any_joint(model: Any, j: int) -> str:
 
 
 def words(values: ArrayLike) -> str:
-    """Return numbers in full."""
+    """Return numbers as text with all digits."""
     return " ".join(repr(float(v)) for v in np.ravel(values))

@@ -1,7 +1,7 @@
-"""Comparison of MuJoCo's reading of a robot's file with the reading here.
+"""Comparison of a robot's file as read by MuJoCo with the reading by forcefit.
 
-MuJoCo's own compiler and kinematics compute poses and masses of bodies and the mismatch
-of constraints, in random postures.
+MuJoCo's compiler and kinematics compute the poses and masses of bodies, and the
+mismatch of constraints, in random postures.
 """
 
 import pickle
@@ -22,18 +22,18 @@ from forcefit.assembly.model.inertia import inertia_matrix
 from forcefit.inputs.errors import one_line
 from forcefit.stiffness.screws import rotation_vector
 
-# [kg] largest mass that MuJoCo gives a body without mass, to move it
+# [kg] largest mass that MuJoCo assigns to a massless body so that it can move
 _LIGHTEST = 1.01e-6
-# [kg m^2] smaller principal moments are not compared: MuJoCo may raise them to 1e-9
+# [kg m^2] smaller principal moments are not compared, as MuJoCo may raise them to 1e-9
 _LEAST_MOMENT = 1e-8
-_ROUNDING = 2e-12  # [kg m^2] at which MuJoCo ends its search of principal axes
+_ROUNDING = 2e-12  # [kg m^2] accuracy of MuJoCo's principal moments
 _KEYS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 _UNIT_INERTIA = dict(zip(_KEYS, ("1", "1", "1", "0", "0", "0"), strict=True))
 _DRAWN = {"visual", "collision", "gazebo", "transmission", "loop_joint"}
 
 
 def compare_here(mechanism: Mechanism, path: Path) -> Comparison:
-    """Compare a mechanism with MuJoCo's reading of its file, in this process.
+    """Compare a mechanism with its file as read by MuJoCo, in this process.
 
     Args:
         mechanism: mechanism as it was read or written.
@@ -45,19 +45,19 @@ def compare_here(mechanism: Mechanism, path: Path) -> Comparison:
     import mujoco
 
     reader = f"MuJoCo {mujoco.__version__}"
-    mujoco.set_mju_user_warning(lambda _: None)  # otherwise it would write a log file
+    mujoco.set_mju_user_warning(lambda _: None)  # by default it writes a log file
     try:
         with catch_warnings():
             simplefilter("ignore")
             model, whole = _model(mujoco, path)
         return _compared(mujoco, model, mechanism, Comparison(reader, path.name), whole)
-    except Exception as error:  # C++ exceptions of many kinds
+    except Exception as error:  # MuJoCo raises many kinds of C++ exceptions
         words = one_line(" ".join(str(error).split()), 160)
         return Comparison(reader, path.name, f"{reader} does not read it ({words})")
 
 
 def main() -> None:
-    """Compare files of :mod:`.comparison` in a separate process."""
+    """Run the comparison of :mod:`.comparison` in a separate process."""
     given, made = Path(sys.argv[1]), Path(sys.argv[2])
     with given.open("rb") as file:
         mechanism, path = pickle.load(file)
@@ -86,7 +86,7 @@ def _model(mujoco: Any, path: Path) -> tuple[Any, bool]:
 
 
 def _settled(mujoco: Any, spec: Any) -> Any:
-    """Return a model whose bodies keep their frames and may have no mass."""
+    """Return a model whose bodies keep their frames and may be massless."""
     compiler = spec.compiler
     compiler.fusestatic = compiler.alignfree = 0
     for joint in spec.joints:
@@ -108,7 +108,7 @@ def _bare_urdf(path: Path) -> str:
         if element.tag.endswith(":joint") or element.get("quat_xyzw"):
             raise ValueError(f"its URDF has no {element.tag} of this kind")
         if element.tag == "inertia" and not _comparable(_attributes(element.attrib)):
-            element.attrib.update(_UNIT_INERTIA)  # refused for thin rods
+            element.attrib.update(_UNIT_INERTIA)  # MuJoCo rejects thin rods
         for inner in list(element):
             if inner.tag in _DRAWN or ":" in inner.tag:
                 element.remove(inner)
@@ -175,19 +175,19 @@ def _compared(
 
 
 def _widen(gaps: dict[str, float], where: str, gap: float) -> None:
-    """Keep the largest difference of each place."""
+    """Store the largest difference at each place."""
     gaps[where] = max(gaps.get(where, 0.0), float(gap))
 
 
 def _body_names(model: Any) -> list[str]:
-    """Return the names of all bodies; unnamed ones are numbered as in this reader."""
+    """Return the names of all bodies; unnamed ones get a number as in forcefit."""
     return [model.body(i).name or f"body{i}" for i in range(model.nbody)]
 
 
 def _mass_gaps(
     model: Any, mechanism: Mechanism, bodies: list[tuple[int, str]]
 ) -> dict[str, float]:
-    """Return the relative differences of masses, and of centres [m]."""
+    """Return the relative differences of masses, and the differences of centres [m]."""
     gaps: dict[str, float] = {}
     for i, name in bodies:
         body, mass = mechanism.bodies[name], float(model.body_mass[i])
@@ -213,7 +213,7 @@ def _inertia_gaps(
 
 
 def _moments(mujoco: Any, model: Any, i: int) -> NDArray:
-    """Return the (3, 3) [kg m^2] of a body about its centre, in its axes."""
+    """Return the inertia (3, 3) [kg m^2] of a body about its centre, in its axes."""
     entries = np.zeros(9)
     mujoco.mju_quat2Mat(entries, model.body_iquat[i])
     R = entries.reshape(3, 3)
@@ -221,18 +221,18 @@ def _moments(mujoco: Any, model: Any, i: int) -> NDArray:
 
 
 def _comparable(J: NDArray) -> bool:
-    """Return whether MuJoCo uses moments unchanged: of no thin rod or plate."""
+    """Return whether MuJoCo keeps the moments, which excludes thin rods and plates."""
     least, middle, most = np.linalg.eigvalsh(J)
     return bool(least > _LEAST_MOMENT and most < (1 - 1e-9) * (least + middle))
 
 
 def _attributes(six: Mapping[str, str]) -> NDArray:
-    """Return the (3, 3) [kg m^2] of an element of a URDF."""
+    """Return the inertia (3, 3) [kg m^2] of a URDF element."""
     return inertia_matrix([float(six.get(key, "0")) for key in _KEYS])
 
 
 def _rules(mujoco: Any, model: Any) -> dict[str, tuple[int, float]]:
-    """Return rows and rotation scales of active constraints, by their names here."""
+    """Return row and rotation scale of active constraints, by forcefit's name."""
     kinds = int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)
     active = [i for i in range(model.neq) if model.eq_active0[i]]
     return {
@@ -242,7 +242,7 @@ def _rules(mujoco: Any, model: Any) -> dict[str, tuple[int, float]]:
 
 
 def _rows(mujoco: Any, data: Any, constraint: int) -> NDArray:
-    """Return the rows of one equality constraint."""
+    """Return the rows of an equality constraint."""
     equal = data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
     return np.asarray(equal & (data.efc_id == constraint))
 
@@ -250,7 +250,7 @@ def _rows(mujoco: Any, data: Any, constraint: int) -> NDArray:
 def _placed(
     mujoco: Any, model: Any, data: Any, mechanism: Mechanism, q: NDArray
 ) -> dict[str, NDArray]:
-    """Return poses of all bodies, at the coordinates of MuJoCo's ``data``."""
+    """Return the poses of all bodies for the coordinates in MuJoCo's ``data``."""
     names, kinds = _body_names(model), mujoco.mjtJoint
     row = {j.name: k for k, j in enumerate(mechanism.joints) if j.kind != "fixed"}
     known: set[str] = set()
@@ -269,7 +269,7 @@ def _placed(
         }:  # fmt: skip
             known |= {f"{name}.{part}" for part in ("tx", "ty", "tz", "rx", "ry", "rz")}
             several.append((i, name, bool(first)))
-    # joints that the other program does not know keep the file's coordinate
+    # joints that MuJoCo does not know keep the coordinate of the file
     held = [joint.name not in known for joint in mechanism.joints]
     poses = body_poses(mechanism, np.where(held, 0.0, q))
     for i, name, first in several:

@@ -1,8 +1,8 @@
-"""Orientations in other programs' forms: roll-pitch-yaw, quaternions, Euler angles.
+"""Orientations in the forms of other programs: roll-pitch-yaw, quaternions, Euler.
 
 Sources:
     Shoemake (1994), Euler angle conversion, Graphics Gems IV: the third angle is
-    computed from the first, which keeps accuracy if the second is a right angle.
+    computed from the first, which remains accurate if the second is 90 degrees.
 """
 
 import math
@@ -22,7 +22,7 @@ def from_roll_pitch_yaw(angles: ArrayLike) -> NDArray:
 
 
 def to_roll_pitch_yaw(R: NDArray) -> tuple[float, float, float]:
-    """Return the angles [rad] of a (3, 3) rotation, inverse of the function above."""
+    """Return roll, pitch, yaw [rad] of a (3, 3) rotation (inverse of the above)."""
     roll = math.atan2(R[2, 1], R[2, 2])
     c, s = math.cos(roll), math.sin(roll)
     pitch = math.atan2(-R[2, 0], s * R[2, 1] + c * R[2, 2])
@@ -44,7 +44,7 @@ def to_quaternion(R: NDArray) -> tuple[float, float, float, float]:
     """Return the unit quaternion ``[w x y z]`` of a (3, 3) rotation."""
     turn = rotation_vector(R)
     angle = float(np.linalg.norm(turn))
-    half = np.sinc(angle / (2 * np.pi)) / 2 * turn  # sin(a / 2) along the axis
+    half = np.sinc(angle / (2 * np.pi)) / 2 * turn  # sin(angle / 2) times the axis
     return math.cos(angle / 2), float(half[0]), float(half[1]), float(half[2])
 
 
@@ -52,11 +52,11 @@ def from_euler(angles: ArrayLike, sequence: str) -> NDArray:
     """Return the (3, 3) rotation by three angles [rad] about axes such as ``"xyz"``.
 
     Args:
-        angles: (3,) in the order of the sequence.
+        angles: (3,) angles in the order of the sequence.
         sequence: three letters; small letters are body axes, capitals fixed axes.
 
     Returns:
-        The rotation.
+        The rotation matrix.
     """
     R = np.eye(3)
     for axis, angle in zip(sequence, np.asarray(angles, dtype=float), strict=True):
@@ -66,7 +66,7 @@ def from_euler(angles: ArrayLike, sequence: str) -> NDArray:
 
 
 def onto(axis: ArrayLike) -> NDArray:
-    """Return the (3, 3) smallest rotation that brings z onto a unit vector."""
+    """Return the smallest (3, 3) rotation that rotates z to a unit vector."""
     x, y, z = np.asarray(axis, dtype=float)
     sine = math.hypot(x, y)
     if sine == 0.0:
@@ -76,5 +76,5 @@ def onto(axis: ArrayLike) -> NDArray:
 
 
 def _about(axis: str, angle: float) -> NDArray:
-    """Return the (3, 3) turn about a coordinate axis."""
+    """Return the (3, 3) rotation about a coordinate axis."""
     return rotation_matrix(angle * np.array(_UNIT[axis]))

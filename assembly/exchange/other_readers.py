@@ -1,12 +1,12 @@
-"""Readers of robots that other distributions install, by entry points.
+"""Readers of robot files that other Python packages install by entry points.
 
-A distribution names a function for the ending of its files::
+A package assigns a function to the suffix of its files::
 
     [project.entry-points."forcefit.readers"]
-    cad = "their_package.robots:read"   # of files that end in .cad
+    cad = "their_package.robots:read"   # for files that end in .cad
 
-``read(path)`` returns a :class:`forcefit.assembly.model.robot.Robot`; its ``BadInput``
-is the message for the user.
+``read(path)`` returns a :class:`forcefit.assembly.model.robot.Robot`. If it raises
+``BadInput``, the user sees its message.
 """
 
 from pathlib import Path
@@ -19,22 +19,22 @@ GROUP = "forcefit.readers"
 
 
 def has_reader(path: Path) -> bool:
-    """Return whether a distribution installed a reader of this ending."""
+    """Return whether a package has installed a reader for the suffix of a file."""
     return _ending(path) in installed_names(GROUP)
 
 
 def read_by_other(path: Path) -> Robot:
-    """Return the robot of a file that an installed distribution reads.
+    """Return the robot of a file, read by an installed package.
 
     Args:
-        path: file whose ending has a reader, see :func:`has_reader`.
+        path: file with a suffix for which a reader exists, see :func:`has_reader`.
 
     Returns:
         The robot.
 
     Raises:
-        BadInput: several distributions read this ending; the reader cannot be imported,
-            fails, or returns something else.
+        BadInput: several packages read this suffix; or the reader cannot be imported,
+            fails, or does not return a robot.
     """
     try:
         read, words = load_installed(GROUP, _ending(path), "reader")
@@ -48,5 +48,5 @@ def read_by_other(path: Path) -> Robot:
 
 
 def _ending(path: Path) -> str:
-    """Return the ending of a file, without its dot."""
+    """Return the suffix of a file without the dot."""
     return path.suffix[1:].lower()

@@ -1,7 +1,7 @@
-"""A small TOML file that adds elasticity, clearances, tolerances to a robot.
+"""Overlay: a TOML file that adds elasticity, clearances and tolerances to a robot.
 
-It is separate from the robot's own file, which may then be written again, for example
-by a CAD program, without loss of measured data.
+An overlay is separate from the robot's own file. A CAD program can therefore write the
+robot's file again without loss of measured data.
 """
 
 from collections.abc import Mapping
@@ -12,23 +12,23 @@ from typing import Any
 from forcefit.inputs.errors import nearest, quoted
 from forcefit.inputs.table import Table, read_toml
 
-# keys that are valid only in the robot's own file
+# keys that are allowed only in the robot's own file
 _PLACED = ("parent", "translation", "rotation", "dh", "joint")
 _WHOLE = ("name", "description", "platform", "effect", "frame")
 
 
 def lay_over(robot: Mapping[str, Any], overlay: Path | str) -> Table:
-    """Return a robot's table with an overlay's keys added or replaced.
+    """Return a robot's table, with keys added or replaced by an overlay.
 
     Args:
-        robot: table of :func:`forcefit.assembly.files.robot_file.robot_table`; its
-            paths start in the overlay's folder.
-        overlay: the file: ``[[frame]]`` with a ``name`` (``*`` matches any letters) and
-            any keys of a frame except those of its placement; ``platform``,
-            ``description``, ``[[effect]]`` of the whole robot.
+        robot: table from :func:`forcefit.assembly.files.robot_file.robot_table`; its
+            paths are relative to the overlay's folder.
+        overlay: the file. It may contain ``[[frame]]`` with a ``name`` (``*`` matches
+            any letters) and any keys of a frame except those of its placement; also
+            ``platform``, ``description``, and ``[[effect]]`` of the whole robot.
 
     Returns:
-        The root table, ready to be read; error messages name the overlay.
+        The root table, which can then be read; error messages name the overlay.
 
     Raises:
         BadInput: the overlay is not TOML, names an unknown frame, or changes a

@@ -1,12 +1,12 @@
-"""Import of a model of Pinocchio that is in memory: ``pinocchio.Model``.
+"""Import of a Pinocchio model in memory: ``pinocchio.Model``.
 
-The model is written as MJCF, which is read as a file is.  It is a tree; its loops, if
-any, are in objects of their own, which are not read.  Every joint of one freedom counts
-as a drive, as in a URDF that names none.
+The model is converted to MJCF text, which is then read like a file.  The model is a
+tree; Pinocchio stores loops in separate objects, which are not read.  Every joint of
+one freedom is assumed to be a drive, as for a URDF that names no drives.
 
 Sources:
-    Pinocchio documentation, Model and JointModel: motion subspaces have the linear part
-    first; a link that a fixed joint holds belongs to the joint before it.
+    Pinocchio documentation, Model and JointModel: motion subspaces begin with the
+    linear part; a link on a fixed joint belongs to the preceding joint.
 """
 
 from typing import Any
@@ -20,11 +20,11 @@ from forcefit.inputs.errors import BadInput, quoted
 
 _SEVERAL = {"JointModelSpherical": "ball", "JointModelFreeFlyer": "free"}
 ASSUMED = "every joint of one freedom as a drive"
-_LARGEST = 1e6  # [rad, m] larger limits are none
+_LARGEST = 1e6  # [rad, m] larger limits count as no limits
 
 
 def is_pinocchio(model: object) -> bool:
-    """Return whether an object is a model of Pinocchio."""
+    """Return whether an object is a Pinocchio model."""
     kind = type(model)
     return kind.__module__.startswith("pinocchio") and kind.__name__ == "Model"
 
@@ -36,10 +36,10 @@ def mjcf_of_pinocchio(model: Any) -> str:
         model: ``pinocchio.Model``.
 
     Returns:
-        The text; bodies have the names of the model's frames of bodies, or of joints.
+        The text; bodies have the names of the model's body frames, or of joints.
 
     Raises:
-        BadInput: a joint of a kind that MJCF lacks; the message names it.
+        BadInput: MJCF has no equivalent for a joint; the message names the joint.
     """
     root = Element("mujoco", model=model.name or "pinocchio model")
     SubElement(root, "compiler", angle="radian")
@@ -58,24 +58,24 @@ def mjcf_of_pinocchio(model: Any) -> str:
         if _add_joint(model, body, i):
             SubElement(drives, "general", name=name, joint=name)
         for frame in frames:
-            if frame is not own:  # a link that a fixed joint holds
+            if frame is not own:  # a link on a fixed joint
                 SubElement(body, "body", _pose(frame.placement), name=frame.name)
     return tostring(root, encoding="unicode")
 
 
 def _is_body(frame: Any) -> bool:
-    """Return whether a frame is that of a body."""
+    """Return whether a frame belongs to a body."""
     return str(frame.type).rpartition(".")[2] == "BODY"
 
 
 def _pose(placement: Any) -> dict[str, str]:
-    """Return a placement as attributes."""
+    """Return a placement as attributes of an element."""
     quaternion = to_quaternion(np.array(placement.rotation))
     return {"pos": words(placement.translation), "quat": words(quaternion)}
 
 
 def _add_mass(body: Element, inertia: Any) -> None:
-    """Add the mass of a body, its moments about its centre in the joint's axes."""
+    """Add mass and moments of inertia about the centre, in the joint's axes."""
     if inertia.mass:
         J = np.array(inertia.inertia)
         six = [J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]]
@@ -95,7 +95,7 @@ def _add_joint(model: Any, body: Element, i: int) -> bool:
         return False
     data = joint.createData()
     q = np.zeros(model.nq)
-    q[joint.idx_q] = 1.0 if joint.nq > joint.nv else 0.0  # cosine and sine of an angle
+    q[joint.idx_q] = 1.0 if joint.nq > joint.nv else 0.0  # stored as cosine and sine
     joint.calc(data, q)
     S = np.reshape(data.S, (6, -1))
     turns, slides = np.any(S[3:]), np.any(S[:3])

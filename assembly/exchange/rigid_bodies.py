@@ -1,4 +1,4 @@
-"""Masses and moments of inertia of bodies of other programs, and of frames."""
+"""Masses and moments of inertia of imported bodies, and of frames to be exported."""
 
 from dataclasses import replace
 from typing import Any
@@ -27,7 +27,7 @@ def mass_keys(body: Body) -> dict[str, Any]:
 
 
 def with_possible_moments(mechanism: Mechanism) -> Mechanism:
-    """Return the mechanism without moments of inertia that no body has."""
+    """Return the mechanism with impossible moments of inertia removed."""
     bodies = {
         name: replace(body, inertia=np.zeros((3, 3)))
         for name, body in mechanism.bodies.items()
@@ -41,7 +41,7 @@ def with_possible_moments(mechanism: Mechanism) -> Mechanism:
 
 
 def lumped_body(name: str, frames: list[Frame]) -> Body:
-    """Return one rigid body for all frames on a joint: masses, and beams as rods."""
+    """Return one rigid body for all frames on a joint; beams count as rods."""
     parts: list[MassProperties] = []
     for frame in frames:
         T = Robot("", frame.name, (replace(frame, parent=BASE),)).fixed_transforms[0]
@@ -55,6 +55,6 @@ def lumped_body(name: str, frames: list[Frame]) -> Body:
             span = R @ axis * length
             area = declared_section(link.section, link.poisson).area
             mass = link.density * area * length
-            # a slender rod: m L^2 / 12
+            # moment of inertia of a slender rod: m L^2 / 12
             parts.append((mass, T[:3, 3] - span / 2, point_inertia(mass / 12, span)))
     return Body(name, *joined_bodies(parts))

@@ -1,4 +1,4 @@
-"""Import and export of robots in files of any kind, by their suffix."""
+"""Import and export of robots in files of all supported formats, by their suffix."""
 
 import logging
 import os
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger("forcefit.load")
 OTHERS = (".urdf", ".xml", ".sdf")
-_BLANKS = b"\xef\xbb\xbf \r\n\t"  # a byte order mark and blanks
-# words in a remark which say that an omission may change results
+_BLANKS = b"\xef\xbb\xbf \r\n\t"  # byte order mark and whitespace
+# words in a remark that indicate that an omission may change results
 _WEIGHTY = ("mimic:", "no platform", "no drive", "may carry load", "masses")
 
 
@@ -34,28 +34,28 @@ def load_robot(
     *,
     links: bool = True,
 ) -> Robot:
-    """Return a built-in robot by its name, the robot of a file, or of a model.
+    """Return a built-in robot by name, or the robot of a file or of a model.
 
     Args:
-        name: name such as ``"irsbot2"``; or the path of a robot file, a URDF (with its
-            loops next to it), MJCF or SDF file; or a ``mujoco.MjModel`` or
-            ``mujoco.MjSpec``, of which bodies, joints, equalities between them,
-            actuators and the key ``home`` are read; or a ``pinocchio.Model``, a tree
-            whose joints of one freedom are all drives.
-        close: function that makes the closures of a declared robot hold, as
-            :mod:`forcefit.assembly.kinematics.closing` does; none if absent.
-        links: whether links given by a mesh or a library are solved or read now, which
-            solvers need.  Without them a robot can be placed, written and converted,
-            and its assembly zone can be computed.  A robot with joints that are bolted
-            at a pose needs them always.
+        name: name such as ``"irsbot2"``; or the path of a robot file, or of a URDF
+            (with its loops file next to it), MJCF or SDF file; or a ``mujoco.MjModel``
+            or ``mujoco.MjSpec``, of which bodies, joints, equalities between them,
+            actuators and the keyframe ``home`` are read; or a ``pinocchio.Model``, a
+            tree in which all joints of one freedom are drives.
+        close: function that closes the loops of a robot file, as
+            :mod:`forcefit.assembly.kinematics.closing` does; None for no closing.
+        links: whether links given by a mesh or a library are solved or read now, as
+            solvers require.  Otherwise the robot can only be placed, written and
+            converted, and its assembly zone can be computed.  Links are always solved
+            for a robot with joints that are bolted at a pose.
 
     Returns:
-        The robot; its remarks include the assumptions and omissions for a file of
-        another program.
+        The robot. For a file of another program, its remarks list assumptions and
+        omissions.
 
     Raises:
-        BadInput: neither a built-in name nor a file nor a model, it breaks a rule, or a
-            mesh or library that it names is not usable.
+        BadInput: the name is neither a built-in robot nor a file nor a model; the robot
+            violates a rule; or a mesh or library that it names is not usable.
     """
     declared = isinstance(name, str | Path)
     robot = _load_declared(name, close) if declared else _robot_of_model(name, close)
@@ -70,7 +70,7 @@ def load_robot(
 
 
 def _load_declared(name: str | Path, close: Closing | None) -> Robot:
-    """Return the robot of a name or of a file, with links as declared."""
+    """Return the robot of a name or a file, with links not yet solved."""
     path = Path(name)
     if path.suffix.lower() not in OTHERS:
         if _is_of_other(path):
@@ -86,17 +86,17 @@ def _load_declared(name: str | Path, close: Closing | None) -> Robot:
 
 
 def is_robot_file(path: Path) -> bool:
-    """Return whether a file is a TOML of forcefit, not one of another program."""
+    """Return whether a file is a robot file of forcefit (TOML)."""
     return path.suffix.lower() not in OTHERS and not _is_of_other(path)
 
 
 def _is_of_other(path: Path) -> bool:
-    """Return whether a file has an ending that another distribution reads."""
+    """Return whether another package has installed a reader for a file's suffix."""
     return path.suffix not in {"", ".toml"} and path.is_file() and has_reader(path)
 
 
 def _robot_of_foreign(path: Path, title: str, close: Closing | None) -> Robot:
-    """Return the robot of another program's file; remarks begin with its title."""
+    """Return the robot of another program's file; its remarks begin with the title."""
     from forcefit.assembly.exchange.foreign import robot_of_file
 
     conversion = robot_of_file(path, ask=False)[0]
@@ -139,17 +139,17 @@ def _robot_of_model(model: object, close: Closing | None) -> Robot:
 
 
 def write_robot(robot: Robot, path: str | Path) -> None:
-    """Write a robot to a file of the kind given by the suffix.
+    """Write a robot to a file whose format is given by the suffix.
 
     Args:
-        robot: to be written.
-        path: ``.toml``: a robot file, which holds the complete robot; ``.urdf`` (and a
-            YAML next to it) or ``.xml`` (MJCF): its rigid bodies and joints; see
-            ``forcefit convert``, which reports what they leave out.
+        robot: robot to be written.
+        path: ``.toml`` for a robot file, which contains the complete robot; ``.urdf``
+            (with a YAML file next to it) or ``.xml`` (MJCF) for its rigid bodies and
+            joints; see ``forcefit convert``, which reports what these omit.
 
     Raises:
-        BadInput: another suffix, a file of another program exists there, or it cannot
-            be written.
+        BadInput: the suffix is not supported, a file of another program exists at this
+            path, or the file cannot be written.
     """
     path = Path(path)
     if path.suffix.lower() == ".toml":

@@ -44,18 +44,18 @@ _HELD_OF_AXIS = ("xyz", "use_parent_model_frame", "mimic")
 
 
 def read_sdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
-    """Return the mechanism of an SDF file with one model, perhaps with nested models.
+    """Return the mechanism of an SDF file with one model, possibly with nested models.
 
     Args:
-        path: the file.
-        loops: a file with drives and further loops, or None.
+        path: path of the file.
+        loops: loops file with drives and further loops, or None.
 
     Returns:
         The mechanism: a tree from the world, or from the first link at its pose; joints
         that the tree does not need become loops.
 
     Raises:
-        BadInput: a rule of the format is broken, or a joint has an unknown type.
+        BadInput: the file violates a rule of the format, or a joint type is unknown.
     """
     root = read_xml(path, "sdf")
     frames = frames_of(root)
@@ -93,12 +93,12 @@ def _tree(
     frames: Frames, ends: dict[str, tuple[str, str]], bodies: dict[str, Body],
     first: str, held: list[Joint],
 ) -> tuple[list[Joint], dict[str, list[str]], list[Loop]]:  # fmt: skip
-    """Return joints that reach every body from the root, and loops of other joints."""
+    """Return the joints of a tree from the root to every body, and the loops."""
     reached = {first} if held or WORLD not in bodies else {WORLD}
     tree, loops, waiting = held, list[Loop](), list(ends)
     parts: dict[str, list[str]] = {}
     while waiting:
-        # in the order written; joints that reach no body yet wait
+        # in the order of the file; joints that are not connected yet are postponed
         name = next((n for n in waiting if reached & set(ends[n])), waiting[0])
         waiting.remove(name)
         parent, child = ends[name]
@@ -119,9 +119,9 @@ def _tree(
 
 
 def _of_axis(joint: Node, tag: str, part: Node) -> str:
-    """Return the part of an axis that is left out, in words; empty if none is."""
+    """Return the description of what is omitted from an axis; empty if nothing is."""
     spring = part.child("spring_stiffness")
-    # further axes of joints of several freedoms are not read
+    # forcefit does not read further axes of joints of several freedoms
     crossed = joint.optional("type") in {"universal", "revolute2"}
     single = joint.optional("type") not in {"ball", "screw"}
     taken = crossed or (tag == "axis" and single)
@@ -139,7 +139,7 @@ def _of_axis(joint: Node, tag: str, part: Node) -> str:
 
 
 def _taken(words: dict[str, str]) -> Iterator[str]:
-    """Return the assumptions on masses, each with the links' names."""
+    """Yield the assumptions on masses, each with the names of the links."""
     by_words: dict[str, list[str]] = {}
     for name, line in words.items():
         if line:
@@ -149,7 +149,7 @@ def _taken(words: dict[str, str]) -> Iterator[str]:
 
 
 def _left_out(frames: Frames, root: Node) -> Iterator[str]:
-    """Return the parts of an SDF that a robot of frames cannot represent."""
+    """Yield descriptions of SDF parts that a robot of frames cannot represent."""
     extra: dict[str, list[str]] = {}
 
     def add(what: str, name: str) -> None:

@@ -1,9 +1,10 @@
 """Frames of SDF: links, joints, frames and nested models, placed and attached.
 
 Sources:
-    sdformat.org, specification 1.12 and "Pose frame semantics": a link's pose is in its
-    model's frame, a joint's in its child's, a frame's in its ``attached_to``, unless
-    ``relative_to`` names another; names of nested models are joined by ``::``.
+    sdformat.org, specification 1.12 and "Pose frame semantics": the pose of a link is
+    in its model's frame, of a joint in its child's frame, of a frame in the frame
+    ``attached_to``, unless ``relative_to`` names another frame; names of nested models
+    are joined by ``::``.
 """
 
 import math
@@ -23,18 +24,18 @@ MODEL = "__model__"
 FRAMES = ("link", "joint", "frame")
 _AROUND = f"{WORLD}::"
 _NESTED = 20  # largest depth of nested models
-_OLD = 1.4  # last version in which axes are seen from the model
+_OLD = 1.4  # last version in which joint axes are in the model's frame
 
 
 @dataclass(frozen=True)
 class Named:
-    """An element with a pose, and the prefix of names in its model.
+    """An element with a pose, and the name prefix of its model.
 
     Attributes:
-        node: node of a link, joint, frame or model.
-        scope: prefix: empty in the outermost model, such as ``"arm::"`` in a nested
-            one, ``"world::"`` in the world around it.
-        old: whether axes are seen from the model, as in old versions of the format.
+        node: element of a link, joint, frame or model.
+        scope: name prefix: empty in the outermost model, such as ``"arm::"`` in a
+            nested one, ``"world::"`` in the world around it.
+        old: whether joint axes are in the model's frame, as in old format versions.
     """
 
     node: Node
@@ -44,12 +45,12 @@ class Named:
 
 @dataclass
 class Frames:
-    """Named frames of a model and of nested models, placed on first use.
+    """Named frames of a model and its nested models, whose poses are computed on use.
 
     Attributes:
         model: the outermost model.
         named: links, joints, frames and models by their full names.
-        poses: (4, 4) seen from the world, of those placed so far.
+        poses: (4, 4) poses in the world that have been computed so far.
     """
 
     model: Node
@@ -57,11 +58,11 @@ class Frames:
     poses: dict[str, NDArray] = field(default_factory=dict)
 
     def of(self, tag: str) -> Iterator[tuple[str, Named]]:
-        """Return the names and elements of one kind, in the order written."""
+        """Yield the names and elements of one kind, in the order of the file."""
         return ((k, v) for k, v in self.named.items() if v.node.tag == tag)
 
     def name(self, name: str, scope: str, node: Node, key: str = "") -> str:
-        """Return full name for a name in a model, or raise an error of an element."""
+        """Return the full name for a name in a model; reject unknown names."""
         if name == WORLD or (name, scope) == (MODEL, _AROUND):
             return WORLD
         own = f"{self.model.optional('name')}::"
@@ -75,7 +76,7 @@ class Frames:
         raise node.bad(key, f"found {quoted(name)}, expected a link or frame{hint}")
 
     def pose(self, name: str, asked: tuple[str, ...] = ()) -> NDArray:
-        """Return the (4, 4) pose seen from the world, by the full name."""
+        """Return the (4, 4) pose in the world of a full name."""
         if name == WORLD:
             return np.eye(4)
         if name not in self.poses:
@@ -88,7 +89,7 @@ class Frames:
                 )
             own = node.child("pose")
             relative = ""
-            if own is not None:  # called "frame" until 1.6
+            if own is not None:  # named "frame" until version 1.6
                 relative = own.optional("relative_to") or own.optional("frame")
             relative = relative or self._default(name)
             base = self.pose(self.name(relative, scope, node, "pose"), (*asked, name))
@@ -102,14 +103,14 @@ class Frames:
         return self.poses[name]
 
     def _default(self, name: str) -> str:
-        """Return the default frame of a pose without ``relative_to``."""
+        """Return the frame to which a pose without ``relative_to`` refers."""
         node = self.named[name].node
         if node.tag == "joint":
             return word(node, "child")
         return (node.optional("attached_to") if node.tag == "frame" else "") or MODEL
 
     def link(self, name: str, asked: tuple[str, ...] = ()) -> str:
-        """Return the link to which a frame is attached, ``"world"`` for the world."""
+        """Return the link to which a frame is attached; ``"world"`` for the world."""
         if name == WORLD:
             return WORLD
         node, scope = self.named[name].node, self.named[name].scope
@@ -137,22 +138,22 @@ class Frames:
 
 
 def frames_of(root: Node) -> Frames:
-    """Return all named frames of a file's one model, and of the world around it.
+    """Return all named frames of a file's only model, and of the world around it.
 
     Args:
-        root: ``<sdf>``.
+        root: root element ``<sdf>``.
 
     Returns:
-        The frames, not placed yet.
+        The frames, whose poses are not computed yet.
 
     Raises:
         BadInput: a name is missing or not unique, or there is not exactly one model.
     """
     worlds = list(root.children("world"))
     models = [m for group in (root, *worlds) for m in group.children("model")]
-    if len(models) > 1:  # such as the ground
+    if len(models) > 1:  # other models may be static, such as the ground
         models = [m for m in models if not _is_static(m)]
-    if not models:  # in an included file
+    if not models:  # the model may be in an included file
         given = [i for group in (root, *worlds) for i in group.children("include")]
         models = given if len(given) == 1 else []
     if len(models) != 1:
@@ -175,7 +176,7 @@ def _is_static(model: Node) -> bool:
 
 
 def _gather(frames: Frames, model: Node, scope: str, outer: str, old: bool) -> None:
-    """Collect the elements of a model, also in nested models."""
+    """Collect the elements of a model and of its nested models."""
     if scope.count("::") > _NESTED:
         raise model.bad("", f"found models more than {_NESTED} deep")
     frames.named[scope + MODEL] = Named(model, outer, old)
@@ -190,22 +191,22 @@ def _gather(frames: Frames, model: Node, scope: str, outer: str, old: bool) -> N
         if inside is not None:
             within = f"{scope}{inside.text('name')}::"
             if within + MODEL in frames.named:
-                raise node.bad("name", "found it twice; expected names that differ")
+                raise node.bad("name", "found this name twice; expected unique names")
             _gather(frames, inside, within, scope, its)
 
 
 def _take(frames: Frames, node: Node, scope: str, name: str, old: bool) -> None:
-    """Add a link, joint or frame; a link's name has precedence over a joint's."""
+    """Add a link, joint or frame; of equal names, the link keeps its name."""
     full = scope + name
     if full in frames.named and frames.named[full].node.tag != node.tag:
-        full += f"_{node.tag}"  # libsdformat renames it in this way
+        full += f"_{node.tag}"  # libsdformat uses the same new name
     if full in frames.named:
-        raise node.bad("name", "found it twice; expected names that differ")
+        raise node.bad("name", "found this name twice; expected unique names")
     frames.named[full] = Named(node, scope, old)
 
 
 def _is_old(root: Node) -> bool:
-    """Return whether axes are seen from the model in a file's version."""
+    """Return whether a file's version defines joint axes in the model's frame."""
     try:
         return float(root.optional("version")) <= _OLD
     except ValueError:
@@ -216,14 +217,14 @@ def included(node: Node) -> tuple[Node, bool]:
     """Return the model of an included file, and whether its version is old.
 
     Args:
-        node: ``<include>``; its address is a file or folder next to the folder of its
-            own file, or next to a parent folder.
+        node: element ``<include>``; its address is a file or folder next to the folder
+            of the file that contains it, or next to a parent folder.
 
     Returns:
-        The model with the name, pose and placement frame of the include.
+        The model, with the name, pose and placement frame of the include element.
 
     Raises:
-        BadInput: the file does not exist, or is no file of one model.
+        BadInput: the file does not exist, or does not contain exactly one model.
     """
     if node.optional("merge") in {"true", "1"}:
         raise node.bad(
@@ -266,14 +267,14 @@ def word(node: Node, tag: str) -> str:
     """Return the text of an inner element that names a link.
 
     Args:
-        node: a joint.
-        tag: tag of the element.
+        node: element of a joint.
+        tag: tag of the inner element.
 
     Returns:
-        The name.
+        The name of the link.
 
     Raises:
-        BadInput: the attribute is missing or empty.
+        BadInput: the inner element is missing or empty.
     """
     inner = node.child(tag)
     if inner is None or not inner.content:
@@ -282,16 +283,16 @@ def word(node: Node, tag: str) -> str:
 
 
 def own_pose(node: Node) -> NDArray:
-    """Return the (4, 4) transform of a pose element; identity if it is empty.
+    """Return the (4, 4) transform of a pose element; the identity if it is empty.
 
     Args:
-        node: ``<pose>``.
+        node: element ``<pose>``.
 
     Returns:
         The transform.
 
     Raises:
-        BadInput: a wrong number of values.
+        BadInput: the number of values is wrong.
     """
     kind = node.optional("rotation_format") or "euler_rpy"
     if kind not in {"euler_rpy", "quat_xyzw"}:

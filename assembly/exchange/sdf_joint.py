@@ -1,8 +1,8 @@
-"""A joint of SDF as joints of one freedom; also for ``<gazebo>`` in a URDF.
+"""Conversion of SDF joints to joints of one freedom; also for ``<gazebo>`` in a URDF.
 
 Sources:
-    sdformat.org, specification 1.12, ``<joint>``; until 1.4 an axis is seen from the
-    model's frame, until 1.6 with ``use_parent_model_frame``, later with
+    sdformat.org, specification 1.12, ``<joint>``: an axis is in the model's frame until
+    version 1.4, until 1.6 with ``use_parent_model_frame``, later with
     ``expressed_in``.  gazebosim/sdformat, pull request 1168: ``screw_thread_pitch``
     [m per turn] is positive for a right-hand thread; the older ``thread_pitch``
     [rad/m] is positive for a left-hand thread, as in Gazebo classic.
@@ -32,7 +32,7 @@ _Z = (0.0, 0.0, 1.0)
 
 
 def joint_ends(frames: Frames, named: Named) -> tuple[str, str]:
-    """Return links of a joint's parent and child, which may name attached frames.
+    """Return the parent and child links of a joint, which may name attached frames.
 
     Args:
         frames: frames of the model.
@@ -42,7 +42,7 @@ def joint_ends(frames: Frames, named: Named) -> tuple[str, str]:
         Names of two different links; ``"world"`` for the world.
 
     Raises:
-        BadInput: a name that the model lacks, or both are the same link.
+        BadInput: a name does not exist in the model, or both are the same link.
     """
     node = named.node
     ends = [
@@ -61,15 +61,15 @@ def joint_parts(
     frames: Frames, name: str, named: Named, ends: tuple[str, str], carried: str,
     backwards: bool = False,
 ) -> tuple[list[Joint], list[Body]]:  # fmt: skip
-    """Return a joint as joints of one freedom, from child to parent if backwards.
+    """Return the joints of one freedom that form a joint, reversed if backwards.
 
     Args:
         frames: frames of the model.
         name: name of the joint.
-        named: its element.
+        named: element of the joint.
         ends: links of parent and child.
-        carried: name of the body on it.
-        backwards: whether the tree reaches the child first.
+        carried: name of the body on the joint.
+        backwards: whether the tree reaches the child before the parent.
 
     Returns:
         The joints and the bodies between them.
@@ -101,17 +101,17 @@ def joint_parts(
     if len(parts) == 1:
         ((_, one, axis),) = parts
         joint = Joint(name, one, parent, carried, placement, axis, after)
-        if kind == "screw":  # the format does not state the unit of its range
+        if kind == "screw":  # the format does not define the unit of its range
             return [replace(joint, lead=_lead(node))], []
         return [joint if one == "fixed" else _of_axis(joint, node, "axis")], []
     joints, between = chain(name, parent, carried, placement, after, parts)
-    tags = {"first": "axis", "second": "axis2"}  # a ball's rotations have none
+    tags = {"first": "axis", "second": "axis2"}  # the rotations of a ball have no tag
     known = [tags.get(part, "") for part, _, _ in parts]
     return [_of_axis(j, node, t) for j, t in zip(joints, known, strict=True)], between
 
 
 def _lead(node: Node) -> float:
-    """Return the [m/rad] lead of a screw, positive for a right-hand thread."""
+    """Return the lead [m/rad] of a screw joint, positive for a right-hand thread."""
     pitch, old = node.child("screw_thread_pitch"), node.child("thread_pitch")
     if pitch is None and old is None:
         raise node.bad(
@@ -133,7 +133,7 @@ def _lead(node: Node) -> float:
 
 
 def _of_axis(joint: Joint, node: Node, tag: str) -> Joint:
-    """Return the joint of one freedom with range and spring of its axis."""
+    """Return the joint of one freedom with the range and the spring of its axis."""
     axis = node.child(tag)
     if axis is None:
         return joint
@@ -152,7 +152,7 @@ def _of_axis(joint: Joint, node: Node, tag: str) -> Joint:
 
 
 def _axis(frames: Frames, named: Named, tag: str, at: NDArray) -> NDArray:
-    """Return the (3,) direction in the joint's axes."""
+    """Return the direction (3,) of an axis in the joint's axes."""
     axis = named.node.child(tag)
     if axis is None:
         return np.array(_Z)
@@ -175,16 +175,16 @@ def _axis(frames: Frames, named: Named, tag: str, at: NDArray) -> NDArray:
 def joint_couplings(
     frames: Frames, name: str, named: Named, parts: dict[str, list[str]]
 ) -> list[Coupling]:
-    """Return the couplings of a joint's axes (``<mimic>``).
+    """Return the couplings that ``<mimic>`` defines for the axes of a joint.
 
     Args:
         frames: frames of the model.
         name: name of the joint.
-        named: its element.
-        parts: names of the joints of one freedom by that of the whole.
+        named: element of the joint.
+        parts: names of the joints of one freedom by the name of the whole joint.
 
     Returns:
-        A coupling for each axis that follows another.
+        A coupling for each axis that follows another axis.
 
     Raises:
         BadInput: the joint follows a joint or an axis that does not exist.
@@ -211,7 +211,7 @@ def joint_couplings(
 
 
 def _part(mimic: Node, parts: list[str], tag: str) -> str:
-    """Return the joint of one freedom for an axis of a joint."""
+    """Return the joint of one freedom that belongs to an axis of a joint."""
     if len(parts) == 1 and tag == "axis":
         return parts[0]
     ends = {"axis": ".first", "axis2": ".second"}.get(tag, "?")
@@ -222,6 +222,6 @@ def _part(mimic: Node, parts: list[str], tag: str) -> str:
 
 
 def _number(node: Node, key: str, default: float) -> float:
-    """Return a number of an inner element."""
+    """Return the number in an inner element, or the default."""
     inner = node.child(key)
     return default if inner is None else inner.number("", "-")

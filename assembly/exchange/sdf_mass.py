@@ -1,10 +1,10 @@
-"""Masses and moments of inertia of SDF's links: written, default, or of shapes.
+"""Masses and moments of inertia of SDF links: written, default, or from shapes.
 
 Sources:
-    sdformat.org, specification 1.12, ``<inertial>``: a link without it, or without its
-    mass, has 1 kg, and moments that are not written are 1 kg m^2; with ``auto``
-    densities of the collisions are used, 1000 kg/m^3 by default, and a given mass is
-    kept, with the moments in proportion.
+    sdformat.org, specification 1.12, ``<inertial>``: a link without this element, or
+    without a mass in it, has 1 kg; moments that are not written are 1 kg m^2. With
+    ``auto``, densities of the collision shapes are used, 1000 kg/m^3 by default; a
+    given mass is kept, and the moments are scaled to it.
 """
 
 import numpy as np
@@ -20,10 +20,10 @@ from forcefit.assembly.model.inertia import (
     joined_bodies,
 )
 
-_DEFAULT_MASS = 1.0  # [kg] the format's default
-_DEFAULT_INERTIA = np.eye(3)  # [kg m^2] likewise
-_DEFAULT_DENSITY = 1000.0  # [kg/m^3] the format's default
-# keys of a shape's sizes, and how many numbers each has
+_DEFAULT_MASS = 1.0  # [kg] default of the format
+_DEFAULT_INERTIA = np.eye(3)  # [kg m^2] default of the format
+_DEFAULT_DENSITY = 1000.0  # [kg/m^3] default of the format
+# keys of a shape's sizes, and the number of values of each
 _SIZES = {"box": {"size": 3}, "sphere": {"radius": 1}, "ellipsoid": {"radii": 3},
           "cylinder": {"radius": 1, "length": 1},
           "capsule": {"radius": 1, "length": 1},
@@ -31,7 +31,7 @@ _SIZES = {"box": {"size": 3}, "sphere": {"radius": 1}, "ellipsoid": {"radii": 3}
 
 
 def link_body(frames: Frames, name: str, named: Named) -> tuple[Body, str]:
-    """Return a link's body, and the assumption if the file has no mass.
+    """Return the body of a link, and the assumption if the file contains no mass.
 
     Args:
         frames: frames of the model.
@@ -39,7 +39,7 @@ def link_body(frames: Frames, name: str, named: Named) -> tuple[Body, str]:
         named: the link.
 
     Returns:
-        The body, and words; empty if the file has the mass.
+        The body, and the assumption as text; empty if the file contains the mass.
 
     Raises:
         BadInput: a mass or a size is not positive.
@@ -70,7 +70,7 @@ def link_body(frames: Frames, name: str, named: Named) -> tuple[Body, str]:
 
 
 def _moments(inertial: Node) -> NDArray | None:
-    """Return the (3, 3) [kg m^2] of ``inertia`` in its pose's axes, None without it."""
+    """Return ``inertia`` (3, 3) [kg m^2] in its pose's axes; None if not written."""
     inertia = inertial.child("inertia")
     if inertia is None:
         return None
@@ -83,7 +83,7 @@ def _moments(inertial: Node) -> NDArray | None:
 
 
 def _of_shapes(frames: Frames, named: Named, inertial: Node) -> MassProperties:
-    """Return the mass properties of all collisions of a link together."""
+    """Return the mass properties of all collision shapes of a link together."""
     density = _density(inertial, _DEFAULT_DENSITY)
     parts = []
     for collision in named.node.children("collision"):
@@ -98,7 +98,7 @@ def _of_shapes(frames: Frames, named: Named, inertial: Node) -> MassProperties:
             )  # fmt: skip
         T = _placed(frames, named, collision)
         sizes = _sizes(shape)
-        # a cone's centre is at a quarter of its length from its foot
+        # the centre of a cone is at a quarter of its length from its base
         above = -sizes[1] / 4 if shape.tag == "cone" else 0.0
         centre = T[:3, :3] @ [0.0, 0.0, above] + T[:3, 3]
         mass = _density(collision, density) * volume(shape.tag, sizes)
@@ -121,7 +121,7 @@ def _sizes(shape: Node) -> list[float]:
 
 
 def _density(node: Node, default: float) -> float:
-    """Return the density [kg/m^3] of an element, or the default."""
+    """Return the density [kg/m^3] of an element, or the default density."""
     inner = node.child("density")
     if inner is None:
         return default
@@ -132,7 +132,7 @@ def _density(node: Node, default: float) -> float:
 
 
 def _placed(frames: Frames, named: Named, collision: Node) -> NDArray:
-    """Return the (4, 4) pose of a collision in its link."""
+    """Return the (4, 4) pose of a collision shape in its link."""
     pose = collision.child("pose")
     if pose is None:
         return np.eye(4)

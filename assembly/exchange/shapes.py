@@ -1,4 +1,4 @@
-"""Volumes and moments of inertia of simple bodies, for masses from shapes."""
+"""Volumes, areas and moments of inertia of simple shapes, to compute masses."""
 
 import math
 from collections.abc import Sequence
@@ -6,11 +6,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-_SHELL = 1e-6  # [m] thickness of an ellipsoid's shell
+_SHELL = 1e-6  # [m] thickness of the shell of an ellipsoid
 
 
 def volume(shape: str, sizes: Sequence[float]) -> float:
-    """Return the volume of a body.
+    """Return the volume of a solid shape.
 
     Args:
         shape: ``box`` (three edges), ``sphere`` (radius), ``ellipsoid`` (three
@@ -19,7 +19,7 @@ def volume(shape: str, sizes: Sequence[float]) -> float:
         sizes: [m] sizes of the shape.
 
     Returns:
-        [m^3].
+        Volume [m^3].
     """
     if shape == "box":
         return math.prod(sizes)
@@ -33,14 +33,14 @@ def volume(shape: str, sizes: Sequence[float]) -> float:
 
 
 def area(shape: str, sizes: Sequence[float]) -> float:
-    """Return the surface of a body.
+    """Return the surface area of a shape.
 
     Args:
         shape: ``box``, ``sphere``, ``cylinder`` or ``capsule``, see :func:`volume`.
         sizes: [m] sizes of the shape.
 
     Returns:
-        [m^2].
+        Area [m^2].
     """
     if shape == "box":
         a, b, c = sizes
@@ -56,11 +56,11 @@ def moments(shape: str, sizes: Sequence[float]) -> NDArray:
     """Return the moments of inertia of a solid body about its centre.
 
     Args:
-        shape: see :func:`volume`; length and cone along z.
+        shape: see :func:`volume`; cylinders, capsules and cones are along z.
         sizes: [m] sizes of the shape.
 
     Returns:
-        (3,) [m^2] about x, y and z for 1 kg.
+        (3,) [m^2] moments about x, y and z for 1 kg.
     """
     if shape == "box":
         return _across(np.square(sizes)) / 12
@@ -72,7 +72,7 @@ def moments(shape: str, sizes: Sequence[float]) -> NDArray:
     bar = _round(r2 / 4 + length**2 / 12, r2 / 2)
     if shape == "cylinder":
         return bar
-    # halves of a ball, their centres at 3/8 of the radius from the bar's ends
+    # the hemispheres have their centres 3/8 of the radius beyond the cylinder's ends
     far = length**2 / 4 + 3 / 8 * sizes[0] * length
     ends = _round(0.4 * r2 + far, 0.4 * r2)
     return np.asarray(
@@ -84,16 +84,16 @@ def shell_moments(shape: str, sizes: Sequence[float]) -> NDArray:
     """Return the moments of inertia of a thin shell about its centre.
 
     Args:
-        shape: as for :func:`moments`, except ``cone``; an ellipsoid's shell has half
-            axes 1 um longer outside than inside, as MuJoCo takes it.
+        shape: as for :func:`moments`, except ``cone``. As in MuJoCo, the outer half
+            axes of an ellipsoid's shell are 1 um longer than the inner ones.
         sizes: [m] sizes of the shape.
 
     Returns:
-        (3,) [m^2] about x, y and z for 1 kg.
+        (3,) [m^2] moments about x, y and z for 1 kg.
     """
     if shape == "box":
         squares, areas = np.square(sizes), math.prod(sizes) / np.array(sizes)
-        # a pair of faces is half an edge from the centre and a plate in its plane
+        # two opposite faces: plates at half an edge from the centre
         faces = [_across(squares / 12 + squares / 6 * pair) for pair in np.eye(3)]
         return np.asarray(np.average(faces, axis=0, weights=areas))
     if shape == "sphere":
@@ -101,7 +101,7 @@ def shell_moments(shape: str, sizes: Sequence[float]) -> NDArray:
     if shape == "ellipsoid":
         a, b, c = axes = np.array(sizes)
         volume = (a * b + b * c + c * a + (a + b + c) * _SHELL + _SHELL**2) * _SHELL
-        outside = np.prod(axes + _SHELL) / volume  # of the shell's volume
+        outside = np.prod(axes + _SHELL) / volume  # outer volume over shell volume
         thicker = outside * (2 * axes + _SHELL) * _SHELL
         return (_across(axes**2) + _across(thicker)) / 5
     r2, length = sizes[0] ** 2, sizes[1]
@@ -115,10 +115,10 @@ def shell_moments(shape: str, sizes: Sequence[float]) -> NDArray:
 
 
 def _across(squares: NDArray) -> NDArray:
-    """Return sums of the other two, as of squares of lengths along x, y and z."""
+    """Return, for each of three values, the sum of the other two."""
     return np.asarray(np.sum(squares) - squares)
 
 
 def _round(across: float, along: float) -> NDArray:
-    """Return the moments of a body that is round about z."""
+    """Return the moments of a body that is rotationally symmetric about z."""
     return np.array([across, across, along])

@@ -1,4 +1,4 @@
-"""Springs of joints: those without load at home, and those that load the robot."""
+"""Springs of joints: those unloaded at home are converted, others are reported."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,18 +6,18 @@ from numpy.typing import NDArray
 from forcefit.assembly.exchange.mechanism import Joint, Mechanism
 from forcefit.assembly.exchange.xml_file import counted
 
-_AT_REST = 1e-9  # [rad or m] largest distance from home
-_OWN = {"revolute": 2, "prismatic": 5}  # index of a joint's own component of a screw
+_AT_REST = 1e-9  # [rad or m] largest distance from home of an unloaded spring
+_OWN = {"revolute": 2, "prismatic": 5}  # index of the joint's motion in a screw
 
 
 def springs_at_rest(mechanism: Mechanism) -> dict[str, NDArray]:
-    """Return stiffnesses of passive joints whose springs have no load at home.
+    """Return the stiffness of passive joints whose springs are unloaded at home.
 
     Args:
         mechanism: mechanism at home.
 
     Returns:
-        (6, 6) [N m/rad .. N/m] by joint, rigid except along the joint's own motion.
+        (6, 6) [N m/rad .. N/m] by joint, rigid except along the joint's motion.
     """
     matrices = {}
     for joint in mechanism.joints:
@@ -29,13 +29,13 @@ def springs_at_rest(mechanism: Mechanism) -> dict[str, NDArray]:
 
 
 def other_springs(mechanism: Mechanism) -> tuple[str, ...]:
-    """Return texts on springs that are not converted.
+    """Return descriptions of springs that are not converted.
 
     Args:
         mechanism: mechanism at home.
 
     Returns:
-        A line for springs at drives, and a line for springs under load at home.
+        One line for springs at drives, one line for springs under load at home.
     """
     springs = [joint for joint in mechanism.joints if _is_spring(joint)]
     driven = [joint.name for joint in springs if joint.actuated]
@@ -54,5 +54,5 @@ def _is_spring(joint: Joint) -> bool:
 
 
 def _at_rest(joint: Joint) -> bool:
-    """Return whether the joint's spring has no load at home."""
+    """Return whether the spring of a joint is unloaded at home."""
     return abs(joint.position - joint.rest) < _AT_REST

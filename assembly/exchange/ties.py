@@ -1,4 +1,4 @@
-"""Elements of unknown type that may connect bodies."""
+"""Detection of unknown elements that may connect bodies."""
 
 from collections.abc import Container, Mapping
 
@@ -6,20 +6,20 @@ from forcefit.assembly.exchange.xml_file import Node
 from forcefit.inputs.errors import quoted
 
 # words in names of elements that refer to bodies without constraining or moving them;
-# the report names plugins, which are programs
+# plugins, which are programs, are reported by name
 _HARMLESS = ("collision", "collide", "material", "transmission", "control", "sensor",
              "plugin", "gripper", "visual", "group", "state")  # fmt: skip
 
 
 def refuse_ties(node: Node, owners: Mapping[str, str]) -> None:
-    """Reject an unknown element that names two bodies, which it may connect.
+    """Reject an unknown element that refers to two bodies and may connect them.
 
     Args:
-        node: an element that is not converted.
-        owners: bodies by their names and by those of frames on them.
+        node: element that is not converted.
+        owners: bodies by their own names and by the names of frames on them.
 
     Raises:
-        BadInput: the element names two bodies, and its kind may connect them.
+        BadInput: the element refers to two bodies, and its kind may connect them.
     """
     if _is_harmless(node):
         return
@@ -38,18 +38,18 @@ def _is_harmless(node: Node) -> bool:
 
 
 def may_tie(node: Node, names: Container[str]) -> str:
-    """Return words for an element left out that may connect bodies, else none.
+    """Return a warning for an omitted element that may connect bodies, or "".
 
     Args:
-        node: an element that is not converted.
+        node: element that is not converted.
         names: names of joints and bodies.
 
     Returns:
-        The words to be added to its name.
+        Words to be appended to the element's name.
     """
     unknown = node.tag == "plugin" or not _is_harmless(node)
     if unknown and len(node.names_in(names)) > 1:
         return ", not converted, though it may connect or move the bodies that it names"
-    if node.tag == "springStiffness":  # of Gazebo, at a joint of the URDF
+    if node.tag == "springStiffness":  # Gazebo's spring at a URDF joint
         return ", not converted, though it may carry load"
     return ""

@@ -1,4 +1,4 @@
-"""Poses of the frames of a tree of joints, each about or along its z."""
+"""Poses of the frames of a tree of joints, each about or along its z axis."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,17 +11,18 @@ def place_frames(
     q: NDArray,
     leads: NDArray | float = 0.0,
 ) -> tuple[NDArray, NDArray]:
-    """Return transforms of all frames, before and after their joint's motion.
+    """Return the poses of all frames, before and after the motion of their joint.
 
     Args:
-        parents: (n,) rows, each before its children, -1 for the base.
-        kinds: (n,) 0 fixed, 1 revolute or helical, 2 prismatic.
-        fixed: (n, 4, 4) frames in their parents.
+        parents: (n,) index of each parent, which precedes its children; -1 for the
+            base.
+        kinds: (n,) kind of each joint: 0 fixed, 1 revolute or helical, 2 prismatic.
+        fixed: (n, 4, 4) poses of the frames in their parents.
         q: (n,) [rad or m] coordinates.
-        leads: (n,) [m/rad] translations of helical joints per angle, 0 of others.
+        leads: (n,) [m/rad] translation per angle of helical joints; 0 for others.
 
     Returns:
-        (n, 4, 4) before it and (n, 4, 4) after it, seen from the base.
+        (n, 4, 4) poses before and (n, 4, 4) poses after the motion, in base axes.
     """
     angle = np.where(kinds == 1, q, 0.0)
     motion = np.zeros((len(q), 4, 4))

@@ -1,8 +1,8 @@
-"""Import of URDF: links, joints, and the loops of a separate file.
+"""Import of URDF: links, joints, and the loops from a separate file.
 
 Sources:
-    ROS wiki, urdf/XML/joint and urdf/XML/link: a child link is in the joint's own frame
-    after its motion; an absent axis is x; rpy are rotations about fixed axes.
+    ROS wiki, urdf/XML/joint and urdf/XML/link: a child link has the frame of its joint
+    after the motion; the default axis is x; rpy are rotations about fixed axes.
 """
 
 from collections.abc import Iterator, Mapping
@@ -39,15 +39,15 @@ def read_urdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
     """Return the mechanism of a URDF.
 
     Args:
-        path: the file.
-        loops: its loops file, None for an open chain.
+        path: path of the file.
+        loops: loops file of the robot; None for an open chain.
 
     Returns:
-        The mechanism.  Its drives are those of the loops file, else those with a
-        transmission, else, in a robot without loops, all joints.
+        The mechanism.  Its drives are those of the loops file; if it lists none, the
+        joints with a transmission; without these and without loops, all joints.
 
     Raises:
-        BadInput: a rule of the format is broken, or a joint has an unknown type.
+        BadInput: the file violates a rule of the format, or a joint type is unknown.
     """
     root = read_xml(path, "robot")
     for node in root.descendants():
@@ -61,7 +61,7 @@ def read_urdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
     for node in root.children("link"):
         body = _body(node)
         if body.name in bodies:
-            raise node.bad("name", "found it twice; expected names that differ")
+            raise node.bad("name", "found this name twice; expected unique names")
         bodies[body.name] = body
     if not bodies:
         raise BadInput(f"{path}: link: missing; expected at least one")
@@ -91,10 +91,10 @@ def read_urdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
 
 
 def _add(node: Node, parts: dict[str, list[str]], several: list[Joint]) -> None:
-    """Add the parts of a joint, whose name must be new."""
+    """Add the parts of a joint; reject a name that already exists."""
     name = node.text("name")
     if name in parts:
-        raise node.bad("name", "found it twice; expected names that differ")
+        raise node.bad("name", "found this name twice; expected unique names")
     parts[name] = [joint.name for joint in several]
 
 
@@ -135,18 +135,18 @@ def _joints(node: Node) -> tuple[list[Joint], list[Body]]:
 
 
 def _limits(node: Node) -> tuple[float, float] | None:
-    """Return the range of a joint, None if it is continuous or has none."""
+    """Return the range of a joint; None if it is continuous or has no range."""
     limit = node.child("limit")
     if limit is None or node.text("type") in {"fixed", "continuous"}:
         return None
     ends = (limit.element.get("lower"), limit.element.get("upper"))
-    # an absent end means 0 in the format; files without limits leave out both
+    # an absent end means 0 in the format; files without limits omit both ends
     lower, upper = ("0" if end is None else end for end in ends)
     return None if ends == (None, None) else limit.limits(lower, upper)
 
 
 def _couplings(nodes: list[Node], joints: dict[str, Joint]) -> Iterator[Coupling]:
-    """Yield joints that follow another (``<mimic>``)."""
+    """Yield the couplings of joints that follow another joint (``<mimic>``)."""
     for node in nodes:
         mimic = node.child("mimic")
         if mimic is None:
@@ -165,10 +165,10 @@ def _couplings(nodes: list[Node], joints: dict[str, Joint]) -> Iterator[Coupling
 def _left_out(
     root: Node, joints: list[Node], bodies: Mapping[str, Body]
 ) -> tuple[str, ...]:
-    """Return the parts of a URDF that a robot of frames cannot represent."""
+    """Return descriptions of URDF parts that a robot of frames cannot represent."""
     links = list(root.children("link"))
     owners = {name: name for name in bodies}
-    # Drake's frames on links
+    # frames on links, an extension of Drake
     owners |= {f.optional("name"): f.optional("link") for f in root.children("frame")}
     named = {*bodies, *(joint.text("name") for joint in joints)}
     extra: dict[str, list[str]] = {}

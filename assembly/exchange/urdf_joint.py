@@ -1,9 +1,9 @@
-"""Freedoms and poses of URDF's joints.
+"""Freedoms and poses of URDF joints.
 
 Sources:
-    ROS wiki, urdf/XML/joint: an absent axis is x; rpy are rotations about fixed axes.
-    Drake, multibody/parsing: a universal ``drake:joint`` rotates about x, then y, a
-    planar one moves in x and y.
+    ROS wiki, urdf/XML/joint: the default axis is x; rpy are rotations about fixed axes.
+    Drake, multibody/parsing: a universal ``drake:joint`` rotates about x, then y; a
+    planar one translates along x and y.
 """
 
 import numpy as np
@@ -25,16 +25,16 @@ _ZERO = np.zeros(3)
 
 
 def joint_freedoms(node: Node) -> list[tuple[str, str, NDArray]]:
-    """Return name, kind and axis of each freedom of a joint, or that it is fixed.
+    """Return name, kind and axis of each freedom of a joint, or of a fixed joint.
 
     Args:
-        node: a joint; a prefix means a joint of Drake, with its own axes.
+        node: element of a joint; a prefix marks a joint of Drake, with Drake's axes.
 
     Returns:
         The freedoms, in the order in which they move the child.
 
     Raises:
-        BadInput: an unknown type, or an axis has no direction.
+        BadInput: the type is unknown, or an axis has no direction.
     """
     own_axes = ":" in node.tag
     kind = node.choice("type", _KINDS_OF_DRAKE if own_axes else _KINDS, "")
@@ -62,7 +62,7 @@ def joint_freedoms(node: Node) -> list[tuple[str, str, NDArray]]:
 
 
 def pose_of(origin: Node) -> NDArray:
-    """Return (4, 4) pose of an element with ``xyz`` and ``rpy`` or ``quat_xyzw``."""
+    """Return the (4, 4) pose of an element from ``xyz`` and ``rpy`` or a quaternion."""
     shift = origin.numbers("xyz", 3, "m", _ZERO)
     if not origin.has("quat_xyzw"):
         turn = from_roll_pitch_yaw(origin.numbers("rpy", 3, "rad", _ZERO))
@@ -74,6 +74,6 @@ def pose_of(origin: Node) -> NDArray:
 
 
 def _axis(node: Node, tag: str, default: NDArray) -> NDArray:
-    """Return the (3,) unit direction of an inner element of a joint."""
+    """Return the unit direction (3,) in an inner element of a joint."""
     axis = node.child(tag)
     return default if axis is None else axis.unit_vector("xyz", default)

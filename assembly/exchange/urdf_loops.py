@@ -1,9 +1,9 @@
-"""Loops in a URDF itself: ``<loop_joint>``, and joints in ``<gazebo>``.
+"""Loops that a URDF itself contains: ``<loop_joint>``, and joints in ``<gazebo>``.
 
 Sources:
     Isaac Sim, URDF importer, and Drake before 2018: ``loop_joint`` places a joint at
-    ``link1`` and at ``link2``.  Gazebo: the content of ``<gazebo>`` is SDF, added to
-    the model with the frame of the URDF's root.
+    ``link1`` and at ``link2``.  Gazebo: the content of ``<gazebo>`` is SDF and is added
+    to the model in the frame of the URDF's root.
 """
 
 from collections.abc import Iterator
@@ -34,16 +34,16 @@ Closing = tuple[str, list[Joint], list[Body], Loop]
 def with_closing_joints(
     mechanism: Mechanism, root: Node, parts: dict[str, list[str]]
 ) -> Mechanism:
-    """Return the mechanism with the loops of its own file.
+    """Return the mechanism with the loops that the URDF contains.
 
     Args:
         mechanism: mechanism of the file's links and joints.
-        root: the file's element.
-        parts: names of the joints of one freedom by that of the whole joint; those of
-            closing joints are added.
+        root: root element of the file.
+        parts: names of the joints of one freedom by the name of the whole joint; the
+            parts of closing joints are added.
 
     Returns:
-        The mechanism.
+        The mechanism with its loops.
 
     Raises:
         BadInput: a closing joint names a link that does not exist, or the same link
@@ -53,8 +53,8 @@ def with_closing_joints(
     loops = list(mechanism.loops)
     for node, (name, several, between, loop) in _closing(mechanism, root):
         if name in parts or any(name == one.name for one in loops):
-            raise node.bad("name", "found it twice; expected names that differ")
-        if several:  # a point has no joint with a coordinate
+            raise node.bad("name", "found this name twice; expected unique names")
+        if several:  # for a common point, there is no joint with a coordinate
             parts[name] = [joint.name for joint in several]
         joints += several
         bodies |= {body.name: body for body in between}
@@ -63,7 +63,7 @@ def with_closing_joints(
 
 
 def _closing(mechanism: Mechanism, root: Node) -> Iterator[tuple[Node, Closing]]:
-    """Yield closing joints of both kinds."""
+    """Yield the closing joints of both kinds."""
     for node in root.children():
         if node.tag.split(":")[-1] == "loop_joint":
             yield node, _loop_joint(mechanism, node)
@@ -80,7 +80,7 @@ def _closing(mechanism: Mechanism, root: Node) -> Iterator[tuple[Node, Closing]]
 
 
 def _loop_joint(mechanism: Mechanism, node: Node) -> Closing:
-    """Return a joint between two places; for a ball joint, a common point."""
+    """Return a joint between two places, or a common point for a ball joint."""
     name = node.text("name")
     (first, A), (second, B) = (_place(mechanism, node, tag) for tag in _ENDS)
     if first == second:
@@ -102,7 +102,7 @@ _ENDS = ("link1", "link2")
 
 
 def _place(mechanism: Mechanism, node: Node, tag: str) -> tuple[str, NDArray]:
-    """Return a link, and the (4, 4) pose of the place in it."""
+    """Return the link of a place, and the (4, 4) pose of the place in the link."""
     end = node.child(tag)
     if end is None:
         raise node.bad(tag, "missing; expected a link and a place in it")
@@ -114,7 +114,7 @@ def _place(mechanism: Mechanism, node: Node, tag: str) -> tuple[str, NDArray]:
 
 
 def _gazebo_joint(mechanism: Mechanism, frames: Frames, node: Node) -> Closing:
-    """Return a joint of SDF between links of the URDF, with all coordinates zero."""
+    """Return an SDF joint between links of the URDF, at zero coordinates."""
     name = node.text("name")
     named = frames.named[name] = Named(node, "")
     parent, child = (

@@ -1,4 +1,4 @@
-"""Export of URDF and of its loops file, with all digits of numbers."""
+"""Export of URDF and of its loops file; numbers have all digits."""
 
 from xml.sax.saxutils import quoteattr
 
@@ -15,11 +15,11 @@ def urdf_text(mechanism: Mechanism) -> str:
     """Return the text of a URDF.
 
     Args:
-        mechanism: mechanism with children in their joints' own frames (``after`` is the
+        mechanism: mechanism in which each child has its joint's frame (``after`` is the
             identity), as for robots of frames.
 
     Returns:
-        The text; :func:`loops_of` returns its loops, drives and home.
+        The text, without loops, drives and home, which :func:`loops_of` returns.
     """
     lines = [XML_MARK, f"<robot name={quoteattr(mechanism.name)}>"]
     for body in mechanism.bodies.values():
@@ -42,12 +42,12 @@ def loops_of(mechanism: Mechanism) -> LoopsFile:
 
 
 def numbers(values: NDArray | tuple[float, ...]) -> str:
-    """Return numbers separated by blanks, with all their digits."""
+    """Return numbers as text with all digits, separated by blanks."""
     return " ".join(repr(float(value)) for value in values)
 
 
 def _link(body: Body) -> list[str]:
-    """Return ``<link>`` with its inertial, if it has a mass or moments of inertia."""
+    """Return ``<link>`` as lines, with mass and moments of inertia if there are any."""
     name = quoteattr(body.name)
     if not body.mass and not body.inertia.any():
         return [f"  <link name={name}/>"]
@@ -67,7 +67,7 @@ def _link(body: Body) -> list[str]:
 
 
 def _joint(joint: Joint) -> list[str]:
-    """Return ``<joint>``; a revolute joint without limits is continuous."""
+    """Return ``<joint>`` as lines; a revolute joint without limits is continuous."""
     kind = joint.kind
     if kind == "revolute" and joint.limits is None:
         kind = "continuous"

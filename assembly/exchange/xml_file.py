@@ -1,4 +1,4 @@
-"""Reader of XML files: no entities, no other file, and one message per mistake."""
+"""Reader of XML files without entities and external files; one message per mistake."""
 
 import re
 from collections.abc import Container, Iterator
@@ -15,12 +15,12 @@ from forcefit.inputs.table import read_text
 from forcefit.stiffness.screws import transform
 
 _DEEPEST = 200  # largest depth of nested elements
-# comments, which may contain "--" in some files, and declarations in a wrong place
+# comments, which contain "--" in some files, and misplaced declarations
 _SKIPPED = re.compile(
     r"<!\[CDATA\[.*?(?:\]\]>|\Z)|<!--.*?(?:-->|\Z)|<\?xml\s[^<>]*>", re.S
 )
 
-_ENDLESS = 1e3  # [rad or m] larger limits are not binding
+_ENDLESS = 1e3  # [rad or m] larger limits count as no limits
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Node:
 
     Attributes:
         element: element of :mod:`xml.etree.ElementTree`.
-        file: its file's name.
+        file: name of the file.
     """
 
     element: Any
@@ -37,22 +37,22 @@ class Node:
 
     @property
     def tag(self) -> str:
-        """Its name."""
+        """Tag of the element."""
         return str(self.element.tag)
 
     @property
     def place(self) -> str:
-        """Its tag and its own ``name``, for messages."""
+        """Tag and ``name`` of the element, for messages."""
         name = self.element.get("name")
         return self.tag if name is None else f"{self.tag} {quoted(name)}"
 
     def bad(self, key: str, message: str) -> BadInput:
-        """Return an error for an attribute of this element, for the caller to raise."""
+        """Return the error for an attribute, which the caller raises."""
         place = f"{self.place}.{key}" if key else self.place
         return BadInput(f"{self.file}: {place}: {message}")
 
     def children(self, *tags: str) -> Iterator["Node"]:
-        """Yield inner elements of these names; all if no name is given."""
+        """Yield the inner elements with the given tags; all if none is given."""
         for element in self.element:
             if not tags or element.tag in tags:
                 yield Node(element, self.file)
@@ -64,11 +64,11 @@ class Node:
 
     @property
     def content(self) -> str:
-        """Text of the element without blanks around it."""
+        """Text of the element without surrounding blanks."""
         return (self.element.text or "").strip()
 
     def names_in(self, valid: Container[str]) -> list[str]:
-        """Return the valid names in the element's attributes and texts, in order."""
+        """Return the valid names that occur in attributes and texts, in order."""
         found: dict[str, None] = {}
         for node in self.descendants():
             words = [*node.element.attrib.values(), node.content]
@@ -76,7 +76,7 @@ class Node:
         return list(found)
 
     def child(self, tag: str) -> "Node | None":
-        """Return the first inner element of this name, None without one."""
+        """Return the first inner element with a tag; None if there is none."""
         return next(self.children(tag), None)
 
     def has(self, key: str) -> bool:
@@ -84,21 +84,21 @@ class Node:
         return self.element.get(key) is not None
 
     def optional(self, key: str) -> str:
-        """Return an attribute's text without blanks around it, empty if absent."""
+        """Return the text of an attribute without surrounding blanks, or ""."""
         return str(self.element.get(key, "")).strip()
 
     def text(self, key: str, default: str | None = None) -> str:
-        """Return an attribute's text.
+        """Return the text of an attribute.
 
         Args:
-            key: its name.
-            default: value of an absent attribute, which is an error without a default.
+            key: name of the attribute.
+            default: value if the attribute is absent; None to raise an error then.
 
         Returns:
-            The text without blanks around it.
+            The text without surrounding blanks.
 
         Raises:
-            BadInput: absent without a default, or empty.
+            BadInput: the attribute is absent and has no default, or it is empty.
         """
         value = self.element.get(key, default)
         if value is None or not (value.strip() or value == default):
@@ -106,7 +106,7 @@ class Node:
         return str(value).strip()
 
     def choice(self, key: str, valid: tuple[str, ...], default: str) -> str:
-        """Return an attribute that is one of a few words."""
+        """Return the value of an attribute, which must be one of a few words."""
         value = self.text(key, default)
         if value not in valid:
             names = " | ".join(valid)
@@ -118,20 +118,20 @@ class Node:
     def numbers(
         self, key: str, count: int, unit: str, default: NDArray | None = None
     ) -> NDArray:
-        """Return the finite numbers of an attribute, between blanks.
+        """Return the finite numbers of an attribute, separated by blanks.
 
         Args:
-            key: its name; empty for the element's own text.
+            key: name of the attribute; empty for the element's own text.
             count: number of values.
             unit: unit for the error message.
-            default: values of an absent attribute, which is an error without a default.
+            default: values if the attribute is absent; None to raise an error then.
 
         Returns:
             (count,) numbers.
 
         Raises:
-            BadInput: absent without a default, a wrong number of values, not finite or
-                too large.
+            BadInput: the attribute is absent and has no default, the number of values
+                is wrong, or a value is not finite or too large.
         """
         text = self.element.get(key) if key else self.element.text or ""
         expected = f"expected {count} finite number{'s' * (count > 1)} [{unit}]"
@@ -155,19 +155,19 @@ class Node:
     def limits(
         self, lower: str | None, upper: str | None, unit: float = 1.0
     ) -> tuple[float, float] | None:
-        """Return the least and largest coordinate of a joint from two texts.
+        """Return the smallest and largest coordinate of a joint from two texts.
 
         Args:
-            lower: a number, infinite or of any size; None if absent.
-            upper: a number, infinite or of any size; None if absent.
-            unit: factor of both.
+            lower: lower limit of any size, possibly infinite; None if absent.
+            upper: upper limit of any size, possibly infinite; None if absent.
+            unit: factor by which both are multiplied.
 
         Returns:
-            Both [rad or m], 1e6 for an absent or larger one; None if neither is
-            binding, or if their range is empty.
+            Both limits [rad or m], 1e6 for an absent or a larger one; None if there is
+            no effective limit, or if the range is empty.
 
         Raises:
-            BadInput: a text is no number.
+            BadInput: a text is not a number.
         """
         ends = []
         for text, far in ((lower, -LARGEST_LENGTH), (upper, LARGEST_LENGTH)):
@@ -182,12 +182,12 @@ class Node:
         return (ends[0], ends[1]) if binds and ends[0] < ends[1] else None
 
     def unit_vector(self, key: str, default: NDArray | None = None) -> NDArray:
-        """Return the (3,) direction of an attribute, of length 1."""
+        """Return the direction (3,) of an attribute, normalised to length 1."""
         vector = self.numbers(key, 3, "-", default)
         length = float(np.linalg.norm(vector))
         if length < 1e-9:
             raise self.bad(key, f"found {describe(vector.tolist())}, not a direction")
-        # a vector of length 1 to rounding is not changed
+        # a vector whose length is 1 except for rounding is not changed
         return vector if abs(length - 1.0) < 1e-15 else vector / length
 
 
@@ -195,16 +195,16 @@ def read_xml(path: Path | str, *roots: str) -> Node:
     """Return the root element of an XML file, as tolerantly as other readers.
 
     Args:
-        path: the file.
-        roots: names that its root element may have.
+        path: path of the file.
+        roots: allowed tags of the root element.
 
     Returns:
-        The element.  Namespaces are not resolved: a name keeps its prefix, and
+        The root element.  Namespaces are not resolved: a tag keeps its prefix, and
         ``xmlns`` has no effect.
 
     Raises:
         BadInput: the file cannot be read, is not XML, declares entities or a document
-            type, or is something else.
+            type, or has another root element.
     """
     text = _SKIPPED.sub(_blank_lines, read_text(path))
     element = _parsed(text, path)
@@ -224,7 +224,7 @@ def read_xml(path: Path | str, *roots: str) -> Node:
 
 
 def _parsed(text: str, path: Path | str) -> Any:
-    """Return the root element of a text without entities and document types."""
+    """Parse a text and return its root; reject entities and document types."""
     from xml.etree.ElementTree import TreeBuilder
     from xml.parsers.expat import ExpatError, ParserCreate
 
@@ -235,7 +235,7 @@ def _parsed(text: str, path: Path | str) -> Any:
         )
 
     builder = TreeBuilder()
-    parser = ParserCreate()  # without a separator prefixes stay in the names
+    parser = ParserCreate()  # without a separator, tags keep their prefixes
     parser.buffer_text = True
     parser.StartElementHandler = builder.start
     parser.EndElementHandler = builder.end
@@ -245,7 +245,7 @@ def _parsed(text: str, path: Path | str) -> Any:
     parser.ExternalEntityRefHandler = refuse
     try:
         parser.Parse(text, True)
-    except ExpatError as error:  # its text ends with line and column
+    except ExpatError as error:  # the message ends with line and column
         reason = one_line(str(error), 200)
         raise BadInput(f"{path}: not valid XML: {reason}") from None
     except ValueError as error:
@@ -254,20 +254,20 @@ def _parsed(text: str, path: Path | str) -> Any:
 
 
 def _blank_lines(match: re.Match[str]) -> str:
-    """Return the line ends of skipped text, so that line numbers stay correct."""
+    """Return the line breaks of skipped text, so that line numbers remain correct."""
     text = match[0]
     return text if text.startswith("<![CDATA[") else "\n" * text.count("\n")
 
 
 def placed(translation: NDArray, rotation: NDArray) -> NDArray:
-    """Return the (4, 4) read-only transform."""
+    """Return the read-only (4, 4) transform of a translation and a rotation."""
     T = transform(translation, rotation)
     T.setflags(write=False)
     return T
 
 
 def counted(what: str, names: list[str]) -> tuple[str, ...]:
-    """Return a line with the number of things left out, and the first names."""
+    """Return a line with the number of omitted items and their first names, if any."""
     if not names:
         return ()
     named = [name for name in names if name]

@@ -1,4 +1,4 @@
-"""Robot files, read and written; links, joints and effects have a module each.
+"""Reading and writing of robot files, with a module each for links, joints and effects.
 
-Begin at ``robot_file.py``; the format is ``docs/robot_files.md``.
+Start with ``robot_file.py``; ``docs/robot_files.md`` describes the format.
 """

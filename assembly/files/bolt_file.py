@@ -17,15 +17,15 @@ _EXPECTED = (
 def read_locked_at(
     table: Table, fixed: bool, clearance: Clearance | None
 ) -> tuple[Clearance | None, LockedAt | None]:
-    """Return the clearance of a joint in use, and where it is bolted.
+    """Return the clearance of a joint in use, and the pose at which it is bolted.
 
     Args:
         table: table of the joint.
-        fixed: whether the joint is a fixed one.
-        clearance: clearance given there.
+        fixed: whether the joint is a fixed joint.
+        clearance: clearance given in the table.
 
     Returns:
-        The clearance and None without the key; else None and the bolt.
+        The clearance and None if ``locked_at`` is absent; otherwise None and the bolt.
 
     Raises:
         BadInput: the joint is not fixed or has no clearance, or the pose is not given
@@ -53,7 +53,7 @@ def read_locked_at(
 
 
 def _numbers(table: Table, key: str, names: tuple[str, ...] | None) -> dict[str, float]:
-    """Return the coordinates of a table by name; empty if it is absent."""
+    """Return the coordinates of a table by name; empty if the key is absent."""
     if not table.has(key):
         return {}
     inner = table.table(key)
@@ -67,7 +67,7 @@ def _numbers(table: Table, key: str, names: tuple[str, ...] | None) -> dict[str,
 
 
 def bolt_table(bolt: LockedAt) -> Any:
-    """Return the value of ``locked_at``.
+    """Return the value of ``locked_at`` for a robot file.
 
     Args:
         bolt: the pose at which a joint is bolted.

@@ -1,7 +1,7 @@
 """Tolerances of features in robot files: ``[[tolerance]]``.
 
-In a file of frames a feature is a frame, in a file of bodies a joint of the body; see
-``docs/drawing_tolerances.md``.
+In a file of frames, a feature is a frame.  In a file of bodies, a feature is a joint of
+the body.  See ``docs/drawing_tolerances.md``.
 """
 
 from collections.abc import Iterator, Mapping
@@ -42,14 +42,14 @@ from forcefit.inputs.table import BadInput, Table, describe, nearest, quoted
 
 _ZONES = (*LOCATIONS, *ORIENTATIONS, "length", "general")
 _LARGEST_CP = 5.0
-_ACROSS = 1e-3  # largest cosine of two directions at right angles
-_NOT_ACROSS = "found one that is not at right angles to the axis, expected 90 deg"
-_SIZES = {"axis": 1, "plane": 2, "point": 0}  # numbers of "extent"
+_ACROSS = 1e-3  # largest cosine of two perpendicular directions
+_NOT_ACROSS = "found a direction that is not perpendicular to the axis, expected 90 deg"
+_SIZES = {"axis": 1, "plane": 2, "point": 0}  # count of numbers in "extent"
 _EXTENTS = {
     "axis": 'the length of the bore, such as "20 mm"',
     "plane": 'two sizes of the face, such as ["40 mm", "30 mm"], or "diameter"',
 }
-# words that a shape cannot have
+# keys that a shape cannot have
 _EXCLUDED = {
     "axis": ("profile",),
     "plane": ("coaxiality",),
@@ -61,14 +61,14 @@ def read_frame_callouts(root: Table, frames: list[str]) -> tuple[Callout, ...]:
     """Return the callouts of a file of frames.
 
     Args:
-        root: its root table.
+        root: root table of the file.
         frames: names of the frames.
 
     Returns:
-        In the order of the file; whether they fit the geometry is not checked.
+        Callouts in the order of the file, not checked against the geometry.
 
     Raises:
-        BadInput: a rule of the format is broken.
+        BadInput: the file violates a rule of the format.
     """
     found = []
     for table in root.tables("tolerance"):
@@ -94,18 +94,19 @@ def read_frame_callouts(root: Table, frames: list[str]) -> tuple[Callout, ...]:
 def read_drawn_callouts(
     copied: Copy, bodies: list[DrawnBody], joints: list[DrawnJoint]
 ) -> Iterator[DrawnCallout]:
-    """Return the callouts of the bodies of a copy, and of the base.
+    """Yield the callouts of the bodies in a copy of a leg, and of the base.
 
     Args:
-        copied: a copy of a leg, or the robot's own bodies.
-        bodies: of the whole robot.
-        joints: of the whole robot.
+        copied: a copy of a leg, or the bodies that belong to no leg.
+        bodies: bodies of the whole robot.
+        joints: joints of the whole robot.
 
     Yields:
-        Callouts whose features and datums are joints, directions in base axes at home.
+        Callouts whose features and datums are joints; directions are in base axes in
+        the home pose.
 
     Raises:
-        BadInput: a rule of the format is broken.
+        BadInput: the file violates a rule of the format.
     """
     owners = [(copied.prefix + t.content["name"], t)
               for t in copied.table.tables("body")]  # fmt: skip
@@ -158,9 +159,9 @@ def _drawn(
 def _check_direction(
     table: Table, direction: Vector, feature: DrawnJoint, body: str
 ) -> None:
-    """Refuse a direction, base axes, that is not across the axis of a bore."""
+    """Raise BadInput if a direction is not perpendicular to the axis of a bore."""
     if feature.kind == "planar":
-        fault = "found one of a face, whose sizes are along the joint's x and y"
+        fault = "found a direction for a face; its sides are along the joint's x and y"
         raise table.bad("direction", f"{fault}; expected none")
     second = feature.kind == "universal" and body == feature.second
     axis = feature.axis2 if second else feature.axis
@@ -172,7 +173,7 @@ def _callout(
     table: Table, name: str, feature: str, datums: tuple[Datum, ...], shape: str,
     after: bool, axis: Vector | None,
 ) -> Callout:  # fmt: skip
-    """The keys that both formats have."""
+    """Return a callout from the keys that both formats have."""
     if len({replace(d, hole="", hole_of="") for d in datums}) < len(datums):
         names = [datum.frame for datum in datums]
         raise table.bad("datums", f"found {names}, expected each datum once")
@@ -182,11 +183,11 @@ def _callout(
     across = _across(table, axis)
     if across is not None and (shape == "point" or not (widths or envelope)):
         fault = "a point" if shape == "point" else "a feature without a zone"
-        raise table.bad("direction", f"found one of {fault}, expected none")
+        raise table.bad("direction", f"found a direction for {fault}, expected none")
     distribution = table.choice("distribution", DISTRIBUTIONS, "uniform")
     if table.has("cp") and distribution == "uniform":
         expected = 'expected distribution = "normal" or "truncated" with it'
-        raise table.bad("cp", f"found one of a uniform distribution, {expected}")
+        raise table.bad("cp", f"found a cp for a uniform distribution, {expected}")
     length = general = None
     if table.has("length"):
         length = parsed_value(table, "length", parse_length)
@@ -209,7 +210,7 @@ def _callout(
 
 
 def _widths(table: Table, shape: str) -> tuple[dict[str, float], str]:
-    """The widths of the zones, and the hole whose position is at maximum material."""
+    """Return the widths of the zones, and the hole with maximum material condition."""
     widths: dict[str, float] = {}
     used = False
     hole = table.text("hole", "") if table.has("hole") else ""
@@ -220,22 +221,22 @@ def _widths(table: Table, shape: str) -> tuple[dict[str, float], str]:
             continue
         if word in _EXCLUDED[shape]:
             article = "an" if shape == "axis" else "a"
-            fault = f"found one of a feature that is {article} {shape}"
+            fault = f"found for a feature that is {article} {shape}"
             raise table.bad(word, f"{fault}, expected none")
         widths[word], at_most = parsed_value(table, word, parse_width)
         if at_most and (word != "position" or shape != "axis" or not hole):
-            fault = 'found (M), expected it with the position of a bore and "hole"'
+            fault = 'found (M), expected only for the position of a bore with "hole"'
             raise table.bad(word, f'{fault}, such as hole = "12 H7"')
         used = used or at_most
     if hole and not used:
-        expected = 'expected one with it, such as position = "0.05 mm (M)"'
-        raise table.bad("hole", f"found one without (M), {expected}")
+        expected = 'expected a position with (M), such as position = "0.05 mm (M)"'
+        raise table.bad("hole", f"found a hole without (M), {expected}")
     _check_widths(table, widths)
     return widths, hole
 
 
 def _check_widths(table: Table, widths: dict[str, float]) -> None:
-    """Refuse an orientation zone that is not smaller than the location's."""
+    """Raise BadInput if an orientation zone is not smaller than the location zone."""
     located = [widths[w] for w in LOCATIONS if w in widths]
     for word in ORIENTATIONS:
         if word in widths and located and not widths[word] < min(located):
@@ -255,7 +256,7 @@ def _check_form(table: Table, form: float, widths: Mapping[str, float]) -> None:
 
 
 def _extent(table: Table, shape: str, widths: dict[str, float]) -> tuple[float, ...]:
-    """[m] the length of a bore, or the sizes of a face."""
+    """Return the length [m] of a bore, or the side lengths [m] of a face."""
     if table.has("diameter"):
         return _diameter(table, shape)
     count = _SIZES[shape]
@@ -295,7 +296,7 @@ def _diameter(table: Table, shape: str) -> tuple[float, ...]:
 
 
 def _across(table: Table, axis: Vector | None) -> Vector | None:
-    """Unit vector in which the zones are, at right angles to a known axis."""
+    """Return the unit vector of the zones' direction, perpendicular to a known axis."""
     direction = read_direction(table, "direction")
     if direction is not None and axis is not None:
         if abs(float(np.dot(direction, axis))) > _ACROSS:

@@ -1,6 +1,6 @@
 """Robot files of ``format = 2``: bodies and joints by points and axes at home.
 
-The keys are those of ``docs/drawn_robots.md``.
+The keys are described in ``docs/drawn_robots.md``.
 """
 
 import copy
@@ -30,29 +30,30 @@ from forcefit.assembly.model.robot import BASE
 from forcefit.inputs.table import Table, describe, nearest, quoted
 from forcefit.stiffness.screws import rotation_matrix, transform
 
-MOST_COPIES = 200  # of a leg
+MOST_COPIES = 200  # largest number of copies of a leg
 
 
 def is_drawing(root: Table) -> bool:
-    """Whether a robot file is one of bodies and joints."""
+    """Return whether a robot file consists of bodies and joints."""
     given = set(root.content)
     named = {"body", "joint", "leg"} & given and "frame" not in given
     return root.content.get("format") == 2 or bool(named)
 
 
 def read_drawing(root: Table, name: str, description: str) -> Drawing:
-    """The bodies and joints of a robot file.
+    """Return the bodies and joints of a robot file.
 
     Args:
-        root: its root table; keys of other parts of the file are left to the caller.
-        name: of the robot.
-        description: of it.
+        root: root table of the file; keys of other parts of the file are left to the
+            caller.
+        name: name of the robot.
+        description: description of the robot.
 
     Returns:
-        The drawing, legs copied, all names those of the whole robot.
+        The drawing with all copies of the legs; names are those in the whole robot.
 
     Raises:
-        BadInput: a rule of the format is broken.
+        BadInput: the file violates a rule of the format.
     """
     root.content = copy.deepcopy(root.content)  # texts with units become numbers
     if root.get("format", 2) == 1:
@@ -87,7 +88,7 @@ def read_drawing(root: Table, name: str, description: str) -> Drawing:
 
 
 def _copies(root: Table) -> Iterator[Copy]:
-    """Copies of the legs, and the robot's own bodies, in the order of the file."""
+    """Yield the copies of the legs, and the bodies outside legs, in file order."""
     order = [key for key in root.content if key in {"leg", "body", "joint"}]
     own = Copy(root, "", np.eye(4))
     legs = root.tables("leg")
@@ -100,13 +101,13 @@ def _copies(root: Table) -> Iterator[Copy]:
             name = leg.text("name", longest=LONGEST_NAME)
             leg.place = f"leg {quoted(name)}"
             if name in names:
-                raise leg.bad("name", "found it twice, expected different names")
+                raise leg.bad("name", "found a name twice, expected different names")
             names.append(name)
             yield from _repeated(leg, name)
 
 
 def _repeated(leg: Table, name: str) -> Iterator[Copy]:
-    """The copies of one leg; the first is the leg as written."""
+    """Yield the copies of one leg; the first copy is the leg as written."""
     if not leg.has("repeat"):
         yield Copy(leg, f"{name}.", np.eye(4))
         return
@@ -129,7 +130,7 @@ def _repeated(leg: Table, name: str) -> Iterator[Copy]:
 def _joints(
     copied: Copy, names: list[str], forms: dict[str, tuple[str, float]]
 ) -> Iterator[DrawnJoint]:
-    """The joints of a copy, between bodies of it or of the whole robot."""
+    """Yield the joints of a copy, between bodies of the copy or of the whole robot."""
 
     def find(name: str) -> str | None:
         inner = copied.prefix + name
@@ -150,7 +151,7 @@ def _joints(
 def _between(
     table: Table, find: Callable[[str], str | None], names: list[str]
 ) -> list[str]:
-    """Full names of the two bodies of a joint."""
+    """Return the full names of the two bodies of a joint."""
     value = table.require("between", 'two names of bodies, or "base"')
     proper = isinstance(value, list) and all(isinstance(v, str) for v in value)
     if not proper or len(value) != 2:
@@ -167,7 +168,8 @@ def _between(
             raise table.bad("between", fault)
         found.append(full)
     if found[0] == found[1]:
-        raise table.bad("between", f"found {quoted(value[0])} twice, expected two")
+        fault = f"found {quoted(value[0])} twice, expected two bodies"
+        raise table.bad("between", fault)
     return found
 
 
@@ -181,7 +183,7 @@ def _form_remarks(forms: dict[str, tuple[str, float]]) -> tuple[str, ...]:
 
 
 def _check_distinct(root: Table, kind: str, names: list[str]) -> None:
-    """Refuse a name that two have."""
+    """Raise BadInput if two tables have the same name."""
     seen: set[str] = set()
     for name in names:
         if name in seen:

@@ -1,6 +1,6 @@
-"""Robots written as files of ``format = 2``: bodies and joints at home.
+"""Writing of robots as files of ``format = 2``: bodies and joints at home.
 
-Begin with :func:`drawing_text`.
+Start with :func:`drawing_text`.
 """
 
 from pathlib import Path
@@ -32,9 +32,9 @@ def drawing_text(robot: Robot, drawing: Drawing, folder: Path) -> str:
     """Return the text of a file of bodies and joints.
 
     Args:
-        robot: whose effects, reference point and diagnosis are written too.
-        drawing: of it.
-        folder: folder of the file to be written, to which paths are made relative.
+        robot: robot whose effects, reference point and diagnosis are also written.
+        drawing: drawing of the robot.
+        folder: folder of the file to be written; paths are written relative to it.
 
     Returns:
         The text.
@@ -57,7 +57,7 @@ def drawing_text(robot: Robot, drawing: Drawing, folder: Path) -> str:
 
 
 def _point(values: NDArray) -> list[float]:
-    """Numbers to be written, rounding errors as 0."""
+    """Return the numbers to be written, with rounding errors replaced by 0."""
     least = _ROUNDING * max(1.0, float(np.abs(values).max()))
     return [float(v) if abs(v) > least else 0.0 for v in values]
 
@@ -120,13 +120,13 @@ def _drive_stiffness(joint: DrawnJoint) -> float | None:
 
 
 def _none(key: str) -> Any:
-    """Return what a bearing without clearance, stiffness or error is written as."""
+    """Return the value that is written for an absent clearance, stiffness or error."""
     free = [np.inf, np.inf, 0.0, np.inf, np.inf, np.inf]
     return {"clearance": {}, "joint_stiffness": free}.get(key, [0.0] * 6)
 
 
 def _numbers_table(own: JointNumbers) -> dict[str, Any]:
-    """Return the keys of a joint's or a bearing's numbers."""
+    """Return the keys for the numbers of a joint or a bearing."""
     table = joint_table(own.clearance, own.locked_at, own.stiffness)
     if own.error.any():
         table["geometric_error"] = own.error.tolist()

@@ -1,4 +1,4 @@
-"""Bodies of robot files of ``format = 2``, and the joints between which links are."""
+"""Bodies of robot files of ``format = 2``, and the joints at the ends of links."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -17,17 +17,17 @@ from forcefit.assembly.model.robot import BASE
 from forcefit.inputs.table import Table, nearest, quoted
 from forcefit.stiffness.screws import transform
 
-LONGEST_NAME = 200  # characters
+LONGEST_NAME = 200  # largest number of characters
 
 
 @dataclass(frozen=True, eq=False)
 class Copy:
-    """A leg's copy, or the robot's own bodies and joints.
+    """A copy of a leg, or the bodies and joints that belong to no leg.
 
     Attributes:
-        table: where they are written.
-        prefix: of their names, such as ``"leg1."``.
-        T: (4, 4) by which points and axes of the table are moved.
+        table: table in which the bodies and joints are written.
+        prefix: prefix of their names, such as ``"leg1."``.
+        T: (4, 4) transform of the points and axes of the table to the copy.
     """
 
     table: Table
@@ -36,13 +36,13 @@ class Copy:
 
 
 def read_bodies(copied: Copy) -> Iterator[DrawnBody]:
-    """The bodies of a copy, their links' ends still to be found."""
+    """Yield the bodies of a copy; the joints at the links' ends are not yet known."""
     for table in copied.table.tables("body"):
         name = table.text("name", longest=LONGEST_NAME)
         table.place = place_of(copied.table, "body", name)
         if name == BASE:
             raise table.bad(
-                "name", f'found "{BASE}", which stands still; expected another'
+                "name", f'found "{BASE}", which is fixed; expected another name'
             )
         without_units(table, "centre", "length")
         link = read_drawn_link(table)
@@ -57,33 +57,33 @@ def read_bodies(copied: Copy) -> Iterator[DrawnBody]:
         )
         for key in ("from", "to"):
             if table.has(key) and link is None:
-                raise table.bad(key, 'found one without "link", expected both')
+                raise table.bad(key, 'found a joint without "link", expected both')
         table.tables("tolerance")  # read when all joints are known
         table.finish()
         yield turned_body(body, copied.T)
 
 
 def place_of(owner: Table, kind: str, name: str) -> str:
-    """Place of a body or a joint in messages."""
+    """Return the place of a body or a joint for messages."""
     return f"{owner.place + '.' if owner.place else ''}{kind} {quoted(name)}"
 
 
 def with_ends(
     body: DrawnBody, copied: Copy, joints: list[DrawnJoint], point: NDArray | None
 ) -> DrawnBody:
-    """The body with the joints between which its link is.
+    """Return the body with the joints at the ends of its link.
 
     Args:
-        body: as read.
-        copied: where it is written.
-        joints: of the whole robot.
+        body: body as read.
+        copied: copy in which the body is written.
+        joints: joints of the whole robot.
         point: (3,) [m] the platform's point if the body is the platform.
 
     Returns:
-        The body; a beam along a curve is a stiffness and a mass.
+        The body; a beam along a curve becomes a stiffness and a mass.
 
     Raises:
-        BadInput: there are no such joints, or the curve does not lead from one to
+        BadInput: there are no such joints, or the curve does not lead from one joint to
             the other.
     """
     table = next(
@@ -118,7 +118,7 @@ def with_ends(
 def _ends(
     table: Table, prefix: str, here: list[str], platform: bool
 ) -> tuple[str, str | None]:
-    """Full names of the joints at the two ends of a link."""
+    """Return the full names of the joints at the two ends of a link."""
     given = [_end(table, key, prefix, here) for key in ("from", "to")]
     left = [name for name in here if name not in given]
     first = given[0] or (left.pop(0) if left else None)
@@ -132,7 +132,7 @@ def _ends(
 
 
 def _end(table: Table, key: str, prefix: str, here: list[str]) -> str | None:
-    """Full name of the joint at one end of a link, None if not given."""
+    """Return the full name of the joint at one end of a link; None if not given."""
     if not table.has(key):
         return None
     name = table.text(key, expected="the name of a joint")
@@ -147,7 +147,7 @@ def _end(table: Table, key: str, prefix: str, here: list[str]) -> str | None:
 def link_remarks(
     bodies: list[DrawnBody], joints: list[DrawnJoint], copies: list[Copy]
 ) -> tuple[str, ...]:
-    """Return a remark on links whose ends are assumed, for lack of `from` and `to`."""
+    """Return a remark on links whose ends are assumed, without `from` and `to`."""
     stated = {
         copied.prefix + table.content["name"]
         for copied in copies

@@ -17,23 +17,23 @@ from forcefit.assembly.model.largest import LARGEST_LENGTH
 from forcefit.assembly.model.robot import Clearance
 from forcefit.inputs.table import Table, describe, quoted
 
-_LEAST_LENGTH = 1e-9  # [m] a shorter contact would allow tilts of many turns
+_LEAST_LENGTH = 1e-9  # [m] a shorter contact would allow a tilt of many turns
 _ANGLES = ("tilt", "spin")
 _Clearance = tuple[Clearance | None, tuple[Contact, ...]]
 
 
 def read_drawn_clearance(table: Table, kind: str) -> _Clearance:
-    """The ``clearance`` table of a joint or of a bearing.
+    """Return the clearance of a joint or of a bearing from its ``clearance`` table.
 
     Args:
-        table: of the joint.
-        kind: its type; that of a universal joint's bearing is ``"revolute"``.
+        table: table of the joint.
+        kind: type of the joint; ``"revolute"`` for a bearing of a universal joint.
 
     Returns:
-        The bounds of its own frame, None if there are none; and its contacts.
+        The bounds of the joint's own frame, None if there are none; and its contacts.
 
     Raises:
-        BadInput: a rule of the format is broken.
+        BadInput: the table violates a rule of the format.
     """
     if not table.has("clearance"):
         return None, ()
@@ -60,7 +60,7 @@ def read_drawn_clearance(table: Table, kind: str) -> _Clearance:
 
 
 def _in_bore(table: Table, kind: str, bounds: Clearance) -> _Clearance:
-    """The bounds without ``radial``, and the contacts of a bore with it."""
+    """Return the bounds without ``radial``, and the contacts of a bore."""
     _refuse_with(table, "length", ("tilt", "ball"))
     _refuse_without_shaft(table, "length", kind)
     half = _length(table, "length") / 2
@@ -70,7 +70,7 @@ def _in_bore(table: Table, kind: str, bounds: Clearance) -> _Clearance:
 
 
 def _in_bearings(table: Table, kind: str, bounds: Clearance) -> _Clearance:
-    """The bounds, and the contacts of a shaft in two bearings."""
+    """Return the bounds, and the contacts of a shaft in two bearings."""
     _refuse_with(table, "bearings", ("radial", "tilt", "ball"))
     _refuse_without_shaft(table, "bearings", kind)
     value = table.get("bearings")
@@ -81,14 +81,14 @@ def _in_bearings(table: Table, kind: str, bounds: Clearance) -> _Clearance:
     first, second = sorted(_bearing(table, k, one) for k, one in enumerate(value, 1))
     (z1, gap1, fit1, part1), (z2, gap2, fit2, part2) = first, second
     if z2 - z1 <= _LEAST_LENGTH:
-        fault = f"found both at z = {z1:g} m"
+        fault = f"found both bearings at z = {z1:g} m"
         raise table.bad("bearings", f"{fault}, expected a distance between them")
     contacts = bearings((z1, gap1), (z2, gap2))
     return _of_shaft(bounds), fitted(contacts, (fit1, fit2), (part1, part2), z2 - z1)
 
 
 def _bearing(table: Table, number: int, content: dict) -> tuple[float, float, str, str]:
-    """Height and radial gap [m] of one bearing, its fit and the name of its parts."""
+    """Return height and radial gap [m] of one bearing, its fit and its parts' name."""
     inner = Table(dict(content), table.file, f"{table.place}.bearings[{number}]")
     for key in ("z", "radial"):
         without_units(inner, key, "length")
@@ -99,7 +99,7 @@ def _bearing(table: Table, number: int, content: dict) -> tuple[float, float, st
 
 
 def _gap(table: Table) -> tuple[float, str]:
-    """Radial gap [m], of a fit its mean, and the fit; empty if the gap is stated."""
+    """Return the radial gap [m], or the mean gap of a fit; and the fit, or ``""``."""
     fit = fit_of(table)
     if fit is not None:
         return fit.mean_radial, fit.text
@@ -107,20 +107,20 @@ def _gap(table: Table) -> tuple[float, str]:
 
 
 def _of_shaft(bounds: Clearance) -> Clearance | None:
-    """The bounds that bearings leave to the joint, None if there are none."""
+    """Return the bounds that remain in addition to bearings; None without bounds."""
     kept = Clearance(axial=bounds.axial, spin=bounds.spin)
     return None if kept == Clearance() else kept
 
 
 def _refuse_without_shaft(table: Table, key: str, kind: str) -> None:
-    """Reject a bore or bearings of a joint that tilts or moves across its axis."""
+    """Raise BadInput for a bore or bearings of a joint without a shaft."""
     if not {0, 1, 3, 4}.isdisjoint(FREE_ROWS[kind]):
         fault = f"found the clearance of a shaft on a {kind} joint"
         raise table.bad(key, f"{fault}, which has no shaft; expected none")
 
 
 def _in_guide(table: Table, kind: str, bounds: Clearance) -> _Clearance:
-    """The bound along the axis, and the contacts of a guide."""
+    """Return the bound along the axis, and the contacts of a guide."""
     _refuse_type(table, "guide", kind, "prismatic")
     _refuse_with(table, "guide", ("radial", "tilt", "spin", "ball"))
     inner = _sizes(table, "guide", ("gap", "length", "width", "height"))
@@ -166,7 +166,7 @@ def _guide_fits(inner: Table) -> tuple[Fit, Fit] | None:
 
 
 def _on_pad(table: Table, kind: str, bounds: Clearance) -> _Clearance:
-    """No bounds, and the contacts of a pad."""
+    """Return None for the bounds, and the contacts of a pad."""
     _refuse_type(table, "pad", kind, "planar")
     _refuse_with(table, "pad", ("axial", "tilt", "ball"))
     inner = _sizes(table, "pad", ("gap", "length", "width"))
@@ -182,14 +182,14 @@ _CONTACTS = {
 
 
 def _refuse_type(table: Table, key: str, kind: str, of_kind: str) -> None:
-    """Reject contacts of another type of joint."""
+    """Raise BadInput for contacts of another type of joint."""
     if kind != of_kind:
-        fault = f"found one on a {kind} joint, expected none"
+        fault = f"found on a {kind} joint, expected none"
         raise table.bad(key, f"{fault}; only a {of_kind} joint has a {key}")
 
 
 def _refuse_with(table: Table, key: str, others: tuple[str, ...]) -> None:
-    """Reject contacts together with bounds of the same motions."""
+    """Raise BadInput for contacts together with bounds of the same motions."""
     for other in others:
         if table.has(other):
             fault = f"found together with {quoted(key)}, which bounds that motion"
@@ -197,7 +197,7 @@ def _refuse_with(table: Table, key: str, others: tuple[str, ...]) -> None:
 
 
 def _sizes(table: Table, key: str, keys: tuple[str, ...]) -> Table:
-    """A table of lengths, their units removed."""
+    """Return a table of lengths, with texts replaced by numbers."""
     given = table.table(key)
     inner = Table(dict(given.content), given.file, given.place)
     for name in keys:
@@ -206,12 +206,12 @@ def _sizes(table: Table, key: str, keys: tuple[str, ...]) -> Table:
 
 
 def _length(table: Table, key: str) -> float:
-    """A length of a contact."""
+    """Return a length of a contact."""
     return table.number(key, "m", above=_LEAST_LENGTH, largest=LARGEST_LENGTH)
 
 
 def _refuse_free(table: Table, bounds: Clearance | None, kind: str) -> None:
-    """Reject bounds of the free motions of a joint of several freedoms."""
+    """Raise BadInput for bounds of free motions, if a joint has several of them."""
     free = set(FREE_ROWS[kind])
     for key, rows in zip(BOUNDS, CONES, strict=True):
         given = bounds is not None and getattr(bounds, key) is not None

@@ -29,19 +29,19 @@ _ROWS = ("RX", "RY", "RZ", "TX", "TY", "TZ")
 
 
 def read_drawn_joint(table: Table, name: str, first: str, second: str) -> DrawnJoint:
-    """One joint of a file.
+    """Return one joint of a file.
 
     Args:
-        table: of the joint.
-        name: of the joint in the whole robot.
+        table: table of the joint.
+        name: name of the joint in the whole robot.
         first: name of its first body.
-        second: name of its second.
+        second: name of its second body.
 
     Returns:
-        The joint as it is written, its leg not yet copied.
+        The joint as written, before its leg is copied.
 
     Raises:
-        BadInput: a rule of the format is broken.
+        BadInput: the table violates a rule of the format.
     """
     kind = table.choice("type", FREE_ROWS)
     without_units(table, "pitch", "length")
@@ -56,10 +56,10 @@ def read_drawn_joint(table: Table, name: str, first: str, second: str) -> DrawnJ
     if not one and (actuated or given):
         key = "actuated" if actuated else given[0]
         names = " | ".join(f'"{name}"' for name in ONE_FREEDOM)
-        fault = f"found one on a {kind} joint, expected {names}"
+        fault = f"found on a {kind} joint, expected {names}"
         raise table.bad(key, fault)
     if "drive_stiffness" in given and not actuated:
-        raise table.bad("drive_stiffness", "found one without actuated = true")
+        raise table.bad("drive_stiffness", "found a stiffness without actuated = true")
     joint = DrawnJoint(
         name, kind, first, second,
         at=table.array("at", (3,), "m", largest=LARGEST_LENGTH),
@@ -73,7 +73,7 @@ def read_drawn_joint(table: Table, name: str, first: str, second: str) -> DrawnJ
 
 
 def _axes(table: Table, kind: str) -> tuple[NDArray, NDArray, NDArray]:
-    """Unit vectors of the axis, of x at right angles to it, and of the second axis."""
+    """Return three unit vectors: the axis, a perpendicular x axis, the second axis."""
     needs = kind not in {"fixed", "spherical"}
     axis = _direction(table, "axis", needs)
     axis = np.array([0.0, 0.0, 1.0]) if axis is None else axis
@@ -82,12 +82,14 @@ def _axes(table: Table, kind: str) -> tuple[NDArray, NDArray, NDArray]:
         across = perpendicular(axis)
         return axis, across, across
     if np.linalg.norm(np.cross(axis, axis2)) < _PARALLEL:
-        raise table.bad("axis2", 'found it parallel to "axis", expected an angle')
+        raise table.bad(
+            "axis2", 'found a direction parallel to "axis", expected another'
+        )
     return axis, perpendicular(axis, axis2), axis2
 
 
 def _direction(table: Table, key: str, needed: bool) -> NDArray | None:
-    """(3,) unit vector, None if absent and not needed."""
+    """Return a (3,) unit vector; None if absent and not needed."""
     if not needed and not table.has(key):
         return None
     without_units(table, key, "length")
@@ -99,18 +101,18 @@ def _direction(table: Table, key: str, needed: bool) -> NDArray | None:
 
 
 def _limits(table: Table, unit: str) -> tuple[float, float] | None:
-    """Least and largest coordinate, None if not given."""
+    """Return the least and largest coordinate; None if not given."""
     if not table.has("limits"):
         return None
     least, most = table.array("limits", (2,), unit, largest=LARGEST_LENGTH)
     if not least < most:
-        fault = f"found [{least:g}, {most:g}], expected the smaller one first"
+        fault = f"found [{least:g}, {most:g}], expected the smaller number first"
         raise table.bad("limits", fault)
     return float(least), float(most)
 
 
 def _numbers(table: Table, kind: str, actuated: bool) -> tuple[JointNumbers, ...]:
-    """Error, clearance and stiffness; of a universal joint for each bearing."""
+    """Return error, clearance and stiffness; for a universal joint one per bearing."""
     if kind != "universal":
         return (_one(table, kind, actuated),)
     for key in ("clearance", "geometric_error", "tolerance"):
@@ -124,7 +126,7 @@ def _numbers(table: Table, kind: str, actuated: bool) -> tuple[JointNumbers, ...
 
 
 def _refuse_count(table: Table, key: str) -> None:
-    """Reject a list of values for another number of bearings than two."""
+    """Raise BadInput for a list that has not one value for each of two bearings."""
     value = table.content.get(key)
     parts = dict if key == "clearance" else list
     if not isinstance(value, list) or not all(isinstance(v, parts) for v in value):
@@ -135,14 +137,14 @@ def _refuse_count(table: Table, key: str) -> None:
 
 
 def _bearing(table: Table, key: str, which: int) -> Any:
-    """The value of one bearing: of ``[first, second]``, or the one given for both."""
+    """Return a bearing's value from ``[first, second]`` or from a common value."""
     value = table.content[key]
     pair = isinstance(value, list) and len(value) == 2
     return value[which] if pair else value
 
 
 def _one(table: Table, kind: str, actuated: bool) -> JointNumbers:
-    """Numbers of one joint or bearing."""
+    """Return the numbers of one joint or bearing."""
     for key in ("geometric_error", "tolerance"):
         without_units(table, key, SCREW)
     zero = np.zeros(6)
@@ -161,18 +163,18 @@ def _one(table: Table, kind: str, actuated: bool) -> JointNumbers:
 
 
 def _tolerance(table: Table) -> NDArray | None:
-    """(6,) standard deviations, None if not given."""
+    """Return (6,) standard deviations; None if not given."""
     if not table.has("tolerance"):
         return None
     sigma = table.array("tolerance", (6,), "rad, m", largest=LARGEST_LENGTH)
     if sigma.min() < 0:
-        fault = f"found {sigma.min():g} in it, expected 6 numbers >= 0 [rad, m]"
+        fault = f"found the number {sigma.min():g}, expected 6 numbers >= 0 [rad, m]"
         raise table.bad("tolerance", fault)
     return sigma
 
 
 def _stiffness(table: Table, kind: str, actuated: bool) -> NDArray | None:
-    """(6, 6) K_B with the drive's stiffness, 0 along free motions; None if rigid."""
+    """Return (6, 6) K_B with the drive, 0 along free motions; None if rigid."""
     free = FREE_ROWS[kind]
     if len(free) > 1:
         return _several_free(table, kind)
@@ -192,7 +194,7 @@ def _stiffness(table: Table, kind: str, actuated: bool) -> NDArray | None:
 
 
 def _several_free(table: Table, kind: str) -> NDArray | None:
-    """(6, 6) K_B of a joint of several freedoms, 0 along each of them."""
+    """Return (6, 6) K_B of a joint with several free motions, 0 along each of them."""
     if not table.has("joint_stiffness"):
         return None
     free = list(FREE_ROWS[kind])
@@ -216,7 +218,7 @@ def _several_free(table: Table, kind: str) -> NDArray | None:
 
 
 def copy_rows(value: Any) -> Any:
-    """A list with its lists copied; any other value."""
+    """Return a list with its inner lists copied; any other value unchanged."""
     if not isinstance(value, list):
         return value
     return [list(row) if isinstance(row, list) else row for row in value]

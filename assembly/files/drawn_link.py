@@ -1,4 +1,4 @@
-"""Links of bodies in files of ``format = 2``: units, and beams along a curve."""
+"""Links of bodies in files of ``format = 2``: lengths with units, and curved beams."""
 
 from dataclasses import dataclass
 from typing import Any, NoReturn
@@ -19,7 +19,7 @@ _LENGTHS = ("radius", "inner_radius", "width", "height", "length", "wall", "web"
             "flange")  # fmt: skip
 _CURVE = ("curve", "young", "poisson", "density", "theory")
 _KINDS = ("beam", "curve", "stiffness", "mesh", "library", "model")
-_GAP = 1e-6  # [1] of the beam's reach by which it may miss the joint at its end
+_GAP = 1e-6  # [-] accepted distance from the end joint, relative to the beam's reach
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,17 +34,17 @@ class Curve:
 
 
 def read_drawn_link(body: Table) -> Link | Curve | None:
-    """The link of a body.
+    """Return the link of a body.
 
     Args:
-        body: its table, whose texts with units become numbers.
+        body: table of the body; texts with units in it are replaced by numbers.
 
     Returns:
-        The link as a robot file has it, directions in base axes at home; a curve, or
-        None for a rigid body.
+        The link, with directions in base axes in the home pose; a curve; or None for a
+        rigid body.
 
     Raises:
-        BadInput: a rule of the format is broken.
+        BadInput: the table violates a rule of the format.
     """
     link = body.content.get("link")
     if isinstance(link, dict) and not set(_KINDS) & set(link):
@@ -59,22 +59,22 @@ def read_drawn_link(body: Table) -> Link | Curve | None:
     for key in table.content:
         if key not in _CURVE:
             names = " | ".join(f'"{name}"' for name in _CURVE[1:])
-            raise table.bad(key, f'found it with "curve", expected only {names}')
+            raise table.bad(key, f'found together with "curve", expected only {names}')
     return Curve(table)
 
 
 def _refuse_no_kind(link: Table) -> NoReturn:
-    """Reject a link without its kind, which may be misspelt."""
+    """Raise BadInput for a link without a known kind, which can be misspelt."""
     unknown = [key for key in link.content if key not in (*_CURVE, "pieces", "up")]
     if unknown:
         hint = nearest(unknown[0], _KINDS)
         raise link.bad("", f"unknown key {quoted(unknown[0])}{hint}")
     names = " | ".join(map(quoted, _KINDS))
-    raise link.bad("", f"found none of them, expected exactly one of {names}")
+    raise link.bad("", f"found no kind of link, expected exactly one of {names}")
 
 
 def _plain_lengths(content: dict[str, Any], body: Table, place: str) -> None:
-    """Lengths of a section as numbers."""
+    """Replace texts with units in a section by numbers."""
     inner = Table(content, body.file, f"{body.place}.{place}")
     for key in _LENGTHS:
         without_units(inner, key, "length")
@@ -117,8 +117,8 @@ def curve_link(
     pieces = read_pieces(tables, start, poisson)
     gap = float(np.linalg.norm(pieces[-1].place(1.0) - tip[:3, 3]))
     if gap > _GAP * float(np.linalg.norm(tip[:3, 3] - start)):
-        fault = f"found that it ends {gap:.3g} m from the joint at its end"
-        raise table.bad("curve", f"{fault}, expected it there")
+        fault = f"found the end of the curve {gap:.3g} m from the joint there"
+        raise table.bad("curve", f"{fault}, expected 0 m")
     try:
         C = curve_compliance(pieces, young, poisson, theory=theory)
     except BadInput as error:

@@ -20,15 +20,15 @@ def with_effects(robot: Robot, tables: Sequence[Table]) -> Robot:
     """Return a robot with the effects of its file.
 
     Args:
-        robot: robot of the same file, without them.
-        tables: every ``[[effect]]``.
+        robot: robot of the same file, without effects.
+        tables: every ``[[effect]]`` table.
 
     Returns:
-        The robot.
+        The robot with effects.
 
     Raises:
-        BadInput: an unknown effect or parameter, an effect given twice or at a frame
-            where it cannot act, or a value that is not a finite number.
+        BadInput: an effect or parameter is unknown, an effect is given twice or at a
+            frame where it cannot act, or a value is not a finite number.
     """
     everywhere: dict[str, Values] = {}
     sessions: dict[str, dict[str, Values]] = {}
@@ -51,7 +51,7 @@ def with_effects(robot: Robot, tables: Sequence[Table]) -> Robot:
             )
         effects = everywhere if session is None else sessions.setdefault(session, {})
         if name in effects:
-            raise table.bad("name", "found twice; expected one [[effect]] of each name")
+            raise table.bad("name", "found twice; expected one [[effect]] per name")
         effects[name] = _parameters(table, robot, name)
     return replace(
         robot, effects=everywhere, session_effects=sessions, functions=tuple(functions)
@@ -67,14 +67,16 @@ def _parameters(table: Table, robot: Robot, effect: str) -> Values:
     for key in given:
         if key not in allowed:
             hint = nearest(key, allowed)
-            message = f"found {quoted(key)}, which is no parameter of {effect} here"
+            message = f"found {quoted(key)}, which is not a parameter of {effect}"
             raise table.bad("parameters", f"{message}{hint}")
     # time constants must be given and positive
     times = {key for key in allowed if LIBRARY[effect].unit(robot, key) == "s"}
     for key in sorted(times - set(given)):
         owner = key.rpartition(".")[0]
         if not owner or any(k == owner or k.startswith(f"{owner}.") for k in given):
-            raise table.bad("parameters", f"found no {quoted(key)}; expected it, in s")
+            raise table.bad(
+                "parameters", f"{quoted(key)} is missing; expected a time in s"
+            )
     if inner is None:
         return {}
     return {
@@ -90,7 +92,7 @@ def effect_tables(robot: Robot) -> list[dict[str, Any]]:
         robot: any robot.
 
     Returns:
-        One table each; :func:`with_effects` reads them back to the same effects.
+        One table per effect, from which :func:`with_effects` reads the same effects.
     """
 
     def listed(
@@ -108,11 +110,11 @@ def effect_tables(robot: Robot) -> list[dict[str, Any]]:
 
 
 def parameter_names(robot: Robot, effect: str) -> tuple[str, ...]:
-    """Return the public names of all parameters that an effect may have on a robot.
+    """Return the public names of all parameters that an effect can have on a robot.
 
     Args:
         robot: any robot.
-        effect: a name of the library.
+        effect: name of an effect in the library.
 
     Returns:
         Names such as ``"leg1.drive"`` or ``"g.z"``.

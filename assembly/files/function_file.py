@@ -1,4 +1,4 @@
-"""``[[effect]]`` named ``function`` of a robot file, read and written."""
+"""Reading and writing of an ``[[effect]]`` named ``function`` in a robot file."""
 
 import math
 from collections.abc import Mapping
@@ -39,15 +39,15 @@ def read_function(table: Table, robot: Robot) -> Function:
     """Return one general effect.
 
     Args:
-        table: an ``[[effect]]`` whose name is ``function``.
+        table: an ``[[effect]]`` table whose name is ``function``.
         robot: robot of the same file.
 
     Returns:
         The function, completely checked.
 
     Raises:
-        BadInput: an unknown place, component, variable, form or parameter, a missing
-            one, or a formula that is invalid or has inconsistent units.
+        BadInput: a place, component, variable, form or parameter is unknown or missing,
+            or a formula is invalid or has inconsistent units.
     """
     label = table.text("label", "", longest=200)
     if label:
@@ -67,7 +67,7 @@ def read_function(table: Table, robot: Robot) -> Function:
         valid = components_of(where, robot)
         if name not in valid:
             hint = nearest(name, valid)
-            raise table.bad("components", f"found {quoted(name)} there{hint}")
+            raise table.bad("components", f"found {quoted(name)}{hint}")
     variables = tuple(_of_main(v, robot) for v in _words(table, "variables", 2))
     for name in variables:
         _check_variable(table, name, robot)
@@ -92,7 +92,7 @@ def read_function(table: Table, robot: Robot) -> Function:
 
 
 def _words(table: Table, key: str, most: int) -> tuple[str, ...]:
-    """Return distinct names, at least one."""
+    """Return one or more distinct names."""
     value = table.require(key, f"1 to {most} names")
     if isinstance(value, list) and all(isinstance(v, str) for v in value):
         if 1 <= len(value) <= most and len(set(value)) == len(value):
@@ -120,7 +120,7 @@ def _of_main(variable: str, robot: Robot) -> str:
 
 
 def _check_variable(table: Table, name: str, robot: Robot) -> None:
-    """Reject a variable that conditions do not have."""
+    """Raise BadInput for a variable that measurements do not have."""
     kind, _, rest = name.partition(".")
     frames = [frame.name for frame in robot.frames]
     if kind == "q":
@@ -143,11 +143,13 @@ def _check_variable(table: Table, name: str, robot: Robot) -> None:
 
 
 def _check_parameters(table: Table, function: Function, robot: Robot) -> None:
-    """Reject parameters that the form does not have, and missing ones."""
+    """Raise BadInput for unknown and for missing parameters of a form."""
     for name in function.std:
         if name not in function.parameters:
             hint = nearest(name, function.parameters)
-            raise table.bad("std", f"found {quoted(name)}, which is no parameter{hint}")
+            raise table.bad(
+                "std", f"found {quoted(name)}, which is not a parameter{hint}"
+            )
     if function.form == FORMULA:
         _check_formula(table, function, robot)
         return
@@ -161,7 +163,7 @@ def _check_parameters(table: Table, function: Function, robot: Robot) -> None:
     first = function.variables[0]
     if form.remembers and first.startswith("wrench."):
         message = (
-            f"found {quoted(first)}, expected a variable that is no wrench, "
+            f"found {quoted(first)}, expected a variable other than a wrench, "
             f"because {form.name} depends on its history"
         )
         raise table.bad("variables", f"{message}; expected no wrench")
@@ -170,11 +172,13 @@ def _check_parameters(table: Table, function: Function, robot: Robot) -> None:
         own = parameters_of(function, component)
         for name in own:
             if name not in shapes and not form.is_column(name, count):
-                message = f"found {quoted(name)}, which is no parameter of {form.name}"
+                message = (
+                    f"found {quoted(name)}, which is not a parameter of {form.name}"
+                )
                 raise table.bad("parameters", f"{message}; expected {_example(form)}")
         for name, needed in shapes.items():
             if needed and name not in own:
-                message = f"{quoted(name)} is missing; {form.name} needs it"
+                message = f"{quoted(name)} is missing; {form.name} requires it"
                 raise table.bad("parameters", message)
             if name.partition(".")[0] in _POSITIVE and own.get(name, 1.0) <= 0:
                 message = f"{quoted(name)}: found {own[name]:g}, expected > 0"
@@ -187,7 +191,7 @@ def _check_parameters(table: Table, function: Function, robot: Robot) -> None:
     unturned = any(whole_unit(variable_unit(robot, name)) != "rad" for name in waving)
     if unturned and "period" not in function.parameters:
         message = (
-            '"period" is missing; expected it, because the variable is no angle in rad'
+            '"period" is missing; expected because the variable is not an angle in rad'
         )
         raise table.bad("parameters", message)
 
@@ -251,8 +255,7 @@ def function_table(function: Function) -> dict[str, Any]:
         function: function of a robot.
 
     Returns:
-        Keys and plain values; :func:`read_function` reads them back to the same
-        function.
+        Keys and plain values, from which :func:`read_function` reads the same function.
     """
     table: dict[str, Any] = {"name": FUNCTION}
     if function.label:

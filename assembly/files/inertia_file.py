@@ -6,21 +6,21 @@ from numpy.typing import NDArray
 from forcefit.assembly.model.inertia import inertia_fault, inertia_matrix
 from forcefit.inputs.table import Table
 
-_LARGEST = 1e40  # [kg m^2] as of masses
+_LARGEST = 1e40  # [kg m^2] equal to the limit of masses in SI units
 
 
 def read_inertia(table: Table) -> NDArray:
-    """Return the moments of inertia of a frame or a body, zero where absent.
+    """Return the moments of inertia of a frame or a body; zero if absent.
 
     Args:
-        table: with or without ``inertia``: Ixx, Iyy, Izz, Ixy, Ixz, Iyz, the last three
-            as they are in the matrix.
+        table: table with or without ``inertia``: Ixx, Iyy, Izz, Ixy, Ixz, Iyz, where
+            the last three are the entries of the matrix.
 
     Returns:
-        (3, 3) [kg m^2].
+        (3, 3) [kg m^2] matrix.
 
     Raises:
-        BadInput: they are not six numbers, or no body has them.
+        BadInput: the value is not six numbers, or no body has these moments of inertia.
     """
     if not table.has("inertia"):
         return np.zeros((3, 3))

@@ -24,14 +24,14 @@ _CLEARANCE = {"radial": "m", "axial": "m", "tilt": "rad", "spin": "rad", "ball":
 
 
 def read_pitch(table: Table, joint: str) -> float:
-    """Return the ``pitch`` of a helical joint, 0 of other joints.
+    """Return the ``pitch`` of a helical joint; 0 for other joints.
 
     Args:
         table: table of a frame or a drawn joint.
         joint: type of the joint.
 
     Returns:
-        [m] translation in a turn of 360 degrees, positive for a right-hand thread.
+        [m] translation per turn of 360 degrees, positive for a right-hand thread.
 
     Raises:
         BadInput: the pitch is missing, 0 or above 1 m, or the joint is not helical.
@@ -39,7 +39,7 @@ def read_pitch(table: Table, joint: str) -> float:
     if joint != "helical":
         if table.has("pitch"):
             expected = "expected none, or a helical joint"
-            raise table.bad("pitch", f"found one on a {joint} joint, {expected}")
+            raise table.bad("pitch", f"found a pitch on a {joint} joint, {expected}")
         return 0.0
     pitch = table.number("pitch", "m per turn", largest=LARGEST_PITCH)
     if abs(pitch) < LEAST_PITCH:
@@ -49,7 +49,7 @@ def read_pitch(table: Table, joint: str) -> float:
 
 
 def read_clearance(table: Table, joint: str) -> Clearance | None:
-    """Return the ``clearance`` table, None if absent.
+    """Return the bounds of the ``clearance`` table; None if the table is absent.
 
     Args:
         table: table of a ``[[frame]]``.
@@ -59,7 +59,7 @@ def read_clearance(table: Table, joint: str) -> Clearance | None:
         The given bounds.
 
     Raises:
-        BadInput: an unknown key, or a bound that :func:`read_bounds` refuses.
+        BadInput: a key is unknown, or :func:`read_bounds` rejects a bound.
     """
     if not table.has("clearance"):
         return None
@@ -75,7 +75,7 @@ def read_clearance(table: Table, joint: str) -> Clearance | None:
 
 
 def read_bounds(table: Table, joint: str) -> Clearance:
-    """Return the bounds of a ``clearance`` table, which may have other keys too.
+    """Return the bounds of a ``clearance`` table, which can also contain other keys.
 
     Args:
         table: the table.
@@ -85,8 +85,8 @@ def read_bounds(table: Table, joint: str) -> Clearance:
         The given bounds.
 
     Raises:
-        BadInput: a value is not a number >= 0, or ``inf`` of a joint that is not fixed,
-            or so small that its square is 0; or ``ball`` is given with another bound of
+        BadInput: a value is not a number >= 0; it is ``inf`` for a joint that is not
+            fixed; its square is 0; or ``ball`` is given together with another bound of
             the same motion.
     """
     bounds = {
@@ -95,7 +95,7 @@ def read_bounds(table: Table, joint: str) -> Clearance:
         if table.has(key)
     }
     if joint == "helical" and "spin" in bounds:
-        raise table.bad("spin", f"found one on a helical joint, {NO_SPIN}")
+        raise table.bad("spin", f"found a bound on a helical joint, {NO_SPIN}")
     for key, bound in bounds.items():
         if 0.0 < bound < _LEAST_CLEARANCE:
             expected = f"expected 0 or at least {_LEAST_CLEARANCE:g}"
@@ -113,21 +113,21 @@ def read_bounds(table: Table, joint: str) -> Clearance:
 
 
 def _bound(table: Table, key: str, unit: str, joint: str) -> float:
-    """A bound; ``inf`` leaves a motion of a fixed joint free, as contacts do."""
+    """Return a bound; ``inf`` makes a motion of a fixed joint unbounded."""
     if joint == "fixed" and table.content[key] == math.inf:
         return float(table.get(key))
     return table.number(key, unit, least=0.0, largest=LARGEST_LENGTH)
 
 
 def read_fit(table: Table) -> str:
-    """Return the ISO 286 fit of the ``clearance`` table, empty if it has none."""
+    """Return the ISO 286 fit of the ``clearance`` table; empty if it has none."""
     content = table.content.get("clearance")
     fit = content.get("fit") if isinstance(content, dict) else None
     return fit.strip() if isinstance(fit, str) else ""
 
 
 def read_fitted_end(table: Table) -> FittedEnd | None:
-    """Return how a frame's tilt follows from its fit, None if ``radial`` does."""
+    """Return the data by which a fit determines a frame's tilt; None for ``radial``."""
     content = table.content.get("clearance")
     if not isinstance(content, dict) or "length" not in content:
         return None
@@ -143,22 +143,23 @@ def _fitted_end(inner: Table) -> FittedEnd | None:
             raise inner.bad(key, f'{fault}; expected one with "length"')
     bound = inner.choice("bound", ("tilt", "spin"), "tilt")
     if inner.has(bound):
-        fault = 'found it together with "length", from which it follows'
+        fault = 'found together with "length", which determines the tilt'
         raise inner.bad(bound, f"{fault}; expected one of them")
     length = inner.number("length", "m", above=_LEAST_LENGTH, largest=LARGEST_LENGTH)
     return FittedEnd(length, inner.text("parts"), bound)
 
 
 def fit_of(inner: Table) -> Fit | None:
-    """Return the fit of a clearance or of a bearing, None if it has none.
+    """Return the fit of a clearance or of a bearing; None if it has none.
 
     Raises:
-        BadInput: it is none, one of interference, or given with ``radial``.
+        BadInput: the text is not a fit, the fit is an interference fit, or ``radial``
+            is also given.
     """
     if not inner.has("fit"):
         return None
     if inner.has("radial"):
-        raise inner.bad("radial", 'found it together with "fit", expected one of them')
+        raise inner.bad("radial", 'found together with "fit", expected one of them')
     text = inner.text("fit", expected='a fit such as "12 H7/g6"')
     try:
         return clearance_fit(text)
@@ -167,19 +168,20 @@ def fit_of(inner: Table) -> Fit | None:
 
 
 def read_joint_stiffness(table: Table, free: int | None = None) -> NDArray | None:
-    """Return K_B as a full matrix; infinities only on its diagonal.
+    """Return K_B as a full matrix with infinities only on its diagonal.
 
     Args:
         table: table of a ``[[frame]]``.
-        free: row along which a passive joint moves; zeros in its row and column leave
-            it free.  None if the joint is not passive.
+        free: index of the direction along which a passive joint moves; zeros in its row
+            and column leave the motion free.  None if the joint is not passive.
 
     Returns:
-        (6, 6) [N m/rad .. N/m] symmetric positive definite, except for a row and column
-        of zeros along a free motion; None if absent.
+        (6, 6) [N m/rad .. N/m] symmetric positive definite matrix, except for a row and
+        column of zeros along a free motion; None if absent.
 
     Raises:
-        BadInput: another shape, not a stiffness, or ``inf`` along the free motion.
+        BadInput: the value has another shape, is not a stiffness, or contains ``inf``
+            along the free motion.
     """
     key = "joint_stiffness"
     if not table.has(key):
@@ -197,7 +199,9 @@ def read_joint_stiffness(table: Table, free: int | None = None) -> NDArray | Non
         if free is not None and checked[free] == 0.0:
             checked[free] = 1.0
         if checked.min() <= 0:
-            raise table.bad(key, f"found {checked.min():g} in it, expected {expected}")
+            raise table.bad(
+                key, f"found the number {checked.min():g}, expected {expected}"
+            )
         K = np.diag(K)
     rigid = np.isposinf(np.diag(K))
     if free is not None and rigid[free]:
@@ -213,24 +217,24 @@ def read_joint_stiffness(table: Table, free: int | None = None) -> NDArray | Non
         raise table.bad(
             key,
             f"found {K[i, j]:g} at [{i + 1}, {j + 1}]; expected inf only on the "
-            "diagonal, the rest of its row and column zero",
+            "diagonal, with zeros elsewhere in its row and column",
         )
     K[soft] = definite(table, key, K[soft])
     return K
 
 
 def _has_rows(value: list) -> bool:
-    """Return whether a list holds lists."""
+    """Return whether a list contains lists."""
     return any(isinstance(row, list) for row in value)
 
 
 def definite(table: Table, key: str, K: NDArray) -> NDArray:
-    """Return a stiffness matrix, after a check that it is positive definite.
+    """Return a stiffness matrix after a check that it is positive definite.
 
     Args:
         table: the table that was read.
-        key: its key there.
-        K: (n, n) [N m/rad .. N/m] finite; any part of a stiffness.
+        key: key of the matrix in the table.
+        K: (n, n) [N m/rad .. N/m] finite matrix or submatrix of a stiffness.
 
     Returns:
         (n, n) the same matrix, exactly symmetric.
@@ -253,7 +257,7 @@ def definite(table: Table, key: str, K: NDArray) -> NDArray:
         expected = f"expected between {1 / LARGEST:g} and {LARGEST:g}"
         fault = f"found {diagonal[i]:g} as term [{i + 1}, {i + 1}]"
         raise table.bad(key, f"{fault}, {expected}")
-    # scaled to a unit diagonal, so that rad and m weigh alike
+    # scale to a unit diagonal, so that rad and m have equal weights
     size = np.sqrt(diagonal)
     unit = np.clip(K, -1e150, 1e150) / np.outer(size, size)
     asymmetry = np.abs(unit - unit.T)
@@ -262,13 +266,13 @@ def definite(table: Table, key: str, K: NDArray) -> NDArray:
         raise table.bad(
             key,
             f"not symmetric: found [{a + 1}, {b + 1}] = {K[a, b]:.6e} but "
-            f"[{b + 1}, {a + 1}] = {K[b, a]:.6e}, expected them equal",
+            f"[{b + 1}, {a + 1}] = {K[b, a]:.6e}, expected equal numbers",
         )
     least = np.linalg.eigvalsh((unit + unit.T) / 2).min()
     if least <= 1e-13:
         raise table.bad(
             key,
-            f"not positive definite: found {least:.1e} as smallest eigenvalue once "
+            f"not positive definite: found {least:.1e} as smallest eigenvalue when "
             "scaled to a unit diagonal, expected > 0",
         )
     return np.where(K == K.T, K, K / 2 + K.T / 2)
@@ -280,12 +284,12 @@ def joint_table(
     """Return the clearance, bolt and springs of a joint as keys of a robot file.
 
     Args:
-        clearance: clearance in use, if any.
-        bolt: where the joint is bolted, with the clearance that it has before.
-        stiffness: (6, 6) K_B, a list of its diagonal in the file if it has no others.
+        clearance: clearance in use, or None.
+        bolt: pose at which the joint is bolted, with its clearance before bolting.
+        stiffness: (6, 6) K_B; a diagonal matrix is written as a list of six numbers.
 
     Returns:
-        Keys and plain values; those that are absent are left out.
+        Keys and plain values; absent data are omitted.
     """
     table: dict[str, Any] = {}
     clearance = clearance if bolt is None else bolt.clearance

@@ -1,4 +1,4 @@
-"""The ``link`` table of a robot file, read and written: the elasticity of a body."""
+"""Reading and writing of ``link`` in a robot file: the elasticity of a body."""
 
 from pathlib import Path
 from typing import Any
@@ -20,15 +20,15 @@ from forcefit.inputs.table import Table, describe, quoted
 from forcefit.inputs.writing import path_from
 from forcefit.stiffness.surface.surface import UNITS
 
-_SMALLEST_LENGTH = 1e-12  # [m] shorter than any machine's
-_MOST_PIECES = 100  # most pieces of a beam; with 8 the error is 1e-4 of a quarter turn
+_SMALLEST_LENGTH = 1e-12  # [m] shorter than any part of a machine
+_MOST_PIECES = 100  # for 8 pieces, the error for a bend of 90 degrees is 1e-4
 _ONE_SECTION = (
     '"radius" [, "inner_radius"] or "width", "height" or '
     '"area", "I_y", "I_z", "J", "shear_y", "shear_z"'
 )
 _KINDS = ("beam", "stiffness", "mesh", "library", "model")
 _MATERIAL = ("young", "poisson", "density")
-_SECTIONS: dict[str, dict[str, str]] = {  # keys of each kind, and their units
+_SECTIONS: dict[str, dict[str, str]] = {  # keys of each kind of section, with units
     "round": {"radius": "m", "inner_radius": "m"},
     "rectangular": {"width": "m", "height": "m"},
     "general": {
@@ -59,7 +59,7 @@ def read_link(frame: Table, span: NDArray) -> Link | None:
     if not kinds and not set(link.content) <= {*_MATERIAL, "up", "pieces"}:
         link.finish()  # reports a misspelt kind with a suggestion
     if len(kinds) != 1:
-        given = " and ".join(map(quoted, kinds)) or "none of them"
+        given = " and ".join(map(quoted, kinds)) or "no kind of link"
         names = " | ".join(map(quoted, _KINDS))
         raise link.bad("", f"found {given}, expected exactly one of {names}")
     result: Link
@@ -79,7 +79,7 @@ def read_link(frame: Table, span: NDArray) -> Link | None:
 
 
 def _beam_link(link: Table) -> BeamLink:
-    """Return ``beam = { ... }`` and its material."""
+    """Return the beam of ``beam = { ... }`` with its material."""
     beam = link.table("beam")
     theory = beam.choice("theory", ("timoshenko", "euler"), "timoshenko")
     length = _size(beam, "length", "m") if beam.has("length") else None
@@ -97,7 +97,7 @@ def _beam_link(link: Table) -> BeamLink:
 
 
 def _pieces(link: Table) -> int:
-    """Return the number of springs in series, 1 by default; 8.0 counts as whole."""
+    """Return the number of springs in series, by default 1."""
     count = link.number("pieces", "-", 1.0, least=1.0, below=_MOST_PIECES + 1.0)
     if count != round(count):
         raise link.bad("pieces", f"found {count:g}, expected a whole number")
@@ -105,7 +105,7 @@ def _pieces(link: Table) -> int:
 
 
 def _section(beam: Table) -> dict[str, float]:
-    """Return the numbers of the section, one of the three kinds."""
+    """Return the dimensions of the section, which is one of three kinds."""
     keys_of_kind = {
         kind: [key for key in keys if beam.has(key)] for kind, keys in _SECTIONS.items()
     }
@@ -129,7 +129,7 @@ def _section(beam: Table) -> dict[str, float]:
 
 
 def _mesh_link(link: Table, frame: Table) -> MeshLink:
-    """Return ``mesh = { surface, base, tip, ... }`` and its material."""
+    """Return the mesh of ``mesh = { surface, base, tip, ... }`` with its material."""
     from forcefit.stiffness.fem.part_text import read_parts
 
     mesh = link.table("mesh")
@@ -161,7 +161,7 @@ def _mesh_link(link: Table, frame: Table) -> MeshLink:
 
 
 def _interface(mesh: Table, key: str) -> Any:
-    """Return interface of a mesh with a joint, as written; its syntax is checked."""
+    """Return the interface of a mesh with a joint as written, after a syntax check."""
     from forcefit.stiffness.surface.interface import parse_interface
 
     value = mesh.require(key, 'an interface such as "z=0.452"')
@@ -186,7 +186,7 @@ def _check_interface_table(table: Table) -> None:
 
 
 def _library_link(link: Table) -> LibraryLink:
-    """Return ``library = "path/to/library#key"``."""
+    """Return the entry of ``library = "path/to/library#key"``."""
     value = link.text("library")
     path, _, key = value.rpartition("#")
     if not (path and key):
@@ -217,7 +217,7 @@ def _size(table: Table, key: str, unit: str) -> float:
 
 
 def _direction(table: Table, key: str) -> tuple[float, float, float] | None:
-    """Return a direction, None if absent."""
+    """Return a direction; None if absent."""
     if not table.has(key):
         return None
     vector = table.array(key, (3,), "direction", largest=LARGEST_LENGTH)
@@ -235,15 +235,15 @@ def _path(table: Table, key: str, path: str) -> Path:
 
 
 def link_table(link: Link, folder: Path | None = None) -> dict[str, Any]:
-    """Return the keys of a frame's table for its link.
+    """Return the keys of a frame's table that describe its link.
 
     Args:
         link: link of a robot.
-        folder: folder of the file to be written; paths are made relative to it, or are
-            unchanged without it.
+        folder: folder of the file to be written, to which paths are made relative; None
+            to leave paths unchanged.
 
     Returns:
-        The ``link`` table, and the frame's ``up`` for a mesh that has one.
+        The ``link`` table, and the frame's ``up`` for a mesh with this direction.
     """
     if isinstance(link, MatrixLink):
         return {"link": {"stiffness": link.stiffness.tolist()}}

@@ -1,7 +1,7 @@
 """Texts of new robot files of ``format = 2``, with comments, for ``forcefit new``.
 
-The letters of a kind are the joints of a leg from the base: revolute, prismatic,
-universal, spherical.  The first R or P is driven.
+The letters in the name of a kind are the joints of a leg, beginning at the base:
+revolute, prismatic, universal, spherical.  The first R or P is driven.
 """
 
 from collections.abc import Callable, Mapping
@@ -12,7 +12,7 @@ import numpy as np
 from forcefit.inputs.errors import BadInput, nearest, quoted
 
 MOST_LEGS = 12
-Vector = tuple[int, int, int]  # [mm] or a direction
+Vector = tuple[int, int, int]  # a point in mm, or a direction
 
 
 @dataclass(frozen=True)
@@ -20,11 +20,11 @@ class Kind:
     """A kind of robot.
 
     Attributes:
-        about: in a few words.
+        about: short description.
         legs: usual number of legs.
-        step: numbers of legs are multiples of it.
+        step: divisor of all possible numbers of legs.
         platform: [mm] the platform's point.
-        body: text of the legs, for their number.
+        body: function from the number of legs to the text of the legs.
     """
 
     about: str
@@ -35,18 +35,19 @@ class Kind:
 
 
 def new_robot(name: str, kind: str, legs: int | None = None) -> str:
-    """Return the text of a robot file to begin with.
+    """Return the text of a robot file as a starting point for a new robot.
 
     Args:
-        name: of the robot.
+        name: name of the robot.
         kind: a key of :data:`KINDS`.
-        legs: their number; None for the usual one.
+        legs: number of legs; None for the usual number.
 
     Returns:
-        A file of bodies and joints with comments, which solves as it is.
+        Text of a file of bodies and joints with comments, which can be solved without
+        changes.
 
     Raises:
-        BadInput: there is no such kind, or it has no such number of legs.
+        BadInput: the kind is unknown, or it does not exist with this number of legs.
     """
     if kind not in KINDS:
         raise BadInput(f"--kind: found {quoted(kind)}{nearest(kind, KINDS)}")
@@ -97,18 +98,18 @@ _LINEAR = "drive_stiffness = 2e7            # N/m"
 
 
 def _lengths(point: Vector) -> str:
-    """Return a point in mm."""
+    """Return the text of a point, in mm."""
     return "[" + ", ".join(f'"{x} mm"' if x else "0" for x in point) + "]"
 
 
 def _direction(vector: Vector) -> str:
-    """Return a direction of small whole numbers."""
+    """Return the text of a direction of small whole numbers."""
     x, y, z = (int(v) for v in np.array(vector) // np.gcd.reduce(vector))
     return f"[{x}, {y}, {z}]"
 
 
 def _leg(name: str, count: int, comment: str = "") -> str:
-    """Return the head of a leg and its copies."""
+    """Return the text that begins a leg and defines its copies."""
     comment = comment or f"{name}1, {name}2, ...: copies about the vertical"
     return (
         f'[[leg]]\nname = "{name}"                     # {comment}\n'
@@ -117,7 +118,7 @@ def _leg(name: str, count: int, comment: str = "") -> str:
 
 
 def _bodies(*names: str, **radii: str) -> str:
-    """Return bodies of a leg; those with a radius are elastic."""
+    """Return the text of a leg's bodies; bodies with a radius are elastic."""
     text = ""
     for name in names:
         text += f'[[leg.body]]\nname = "{name}"\n'
@@ -129,7 +130,7 @@ def _bodies(*names: str, **radii: str) -> str:
 
 
 def _joint(name: str, kind: str, between: str, at: Vector, *lines: str) -> str:
-    """Return a joint of a leg; ``between`` holds two names."""
+    """Return the text of a leg's joint; ``between`` contains two names."""
     first, second = between.split()
     more = "".join(f"{line}\n" for line in lines)
     return (
@@ -139,25 +140,25 @@ def _joint(name: str, kind: str, between: str, at: Vector, *lines: str) -> str:
 
 
 def _axis(vector: Vector, key: str = "axis", comment: str = "") -> str:
-    """Return a line for a direction."""
+    """Return the line of text for a direction."""
     line = f"{key} = {_direction(vector)}"
     return f"{line:<33}# {comment}" if comment else line
 
 
 def _minus(a: Vector, b: Vector) -> Vector:
-    """The vector from b to a."""
+    """Return the vector from b to a."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 def _cross(a: Vector, b: Vector) -> Vector:
-    """The vector at right angles to two."""
+    """Return the cross product of two vectors."""
     x, y, z = (int(v) for v in np.cross(a, b))
     return x, y, z
 
 
 def _pairs(foot: Callable[[int], Vector], end: Callable[[int], Vector], legs: int,
            leg: Callable[[Vector, Vector], str]) -> str:  # fmt: skip
-    """Return legs in pairs, mirror images of each other."""
+    """Return the text of legs in pairs, which are mirror images of each other."""
     text = ""
     for name, side in (("left", 1), ("right", -1)):
         text += _leg(name, legs // 2) + leg(foot(side), end(side))
@@ -165,7 +166,7 @@ def _pairs(foot: Callable[[int], Vector], end: Callable[[int], Vector], legs: in
 
 
 def _ups(legs: int) -> str:
-    """A Gough platform: six drives hold six freedoms."""
+    """Return the legs of a Gough platform, whose six drives fix six freedoms."""
 
     def leg(a: Vector, b: Vector) -> str:
         along = _minus(b, a)
@@ -186,7 +187,7 @@ def _ups(legs: int) -> str:
 
 
 def _rus(legs: int) -> str:
-    """Cranks, and rods to the platform."""
+    """Return legs with cranks, and with rods to the platform."""
 
     def leg(a: Vector, b: Vector) -> str:
         elbow = a[0] + 120, a[1], a[2]
@@ -208,7 +209,7 @@ def _rus(legs: int) -> str:
 
 
 def _upu(legs: int) -> str:
-    """Tsai's 3-UPU: outer axes parallel at base and platform, so that it translates."""
+    """Return the legs of Tsai's 3-UPU, whose parallel axes make it translate."""
     a, b, y = (240, 0, 0), (80, 0, 450), (0, 1, 0)
     along = _minus(b, a)
     inner = _cross(along, y)
@@ -227,7 +228,7 @@ def _upu(legs: int) -> str:
 
 
 def _prs(legs: int) -> str:
-    """Carriages on vertical rails, hinged legs, balls."""
+    """Return legs with carriages on vertical rails, hinges and ball joints."""
     hinge, ball = (400, 0, 0), (250, 0, -700)
     return (
         _leg("leg", legs)
@@ -240,7 +241,7 @@ def _prs(legs: int) -> str:
 
 
 def _rrr(legs: int) -> str:
-    """A platform in the plane of x and y."""
+    """Return the legs of a robot whose platform moves in the plane of x and y."""
     z = _axis((0, 0, 1))
     return (
         _leg("leg", legs)
@@ -253,7 +254,7 @@ def _rrr(legs: int) -> str:
 
 
 def _delta(legs: int) -> str:
-    """Arms, and two parallel rods each between balls."""
+    """Return arms, each with two parallel rods between ball joints."""
     elbow, end = (350, 0, -100), (50, 0, -600)
     text = (
         _leg("leg", legs)

@@ -1,4 +1,4 @@
-"""Robot files read and written (``docs/robot_files.md``), with all rules checked."""
+"""Reading and writing of robot files (``docs/robot_files.md``), with all checks."""
 
 import math
 from collections.abc import Callable
@@ -59,7 +59,7 @@ from forcefit.stiffness.screws import rotation_matrix, rotation_vector
 
 Closing = Callable[[Robot], Robot]
 _LONGEST_NAME = 200  # largest number of characters
-MOST_FRAMES = 2000  # most frames of a robot; more closures would take minutes
+MOST_FRAMES = 2000  # largest number of frames; more closures would require minutes
 
 
 def read_robot(path: Path | str, close: Closing | None = None) -> Robot:
@@ -67,8 +67,8 @@ def read_robot(path: Path | str, close: Closing | None = None) -> Robot:
 
     Args:
         path: a ``.toml`` file in the public format.
-        close: function that makes the closures of the declared robot hold; none if
-            absent.
+        close: function that makes the closures of the declared robot hold; None to
+            leave them unchanged.
 
     Returns:
         The robot; its nominal closures hold in its home pose.  Meshes and libraries of
@@ -76,7 +76,7 @@ def read_robot(path: Path | str, close: Closing | None = None) -> Robot:
         :func:`forcefit.assembly.files.solved_links.solve_links`.
 
     Raises:
-        BadInput: the file breaks a rule of the format, or a closure does not hold.
+        BadInput: the file violates a rule of the format, or a closure does not hold.
     """
     return robot_of(read_toml(Path(path)), Path(path).stem, close)
 
@@ -93,13 +93,13 @@ def robot_of(root: Table, name: str, close: Closing | None = None) -> Robot:
         The robot; its nominal closures hold in its home pose.
 
     Raises:
-        BadInput: the table breaks a rule of the format, or a closure does not hold.
+        BadInput: the table violates a rule of the format, or a closure does not hold.
     """
     robot = declared_robot(root, name)
     try:
         robot = robot if close is None else close(robot)
         home = home_posture(robot)
-        place_callouts(home)  # whether they fit the geometry
+        place_callouts(home)  # check that callouts fit the geometry
         return with_spans(robot, home.coordinates)
     except BadInput as error:
         raise BadInput(f"{root.file}: {error}") from None
@@ -109,14 +109,14 @@ def declared_robot(root: Table, name: str) -> Robot:
     """Return the robot of a root table as written, without a check of its closures.
 
     Args:
-        root: root of a robot file.
+        root: root table of a robot file.
         name: name of the robot if the table has none.
 
     Returns:
-        The robot; lengths of its beams may still be unknown.
+        The robot; lengths of its beams can still be unknown.
 
     Raises:
-        BadInput: the table breaks a rule of the format.
+        BadInput: the table violates a rule of the format.
     """
     name = root.text("name", name, longest=_LONGEST_NAME)
     description = root.get("description", "")
@@ -159,7 +159,9 @@ def _framed(root: Table, name: str, description: str) -> Robot:
     root.finish()
     if not 0 < len(tables[0]) <= MOST_FRAMES:
         fault = f"found {len(tables[0])}" if tables[0] else "missing"
-        raise root.bad("frame", f"{fault}; expected 1 to {MOST_FRAMES} [[frame]]")
+        raise root.bad(
+            "frame", f"{fault}; expected 1 to {MOST_FRAMES} tables [[frame]]"
+        )
     frames = tuple(_frame(table) for table in tables[0])
     names = [frame.name for frame in frames]
     closures = tuple(_closure(table, names) for table in tables[1])
@@ -188,7 +190,7 @@ def _learned_range(root: Table) -> dict[str, tuple[float, float]]:
     for name in table.content:
         least, most = table.array(name, (2,), "its unit")
         if least > most:
-            fault = f"found [{least:g}, {most:g}], expected the smaller one first"
+            fault = f"found [{least:g}, {most:g}], expected the smaller number first"
             raise table.bad(name, fault)
         ranges[name] = (float(least), float(most))
     table.finish()
@@ -196,7 +198,7 @@ def _learned_range(root: Table) -> dict[str, tuple[float, float]]:
 
 
 def _reference_point(root: Table) -> tuple[float, float, float] | None:
-    """Return the point at which the robot was identified, None if not given."""
+    """Return the point at which the robot was identified; None if not given."""
     if not root.has("reference_point"):
         return None
     x, y, z = root.array("reference_point", (3,), "m", largest=LARGEST_LENGTH).tolist()
@@ -204,8 +206,8 @@ def _reference_point(root: Table) -> tuple[float, float, float] | None:
 
 
 def _diagnosis(root: Table) -> dict[str, Any]:
-    """Return the file's record of its diagnosis, with an absolute path."""
-    # texts, numbers and lists are kept unchanged
+    """Return the diagnosis recorded in the file, with an absolute path."""
+    # texts, numbers and lists are stored unchanged
     content: dict[str, Any] = {}
     if root.has("diagnosis"):
         table = root.table("diagnosis")
@@ -235,7 +237,7 @@ def _is_record(value: object) -> bool:
 
 def _remarks(tables: list[Table]) -> tuple[str, ...]:
     """Return a remark on frames with ``dh`` but without ``alpha``."""
-    # the other three are often zero; a forgotten alpha changes the machine
+    # the other parameters are often zero; a forgotten alpha changes the machine
     dh = {table.content["name"]: table.content.get("dh") for table in tables}
     without_alpha = [
         quoted(name) for name, given in dh.items() if given and "alpha" not in given
@@ -246,7 +248,7 @@ def _remarks(tables: list[Table]) -> tuple[str, ...]:
 
 
 def _fitted_ends(tables: list[Table]) -> dict[str, FittedEnd]:
-    """Return the fitted ends by frame; the same parts must have the same fit."""
+    """Return the fitted ends by frame; equal parts must have equal fits."""
     ends: dict[str, FittedEnd] = {}
     fits: dict[str, str] = {}
     for table in tables:
@@ -255,7 +257,7 @@ def _fitted_ends(tables: list[Table]) -> dict[str, FittedEnd]:
         parts = name if end is None else end.parts
         if fit and fits.setdefault(parts, fit) != fit:
             found = f"found {quoted(fit)} of the parts {quoted(parts)}"
-            expected = f"expected {quoted(fits[parts])}, as before"
+            expected = f"expected {quoted(fits[parts])} as for an earlier frame"
             raise table.table("clearance").bad("fit", f"{found}, {expected}")
         if end is not None:
             ends[name] = end
@@ -263,7 +265,7 @@ def _fitted_ends(tables: list[Table]) -> dict[str, FittedEnd]:
 
 
 def _fit_remarks(robot: Robot) -> tuple[str, ...]:
-    """Return a remark on the fits, of which one clearance is used."""
+    """Return a remark on the fits, whose mean clearance is used."""
     texts = []
     for name, text in fits_by_parts(robot).items():
         fit = parse_fit(text)
@@ -275,7 +277,7 @@ def _fit_remarks(robot: Robot) -> tuple[str, ...]:
 
 
 def _frame(table: Table) -> Frame:
-    """Return one ``[[frame]]``."""
+    """Return the frame of one ``[[frame]]`` table."""
     name = table.text("name", longest=_LONGEST_NAME)
     table.place = f"frame {quoted(name)}"
     joint = table.choice("joint", JOINTS, "fixed")
@@ -323,7 +325,7 @@ def _frame(table: Table) -> Frame:
 
 
 def _numbers(table: Table, key: str, count: int, unit: str) -> NDArray:
-    """Return the lengths or angles, zero where absent."""
+    """Return the lengths or angles of a key; zeros if absent."""
     zero = np.zeros(count)
     return table.array(key, (count,), unit, zero, largest=LARGEST_LENGTH)
 
@@ -331,35 +333,35 @@ def _numbers(table: Table, key: str, count: int, unit: str) -> NDArray:
 def _drive_force(table: Table, passive: bool) -> float:
     """Return the force of a drive on a passive joint, 0 if not given."""
     if table.has("drive_force") and not passive:
-        fault = f"found one on a joint that is not passive; {FORCE_CONTROL}"
+        fault = f"found a force on a joint that is not passive; {FORCE_CONTROL}"
         raise table.bad("drive_force", fault)
     return table.number("drive_force", "N m or N", 0.0, largest=LARGEST)
 
 
 def _limits(table: Table) -> tuple[float, float] | None:
-    """Return least and largest coordinate of a command, None if not given."""
+    """Return the least and largest coordinate of a command; None if not given."""
     if not table.has("limits"):
         return None
     least, most = table.array("limits", (2,), "rad or m", largest=LARGEST_LENGTH)
     if not least < most:
-        message = f"found [{least:g}, {most:g}], expected the smaller one first"
+        message = f"found [{least:g}, {most:g}], expected the smaller number first"
         raise table.bad("limits", message)
     return float(least), float(most)
 
 
 def _tolerance(table: Table) -> NDArray | None:
-    """Return standard deviations of the geometric error, None if not given."""
+    """Return the standard deviations of the geometric error; None if not given."""
     if not table.has("tolerance"):
         return None
     sigma = table.array("tolerance", (6,), "rad, m", largest=LARGEST_LENGTH)
     if sigma.min() < 0:
-        message = f"found {sigma.min():g} in it, expected 6 numbers >= 0 [rad, m]"
+        message = f"found the number {sigma.min():g}, expected 6 numbers >= 0 [rad, m]"
         raise table.bad("tolerance", message)
     return sigma
 
 
 def _placement(table: Table) -> tuple[NDArray, NDArray]:
-    """Return the translation and rotation vector, given as such or by ``dh``."""
+    """Return translation and rotation vector, from their keys or from ``dh``."""
     given = [key for key in ("translation", "rotation") if table.has(key)]
     if not table.has("dh"):
         return (
@@ -385,7 +387,7 @@ def _placement(table: Table) -> tuple[NDArray, NDArray]:
 
 
 def _closure(table: Table, names: list[str]) -> tuple[str, str]:
-    """Return one ``[[closure]]``."""
+    """Return the two frames of one ``[[closure]]`` table."""
     value = table.require("frames", "two frame names")
     table.finish()
     proper = isinstance(value, list) and all(isinstance(v, str) for v in value)
@@ -398,7 +400,7 @@ def _closure(table: Table, names: list[str]) -> tuple[str, str]:
 
 
 def _check_known(table: Table, key: str, name: str, names: list[str]) -> None:
-    """Reject a name that is not that of a frame."""
+    """Raise BadInput if a name is not the name of a frame."""
     if name == BASE:
         message = 'found "base"; expected a frame (add a fixed one whose parent is it)'
         raise table.bad(key, message)
@@ -409,7 +411,7 @@ def _check_known(table: Table, key: str, name: str, names: list[str]) -> None:
 
 
 def _check_meeting_frames(robot: Robot) -> None:
-    """Check that a frame where chains meet has no joint of its own."""
+    """Check that a frame at which chains meet has a rigid joint."""
     meeting = {"platform": [robot.platform]}
     for number, pair in enumerate(robot.closures, 1):
         meeting[f"closure[{number}].frames"] = list(pair)
@@ -427,16 +429,16 @@ def _check_meeting_frames(robot: Robot) -> None:
 
 
 def write_robot(robot: Robot, path: Path | str) -> None:
-    """Write a robot file that :func:`read_robot` reads back to the same robot.
+    """Write a robot file from which :func:`read_robot` reads the same robot.
 
     Args:
-        robot: to be written.
+        robot: the robot.
         path: path of the new file; relative paths of meshes and libraries are written
             relative to its folder.
 
     Raises:
-        BadInput: the file cannot be written, or one is there that this did not write:
-            it may hold comments.
+        BadInput: the file cannot be written, or a file exists that was not written by
+            this function and can contain comments.
     """
     check_writable(path, ROBOT)
     table = robot_table(robot, Path(path).parent)
@@ -457,7 +459,7 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
         folder: folder of the file to be written, to which paths are made relative.
 
     Returns:
-        Plain values; :func:`robot_of` reads them back to the same robot.
+        Plain values, from which :func:`robot_of` reads the same robot.
     """
     table = root_table(robot, folder)
     table["frame"] = [frame_table(frame, folder) for frame in robot.frames]
@@ -474,7 +476,7 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
 
 
 def _write_fit(clearance: dict[str, Any], robot: Robot, name: str) -> None:
-    """Replace the mean of a frame's fit by the fit."""
+    """Replace the mean clearance of a frame's fit by the fit."""
     end = robot.fitted_ends.get(name)
     del clearance["radial" if end is None else end.bound]
     clearance["fit"] = robot.fits[name]
@@ -510,7 +512,7 @@ def root_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
 
 
 def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
-    """Return the content of ``[[frame]]``, defaults left out.
+    """Return the content of ``[[frame]]`` without default values.
 
     Args:
         frame: frame of a robot.

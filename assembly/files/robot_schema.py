@@ -1,4 +1,4 @@
-"""What a robot file holds, for editors: the keys that its reader knows."""
+"""Schema of a robot file for editors: the keys that the reader accepts."""
 
 from forcefit.assembly.callouts.callout import HELD, LOCATIONS, ORIENTATIONS, SHAPES
 from forcefit.assembly.callouts.zone import DISTRIBUTIONS
@@ -168,7 +168,7 @@ _CONTACTS = record(
         width=number("width along y", "m"),
     ),
 )  # fmt: skip
-# of a universal joint one for each of its two bearings
+# a universal joint can have one value for each of its two bearings
 _OF_JOINT = record(**{
     f"{key}_": Either((one, Listed(one)))
     for key, one in (

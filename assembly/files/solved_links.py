@@ -1,7 +1,7 @@
 """Stiffness of links given by a mesh or a library, computed when a robot is loaded.
 
-Afterwards a robot holds all data of its links that solvers need; these open no file and
-run no finite elements.
+Afterwards the robot contains all data of its links that solvers need.  Solvers open no
+files and run no finite elements.
 """
 
 import hashlib
@@ -26,23 +26,23 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger("forcefit.links")
 _CACHE = logging.getLogger("forcefit.cache")
-# in this process links of one shape and material are solved once
+# links of equal shape and material are solved only once per process
 _SOLVED: dict[str, MeshSolution] = {}
 
 
 def solve_links(robot: Robot) -> Robot:
-    """Compute the stiffness of every link that a mesh or a library gives.
+    """Compute the stiffness of every link given by a mesh or a library.
 
     Args:
-        robot: robot as read, or made in Python.
+        robot: robot as read from a file, or created in Python.
 
     Returns:
-        The robot that solvers take; the same object if it has no such link.
+        The robot for use in solvers; the same object if it has no such link.
 
     Raises:
-        BadInput: a file cannot be read or is not usable, or an interface is not.
+        BadInput: a file cannot be read or is not usable, or an interface is invalid.
     """
-    # libraries first, so that they are refused before the finite elements
+    # libraries first, so that their errors are reported before the finite elements run
     frames = [
         frame
         for frame in sorted(robot.frames, key=lambda f: isinstance(f.link, MeshLink))
@@ -60,7 +60,7 @@ def solve_links(robot: Robot) -> Robot:
 
 
 def _note(done: int, total: int) -> None:
-    """Return the number of known links, for a progress display."""
+    """Report the number of known links to a progress display."""
     known = {"done": done, "total": total}
     _LOG.debug("%d of %d links", done, total, extra=known)
 
@@ -69,18 +69,18 @@ def solved_link(frame: Frame, accuracy: float = 0.005) -> Link:
     """Return the link of one frame, with the data of its mesh or its library.
 
     Args:
-        frame: one with a mesh or a library link.
-        accuracy: required of the finite elements, for every entry of K_E relative to
-            sqrt(K_ii K_jj).
+        frame: frame with a mesh or a library link.
+        accuracy: required accuracy of the finite elements: error of every entry of K_E
+            relative to sqrt(K_ii K_jj).
 
     Returns:
         The link.
 
     Raises:
-        BadInput: a file cannot be read or is not usable, an interface is not, ``up`` is
-            parallel to the link, or the distance of the interfaces is not that of the
-            two origins.
-        ValueError: the frame has another link.
+        BadInput: a file cannot be read or is not usable, an interface is invalid,
+            ``up`` is parallel to the link, or the distance of the interfaces differs
+            from the distance of the two origins.
+        ValueError: the frame has another kind of link.
     """
     link, place = frame.link, f"frame {quoted(frame.name)}.link"
     try:
@@ -96,7 +96,7 @@ def solved_link(frame: Frame, accuracy: float = 0.005) -> Link:
 
 
 def _from_library(link: LibraryLink) -> LibraryLink:
-    """Return the link with its entry's compliance."""
+    """Return the link with the compliance of its library entry."""
     from forcefit.stiffness.report.library import read_compliance
 
     C = read_compliance(link.library, link.key)
@@ -138,7 +138,7 @@ def _solve(
     ends = parse_interface(link.base, "base"), parse_interface(link.tip, "tip")
     base = interface_center(surface, ends[0], "base")
     tip = interface_center(surface, ends[1], "tip")
-    _check_place(frame, link, tip - base)  # before the finite elements
+    _check_place(frame, link, tip - base)  # check before the finite elements run
     material = Material(link.young, link.poisson, link.density or 0.0)
     parts = [parse_part("parts", text) for text in link.parts]
     _LOG.info("finite elements of frame %s, %s", quoted(frame.name), link.surface)
@@ -163,7 +163,7 @@ def _digest(path: Path) -> str:
 
 
 def _check_place(frame: Frame, link: MeshLink, mesh_span: NDArray) -> None:
-    """Reject interfaces whose distance differs from that of their origins."""
+    """Raise BadInput if the distance of the interfaces differs from the origins'."""
     try:
         section_axes(mesh_span, link.up)
     except BadInput as error:
@@ -172,13 +172,13 @@ def _check_place(frame: Frame, link: MeshLink, mesh_span: NDArray) -> None:
     most = 1e-6 + 1e-3 * float(np.linalg.norm(wanted))
     if link.axis is None and np.linalg.norm(tip - wanted) > most:
         raise BadInput(
-            f"the centre of the mesh's tip interface lies at {_point(tip)} from "
-            f"that of its base, but the frame's origin lies at {_point(wanted)} "
-            "from its parent's; expected the same point within 1e-6 m + 0.1 % "
-            "of the length"
+            f"the centre of the mesh's tip interface is at {_point(tip)} relative to "
+            f"the base interface, but the frame's origin is at {_point(wanted)} "
+            "relative to the parent's origin; expected equal positions within 1e-6 m "
+            "+ 0.1 % of the length"
         )
 
 
 def _point(p: NDArray) -> str:
-    """Return the coordinates for a message."""
+    """Return the text of a point for a message."""
     return "(" + ", ".join(f"{x:.6g}" for x in p) + ") m"

@@ -70,14 +70,14 @@ def read_steps(path: Path | str, robot: Robot) -> Plan:
         The plan.
 
     Raises:
-        BadInput: the file breaks a rule, or does not fit the robot.
+        BadInput: the file violates a rule, or does not fit the robot.
     """
     root = read_toml(path)
     tables = root.tables("step")
     root.finish()
     if not 0 < len(tables) <= _MOST_STEPS:
         fault = f"found {len(tables)}" if tables else "missing"
-        raise root.bad("step", f"{fault}; expected 1 to {_MOST_STEPS} [[step]]")
+        raise root.bad("step", f"{fault}; expected 1 to {_MOST_STEPS} tables [[step]]")
     plan = Plan(_named([_step(table, robot) for table in tables], tables))
     try:
         check_plan(plan, robot)
@@ -87,7 +87,7 @@ def read_steps(path: Path | str, robot: Robot) -> Plan:
 
 
 def _named(steps: list[Step], tables: list[Table]) -> tuple[Step, ...]:
-    """Return the steps; names that are not given are numbered where they repeat."""
+    """Return the steps; default names that repeat are numbered."""
     count: dict[str, int] = {}
     named = []
     for step, table in zip(steps, tables, strict=True):
@@ -99,7 +99,7 @@ def _named(steps: list[Step], tables: list[Table]) -> tuple[Step, ...]:
 
 
 def _step(table: Table, robot: Robot) -> Step:
-    """Return one ``[[step]]``."""
+    """Return the step of one ``[[step]]`` table."""
     given = [kind for kind in KINDS if table.has(kind)]
     if len(given) != 1:
         found = f"found {' and '.join(given)}" if given else "found none of its kinds"
@@ -112,14 +112,14 @@ def _step(table: Table, robot: Robot) -> Step:
 
 
 def _name(table: Table, kind: str) -> str:
-    """Return the name of a step; by default its kind and what it acts on."""
+    """Return the name of a step; by default its kind and the parts it acts on."""
     value = table.content[kind]
     parts = value if isinstance(value, list) else [value]
     return table.text("name", f"{kind} {' - '.join(map(str, parts))}", longest=400)
 
 
 def _fix(table: Table, name: str, robot: Robot) -> Fix:
-    """Return a fixture; where nothing is given it holds the nominal position."""
+    """Return a fixture, by default at the nominal position."""
     position = _values(table, "at", "rad or m")
     if position is None:
         position = dict.fromkeys(SCREW, 0.0)
@@ -127,7 +127,7 @@ def _fix(table: Table, name: str, robot: Robot) -> Fix:
 
 
 def _clamp(table: Table, name: str, robot: Robot) -> Step:
-    """Return a clamp: where the frame lies, at a position, or with a force."""
+    """Return a clamp at the frame's current pose, at a position, or with a force."""
     frame = _frame(table, "clamp", robot)
     if not table.has("load"):
         position = _values(table, "at", "rad or m")
@@ -145,13 +145,13 @@ def _held(table: Table, fix: Fix) -> Fix:
             fault = f"found {value:g}, expected a number > 0, at most {LARGEST:g}"
             raise table.bad(f"stiffness.{component.lower()}", fault)
         if fix.position is not None and component not in fix.position:
-            fault = 'found a component that "at" leaves free, expected one it holds'
+            fault = 'found a component that "at" leaves free, expected a fixed one'
             raise table.bad(f"stiffness.{component.lower()}", fault)
     return replace(fix, stiffness=stiffness)
 
 
 def _join(table: Table, name: str, robot: Robot) -> Join:
-    """Return a closure that is closed, or a joint that is bolted."""
+    """Return a step that closes a closure or bolts a joint."""
     part = _part(table, "join", robot)
     locked: tuple[str, ...] = ()
     if isinstance(table.content.get("locked"), bool):
@@ -164,7 +164,7 @@ def _join(table: Table, name: str, robot: Robot) -> Join:
     leave_open = table.boolean("leave_open", False)
     if isinstance(part, str) and (locked or limit < inf or leave_open):
         key = "locked" if locked else "force_limit" if limit < inf else "leave_open"
-        fault = "found with a joint, which is bolted as it lies; expected a closure"
+        fault = "found for a joint, which is bolted in its position; expected a closure"
         raise table.bad(key, fault)
     if leave_open and limit == inf:
         raise table.bad("leave_open", 'found without "force_limit", expected both')
@@ -172,12 +172,12 @@ def _join(table: Table, name: str, robot: Robot) -> Join:
 
 
 def _preload(table: Table, name: str, robot: Robot) -> Preload:
-    """Return a load that stays until it is released."""
+    """Return a load that acts until it is released."""
     return Preload(name, _frame(table, "preload", robot), _wrench(table))
 
 
 def _release(table: Table, name: str, robot: Robot) -> Release:
-    """Return the steps whose holds end."""
+    """Return a step that ends fixtures, clamps or loads of earlier steps."""
     value = table.require("release", "the name of an earlier step, or a list of them")
     names = value if isinstance(value, list) else [value]
     if not names or not all(isinstance(n, str) for n in names):
@@ -187,13 +187,13 @@ def _release(table: Table, name: str, robot: Robot) -> Release:
 
 
 def _measure(table: Table, name: str, robot: Robot) -> Measure:
-    """Return a reading."""
+    """Return a measurement step."""
     part = _part(table, "measure", robot)
     return Measure(name, part, _names(table, "components", SCREW))
 
 
 def _adjust(table: Table, name: str, robot: Robot) -> Adjust:
-    """Return an adjustment, and the reading that it makes least."""
+    """Return an adjustment, with the reading that it minimises."""
     components = _names(table, "components")
     reading = _part(table, "reading", robot)
     of: tuple[str, ...] = SCREW
@@ -253,7 +253,7 @@ def _part(table: Table, key: str, robot: Robot) -> tuple[str, str] | str:
 def _names(
     table: Table, key: str, default: tuple[str, ...] | None = None
 ) -> tuple[str, ...]:
-    """Return components of a screw."""
+    """Return the names of components of a screw."""
     if default is not None and not table.has(key):
         return default
     expected = f"a list of {', '.join(_COMPONENTS)}"
@@ -265,7 +265,7 @@ def _names(
 
 
 def _values(table: Table, key: str, unit: str) -> dict[str, float] | None:
-    """Return numbers by component of a screw; None if absent."""
+    """Return numbers by component of a screw; None if the key is absent."""
     if not table.has(key):
         return None
     inner, values = table.table(key), {}
@@ -285,7 +285,7 @@ def _wrench(table: Table) -> np.ndarray:
     """Return the (6,) [N m, N] wrench of ``load``."""
     inner = table.table("load") if table.has("load") else None
     if inner is None:
-        raise table.bad("load", "missing; expected such as { fz = -50 }")
+        raise table.bad("load", "missing; expected a table such as { fz = -50 }")
     values = [inner.number(name, "N m or N", 0.0, largest=LARGEST) for name in _LOADS]
     inner.finish()
     if not any(values):

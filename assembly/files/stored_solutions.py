@@ -1,7 +1,7 @@
-"""Solutions of mesh links on disk: finite elements of the same link run once.
+"""Stored solutions of mesh links: finite elements of the same link run only once.
 
-A solution is identified by a digest of everything on which its numbers depend.  Files
-are written completely or not at all; an unusable one counts as absent.
+A solution is identified by a hash of all data on which its numbers depend.  Files are
+written completely or not at all.  An unusable file counts as absent.
 """
 
 import hashlib
@@ -31,23 +31,23 @@ from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import whole_file
 
 _CACHE = logging.getLogger("forcefit.cache")
-# libraries that read surfaces, mesh and solve: another version may round differently
+# libraries that read surfaces, mesh and solve: other versions can round differently
 _LIBRARIES = ("numpy", "scipy", "pytetwild", "pypardiso", "mkl", "pyvista", "vtk",
               "gmsh", "meshio")  # fmt: skip
-_UNUSED = 90 * 86_400  # [s] without use, after which a solution is removed
+_UNUSED = 90 * 86_400  # [s] time without use after which a solution is deleted
 
 
 def solution_key(link: MeshLink, digest: str, options: object) -> str:
-    """Return the name of the solution of a link.
+    """Return the key under which the solution of a link is stored.
 
     Args:
-        link: to be solved.  The path of its surface and the orientation of its mesh are
-            left out, because a solution is in the mesh's axes.
+        link: link to be solved.  The path of its surface and the orientation of its
+            mesh are ignored, because a solution is expressed in the mesh's axes.
         digest: SHA-256 of the surface file.
         options: :class:`forcefit.stiffness.fem.fea.FemOptions` of the solution.
 
     Returns:
-        A digest of the link, the options and the program; links with the same key have
+        A hash of the link, the options and the program; links with the same key have
         equal solutions.
     """
     from forcefit.stiffness.surface.surface_files import named_solid
@@ -68,12 +68,12 @@ def _program() -> str:
 
 
 def stored_solution(key: str, solve: Callable[[], MeshSolution]) -> MeshSolution:
-    """Return the solution of a key: from the disk, or solved and stored.
+    """Return the solution of a key: read from the disk, or solved and stored.
 
     Args:
         key: result of :func:`solution_key`.
-        solve: function called if no solution is stored; other processes that need this
-            key wait until it is done.
+        solve: function called if no solution is stored; other processes that need the
+            same key wait until it returns.
 
     Returns:
         The solution, bit-identical in both cases.
@@ -87,7 +87,7 @@ def stored_solution(key: str, solve: Callable[[], MeshSolution]) -> MeshSolution
         _CACHE.info("finite elements of a link: stored in %s", path)
     else:
         with _one_process(path.with_suffix(".solving")):
-            found = _read(path, key)  # another process may have been faster
+            found = _read(path, key)  # another process may have stored it meanwhile
             if found is None:
                 found = solve()
                 _write(path, key, found)
@@ -96,7 +96,7 @@ def stored_solution(key: str, solve: Callable[[], MeshSolution]) -> MeshSolution
 
 @contextmanager
 def _one_process(mark: Path) -> Generator[None, None, None]:
-    """Admit one process at a time; all if the disk is full or has no locks."""
+    """Admit one process at a time; all processes if the disk does not support locks."""
     with ExitStack() as stack:
         with suppress(OSError):
             stack.enter_context(locked_file(mark))
@@ -108,14 +108,14 @@ def _one_process(mark: Path) -> Generator[None, None, None]:
 
 
 def _read(path: Path, key: str) -> MeshSolution | None:
-    """Return a stored solution; None if it is absent or of another kind."""
+    """Return a stored solution; None if it is absent or invalid."""
     try:
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as stored:
             content = json.loads(str(stored["content"]))
             if content["key"] != key:
                 return None
             solution = _decoded(content["solution"], stored)
-    except Exception:  # NumPy, zipfile and json raise a dozen kinds of it
+    except Exception:  # NumPy, zipfile and json raise many kinds of exceptions
         return None
     if not isinstance(solution, MeshSolution):
         return None
@@ -125,7 +125,7 @@ def _read(path: Path, key: str) -> MeshSolution | None:
 
 
 def _write(path: Path, key: str, solution: MeshSolution) -> None:
-    """Write a solution completely or not at all; a full disk is no error."""
+    """Write a solution completely or not at all; ignore errors such as a full disk."""
     arrays: list[NDArray] = []
     content = json.dumps({"key": key, "solution": _encoded(solution, arrays)})
     named: dict[str, Any] = {str(k): array for k, array in enumerate(arrays)}
@@ -138,14 +138,14 @@ def _write(path: Path, key: str, solution: MeshSolution) -> None:
 
 
 def _remove_unused(folder: Path) -> None:
-    """Remove solutions without recent use, such as those of older programs."""
+    """Delete solutions that were not used recently, such as those of older programs."""
     for path in folder.glob("link-*.npz"):
         if time.time() - path.stat().st_mtime > _UNUSED:
             path.unlink()
 
 
 def _encoded(value: Any, arrays: list[NDArray]) -> Any:
-    """Return a value in terms of JSON; arrays are appended to a list and numbered."""
+    """Return a JSON-serializable value; arrays become indices into ``arrays``."""
     if isinstance(value, np.ndarray):
         arrays.append(value)
         return {"array": str(len(arrays) - 1)}
@@ -166,7 +166,7 @@ def _encoded(value: Any, arrays: list[NDArray]) -> Any:
 
 
 def _decoded(value: Any, arrays: Mapping[str, NDArray]) -> Any:
-    """Return the value of :func:`_encoded`."""
+    """Return the value that was encoded by :func:`_encoded`."""
     if isinstance(value, list):
         return [_decoded(v, arrays) for v in value]
     if not isinstance(value, dict):
@@ -183,7 +183,7 @@ def _decoded(value: Any, arrays: Mapping[str, NDArray]) -> Any:
 
 @cache
 def _kinds() -> dict[str, Any]:
-    """Return the classes of which a solution consists."""
+    """Return the classes of the objects in a solution, by name."""
     from forcefit.stiffness.fem.adaptive_step import Level
     from forcefit.stiffness.fem.condensation import Condensed
     from forcefit.stiffness.fem.elements import Elements

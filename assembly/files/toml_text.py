@@ -1,4 +1,4 @@
-"""Values and tables as TOML: numbers with all digits, arrays and tables inline."""
+"""Text of values and tables in TOML: all digits of numbers, arrays on one line."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -15,12 +15,12 @@ def file_text(
     """Return the text of a robot file.
 
     Args:
-        values: of the root table.
-        tables: by kind, each written as ``[[kind]]``.
-        diagnosis: written as ``[diagnosis]`` before them.
+        values: values of the root table.
+        tables: tables by kind, each written as ``[[kind]]``.
+        diagnosis: values of the table ``[diagnosis]``, written before the other tables.
 
     Returns:
-        Lines, the first of which marks files that may be overwritten.
+        The text; its first line marks files that can be overwritten.
     """
     lines = [ROBOT_MARK, *_lines(values)]
     if diagnosis:
@@ -32,13 +32,13 @@ def file_text(
 
 
 def _lines(table: Mapping[str, Any]) -> list[str]:
-    """Return a line for each key."""
+    """Return one line of text per key."""
     return [f"{key} = {toml_value(value)}" for key, value in table.items()]
 
 
 def toml_value(value: Any) -> str:
-    """Return a value in TOML."""
-    # tomli-w writes every number of an array on its own line
+    """Return the text of a value in TOML."""
+    # tomli-w writes every number of an array on a separate line
     if isinstance(value, bool | np.bool_):
         return str(value).lower()
     if isinstance(value, str):
@@ -52,11 +52,11 @@ def toml_value(value: Any) -> str:
 
 
 def _key(name: str) -> str:
-    """Return a key, in quotes if it would otherwise be read differently."""
+    """Return the text of a key, in quotes if necessary."""
     bare = name and all(c.isascii() and (c.isalnum() or c in "-_") for c in name)
     return name if bare else toml_value(name)
 
 
 def _escaped(c: str) -> str:
-    """Return a character as written in double quotes."""
+    """Return a character as it is written in double quotes."""
     return f"\\u{ord(c):04x}" if c < " " or c in '"\\\x7f' else c

@@ -6,7 +6,7 @@ from typing import Any
 
 from forcefit.inputs.table import BadInput, Table, describe
 
-UNITS = {  # of each dimension, in m or rad
+UNITS = {  # factors of the units of each dimension, in m or rad
     "length": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
     "angle": {"rad": 1.0, "mrad": 1e-3, "deg": 0.017453292519943295},
 }
@@ -18,19 +18,20 @@ def without_units(table: Table, key: str, dimension: str | Sequence[str]) -> Non
     """Replace texts such as ``"200 mm"`` in a value by numbers in m or rad.
 
     Args:
-        table: where the value is; its content is changed.
-        key: of the value, which may be absent, a number, a text, or lists of them.
-        dimension: ``"length"`` or ``"angle"``; or one for each entry of a list.
+        table: table of the value; its content is changed.
+        key: key of the value, which can be absent, a number, a text, or lists of these.
+        dimension: ``"length"`` or ``"angle"``; or one dimension for each entry of a
+            list.
 
     Raises:
-        BadInput: a text is no number with a unit of that dimension.
+        BadInput: a text is not a number with a unit of that dimension.
     """
     if key in table.content:
         table.content[key] = _plain(table, key, table.content[key], dimension)
 
 
 def _plain(table: Table, key: str, value: Any, dimension: str | Sequence[str]) -> Any:
-    """The value with numbers in place of texts."""
+    """Return the value with texts replaced by numbers."""
     if isinstance(value, list):
         if isinstance(dimension, str) or len(dimension) != len(value):
             dimension = [dimension if isinstance(dimension, str) else "length"] * len(
@@ -44,7 +45,7 @@ def _plain(table: Table, key: str, value: Any, dimension: str | Sequence[str]) -
 
 
 def _number(table: Table, key: str, text: str, dimension: str) -> float:
-    """The number that a text states."""
+    """Return the number that a text states, in m or rad."""
     match = _TEXT.fullmatch(text)
     factor = UNITS[dimension].get(match.group(2)) if match else None
     if match is None or factor is None:
@@ -53,7 +54,7 @@ def _number(table: Table, key: str, text: str, dimension: str) -> float:
 
 
 def _wrong(table: Table, key: str, text: str, dimension: str) -> BadInput:
-    """The error for a text that is none."""
+    """Return the error for a text that is not a number with a unit."""
     units = " ".join(UNITS[dimension])
     example = '"200 mm"' if dimension == "length" else '"30 deg"'
     fault = f"found {describe(text)}, expected a number, or a text with a unit"

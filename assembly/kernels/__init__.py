@@ -1,5 +1,5 @@
-"""Compiled C++ code, and the choice of its module.
+"""Compiled C++ code, and the selection of the module for the processor.
 
-Begin with ``choice.py``; ``kernels.h`` lists the functions, ``records.h`` their
+Start with ``choice.py``.  ``kernels.h`` lists the functions and ``records.h`` their
 arguments.
 """

@@ -1,8 +1,9 @@
-"""Choice of the compiled module, at import: the best one for the processor.
+"""Selection of the compiled module for the processor, at import.
 
-On x86-64 there is a module for each level of instructions (x86-64 psABI).  All modules
-give the same numbers to the last bit.  ``FORCEFIT_MARCH`` names another level than the
-processor's highest.  Other processors have one module.
+On x86-64 there is one module for each level of instructions (x86-64 psABI).  The
+results of all modules are bit-identical.  The variable ``FORCEFIT_MARCH`` selects
+another level than the processor's highest.  There is one module for all other
+processors.
 """
 
 import os
@@ -19,7 +20,7 @@ _VARIABLE = "FORCEFIT_MARCH"
 
 
 def levels_here() -> list[str]:
-    """Return levels of this processor, the lowest first; none except on x86-64.
+    """Return the levels of this processor, the lowest first; none except on x86-64.
 
     Returns:
         Names in :data:`LEVELS`.
@@ -34,13 +35,13 @@ def levels_here() -> list[str]:
 
 
 def chosen() -> ModuleType:
-    """Return module for this processor, or for the level that ``FORCEFIT_MARCH`` names.
+    """Return the module for this processor, or for the level in ``FORCEFIT_MARCH``.
 
     Returns:
         The compiled functions.
 
     Raises:
-        BadInput: the variable names no level, or one that the processor lacks.
+        BadInput: ``FORCEFIT_MARCH`` is not a level, or not one of this processor.
         ImportError: the module is missing, or the processor lacks the lowest level.
     """
     wanted, here = os.environ.get(_VARIABLE), levels_here()
@@ -57,7 +58,7 @@ def chosen() -> ModuleType:
 
 
 def _on_x86_64() -> bool:
-    """Return whether the processor is an x86-64 one."""
+    """Return whether the processor is an x86-64 processor."""
     return platform.machine().lower() in {"x86_64", "amd64"}
 
 

@@ -1,4 +1,4 @@
-"""Postures: the nominal closures solved, and the maps of equations (13)-(15).
+"""Postures: solution of the nominal closures, and the maps of equations (13)-(15).
 
-Begin at ``posture.py``.
+Start with ``posture.py``.
 """

@@ -1,7 +1,8 @@
-"""Ball joints of three revolute frames, counted as a ball at every posture.
+"""Ball joints that are modelled as three revolute frames.
 
-Three axes at right angles at home lose a freedom where the middle one has turned by 90
-degrees.  A ball joint does not: its free motions are every turn about its centre.
+Three axes at right angles in the home pose lose a freedom where the middle joint has
+turned by 90 degrees.  A ball joint does not: it can turn about any axis through its
+centre.  The module therefore counts such frames as a ball joint at every posture.
 """
 
 from collections import Counter
@@ -14,20 +15,21 @@ from forcefit.assembly.kinematics.nominal import size_of
 from forcefit.assembly.model.robot import Robot
 from forcefit.stiffness.screws import rotation_matrix
 
-_SAME = 1e-9  # [lengths, cosine] error below which points, or right angles, are exact
+_SAME = 1e-9  # accepted error of common points [lengths] and right angles [cosine]
 
 
 @lru_cache(maxsize=64)
 def ball_joints(robot: Robot) -> tuple[tuple[int, int, int], ...]:
-    """Return rows of three revolute frames that make a ball joint.
+    """Return the indices of three revolute frames that form a ball joint.
 
     Args:
-        robot: any.
+        robot: any robot.
 
     Returns:
-        Rows of passive frames without springs, each the only child of the one before,
-        with axes through one point, adjacent ones at right angles, and without a
-        mass, a link, a closure or the platform on the bodies between them.
+        Index triples of passive frames without springs.  Each frame is the only child
+        of the previous frame.  Their axes pass through one point, and adjacent axes are
+        at right angles.  The bodies between them have no mass, link, closure or
+        platform.
     """
     children = Counter(f.parent for f in robot.frames)
     used = {robot.platform, *(name for pair in robot.closures for name in pair)}
@@ -56,21 +58,22 @@ def ball_joints(robot: Robot) -> tuple[tuple[int, int, int], ...]:
 
 
 def _turns(robot: Robot, i: int) -> bool:
-    """Whether a frame's joint is a free turn."""
+    """Return whether the joint of a frame turns freely, without a spring or drive."""
     frame = robot.frames[i]
     return frame.joint == "revolute" and frame.passive and not frame.compliant
 
 
 def with_balls(robot: Robot, T: NDArray, screws: NDArray) -> NDArray:
-    """Return motion screws in which ball joints turn about the base's axes.
+    """Replace the motion screws of ball joints by rotations about the base axes.
 
     Args:
         robot: robot of n frames.
         T: (n, 4, 4) frames seen from the base.
-        screws: (n, 6) of unit joint motions, read at the base's origin.
+        screws: (n, 6) screws of unit joint motions, at the base's origin.
 
     Returns:
-        (n, 6) the same spaces of motion; of balls at every posture of dimension 3.
+        (n, 6) screws that span the same motions, and three rotations for every ball
+        joint at every posture.
     """
     screws = screws.copy()
     for ball in ball_joints(robot):

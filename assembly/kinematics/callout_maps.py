@@ -1,11 +1,12 @@
-"""Callouts carried to the geometric errors delta l of the frames of a robot.
+"""Geometric errors delta l of the frames that tolerance callouts of drawings cause.
 
-A body's features deviate from its ideal shape by small screws.  A feature's screw is
-that within its zone plus that of the datum frame, which the datums A, B, C make in this
-order: A holds the components that its shape holds, B those that A leaves free, C the
-last ones.  A feature before its joint is the end of the body: its screw is delta l of
-the frame.  A feature after its joint is where the body begins: all frames that the
-joint's frame carries move relative to it, by minus the screw.
+The features of a body deviate from its ideal shape by small screws.  The screw of a
+feature is its screw within its tolerance zone plus the screw of the datum frame.  The
+datum frame is built from the datums A, B and C in this order: A fixes the components
+that its shape determines, B fixes components that A leaves free, and C the remaining
+ones.  A feature before its joint is the end of a body: its screw is delta l of the
+frame.  A feature after its joint is where the next body begins: all frames that the
+joint carries move relative to the feature by the negative screw.
 """
 
 from collections.abc import Mapping
@@ -36,27 +37,27 @@ from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, quoted
 from forcefit.stiffness.screws import screw_map, transform
 
-_RANK = 1e-9  # singular values below it are rounding
+_RANK = 1e-9  # singular values below this are rounding errors
 
-Side = tuple[str, bool]  # a frame, and whether on the body after its joint
+Side = tuple[str, bool]  # name of a frame, True for the body after its joint
 
 
 @dataclass(frozen=True, eq=False)
 class _Bodies:
-    """Rigid bodies of a robot at home, whose features are on sides of frames."""
+    """Rigid bodies of a robot in its home pose, with the frames of their features."""
 
     robot: Robot
-    before: NDArray  # (n, 4, 4) frames before their joints' motion, base axes
-    after: NDArray  # (n, 4, 4) likewise after it
-    groups: tuple[int, ...]  # body of what each frame carries; the base's is last
+    before: NDArray  # (n, 4, 4) frames before the motion of their joints, base axes
+    after: NDArray  # (n, 4, 4) frames after the motion of their joints, base axes
+    groups: tuple[int, ...]  # body that each frame's joint carries; the base is last
 
     def body(self, side: Side) -> int:
-        """Number of the body of a side."""
+        """Return the number of the body on a side of a frame."""
         row = self.robot.index(side[0])
         return self.groups[row if side[1] else self.robot.parents[row]]
 
     def pose(self, side: Side) -> NDArray:
-        """(4, 4) the frame at home, before or after its joint."""
+        """Return the (4, 4) frame at home, before or after its joint."""
         return (self.after if side[1] else self.before)[self.robot.index(side[0])]
 
 
@@ -83,7 +84,7 @@ def place_callouts(home: Posture) -> tuple[PlacedCallout, ...]:
         twice = next(
             c for k, c in enumerate(callouts) if sides[c.feature, c.after] != k
         )
-        fault = "found the feature twice, expected one [[tolerance]] with all"
+        fault = "found the feature twice, expected one [[tolerance]] per feature"
         raise BadInput(fault_of(twice, fault))
     datums = [_datum_sides(bodies, c, sides) for c in callouts]
     zones = [_zone(bodies, c, d[0], callouts, sides)
@@ -126,17 +127,17 @@ def _own_screw(zone: Zone, end: int, total: int) -> NDArray:
 
 
 def _check_names(names: list[str], callouts: tuple[Callout, ...]) -> None:
-    """Refuse two features that tables could not tell apart."""
+    """Raise BadInput if two features would have the same name in tables."""
     for k, name in enumerate(names):
         if name in names[:k]:
-            fault = f"found {quoted(name)} twice, expected another name of the feature"
+            fault = f"found {quoted(name)} twice, expected a different name per feature"
             raise BadInput(fault_of(callouts[k], fault))
 
 
 def _bodies(home: Posture) -> _Bodies:
-    """The bodies: frames that are fixed to each other, or meet in a closure."""
+    """Return the bodies: groups of frames that closures or fixed joints connect."""
     robot, n = home.robot, len(home.robot.frames)
-    group = list(range(n + 1))  # parent -1, the base, is the last
+    group = list(range(n + 1))  # the base, whose parent index is -1, is the last
 
     def root(i: int) -> int:
         while group[i] != i:
@@ -158,7 +159,7 @@ def _bodies(home: Posture) -> _Bodies:
 def _datum_sides(
     bodies: _Bodies, callout: Callout, sides: Mapping[Side, int]
 ) -> list[Side]:
-    """The datums, on the sides of their frames that are on the feature's body."""
+    """Return the datums as sides of frames on the feature's body."""
     body = bodies.body((callout.feature, callout.after))
     found = []
     for name in (datum.frame for datum in callout.datums):
@@ -171,7 +172,7 @@ def _datum_sides(
             fault = f"found the datum {quoted(name)}, which is the feature itself"
             fault += ", expected another feature of the body"
             raise BadInput(fault_of(callout, fault))
-        # of two sides of a rigid connection the one that has callouts
+        # of the two sides of a rigid connection, prefer the side that has callouts
         found.append(next((side for side in here if side in sides), here[0]))
     return found
 
@@ -179,7 +180,7 @@ def _datum_sides(
 def _order(
     callouts: tuple[Callout, ...], datums: list[list[Side]], sides: Mapping[Side, int]
 ) -> list[int]:
-    """Callouts, each after those of its datums."""
+    """Return the callouts in an order in which datums precede their features."""
     needs = {
         k: [sides[side] for side in datums[k] if side in sides]
         for k in range(len(callouts))
@@ -188,12 +189,12 @@ def _order(
         return list(TopologicalSorter(needs).static_order())
     except CycleError as error:
         names = " -> ".join(quoted(callouts[k].name) for k in error.args[1])
-        fault = f"found circular datums: {names}, expected an order"
+        fault = f"found datums that depend on each other: {names}; expected none"
         raise BadInput(fault_of(callouts[error.args[1][0]], fault)) from None
 
 
 def _feature_pose(bodies: _Bodies, callout: Callout) -> NDArray:
-    """(4, 4) the feature at home: its middle, z along its axis."""
+    """Return the (4, 4) feature at home: origin in its middle, z along its axis."""
     pose = bodies.pose((callout.feature, callout.after))
     return pose @ transform(np.array(callout.at), callout.axes)
 
@@ -202,7 +203,7 @@ def _datum_pose(
     bodies: _Bodies, datum: Datum, side: Side, callouts: tuple[Callout, ...],
     sides: Mapping[Side, int],
 ) -> NDArray:  # fmt: skip
-    """(4, 4) of a datum at home, in the axes of its own callouts if it has any."""
+    """Return the (4, 4) datum at home, in the axes of its own callouts if any."""
     if side in sides:
         return _feature_pose(bodies, callouts[sides[side]])
     return bodies.pose(side) @ transform(np.array(datum.at), axes_along(datum.axis))
@@ -212,7 +213,7 @@ def _zone(
     bodies: _Bodies, callout: Callout, datum: Side, callouts: tuple[Callout, ...],
     sides: Mapping[Side, int],
 ) -> Zone:  # fmt: skip
-    """The zone of a callout relative to its datum A."""
+    """Return the zone of a callout relative to its datum A."""
     pose = _feature_pose(bodies, callout)
     of_datum = _datum_pose(bodies, callout.datums[0], datum, callouts, sides)
     shape = callout.datums[0].shape
@@ -230,7 +231,7 @@ def _zone(
 
 
 def _to_feature(pose: NDArray) -> NDArray:
-    """(6, 6) a screw at the base's origin, base axes, at a pose and in its axes."""
+    """Return the (6, 6) map of screws from the base's origin to a pose and its axes."""
     R = pose[:3, :3]
     return screw_map(-R.T @ pose[:3, 3], R.T)
 
@@ -240,7 +241,7 @@ def _datum_frame(
     callouts: tuple[Callout, ...], sides: Mapping[Side, int], screws: NDArray,
     shifts: Mapping[int, NDArray],
 ) -> NDArray:  # fmt: skip
-    """(6, M) screw of the datum frame at the base's origin for unit coordinates."""
+    """Return the (6, M) screw of the datum frame per unit coordinate, base's origin."""
     D, free = np.zeros(screws.shape[1:]), np.eye(6)
     for j, (datum, side) in enumerate(zip(callout.datums, datums, strict=True)):
         pose = _datum_pose(bodies, datum, side, callouts, sides)
@@ -248,7 +249,7 @@ def _datum_frame(
         if j in shifts:
             own = own + shifts[j]
         to_datum = _to_feature(pose)
-        # lengths over the distance from the feature, so that rad and m weigh alike
+        # divide lengths by the distance from the feature: rad and m have equal weights
         gap = pose[:3, 3] - _feature_pose(bodies, callout)[:3, 3]
         scale = np.repeat([1.0, 1.0 / max(float(np.linalg.norm(gap)), 1e-3)], 3)[
             :, None
@@ -269,7 +270,7 @@ def _datum_frame(
 def _add_errors(
     errors: NDArray, bodies: _Bodies, callout: Callout, screw: NDArray
 ) -> None:
-    """Add the errors delta l of a feature's screw (6, M) in its axes."""
+    """Add the errors delta l that a feature's screw (6, M), in its axes, causes."""
     robot, row = bodies.robot, bodies.robot.index(callout.feature)
     pose = _feature_pose(bodies, callout)
     if not callout.after:
@@ -284,5 +285,5 @@ def _add_errors(
 
 
 def _carried(old: NDArray, new: NDArray) -> NDArray:
-    """(6, 6) a screw read at one pose, in its axes, at another pose."""
+    """Return the (6, 6) map of screws from one pose to another, in the poses' axes."""
     return _to_feature(new) @ np.linalg.inv(_to_feature(old))

@@ -1,9 +1,9 @@
-"""Robots whose nominal closures do not hold: the mismatch becomes an error.
+"""Robots whose nominal closures do not hold: the mismatch becomes a geometric error.
 
-Published dimensions are rounded, and so are the coordinates of redundant drives.  A
-frame's body, or the elastic drives, then take up the mismatch of the closures.  The
-nominal geometry of the returned robot closes; with its geometric errors it is the robot
-that was given.
+Published dimensions are rounded, and so are the coordinates of redundant drives.  The
+body of a frame, or the elastic drives, therefore take up the mismatch of the closures.
+The nominal geometry of the returned robot closes.  Together with its geometric errors,
+the returned robot equals the given robot.
 """
 
 from collections.abc import Callable, Mapping
@@ -40,8 +40,9 @@ def closing_of(
         rest: name of a frame, see :func:`rest_in`.
         mismatch: ``"spring"``, see :func:`preloaded`.
         joints: coordinates of drives for ``mismatch``.
-        own_errors: whether the robot keeps its errors; otherwise it has only those of
-            its closures, as if drawn errors replace its own.
+        own_errors: whether the robot keeps its geometric errors.  If not, the robot has
+            only the errors due to its closures, because drawn errors replace the
+            others.
 
     Returns:
         A function of the robot as declared; None if neither is given.
@@ -68,17 +69,18 @@ def rest_in(robot: Robot, name: str) -> Robot:
     """Return the robot with its closure's mismatch as a geometric error of a frame.
 
     Args:
-        robot: its passive joints are moved as near to closing as possible, with drives
-            at their ``position``.
+        robot: any robot.  Its drives are at their ``position``, and its passive joints
+            are moved as near to closing as possible.
         name: name of a frame, or of a joint of several frames, in the loop that does
             not close; of a universal joint the first bearing takes the mismatch.
 
     Returns:
-        The robot whose nominal geometry closes; with its errors it is the one given.
+        A robot whose nominal geometry closes.  With its geometric errors, it equals the
+        given robot.
 
     Raises:
-        BadInput: no such frame, no loop through it is open, or the mismatch is no small
-            motion.
+        BadInput: there is no such frame, no loop through it is open, or the mismatch is
+            not a small motion.
     """
     if name not in (names := names_of(robot)):
         raise BadInput(f'--rest: no frame "{name[:60]}"{nearest(name, names)}')
@@ -127,20 +129,21 @@ def _corrected(robot: Robot, row: int, X: NDArray) -> Robot:
 
 
 def preloaded(robot: Robot, joints: Mapping[str, float] | None = None) -> Robot:
-    """Return a robot with drive coordinates that do not close, its drives preloaded.
+    """Return a robot with preloaded drives, because their coordinates do not close.
 
     Args:
         robot: robot with redundant drives that are elastic.
-        joints: coordinates [rad or m] of drives by frame; others keep their
+        joints: coordinates [rad or m] of drives by frame; other drives keep their
             ``position``.
 
     Returns:
-        The robot whose home pose is the nearest that closes.  The error of each drive
-        is the difference to its requested coordinate, which its spring takes up.
+        A robot whose home pose is the nearest pose that closes.  The error of each
+        drive is the difference from its requested coordinate; the drive's spring takes
+        up this difference.
 
     Raises:
-        BadInput: an unknown drive; no closing coordinates nearby; a drive with a
-            difference is rigid.
+        BadInput: a drive is unknown; there are no closing coordinates nearby; or a
+            drive with a difference is rigid.
     """
     target = joint_target(robot, joints or {})
     assert target.coordinates is not None
@@ -169,7 +172,7 @@ def preloaded(robot: Robot, joints: Mapping[str, float] | None = None) -> Robot:
         if abs(value) > _OPEN and (own is None or np.isinf(own)):
             raise BadInput(
                 f"--mismatch spring: drive {frame.name}: found a rigid drive "
-                f"whose coordinate is {value:.3g} rad or m off; expected a "
+                f"whose coordinate must change by {value:.3g} rad or m; expected a "
                 "joint_stiffness about its own axis"
             )
         frames.append(replace(frame, geometric_error=error))
@@ -183,7 +186,7 @@ def preloaded(robot: Robot, joints: Mapping[str, float] | None = None) -> Robot:
 
 
 def _positioned(robot: Robot, q: NDArray) -> Robot:
-    """Return the robot with other coordinates at home."""
+    """Return the robot with the coordinates q in its home pose."""
     moves = mobile(robot)
     frames = tuple(
         replace(frame, position=float(value)) if moving else frame
@@ -193,12 +196,12 @@ def _positioned(robot: Robot, q: NDArray) -> Robot:
 
 
 def _independent(robot: Robot, T: NDArray) -> NDArray:
-    """Return (n,) bool: drives that together hold the robot, the first in its file."""
+    """Return (n,) bool, True for the first drives in the file that fix the robot."""
     A = closure_matrices(robot, T)[0][0]
     driven = np.array([f.actuated for f in robot.frames])[mobile(robot)]
     loose = ~driven
     for column in np.flatnonzero(driven)[::-1]:
-        # a drive may be free if the others hold it through the closures
+        # a drive can be free if the other drives fix it through the closures
         others = np.append(np.flatnonzero(loose), column)
         if _rank(A[:, others]) > _rank(A[:, loose]):
             loose[column] = True

@@ -1,4 +1,4 @@
-"""Closures at first order: rates of the joints, with drives free or locked."""
+"""Closures at first order in the joint rates, with drives free or locked."""
 
 from functools import lru_cache
 
@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from forcefit.assembly.kinematics.nominal import mobile, motion_screws, size_of
 from forcefit.assembly.model.robot import Robot
 
-# relative size below which a singular value of closures counts as zero: closures hold
-# to 1e-10, and near a singularity a posture is known only to a root of that
+# relative size below which a singular value of the closures counts as zero: closures
+# hold to 1e-10, and the error of a posture near a singularity is the square root of it
 SINGULAR = 1e-6
-_NOISE = 30.0  # noise of singular values over the closure error
+_NOISE = 30.0  # assumed noise of the singular values divided by the closure error
 
 
 @lru_cache(maxsize=64)
@@ -26,16 +26,16 @@ def closure_signs(robot: Robot) -> NDArray:
 
 
 def closure_matrices(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Return velocities of closures, drives and platform for unit joint rates.
+    """Return the velocities of closures, drives and platform for unit joint rates.
 
     Args:
-        robot: robot of n frames, m of them mobile, a driven, with c closures.
+        robot: robot of n frames with m mobile joints, a drives and c closures.
         T: (k, n, 4, 4) frames seen from the base.
 
     Returns:
-        (k, 6 c, m) of the closures, (k, m, a + 6) of the drives and the platform,
-        (k, m, 6) of the platform; lengths in reference lengths, read at the platform's
-        origin in base axes.
+        (k, 6 c, m) velocities of the closures; (k, m, a + 6) velocities of the drives
+        and the platform; (k, m, 6) velocities of the platform.  Lengths are in
+        reference lengths, at the platform's origin in base axes.
     """
     size = size_of(robot)
     i = robot.index(robot.platform)
@@ -55,14 +55,14 @@ def closure_matrices(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray, NDArra
 
 
 def locked_closures(robot: Robot, T: NDArray) -> NDArray:
-    """Return velocities of closures for unit rates of the passive joints.
+    """Return the velocities of closures for unit rates of the passive joints.
 
     Args:
-        robot: robot of n frames, p of them passive joints, with c closures.
+        robot: robot of n frames with p passive joints and c closures.
         T: (k, n, 4, 4) frames seen from the base.
 
     Returns:
-        (k, 6 c, p), scaled and read as :func:`closure_matrices`.
+        (k, 6 c, p) velocities in the units and axes of :func:`closure_matrices`.
     """
     passive = np.array([not f.actuated for f in robot.frames])[mobile(robot)]
     return closure_matrices(robot, T)[0][:, :, passive]
@@ -75,16 +75,16 @@ def locked_ranks(robot: Robot, T: NDArray) -> NDArray:
 
 
 def redundant_drives(robot: Robot, T: NDArray, left_open: float = 0.0) -> int:
-    """Return the number of drives that the robot could lose and still be held.
+    """Return the number of drives that are not needed to fix the robot.
 
     Args:
         robot: robot of n frames.
         T: (n, 4, 4) frames seen from the base.
-        left_open: [rad, m] closure error there: singular values of its size count as
-            zero.
+        left_open: [rad, m] closure error at this posture: singular values of this size
+            count as zero.
 
     Returns:
-        Their number: the rank of all closures minus that with the drives locked.
+        The rank of all closures minus the rank with the drives locked.
     """
     least = max(SINGULAR, _NOISE * left_open)
     ranks = []

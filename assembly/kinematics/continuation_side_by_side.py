@@ -1,7 +1,7 @@
 """Continuation to several targets in parallel, compiled.
 
-Each lane of the processor's vector registers takes one target; no lane depends on
-another.
+Each lane of the processor's vector registers follows one target.  Lanes do not depend
+on each other.
 """
 
 from typing import Any
@@ -14,16 +14,16 @@ from forcefit.assembly.kinematics.track import Track
 
 
 def tree_of(fields: dict[str, Any]) -> Any:
-    """Return a robot's tree for C++.
+    """Return the kinematic tree of a robot as a C++ object.
 
     Args:
         fields: arrays and numbers of ``Tree`` in ``assembly/kernels/records.h``.
 
     Returns:
-        The tree, checked.
+        The tree, whose arrays have been checked.
 
     Raises:
-        ValueError: an array has another shape, type or order of its numbers.
+        ValueError: the shape, type or memory order of an array is wrong.
     """
     return kernels.Tree(**fields)
 
@@ -32,16 +32,17 @@ def follow_side_by_side(
     tree: Any, start: NDArray, poses: NDArray, held: NDArray, guess: bool,
     track: Track,
 ) -> None:  # fmt: skip
-    """Follow the robot to every target along its straight line.
+    """Follow the robot to every target along a straight line.
 
     Args:
         tree: tree of the robot.
         start: (n,) coordinates at home.
-        poses: (k, 6) ``[tx ty tz rx ry rz]``, NaN where free; no rows if not given.
-        held: (k, n) coordinates, NaN where free.
-        guess: whether the start is a guess that does not close: then one step of any
-            length.
-        track: to fill.
+        poses: (k, 6) ``[tx ty tz rx ry rz]``, NaN for free components; no rows if no
+            poses are given.
+        held: (k, n) coordinates, NaN for free coordinates.
+        guess: whether the start is a guess that does not close; then a single step of
+            any length is made.
+        track: track to fill.
     """
     out = (track.coordinates, track.progress, track.transforms, track.closure_mismatch)
     if len(held) == 1:
@@ -50,7 +51,7 @@ def follow_side_by_side(
     asked = np.isfinite(np.hstack([poses, held]) if len(poses) else held)
     left = np.arange(len(held))
     while left.size:
-        # targets of one call prescribe the same entries
+        # the targets of one call must prescribe the same components
         same = (asked[left] == asked[left[0]]).all(axis=1)
         rows, left = left[same], left[~same]
         whole = len(rows) == len(held)
@@ -66,5 +67,5 @@ def _follow(
     tree: Any, given: tuple[NDArray, NDArray, NDArray], guess: bool,
     out: tuple[NDArray, ...],
 ) -> None:  # fmt: skip
-    """Follow targets that prescribe the same entries of pose and coordinates."""
+    """Follow targets that prescribe the same components of pose and coordinates."""
     kernels.follow_all(tree, *map(np.ascontiguousarray, given), guess, *out)

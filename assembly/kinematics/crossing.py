@@ -1,9 +1,9 @@
-"""Postures beyond a singularity: every path from home crosses it.
+"""Postures beyond a singularity, which every path from the home pose crosses.
 
-With drives locked, the closures' matrix A (6 c, p) of the passive joints has rank r at
-almost all postures.  Between bases of its range and of its row space, carried along a
-path from home, it is a square matrix with a determinant.  A change of the determinant's
-sign shows that a singularity was crossed.
+With drives locked, the closure matrix A (6 c, p) of the passive joints has the rank r
+at almost all postures.  Expressed in bases of its range and its row space, which are
+carried along a path from home, A is a square matrix with a determinant.  A change of
+sign of this determinant shows that the path crossed a singularity.
 """
 
 from functools import lru_cache
@@ -17,23 +17,23 @@ from forcefit.assembly.kinematics.posture import Posture, home_posture, pose_com
 from forcefit.assembly.kinematics.singular_posture import rank_near
 from forcefit.assembly.model.robot import Robot
 
-_ALIKE = 0.3  # product of the cosines between two bases that one step may connect
+_ALIKE = 0.3  # least overlap of the bases at the start and end of a step
 _STEPS = (
     4,
     32,
-)  # steps of a path on which the bases rotate farther; more if the first do not suffice
+)  # numbers of steps of a path, tried in this order if the bases rotate too far
 
 
 def beyond_singularity(robot: Robot, target: Target, T: NDArray) -> NDArray:
-    """Return which postures lie beyond a singularity, seen from home.
+    """Return which postures are separated from home by a singularity.
 
     Args:
         robot: robot of n frames.
         target: k poses or joint coordinates that were reached from home.
-        T: (k, n, 4, 4) frames there.
+        T: (k, n, 4, 4) frames at these targets.
 
     Returns:
-        (k,) bool.  All False if home itself is singular.
+        (k,) bool.  All False if the home pose is singular.
     """
     home = home_posture(robot)
     start = locked_closures(robot, home.transforms[None])
@@ -61,11 +61,11 @@ def home_rank(robot: Robot) -> int:
 
 
 def _compared(A: NDArray, B: NDArray, rank: int) -> tuple[NDArray, NDArray]:
-    """Return signs of B (k, m, p) between the bases of A, and the bases' similarity.
+    """Return the signs of B (k, m, p) in the bases of A, and the overlap of the bases.
 
     Returns:
-        (k,) signs of the determinants; (k,) 1 where both bases span the same, 0 where
-        a direction is lost.
+        (k,) signs of the determinants; (k,) overlaps, 1 if the bases of A and B span
+        the same space, 0 if a direction of one is missing in the other.
     """
     U, _, Vt = np.linalg.svd(A)
     U, V = U[..., :rank], np.swapaxes(Vt[:, :rank], -1, -2)
@@ -91,7 +91,7 @@ def _along(
         if k < steps:
             track = follow(robot, home.coordinates, _part(home, target, k / steps))
             A = locked_closures(robot, track.transforms)
-            # a part of the path that cannot be reached alone is left out
+            # a point of the path that cannot be reached separately is omitted
             A = np.where(track.reached[:, None, None], A, before)
         sign, near = _compared(before, A, rank)
         signs, alike, before = signs * sign, np.minimum(alike, near), A

@@ -1,7 +1,8 @@
-"""Mobility and redundant constraints of the perfect robot: ranks of its closures.
+"""Mobility and redundant constraints of the perfect robot, from ranks of its closures.
 
-:func:`mobility` counts at one posture, :func:`platform_screws` returns the platform's
-free motions there, and :func:`mobility_near` counts again at postures close to it.
+:func:`mobility` counts freedoms at one posture.  :func:`platform_screws` returns the
+free motions of the platform there.  :func:`mobility_near` counts freedoms at postures
+close to it.
 """
 
 from collections import Counter
@@ -19,20 +20,20 @@ from forcefit.assembly.kinematics.ranks import MISMATCH_FACTOR, rank_of
 from forcefit.assembly.model.contact_closures import contact_closures
 from forcefit.results.display import html_table
 
-# relative size of singular values that count as zero: those of files rounded at 6
-# digits, and of singular postures, which closures to 1e-10 determine to its root
+# relative size below which singular values count as zero: rounding of files with 6
+# digits, and at singular postures the square root of the closure error 1e-10
 ZERO = 1e-5
 # [rad, lengths] least motion of the platform for unit joint rates
 _PLATFORM_RANK = 1e-6
-_ERROR = 10.0  # error of free motions, over the ratio of singular values
-_NOISE = 1e-14  # relative rounding of singular values
+_ERROR = 10.0  # assumed error of free motions times the ratio of singular values
+_NOISE = 1e-14  # relative rounding error of singular values
 _DISTANCE = 0.05  # [rad or lengths] distance of nearby postures
 _NEIGHBOURS = 16  # largest number of nearby postures
-_AGREEING = 3  # number of nearby postures whose agreement suffices
-_EXACT = 1e-12  # [rad, m] closure error of a posture that is closed but for rounding
-_LEAST = 1e-8  # relative size of singular values that count as zero there
+_AGREEING = 3  # number of nearby postures that must agree
+_EXACT = 1e-12  # [rad, m] closure error that is only rounding
+_LEAST = 1e-8  # relative size below which singular values count as zero at _EXACT
 _CLOSED = 1e-6  # [rad, m] largest closure error of a nearby posture
-_BACK = 0.1  # share of the distance: a posture nearer than this has returned
+_BACK = 0.1  # a posture nearer than this share of the distance counts as unmoved
 
 
 @dataclass(frozen=True)
@@ -41,24 +42,27 @@ class Mobility:
 
     Attributes:
         freedoms: number of joint motions that keep all closures, drives free.
-        platform_freedoms: number of independent motions of the platform among them;
-            the others are local motions of the legs with the platform at rest.
-        freedoms_drives_locked: as ``freedoms``, with the actuated joints locked.
-        platform_freedoms_drives_locked: as ``platform_freedoms``, likewise.
-        redundant_constraints: number of rows of all joints' constraints, actuated
-            joints locked, minus their rank: independent internal loads of the rigid
-            robot.
+        platform_freedoms: number of independent motions of the platform among them.
+            The others are local motions of the legs, during which the platform is at
+            rest.
+        freedoms_drives_locked: number of such joint motions, drives locked.
+        platform_freedoms_drives_locked: number of independent motions of the platform,
+            drives locked.
+        redundant_constraints: number of constraints of all joints with drives locked,
+            minus their rank: number of independent internal loads of the rigid robot.
         drives: number of actuated joints.
-        locked_freedoms: as ``freedoms_drives_locked``.
-        overconstraint: number of closure equations that the others imply, drives free.
-        smallest_singular_value: [-] least nonzero one of the constraint matrix,
-            lengths divided by the robot's size: near zero is near a singularity.
+        locked_freedoms: equal to ``freedoms_drives_locked``.
+        overconstraint: number of closure equations that depend on the others, drives
+            free.
+        smallest_singular_value: [-] least nonzero singular value of the constraint
+            matrix, with lengths divided by the robot's size.  A value near zero shows
+            that a singularity is near.
         local_freedoms: ``freedoms`` minus ``platform_freedoms``.
-        actuation_redundancy: number of drives that the others hold at their commands:
-            drives minus freedoms that they lock.
-        singular_value_gap: [-] least singular value that counts, over the largest that
-            does not, or over rounding; the lesser of drives free and locked.  Below
-            about 100 the counts are not certain.
+        actuation_redundancy: number of redundant drives: drives minus the freedoms that
+            the drives lock.
+        singular_value_gap: [-] ratio of the least singular value that counts to the
+            largest that does not, or to rounding errors; the smaller ratio of drives
+            free and locked.  Below about 100 the counts are uncertain.
     """
 
     freedoms: int
@@ -79,12 +83,12 @@ class Mobility:
 
 @dataclass(frozen=True)
 class NearMobility:
-    """Mobility at postures close to one.
+    """Mobility at postures close to a given posture.
 
     Attributes:
-        freedoms: the least number there; 0 where no motion leaves the posture, since
-            its freedoms are infinitesimal only.
-        there: the counts at a posture with that number, None where there is none.
+        freedoms: the least number of freedoms at these postures; 0 if no motion leaves
+            the given posture, because its freedoms are only infinitesimal.
+        there: the counts at a posture with that number; None if there is none.
     """
 
     freedoms: int
@@ -96,11 +100,12 @@ def mobility(posture: Posture, tolerance: float = ZERO) -> Mobility:
 
     Args:
         posture: the robot's configuration.
-        tolerance: relative size below which a singular value counts as zero; raised
-            to 30 times the nominal closure error, the rounding of the robot's file.
+        tolerance: relative size below which a singular value counts as zero.  It is
+            increased to 30 times the nominal closure error, which rounding of the robot
+            file causes.
 
     Returns:
-        The numbers.
+        The counts.
 
     Sources:
         Zlatanov, Bonev, Gosselin (2002), Constraint singularities of parallel
@@ -132,15 +137,15 @@ def mobility(posture: Posture, tolerance: float = ZERO) -> Mobility:
 
 
 def platform_screws(posture: Posture) -> tuple[NDArray, float]:
-    """Return independent motions of the platform, drives free.
+    """Return independent motions of the platform with the drives free.
 
     Args:
         posture: the robot's configuration.
 
     Returns:
-        (k, 6) [rad, m] k ``platform_freedoms``, read at the platform's origin in base
-        axes; orthonormal where lengths are divided by the robot's size.  And [rad,
-        lengths] their error.
+        (k, 6) [rad, m] screws of the k ``platform_freedoms``, at the platform's origin
+        in base axes; orthonormal if lengths are divided by the robot's size.  Also
+        [rad, lengths] the error of these screws.
     """
     A, P = _rates(posture)
     moves = mobile(posture.robot)
@@ -152,14 +157,14 @@ def platform_screws(posture: Posture) -> tuple[NDArray, float]:
 
 
 def mobility_near(posture: Posture, here: Mobility) -> NearMobility:
-    """Return the mobility at postures near one, where it may be less than there.
+    """Return the mobility at postures near one, which can be less than at that posture.
 
     Args:
         posture: the robot's configuration.
-        here: its mobility.
+        here: mobility at this posture.
 
     Returns:
-        The number of freedoms, and the counts at a nearby posture that has it.
+        The number of freedoms, and the counts at a nearby posture with that number.
     """
     robot, q = posture.robot, posture.coordinates
     if here.freedoms == 0 or _certainly_least(here):
@@ -184,30 +189,31 @@ def mobility_near(posture: Posture, here: Mobility) -> NearMobility:
         if _AGREEING in {returned, *agreeing.values()}:
             break
     if not found:
-        # where the correction did not converge, none is known to be less
+        # no correction converged, so no smaller number of freedoms is known
         return NearMobility(0 if returned == _AGREEING else here.freedoms, None)
     least = min(found, key=lambda m: (m.freedoms, m.freedoms_drives_locked))
     return NearMobility(min(least.freedoms, here.freedoms), least)
 
 
 def _certainly_least(here: Mobility) -> bool:
-    """Whether no posture has fewer freedoms: all closures independent, drives hold."""
+    """Return whether no posture has fewer freedoms, as all closures are independent."""
     return here.overconstraint == 0 and here.freedoms_drives_locked == 0
 
 
 def _tolerance(posture: Posture, least: float = ZERO) -> float:
-    """Relative size of singular values that count as zero, rounded files included."""
+    """Return the relative size of singular values that count as zero."""
     return max(least, MISMATCH_FACTOR * float(posture.mismatch))
 
 
 def _rates(posture: Posture) -> tuple[NDArray, NDArray]:
-    """Closures and platform for unit joint rates, lengths over the robot's size.
+    """Return velocities of closures and platform for unit joint rates.
 
-    The unit rate of a prismatic joint is one size: counts do not depend on the size.
+    Lengths are divided by the robot's size.  The unit rate of a prismatic joint is one
+    size, so the counts do not depend on the size.
 
     Returns:
-        (6 closures, n) at the base's origin, without those of contacts; (6, n) at the
-        platform's.
+        (6 closures, n) at the base's origin, without the directions that contacts leave
+        free; (6, n) at the platform's origin.
     """
     robot = posture.robot
     size, i = size_of(robot), robot.index(robot.platform)
@@ -224,12 +230,12 @@ def _rates(posture: Posture) -> tuple[NDArray, NDArray]:
 
 @dataclass(frozen=True, eq=False)
 class _Motions:
-    """Joint motions that close, and those of the platform among them.
+    """Joint motions that keep the closures, and the resulting platform motions.
 
     Attributes:
         values: singular values of the closures, the largest first.
         joints: (k, joints) orthonormal joint rates.
-        platform: (6, k) the platform's, lengths over the robot's size.
+        platform: (6, k) platform motions, lengths divided by the robot's size.
     """
 
     values: NDArray
@@ -249,12 +255,12 @@ class _Motions:
 
     @property
     def error(self) -> float:
-        """[rad, lengths] motions of the platform that count as none."""
+        """[rad, lengths] platform motions below this size count as zero."""
         return max(_PLATFORM_RANK, _ERROR / self.gap)
 
     @property
     def gap(self) -> float:
-        """Least singular value that counts, over the largest other or rounding."""
+        """Ratio of the least singular value that counts to the largest other one."""
         rank = self.joints.shape[1] - len(self.joints)
         if not rank:
             return np.inf
@@ -264,16 +270,16 @@ class _Motions:
 
 
 def _motions(A: NDArray, P: NDArray, tolerance: float, least: float = 0.0) -> _Motions:
-    """Joint motions that close, and those of the platform among them.
+    """Return the joint motions that keep the closures, and the platform motions.
 
     Args:
-        A: (6 closures, joints) closures for unit rates of the joints.
-        P: (6, joints) the platform likewise.
+        A: (6 closures, joints) velocities of closures for unit joint rates.
+        P: (6, joints) velocities of the platform for unit joint rates.
         tolerance: relative size below which a singular value of A counts as zero.
-        least: size, likewise.
+        least: absolute size below which a singular value counts as zero.
 
     Returns:
-        The two, and the singular values of A.
+        The motions with the singular values of A.
     """
     _, values, V = np.linalg.svd(A)
     free = V[rank_of(values, tolerance, least) :]

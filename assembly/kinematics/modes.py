@@ -1,8 +1,9 @@
-"""Tracks from a singular home pose, where several operation modes meet.
+"""Continuation from a singular home pose, where several operation modes meet.
 
-There the closures and a partial pose, or the drives, do not determine the mode:
-rounding would choose.  So the platform keeps the components that are not given as at
-home, if possible: first all of them, then its rotation, then its translation.
+At such a pose, the closures and a partial pose, or the drives, do not determine the
+operation mode; rounding errors would select it.  The platform therefore keeps the pose
+components that are not given at their home values, if possible: first all of them, then
+the rotation, then the translation.
 """
 
 from dataclasses import fields
@@ -16,22 +17,22 @@ from forcefit.assembly.kinematics.track import Track
 from forcefit.assembly.model.robot import Robot
 
 _CLOSED = 1e-8  # [rad, m] largest error of closures and pose in a mode
-# components [tx ty tz rx ry rz] that are kept, in the order in which they are tried
+# components [tx ty tz rx ry rz] that keep their values, in the order of the attempts
 _KEPT = (range(6), range(3, 6), range(3))
 
 
 def follow_in_mode(
     robot: Robot, home: NDArray, pose: NDArray, target: Target, singular: bool
 ) -> Track:
-    """Follow the closures from home to many targets, in a mode where modes meet.
+    """Follow the closures from home to many targets within one operation mode.
 
     Args:
         robot: robot of n frames.
         home: (n,) [rad or m] coordinates of the home pose.
         pose: (6,) ``[tx ty tz rx ry rz]`` [m, rad] of the platform there.
         target: k poses or sets of coordinates.
-        singular: whether modes meet at home.  Elsewhere components not given are kept
-            only if the target cannot be reached otherwise.
+        singular: whether modes meet at home.  If not, components that are not given
+            are fixed only if the target cannot be reached otherwise.
 
     Returns:
         The ends of the tracks, and their progress.
@@ -50,7 +51,7 @@ def follow_in_mode(
 
 
 def _held(target: Target, pose: NDArray, kept: range) -> Target:
-    """Return the target with components that it does not give taken from the pose."""
+    """Return the target with missing components replaced by those of the pose."""
     goal = np.full((len(target), 6), np.nan)
     if target.pose is not None:
         goal = np.array(target.pose, dtype=float)
@@ -62,7 +63,7 @@ def _try(
     robot: Robot, home: NDArray, target: Target, track: Track, rows: NDArray,
     whatever: bool,
 ) -> None:  # fmt: skip
-    """Follow other targets; fill these rows of a track if they are reached."""
+    """Follow other targets; fill the given rows of a track with reached targets."""
     found = follow(robot, home, target)
     good = whatever | (found.reached & (found.mismatch < _CLOSED))
     for one in fields(Track):

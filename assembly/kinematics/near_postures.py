@@ -1,6 +1,6 @@
-"""Postures near a posture: a small motion that keeps the closures, then corrected.
+"""Postures near a given posture: small motions with corrected closures.
 
-Begin with :func:`near_postures`.
+Start with :func:`near_postures`.
 """
 
 from collections.abc import Iterator
@@ -13,8 +13,8 @@ from forcefit.assembly.kinematics.nominal import Target, follow, mobile, size_of
 from forcefit.assembly.kinematics.track import Track
 from forcefit.assembly.model.robot import Robot
 
-_CORRECTIONS = 3  # more of them: near a singularity they converge slowly
-_ROUNDING = 1e-13  # [rad, m] closure error that is rounding
+_CORRECTIONS = 3  # number of corrections; near a singularity they converge slowly
+_ROUNDING = 1e-13  # [rad, m] closure error that is only rounding
 
 
 def near_postures(
@@ -30,7 +30,7 @@ def near_postures(
         count: number of postures.
 
     Yields:
-        One posture a time, with its closure error.
+        One posture at a time, with its closure error.
     """
     free = Target(coordinates=np.full((1, len(q)), np.nan))
     for step in _steps_aside(robot, T, distance, count):
@@ -43,7 +43,7 @@ def near_postures(
 
 
 def _steps_aside(robot: Robot, T: NDArray, distance: float, count: int) -> NDArray:
-    """Return (count, n) joint steps that keep the closures at first order."""
+    """Return (count, n) joint steps that satisfy the closures to first order."""
     A = closure_matrices(robot, T[None])[0][0]
     _, values, Vt = np.linalg.svd(A)
     rank = int((values > SINGULAR * values[:1]).sum())

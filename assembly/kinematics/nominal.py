@@ -1,9 +1,10 @@
 """Solution of the nominal closures: joint coordinates at which the robot closes.
 
-Many targets are followed together, each along its straight line from the home pose.
-Steps are damped Gauss-Newton of least norm.  So coordinates that closures and target
-leave undetermined do not change, and overconstrained robots are no special case.  The
-loops are compiled: :mod:`forcefit.assembly.kinematics.continuation_side_by_side`.
+Many targets are followed together, each along a straight line from the home pose.
+Steps are damped Gauss-Newton steps of least norm.  Coordinates that closures and target
+leave undetermined therefore do not change, and overconstrained robots need no special
+case.  The loops are compiled:
+:mod:`forcefit.assembly.kinematics.continuation_side_by_side`.
 """
 
 from dataclasses import dataclass
@@ -20,18 +21,18 @@ from forcefit.assembly.kinematics.continuation_side_by_side import (
 from forcefit.assembly.kinematics.track import Track
 from forcefit.assembly.model.robot import Robot
 
-# number of each joint type in C++: a helical joint is revolute with a lead
+# number of each joint type in C++: a helical joint is a revolute joint with a lead
 KINDS = {"fixed": 0, "revolute": 1, "prismatic": 2, "helical": 1}
 NOT_CLOSED = "expected a configuration in which every closure holds"
 
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """Targets of a continuation: poses or coordinates, NaN where free.
+    """Targets of a continuation: poses or coordinates, NaN for free components.
 
     Attributes:
         pose: (k, 6) ``[tx ty tz rx ry rz]`` [m, rad] of the platform, or None.
-        coordinates: (k, n) [rad or m] of the joints held, or None.
+        coordinates: (k, n) [rad or m] prescribed joint coordinates, or None.
     """
 
     pose: NDArray | None = None
@@ -48,25 +49,25 @@ class Target:
 
 
 def size_of(robot: Robot) -> float:
-    """Return reference length [m]: that of the longest body, 1 if all are points."""
+    """Return the longest length of a body [m], or 1 if all lengths are zero."""
     lengths = np.linalg.norm(robot.fixed_transforms[:, :3, 3], axis=1)
     return float(lengths.max()) or 1.0
 
 
 def mobile(robot: Robot) -> NDArray:
-    """Return the (n,) bool: joints that are not fixed."""
+    """Return (n,) bool, True for joints that are not fixed."""
     return np.array([f.joint != "fixed" for f in robot.frames])
 
 
 def motion_screws(robot: Robot, T: NDArray) -> NDArray:
-    """Return the screws of unit joint motions, read at the base origin.
+    """Return the screws of unit joint motions at the base's origin.
 
     Args:
         robot: robot of n frames.
-        T: (..., n, 4, 4) frames.
+        T: (..., n, 4, 4) frames seen from the base.
 
     Returns:
-        (..., n, 6) zero for fixed joints; base axes.
+        (..., n, 6) screws in base axes; zero for fixed joints.
     """
     z, p = T[..., :3, 2], T[..., :3, 3]
     prismatic = np.array([f.joint == "prismatic" for f in robot.frames])[:, None]
@@ -80,9 +81,9 @@ def motion_screws(robot: Robot, T: NDArray) -> NDArray:
 
 @lru_cache(maxsize=64)
 def _tree(robot: Robot) -> dict[str, Any]:
-    """Return the fields of a compiled tree, once for each robot."""
+    """Return the fields of a compiled tree, cached for each robot."""
     pairs = [[robot.index(name) for name in pair] for pair in robot.closures]
-    # a joint's motion acts after its own frame
+    # the motion of a joint does not move its own frame
     carries = robot.on_path - np.eye(len(robot.frames))
     moved = [carries[a] - carries[b] for a, b in pairs]
     moved.append(carries[robot.index(robot.platform)])
@@ -112,7 +113,7 @@ def follow(robot: Robot, start: NDArray, target: Target, guess: bool = False) ->
     Args:
         robot: robot of n frames.
         start: (n,) coordinates that close.
-        target: k poses or sets of held coordinates.
+        target: k poses or sets of prescribed coordinates.
         guess: whether the start is a guess that need not close; then one step is made.
 
     Returns:

@@ -1,9 +1,9 @@
-"""Beams in pieces: one link as several springs in series.
+"""Beams cut into pieces: one link is modelled as several springs in series.
 
-A single spring at a beam's end is accurate as long as the beam bends little: its error
-grows with the square of the angle.  Cut into n pieces of L / n, each a frame with its
-own spring, the angle of each falls with n and the error with n squared.  For small
-motions the result does not change.
+A single spring at the end of a beam is accurate if the beam bends little: its error is
+proportional to the square of the angle.  If the beam is cut into n pieces of length
+L / n, each a frame with a spring, the angle of each piece is proportional to 1 / n and
+the error to 1 / n^2.  For small motions the result does not change.
 """
 
 from dataclasses import dataclass, replace
@@ -18,15 +18,16 @@ from forcefit.stiffness.screws import rotation_matrix
 
 @dataclass(frozen=True, eq=False)
 class CutRobot:
-    """A robot whose beams are cut into pieces, each a frame.
+    """Robot whose beams are cut into pieces, each of which is a frame.
 
     Attributes:
         robot: robot of m frames, m >= n.
-        owner: (m,) row of the frame, in the robot before the cut, to which each
-            belongs.
-        last: (n,) row of each original frame in the cut robot: the beam's last piece.
-        back: (m,) [m] distance from a frame's own origin to the piece's end, along the
-            beam.
+        owner: (m,) index of the frame, in the robot before the cut, to which each frame
+            of the cut robot belongs.
+        last: (n,) index, in the cut robot, of each original frame: the beam's last
+            piece.
+        back: (m,) [m] distance from the origin of the original frame to the end of the
+            piece, along the beam.
     """
 
     robot: Robot
@@ -35,14 +36,14 @@ class CutRobot:
     back: NDArray
 
     def cut(self, posture: Posture) -> Posture:
-        """Return one posture or many with a frame for each piece.
+        """Return one or many postures with a frame for each piece.
 
         Args:
             posture: posture of the robot before the cut, arrays (..., n) and (..., n,
                 4, 4).
 
         Returns:
-            Arrays (..., m) and (..., m, 4, 4).
+            Posture of the cut robot, arrays (..., m) and (..., m, 4, 4).
         """
         T = posture.transforms[..., self.owner, :, :].copy()
         for row in np.flatnonzero(self.back):
@@ -54,20 +55,20 @@ class CutRobot:
         return Posture(self.robot, q, T, posture.mismatch)
 
     def spread(self, rows: NDArray) -> NDArray:
-        """Return (..., m, k): rows (..., n, k) at the beams' ends, else zero."""
+        """Return (..., m, k) rows: those of frames at ends of beams, zero elsewhere."""
         spread = np.zeros((*rows.shape[:-2], len(self.owner), rows.shape[-1]))
         spread[..., self.last, :] = rows
         return spread
 
 
 def cut_beams(robot: Robot) -> CutRobot:
-    """Return a robot with a frame for every piece of its beams.
+    """Return a robot with one frame for every piece of its beams.
 
     Args:
         robot: robot of n frames.
 
     Returns:
-        The cut robot; the same frames if no beam has several pieces.
+        The cut robot; its frames are those of ``robot`` if no beam has several pieces.
     """
     frames: list[Frame] = []
     owner, last, back = [], [], []
@@ -83,7 +84,7 @@ def cut_beams(robot: Robot) -> CutRobot:
 
 
 def _pieces(frame: Frame) -> list[tuple[Frame, float]]:
-    """Return frames of one body from its base on, with their distance from its tip."""
+    """Return the pieces of one body from base to tip, with distances to its tip."""
     link = frame.link
     if not isinstance(link, BeamLink) or link.pieces == 1:
         return [(frame, 0.0)]

@@ -1,16 +1,16 @@
-"""A robot at a posture: the poses of its frames, and the maps of small screws.
+"""Robot at a posture: the poses of its frames, and the maps of small screws.
 
 ======  ==================  ============  =========================================
 symbol  code                shape         meaning
 ======  ==================  ============  =========================================
 q       ``coordinates``     (..., n)      joint coordinates [rad or m]
-T       ``transforms``      (..., n,4,4)  frames seen from the base, before own joint
-M_j     ``paths``           (..., n,6,6)  eqs (13)-(15): screw at frame j, in its
-                                          axes -> at the platform, in base axes
+T       ``transforms``      (..., n,4,4)  frames seen from the base, without own motion
+M_j     ``paths``           (..., n,6,6)  eqs (13)-(15): map from a screw at frame j, in
+                                          its axes, to the platform, in base axes
 ======  ==================  ============  =========================================
 
-Eq. (14) as printed is off by one: its product down to h = j maps a screw written in
-frame ant(j).  ``paths`` maps one written in frame j itself, ``[R 0; [p_j - p]x R, R]``.
+The printed eq. (14) is off by one: its product down to h = j maps a screw expressed in
+frame ant(j).  ``paths`` maps a screw expressed in frame j, ``[R 0; [p_j - p]x R, R]``.
 """
 
 from collections.abc import Mapping, Sequence
@@ -42,22 +42,22 @@ from forcefit.stiffness.screws import rotation_matrix, rotation_vector, screw_ma
 
 POSE = ("tx", "ty", "tz", "rx", "ry", "rz")
 _HOME_TOLERANCE = 1e-6  # [rad, m] accepted mismatch at home, for rounded robot files
-# relative to the reference length: the same for robots smaller than 100 mm
+# accepted mismatch relative to the reference length, for robots smaller than 100 mm
 _SMALL = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
 class Posture:
-    """A robot whose nominal geometry closes; it exists only if it does.
+    """Posture of a robot whose nominal geometry closes, or many postures of it.
 
-    Or many postures of it, as of :func:`together`: the arrays then have a leading axis.
+    The arrays of many postures, see :func:`together`, begin with a leading axis.
 
     Attributes:
         robot: the manipulator.
-        coordinates: (..., n) [rad or m] of every joint, 0 for fixed ones.
+        coordinates: (..., n) [rad or m] coordinate of every joint, 0 for fixed joints.
         transforms: (..., n, 4, 4) frames seen from the base, without imperfections.
-        mismatch: (...) [rad, m] largest nominal closure error (rounded files); it is
-            ignored.
+        mismatch: (...) [rad, m] largest nominal closure error, due to rounded files; it
+            is neglected.
     """
 
     robot: Robot
@@ -69,7 +69,7 @@ class Posture:
     show = show
 
     def _figures(self) -> Figures:
-        """Return the pose of the platform and coordinates of the drives."""
+        """Return the pose of the platform and the coordinates of the drives."""
         if self.transforms.ndim > 3:
             return {"postures": str(self.transforms.shape[:-3])}
         frames = self.robot.frames
@@ -85,7 +85,7 @@ class Posture:
         }
 
     def __getitem__(self, rows: Any) -> "Posture":
-        """Return one of many postures, by its number, or a selection."""
+        """Return one of many postures by its number, or a selection."""
         mismatch = np.broadcast_to(self.mismatch, self.transforms.shape[:-3])[rows]
         return replace(
             self, coordinates=self.coordinates[rows], transforms=self.transforms[rows],
@@ -107,7 +107,7 @@ class Posture:
 
     @property
     def distinct(self) -> "tuple[Posture, NDArray]":
-        """The c distinct of R postures, and (R,) the index of each in them."""
+        """Distinct postures (c of R), and (R,) the index of each posture among them."""
         coordinates, transforms, which = _distinct(
             Unchanged(self.coordinates), Unchanged(self.transforms)
         )
@@ -115,15 +115,15 @@ class Posture:
         return distinct, which
 
     def pose(self) -> dict[str, float]:
-        """Return nominal platform pose by component, rotation vector in base axes."""
+        """Return the nominal platform pose by component, with a rotation vector."""
         return dict(zip(POSE, pose_components(self.platform).tolist(), strict=True))
 
 
 def together(postures: Sequence[Posture]) -> Posture:
-    """Return k postures of one robot as one object.
+    """Combine k postures of one robot into one object.
 
     Args:
-        postures: k of them, k > 0.
+        postures: k postures, k > 0.
 
     Returns:
         The postures with a leading axis.
@@ -145,7 +145,7 @@ def together(postures: Sequence[Posture]) -> Posture:
 
 @dataclass(frozen=True)
 class Unchanged:
-    """A read-only array, so that results derived from it can be cached."""
+    """Read-only array, so that results computed from it can be cached."""
 
     numbers: NDArray
 
@@ -157,7 +157,7 @@ class Unchanged:
 
 
 def _maps_to(transforms: NDArray, platform: int) -> NDArray:
-    """Return (..., n, 6, 6) maps of screws at each frame to one of them, base axes."""
+    """Return (..., n, 6, 6) maps of screws at each frame to a platform, base axes."""
     offsets = transforms[..., :3, 3] - transforms[..., platform, None, :3, 3]
     return screw_map(offsets, transforms[..., :3, :3])
 
@@ -174,7 +174,7 @@ def _paths(transforms: Unchanged, platform: int) -> NDArray:
 def _distinct(
     coordinates: Unchanged, transforms: Unchanged
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Return rows with distinct coordinates, and the index of each row in them."""
+    """Return the rows with distinct coordinates, and the index of each row in them."""
     q = coordinates.numbers
     _, first, which = np.unique(q, axis=0, return_index=True, return_inverse=True)
     return q[first], transforms.numbers[first], which.reshape(-1)
@@ -182,13 +182,13 @@ def _distinct(
 
 @lru_cache(maxsize=8)
 def _digest(array: Unchanged) -> bytes:
-    """Return the digest of an array's numbers."""
+    """Return the hash of the numbers of an array."""
     return blake2b(np.ascontiguousarray(array.numbers).tobytes()).digest()
 
 
 @dataclass(frozen=True)
 class Content:
-    """Key of a cache: postures with equal transforms, and arrays of equal numbers."""
+    """Cache key, equal for postures and arrays with equal numbers."""
 
     digest: bytes
     postures: Posture = field(compare=False)
@@ -198,15 +198,16 @@ class Content:
 def content_of(
     postures: Posture, arrays: tuple[NDArray, ...], names: object
 ) -> Content:
-    """Return the key of a result that depends on postures and arrays alone.
+    """Return the key of a result that depends only on postures and arrays.
 
     Args:
-        postures: one, or many in one; the key has their transforms and frames' parents.
+        postures: one or many postures; the key contains their transforms and the
+            parents of their frames.
         arrays: arrays of numbers.
-        names: anything else on which it depends, by its ``repr``.
+        names: any other data on which the result depends, compared by ``repr``.
 
     Returns:
-        The key, which also holds the objects it was made of.
+        The key; it also stores the given objects.
     """
     digest = blake2b(repr((names, [a.shape for a in arrays])).encode())
     for array in (postures.robot.parents, *arrays):
@@ -222,7 +223,7 @@ def pose_components(T: NDArray) -> NDArray:
 
 @lru_cache(maxsize=64)
 def home_posture(robot: Robot) -> Posture:
-    """Return the home pose: actuated joints at ``position``, passive ones solved.
+    """Return the home pose: actuated joints at ``position``, passive joints solved.
 
     Args:
         robot: any robot.
@@ -231,8 +232,8 @@ def home_posture(robot: Robot) -> Posture:
         The posture.
 
     Raises:
-        BadInput: a closure does not hold to 1e-6 rad and m, or 1e-5 of the longest body
-            if that is less; the message names it.
+        BadInput: the mismatch of a closure exceeds 1e-6 rad or m, or 1e-5 of the
+            longest body if that is less; the message names the closure.
     """
     actuated = np.array([f.actuated for f in robot.frames])
     held = np.where(actuated, robot.positions, np.nan)
@@ -254,7 +255,7 @@ def home_posture(robot: Robot) -> Posture:
 
 
 def _left_open(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the (closures,) [rad] and [m] largest errors of each closure."""
+    """Return the (closures,) largest rotation [rad] and translation [m] errors."""
     pairs = [[robot.index(name) for name in pair] for pair in robot.closures]
     first, second = (T[[pair[k] for pair in pairs]] for k in (0, 1))
     between = first[:, :3, :3] @ np.swapaxes(second[:, :3, :3], -1, -2)
@@ -263,7 +264,7 @@ def _left_open(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def _either(turned: float, shifted: float, least: float) -> str:
-    """Return the mismatch in the unit in which it is too large, and the expectation."""
+    """Return a text on the mismatch, in the unit in which it is too large."""
     if shifted < least:
         return f"{turned:.3g} rad with the actuated joints held, expected < 1e-06"
     return f"{shifted:.3g} m with the actuated joints held, expected < {least:.3g}"
@@ -293,17 +294,18 @@ def place_robot(
     pose: Mapping[str, float] | None = None,
     joints: Mapping[str, float] | None = None,
 ) -> Posture:
-    """Return the posture of a nominal platform pose, or of actuated coordinates.
+    """Return the posture for a nominal platform pose, or for actuated coordinates.
 
     The closures are followed from the home pose along a straight line, so the assembly
     mode is that of the home pose.  Components that the input leaves undetermined stay
-    near home.  At a singular home pose operation modes meet: there the platform keeps
-    the components that are not given, if possible, its rotation first.
+    near their home values.  At a singular home pose, operation modes meet.  The
+    platform then keeps the components that are not given, the rotation first, if
+    possible.
 
     Args:
         robot: any robot.
         pose: any of ``tx ty tz`` [m], ``rx ry rz`` [rad], the platform's translation
-            and rotation vector in base axes; components not given are free.
+            and rotation vector in base axes; components that are not given are free.
         joints: coordinates [rad or m] of actuated joints by frame; the others keep
             their ``position``.
 
@@ -311,8 +313,8 @@ def place_robot(
         The posture.
 
     Raises:
-        BadInput: both or an unknown name given, a value not finite, or out of reach;
-            the message gives the missing distance.
+        BadInput: both arguments are given, a name is unknown, a value is not finite, or
+            the pose is out of reach; the message contains the missing distance.
     """
     if pose and joints:
         raise BadInput("found both a pose and joints, expected one of them")
@@ -352,7 +354,7 @@ def joint_target(robot: Robot, joints: Mapping[str, float]) -> Target:
 
 
 def _finite(whose: str, value: float, largest: float) -> float:
-    """Return the value, refused if it is not a finite number, or beyond any machine."""
+    """Return the value; raise BadInput if it is not finite or beyond any machine."""
     if not np.isfinite(value):
         raise BadInput(f"{whose}: found {value}, expected a finite number")
     if abs(value) > largest:
@@ -364,15 +366,15 @@ def _finite(whose: str, value: float, largest: float) -> float:
 def place_many(
     robot: Robot, poses: ArrayLike
 ) -> tuple[list[Posture | None], list[str]]:
-    """Return the postures of many nominal platform poses together.
+    """Return the postures of many nominal platform poses, computed together.
 
     Args:
         robot: any robot.
-        poses: (k, 6) ``[tx ty tz rx ry rz]`` [m, rad], NaN where a component is free.
+        poses: (k, 6) ``[tx ty tz rx ry rz]`` [m, rad], NaN for free components.
 
     Returns:
-        For each pose its posture, None where it is out of reach, and for each pose an
-        empty string or the reason why there is no posture.
+        For each pose its posture, or None if it is out of reach; and for each pose an
+        empty string, or the reason why there is no posture.
 
     Raises:
         BadInput: the robot's closures do not hold in its home pose.
@@ -383,14 +385,15 @@ def place_many(
 def place_many_joints(
     robot: Robot, coordinates: ArrayLike
 ) -> tuple[list[Posture | None], list[str]]:
-    """Return the postures of many sets of actuated coordinates together.
+    """Return the postures of many sets of actuated coordinates, computed together.
 
     Args:
         robot: robot of n frames.
-        coordinates: (k, n) [rad or m] of the joints held, NaN for those left free.
+        coordinates: (k, n) [rad or m] prescribed joint coordinates, NaN for free
+            joints.
 
     Returns:
-        As :func:`place_many`.
+        Postures and reasons, see :func:`place_many`.
 
     Raises:
         BadInput: the robot's closures do not hold in its home pose.
@@ -415,7 +418,7 @@ def _follow_many(
 
 
 def _follow(robot: Robot, target: Target) -> Track:
-    """Follow targets from home, in one mode where modes meet there."""
+    """Follow targets from home within one operation mode."""
     home = home_posture(robot)
     pose = pose_components(home.platform)
     singular = home_is_singular(robot)
@@ -423,7 +426,7 @@ def _follow(robot: Robot, target: Target) -> Track:
 
 
 def unreached(robot: Robot, track: Track, target: Target, i: int) -> str:
-    """Return why target i was not reached, with the missing distance."""
+    """Return the reason why target i was not reached, with the missing distance."""
     if target.pose is None:
         remaining = (1.0 - track.progress[i]) * 100
         return (

@@ -1,8 +1,9 @@
-"""Pure motions of a space of screws: translations, turns, screws of a pitch.
+"""Decomposition of a space of screws into translations, rotations and helical motions.
 
-A screw (w, v), read at a point c, is a translation if w = 0, else a turn about an axis
-if w.v = 0, else a screw of pitch 2 pi w.v / w.w, its axis through c + w x v / w.w (Hunt
-1978, Kinematic geometry of mechanisms).  Begin with :func:`pure_motions`.
+A screw (w, v) at a point c is a translation if w = 0.  It is a rotation about an axis
+if w.v = 0.  Otherwise it is a helical motion of pitch 2 pi w.v / w.w, whose axis passes
+through c + w x v / w.w (Hunt 1978, Kinematic geometry of mechanisms).  Start with
+:func:`pure_motions`.
 """
 
 from dataclasses import dataclass
@@ -11,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-# of files rounded at 6 digits: parallel rods turn a platform by ten times that error
-_TURN = 1e-4  # [rad] turn of a motion by one length that counts as a translation
-_PITCH = 1e-5  # [lengths] shift for 1 rad that counts as a turn
+# for files rounded at 6 digits: parallel rods turn a platform by ten times that error
+_TURN = 1e-4  # [rad] largest rotation per reference length of a translation
+_PITCH = 1e-5  # [lengths] largest translation per rad of a rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,11 +22,11 @@ class PureMotion:
     """One independent motion of a body.
 
     Attributes:
-        kind: ``"translation"``, ``"turn"`` or ``"screw"``.
-        direction: (3,) unit vector along it, or of its axis.
-        point: (3,) [m] a point of its axis; None of a translation, and of a turn
-            whose axis may be anywhere.
-        pitch: [m] per turn of a screw, None of the others.
+        kind: ``"translation"``, ``"turn"`` (rotation) or ``"screw"`` (helical motion).
+        direction: (3,) unit vector along the translation, or along the axis.
+        point: (3,) [m] a point of the axis; None for a translation, and for a rotation
+            whose axis can be anywhere.
+        pitch: [m] translation per turn of a helical motion; None for other kinds.
     """
 
     kind: str
@@ -39,17 +40,17 @@ def pure_motions(
 ) -> list[PureMotion]:
     """Return independent motions that span a space of screws.
 
-    Translations come first.  The others are turns if all their axes can meet in one
-    point, else principal screws of the system.
+    Translations come first.  The other motions are rotations if all their axes can meet
+    in one point; otherwise they are the principal screws of the system.
 
     Args:
-        screws: (k, 6) [rad, m] independent, read at a point, base axes.
+        screws: (k, 6) [rad, m] independent screws at a point, base axes.
         at: (3,) [m] that point.
         size: [m] reference length by which translations are compared with rotations.
-        error: [rad, lengths] of the screws, which parts must exceed.
+        error: [rad, lengths] error of the screws; smaller components count as zero.
 
     Returns:
-        k of them, in base axes.
+        k motions in base axes.
     """
     w, v = screws[:, :3], screws[:, 3:] / size
     zero, exact = max(_TURN, error), max(_PITCH, error)
@@ -60,7 +61,7 @@ def pure_motions(
     if not turning:
         return slides
     axes = _plain_basis(Wt[:turning], zero)
-    # velocities of c for these rotations; translations are free to be added
+    # velocities at c for these rotations, up to free translations
     across = _complement(free, zero)
     rates = axes @ np.linalg.pinv(w, rcond=zero) @ v @ across.T @ across
     point, anywhere = _common_point(axes, rates, across, exact)
@@ -71,14 +72,14 @@ def pure_motions(
 
 
 def _plain_basis(rows: NDArray, zero: float) -> NDArray:
-    """Unit vectors that span the rows, along the base's axes where they can be."""
+    """Return unit vectors that span the rows, along the base axes if possible."""
     rank = int((np.linalg.svd(rows, compute_uv=False) > zero).sum()) if len(rows) else 0
     if rank == 3:
         return np.eye(3)
     P = np.linalg.pinv(rows, rcond=zero) @ rows if rank else np.zeros((3, 3))
     basis: list[NDArray] = []
     for _ in range(rank):
-        # the base's axis nearest to the remaining space
+        # select the base axis nearest to the remaining space
         k = int(np.argmax(np.round(np.diag(P), 9)))
         d = P[k] / np.linalg.norm(P[k])
         d = np.where(np.abs(d) < 1e-12, 0.0, d)
@@ -89,7 +90,7 @@ def _plain_basis(rows: NDArray, zero: float) -> NDArray:
 
 
 def _complement(rows: NDArray, zero: float) -> NDArray:
-    """(3 - rank, 3) orthonormal rows at right angles to all rows."""
+    """Return (3 - rank, 3) orthonormal rows that are orthogonal to all rows."""
     if not len(rows):
         return np.eye(3)
     _, values, Vt = np.linalg.svd(rows)
@@ -99,18 +100,18 @@ def _complement(rows: NDArray, zero: float) -> NDArray:
 def _common_point(
     axes: NDArray, rates: NDArray, across: NDArray, zero: float
 ) -> tuple[NDArray | None, bool]:
-    """The point through which all axes can pass, nearest to the origin.
+    """Return the point nearest to the origin through which all axes can pass.
 
     Args:
         axes: (r, 3) unit vectors.
         rates: (r, 3) velocities at the origin, without free translations.
         across: (m, 3) directions in which translations are not free.
-        zero: [lengths] largest difference of velocities that counts as none.
+        zero: [lengths] largest difference of velocities that counts as zero.
 
     Returns:
-        (3,) the point, None if there is none; and whether any point will do.
+        (3,) the point, None if there is none; and whether every point satisfies this.
     """
-    # p x axis must equal the rate, but for free translations
+    # p x axis must equal the rate, except for free translations
     rows = np.vstack([across @ -_cross(axis) for axis in axes])
     goal = np.concatenate([across @ rate for rate in rates])
     point = np.linalg.lstsq(rows, goal, rcond=zero)[0]
@@ -120,14 +121,14 @@ def _common_point(
 
 
 def _cross(a: NDArray) -> NDArray:
-    """(3, 3) matrix of the product a x."""
+    """Return the (3, 3) matrix of the cross product a x."""
     return np.cross(a, np.eye(3)).T
 
 
 def _principal_screws(
     axes: NDArray, rates: NDArray, at: NDArray, size: float, zero: float
 ) -> list[PureMotion]:
-    """Principal screws: stationary pitches w.v / w.w among all combinations."""
+    """Return the principal screws, whose pitches w.v / w.w are stationary."""
     Q = axes @ rates.T
     pitches, mix = eigh((Q + Q.T) / 2, axes @ axes.T)
     found = []

@@ -1,4 +1,4 @@
-"""Ranks: thresholds below which singular values of closures count as zero.
+"""Thresholds below which singular values of closures count as zero.
 
 The compiled methods use the same thresholds.
 """
@@ -7,20 +7,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 RANK = 1e-10  # relative size below which a singular value counts as zero
-ROWS_RANK = 1e-9  # the same among rows that only clearances can satisfy
-# added to RANK for the rounding of robot files, times the nominal closure error left
+ROWS_RANK = 1e-9  # threshold for rows that only clearances can satisfy
+# factor of the nominal closure error that is added to RANK, for rounded robot files
 MISMATCH_FACTOR = 30.0
-# rounding of columns that a projection removes, relative to their size
+# rounding error, relative to their size, of columns that a projection removes
 NOISE = 1e-12
-UNBOUNDED = 1e-8  # [rad, m] of the platform for a unit of a motion without resistance
+UNBOUNDED = 1e-8  # [rad, m] least platform motion per unit of a free motion
 
 
 def rank_tolerance(mismatch: float, least: float = RANK) -> float:
     """Return the relative size below which a singular value of closures counts as zero.
 
     Args:
-        mismatch: [rad, m] nominal closure error left.
-        least: the threshold of closures that hold exactly.
+        mismatch: [rad, m] nominal closure error.
+        least: threshold for closures that hold exactly.
 
     Returns:
         The threshold.
@@ -32,9 +32,9 @@ def rank_of(values: NDArray, tolerance: float, noise: float = 0.0) -> int:
     """Return the number of singular values that do not count as zero.
 
     Args:
-        values: (k,) the largest first.
-        tolerance: share of the largest that a value must exceed.
-        noise: size that it must exceed.
+        values: (k,) singular values, the largest first.
+        tolerance: share of the largest value that a value must exceed.
+        noise: absolute size that a value must exceed.
 
     Returns:
         The rank; 0 without values.
@@ -43,12 +43,12 @@ def rank_of(values: NDArray, tolerance: float, noise: float = 0.0) -> int:
 
 
 def noise_of(columns: ArrayLike) -> float:
-    """Return the rounding that a projection leaves of columns that it removes.
+    """Return the rounding error of columns that a projection removes.
 
     Args:
-        columns: (m, n), before the projection.
+        columns: (m, n) columns before the projection.
 
     Returns:
-        The noise of :func:`rank_of`; 0 without columns.
+        The argument ``noise`` of :func:`rank_of`; 0 without columns.
     """
     return NOISE * float(np.abs(columns).max(initial=0.0))

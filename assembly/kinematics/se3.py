@@ -1,7 +1,7 @@
 r"""Finite motions on SE(3): exponential, logarithm, and their derivatives.
 
-A constant screw that acts for unit time makes the finite motion ``exp(s)``; its axes
-are those of the frame it starts from.  All functions work on batches.
+A constant screw that acts for unit time produces the finite motion ``exp(s)``; the
+screw is expressed in the axes of the initial frame.  All functions work on batches.
 
 ======  ======================  ============  ======================================
 symbol  code                    shape         meaning
@@ -14,8 +14,9 @@ Omega   ``bracket_form``        (..., 6, 6)   a.Omega(w) b = w.[a, b]
 ======  ======================  ============  ======================================
 
 Sources:
-    Barfoot (2017), State Estimation for Robotics, section 7.1 (J of SE(3)), with his
-    coefficients written as Stumpff functions: no cancellation at small angles.
+    Barfoot (2017), State Estimation for Robotics, section 7.1 (J of SE(3)).  His
+    coefficients are written as Stumpff functions, which avoid cancellation at small
+    angles.
 """
 
 import math
@@ -25,21 +26,21 @@ from numpy.typing import ArrayLike, NDArray
 
 from forcefit.stiffness.screws import rotation_vector, skew, transform
 
-_SERIES = 9  # terms of the Stumpff series: 1e-17 at angle 1
+_SERIES = 9  # number of terms of the Stumpff series: error 1e-17 at 1 rad
 _STUMPFF = np.array([
     [1 / math.factorial(2 * j + k) for k in range(6)] for j in range(_SERIES)
 ])  # fmt: skip
-_ROUNDING = 1e-16  # [-] size of terms at which the series of the second derivative ends
+_ROUNDING = 1e-16  # [-] size below which terms of the second derivative are omitted
 
 
 def exponential(screw: ArrayLike) -> NDArray:
-    """Return the finite motion of a constant screw acting for unit time.
+    """Return the finite motion that a constant screw produces in unit time.
 
     Args:
         screw: (..., 6) ``[RX RY RZ TX TY TZ]`` [rad, m].
 
     Returns:
-        (..., 4, 4).
+        (..., 4, 4) transforms.
     """
     s = np.asarray(screw, dtype=float)
     W = skew(s[..., :3])
@@ -51,13 +52,13 @@ def exponential(screw: ArrayLike) -> NDArray:
 
 
 def logarithm(T: ArrayLike) -> NDArray:
-    """Return the constant screw that makes a finite motion in unit time.
+    """Return the constant screw that produces a finite motion in unit time.
 
     Args:
-        T: (..., 4, 4) of rotations by less than pi.
+        T: (..., 4, 4) transforms with rotations by less than pi.
 
     Returns:
-        (..., 6) [rad, m], the inverse of :func:`exponential`.
+        (..., 6) [rad, m] screws, the inverse of :func:`exponential`.
     """
     T = np.asarray(T, dtype=float)
     turn = rotation_vector(T[..., :3, :3])
@@ -73,17 +74,17 @@ def inverse(T: NDArray) -> NDArray:
 
 
 def turn_jacobian(turn: ArrayLike) -> NDArray:
-    """Return the (..., 3, 3) J of SO(3): small rotation per change of the vector."""
+    """Return (..., 3, 3) J of SO(3): small rotation per change of a rotation vector."""
     W = skew(turn)
     _, _, c2, c3, *_ = stumpff(np.asarray(turn, dtype=float))
     return np.eye(3) + c2 * W + c3 * (W @ W)
 
 
 def left_jacobian(screw: ArrayLike) -> NDArray:
-    """Return small motion, in the axes before the motion, per change of a screw.
+    """Return the small motion, in the initial axes, per change of a screw.
 
     Args:
-        screw: (..., 6) [rad, m].
+        screw: (..., 6) [rad, m] screws.
 
     Returns:
         (..., 6, 6) J with ``exp(s + h) = exp(J h) exp(s)`` to first order in h.
@@ -105,17 +106,18 @@ def left_jacobian(screw: ArrayLike) -> NDArray:
 
 
 def second_form(screw: ArrayLike, wrench: ArrayLike) -> NDArray:
-    """Return the work of a wrench on the second-order part of a change of a screw.
+    """Return the work of a wrench on the second-order part of a screw's change.
 
-    To second order ``exp(s + h) = exp(J h + D(h, h) / 2) exp(s)``; this is the matrix
-    of ``w.D(h, h)``, from the series of J in brackets, to rounding.
+    To second order, ``exp(s + h) = exp(J h + D(h, h) / 2) exp(s)``.  This function
+    returns the matrix of ``w.D(h, h)``, computed to rounding from the series of J in
+    brackets.
 
     Args:
         screw: (..., 6) s [rad, m].
         wrench: (..., 6) w [N m, N], in the axes before the motion.
 
     Returns:
-        (..., 6, 6) symmetric; zero at s = 0.
+        (..., 6, 6) symmetric matrices; zero at s = 0.
     """
     ad = bracket(screw)
     w = np.asarray(wrench, dtype=float)[..., None]
@@ -123,7 +125,7 @@ def second_form(screw: ArrayLike, wrench: ArrayLike) -> NDArray:
     powers = [np.broadcast_to(np.eye(6), ad.shape)]
     for _ in range(orders - 1):
         powers.append(powers[-1] @ ad)
-    # w.ad^k [h, ad^j h] / (k + j + 2)! summed over k + j < orders, j not 0
+    # sum of w.ad^k [h, ad^j h] / (k + j + 2)! over k + j < orders and j > 0
     factors = [
         [1 / math.factorial(k + j + 2) if 0 < j < orders - k else 0.0
          for j in range(orders)]
@@ -137,7 +139,7 @@ def second_form(screw: ArrayLike, wrench: ArrayLike) -> NDArray:
 
 
 def _orders(screws: NDArray) -> int:
-    """Return the order of brackets that counts: each order is a power of the angle."""
+    """Return the number of bracket orders whose terms are larger than rounding."""
     most = float(np.linalg.norm(screws[..., :3], axis=-1).max(initial=0.0))
     order, size = 2, most
     while size > _ROUNDING:
@@ -171,7 +173,7 @@ def stumpff(turn: NDArray) -> list[NDArray]:
         turn: (..., 3) [rad] rotation vectors.
 
     Returns:
-        Six arrays (..., 1, 1), ready to multiply matrices.
+        Six arrays (..., 1, 1), which can multiply matrices.
     """
     squared = np.sum(turn * turn, axis=-1)[..., None, None]
     large = squared > 1.0

@@ -1,13 +1,13 @@
-"""Singular postures, where the locked robot gains a freedom.
+"""Singular postures, at which the robot with locked drives gains a freedom.
 
-With its drives locked a robot keeps the freedoms that its closures leave.  Where it
-keeps more than at nearby postures, its closures are dependent at first order only.
-Small errors then move the robot far, or not at all.  Equations (17) to (27) are linear
-in them; they decide neither whether the robot can be assembled nor how large its errors
-are.
-Operation modes meet there (Zlatanov, Bonev, Gosselin 2002).
+With its drives locked, a robot keeps the freedoms that its closures leave.  If it has
+more freedoms at a posture than at nearby postures, its closures are dependent only to
+first order.  Small errors then move the robot far, or not at all.  Equations (17) to
+(27) are linear in the errors.  At such a posture, they determine neither whether the
+robot can be assembled nor the size of its errors.  Operation modes meet at singular
+postures (Zlatanov, Bonev, Gosselin 2002).
 
-Begin with :func:`is_singular`.
+Start with :func:`is_singular`.
 """
 
 from itertools import chain
@@ -21,10 +21,10 @@ from forcefit.assembly.kinematics.nominal import Target, follow
 from forcefit.assembly.model.robot import Robot
 
 _ASIDE = 0.02  # [rad or lengths] distance of nearby postures
-_NEIGHBOURS = 6  # number of nearby postures; one off the singularity suffices
-_APART = 1e-5  # relative size of a singular value that is nonzero there
+_NEIGHBOURS = 6  # number of nearby postures, of which one must not be singular
+_APART = 1e-5  # relative size above which a singular value nearby counts as nonzero
 _CLOSED = 1e-8  # [rad, m] largest closure error of a nearby posture
-_NOISE = 1e3  # times the closure error: singular values below it count as zero
+_NOISE = 1e3  # singular values below this factor times the closure error count as zero
 
 
 def is_singular(robot: Robot, q: NDArray, T: NDArray) -> bool:
@@ -36,10 +36,11 @@ def is_singular(robot: Robot, q: NDArray, T: NDArray) -> bool:
         T: (n, 4, 4) frames seen from the base.
 
     Returns:
-        False if it has as many everywhere, as a robot without drives.
+        True at a singular posture.  False if the number of freedoms is equal nearby,
+        which includes robots without drives.
     """
     rank = int(locked_ranks(robot, T[None])[0])
-    # no posture has a rank above the number of columns
+    # no posture has a rank larger than the number of columns
     most = sum(f.passive for f in robot.frames)
     return rank < most and rank < rank_near(robot, q, T)
 

@@ -1,9 +1,9 @@
 r"""Distance of a posture to singularities of each kind, and the joints involved.
 
-The closures of the rigid robot let its drives and its platform move in a space of
-directions.  In an orthonormal basis of it, with rates (q_a, t) of drives and platform,
-Q_a^T Q_a + Q_t^T Q_t = 1.  The two halves have singular values cos(a_i) and sin(a_i),
-and the map from the drives to the platform has tan(a_i).
+The closures of the rigid robot allow its drives and its platform a space of motions.
+In an orthonormal basis of this space, with rates (q_a, t) of drives and platform,
+Q_a^T Q_a + Q_t^T Q_t = 1.  The two parts have singular values cos(a_i) and sin(a_i),
+and the map from the drives to the platform has the singular values tan(a_i).
 
 ======== ==================== ==================================================
 code     zero means           kind of Gosselin and Angeles
@@ -16,7 +16,7 @@ closure  a closure transmits  constraint: the robot gains a freedom, or changes
          no wrench            its assembly mode
 ======== ==================== ==================================================
 
-Lengths count in units of the robot's longest body, angles in radians.
+Lengths are divided by the length of the robot's longest body; angles are in radians.
 
 Sources:
     Gosselin, Angeles (1990), Singularity analysis of closed-loop kinematic chains.
@@ -39,13 +39,13 @@ from forcefit.stiffness.screws import SCREW
 
 KINDS = ("serial", "parallel", "closure")
 _RANK = 1e-9  # relative size below which a singular value counts as zero
-# [rad or lengths] motions of the drives, to compute ranks
+# [rad or lengths] motions of the drives at which ranks are computed
 _PERTURBATIONS = (0.0, 0.013, -0.021)
 
 
 @dataclass(frozen=True, eq=False)
 class Singularities:
-    """Distances of k postures to the three kinds of singularity.
+    """Distances of k postures from the three kinds of singularity.
 
     Attributes:
         serial: (k,) sine of the least angle a_i, 0 at a serial singularity; at most 1.
@@ -53,7 +53,7 @@ class Singularities:
         closure: (k,) least singular value of the closures that is not always zero.
         serial_joints: (k, n) joint rates of the motion at the serial singularity.
         parallel_joints: (k, n) joint rates of the motion at the parallel singularity.
-        parallel_screws: (k, 6) the platform's motion there.
+        parallel_screws: (k, 6) the platform's motion at the parallel singularity.
         closure_joints: (k, n) joint rates that the closures resist least.
     """
 
@@ -71,7 +71,8 @@ class Singularities:
     def condition(self) -> NDArray:
         """(k,) tan(a_max) / tan(a_min): condition of the map from drives to platform.
 
-        For robots with equally many drives and freedoms; NaN without drives.
+        The number is defined for robots with as many drives as freedoms; NaN without
+        drives.
         """
         least, most = self.serial, self.parallel
         rest = np.sqrt((1 - least**2).clip(0.0) * (1 - most**2).clip(0.0))
@@ -79,14 +80,15 @@ class Singularities:
             return rest / (least * most)
 
     def names(self, robot: Robot, near: float) -> list[str]:
-        """Return for each posture the singularities nearer than ``near``, with joints.
+        """Return a text for each posture that names the singularities near it.
 
         Args:
             robot: the same robot.
             near: distance below which a singularity is named.
 
         Returns:
-            Such as ``"parallel: left.elbow, platform TY"``; empty where none is near.
+            Texts such as ``"parallel: left.elbow, platform TY"``; empty if no
+            singularity is near.
         """
         passive = np.array([f.passive for f in robot.frames])
         moving = {
@@ -110,22 +112,22 @@ class Singularities:
 
 
 def find_singularities(robot: Robot, transforms: NDArray) -> Singularities:
-    """Return the distances to singularities at many postures.
+    """Return the distances of many postures from singularities.
 
     Args:
         robot: robot of n frames; only its geometry matters.
         transforms: (k, n, 4, 4) frames seen from the base.
 
     Returns:
-        The distances, in the order given; 1 for a kind that does not exist, such as
-        closure singularities of a robot without closures.
+        The distances in the order of the postures.  The distance is 1 for a kind that
+        does not exist, such as closure singularities of a robot without closures.
     """
     return _measure(robot, transforms, _generic_ranks(robot))
 
 
 @dataclass(frozen=True)
 class _Ranks:
-    """Ranks away from singularities: of closures, of Q, of its platform part."""
+    """Ranks of closures, of Q and of its platform part, away from singularities."""
 
     closures: int
     motions: int
@@ -140,7 +142,7 @@ def _generic_ranks(robot: Robot) -> _Ranks:
     unit = np.array([
         size_of(robot) if f.joint == "prismatic" else 1.0 for f in robot.frames
     ])
-    # the drives move unequally: symmetric steps may stay in a singular set
+    # the drives move by different amounts: equal steps can stay in a singular set
     spread = 1.0 + 0.37 * np.arange(len(robot.frames)) % 1.0
     goals = np.where(
         driven, home.coordinates + np.outer(_PERTURBATIONS, unit * spread), np.nan
@@ -159,7 +161,7 @@ def _rank(A: NDArray, least: float = _RANK) -> int:
 
 
 def _null_space(A: NDArray, rank: int) -> tuple[NDArray, NDArray, NDArray]:
-    """Return the null space, the least singular value above it, and its row."""
+    """Return the null space, and the least nonzero singular value with its row."""
     if not rank:
         return np.broadcast_to(np.eye(A.shape[2]), (len(A), *A.shape[2:] * 2)), *(
             np.ones(len(A)), np.zeros((len(A), A.shape[2]))
@@ -169,13 +171,13 @@ def _null_space(A: NDArray, rank: int) -> tuple[NDArray, NDArray, NDArray]:
 
 
 def _measure(robot: Robot, T: NDArray, ranks: _Ranks) -> Singularities:
-    """Return distances, given the ranks away from singularities."""
+    """Return the distances, given the ranks away from singularities."""
     A, B, _ = closure_matrices(robot, T)
     N, closure, resisting = _null_space(A, ranks.closures)
     measured = _drives_and_platform(N, B, ranks)
     closure = np.where(closure > SINGULAR, closure, 0.0)
     for i in np.flatnonzero(closure == 0.0).tolist():
-        # the closures leave more motions than elsewhere: all of them count here
+        # the closures leave more motions than elsewhere; all of them count here
         here = slice(i, i + 1)
         more, _, _ = _null_space(A[here], _rank(A[i], SINGULAR))
         own = _ranks_there(more[0] @ B[i], ranks)
@@ -203,9 +205,9 @@ def _measure(robot: Robot, T: NDArray, ranks: _Ranks) -> Singularities:
 
 
 def _ranks_there(moved: NDArray, generic: _Ranks) -> _Ranks:
-    """Return the ranks where closures leave more motions than they generally do."""
+    """Return the ranks where the closures leave more motions than elsewhere."""
     motions = _rank(moved, SINGULAR)
-    # motions that move only drives everywhere are no serial singularity here either
+    # motions that never move the platform are not a serial singularity either
     always = generic.motions - generic.platform
     return _Ranks(generic.closures, motions, min(motions - always, 6))
 
@@ -213,11 +215,11 @@ def _ranks_there(moved: NDArray, generic: _Ranks) -> _Ranks:
 def _drives_and_platform(
     N: NDArray, B: NDArray, ranks: _Ranks
 ) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
-    """Return serial and parallel distances, their motions' joint rates, a screw."""
+    """Return both distances, joint rates of both motions, and a platform screw."""
     drives = B.shape[2] - 6
     W, t, Q = np.linalg.svd(N @ B, full_matrices=False)
     Q = Q[:, : ranks.motions]
-    # joint rates of the rows of Q
+    # joint rates that belong to the rows of Q
     rates = np.swapaxes(W[:, :, : ranks.motions], 1, 2) @ N
     rates = rates / np.maximum(t[:, : ranks.motions, None], 1e-300)
     serial, still_platform = _least(Q[..., drives:], ranks.platform)
@@ -232,7 +234,7 @@ def _drives_and_platform(
 
 
 def _least(half: NDArray, rank: int) -> tuple[NDArray, NDArray]:
-    """Return singular value ``rank`` of halves (k, r, c), and its combination."""
+    """Return singular value ``rank`` of matrices (k, r, c), and its left vector."""
     if not rank:
         return np.ones(len(half)), np.zeros(half.shape[:2])
     U, values, _ = np.linalg.svd(half, full_matrices=True)

@@ -1,4 +1,4 @@
-"""End of a continuation for each target."""
+"""End points of a continuation to many targets."""
 
 from dataclasses import dataclass
 
@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """End of the continuation to each target.
+    """End points of the continuation to many targets.
 
     Attributes:
-        coordinates: (k, n) joint coordinates at the end.
-        transforms: (k, n, 4, 4) frames there.
+        coordinates: (k, n) joint coordinates at the end points.
+        transforms: (k, n, 4, 4) frames at the end points.
         progress: (k,) fraction of the path; 1 if the target was reached.
         closure_mismatch: (k, closures) [rad, m] largest component of each closure
             error.

@@ -1,4 +1,4 @@
-"""Whether a posture is usable: within joint limits, regular, on home's side."""
+"""Test whether a posture is usable: joint limits, singularities, side of home."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,13 +29,13 @@ def verdicts(
     Args:
         robot: robot of n frames.
         target: k poses or sets of coordinates.
-        q: (k, n) [rad or m] coordinates where they were reached.
-        T: (k, n, 4, 4) frames there.
-        near: (k,) bool, True where a posture may be singular; all if absent.
+        q: (k, n) [rad or m] coordinates at the targets.
+        T: (k, n, 4, 4) frames at the targets.
+        near: (k,) bool, True for postures that can be singular; None for all.
 
     Returns:
-        For each :data:`BEYOND_LIMITS`, :data:`SINGULAR` or :data:`BEYOND_SINGULARITY`
-        and the reason; both empty if the posture is usable.
+        For each posture :data:`BEYOND_LIMITS`, :data:`SINGULAR` or
+        :data:`BEYOND_SINGULARITY`, and the reason; both empty if the posture is usable.
     """
     limits = [limits_passed(robot, coordinates) for coordinates in q]
     near = np.ones(len(q), dtype=bool) if near is None else near
@@ -55,7 +55,7 @@ def verdicts(
 
 
 def _singular(robot: Robot, q: NDArray, T: NDArray, near: NDArray) -> NDArray:
-    """Return the (k,) bool of postures whose locked closures have too low a rank."""
+    """Return (k,) bool, True for postures whose locked closures have too low a rank."""
     singular = near.copy()
     if near.any():
         singular[near] = locked_ranks(robot, T[near]) < home_rank(robot)
@@ -65,14 +65,15 @@ def _singular(robot: Robot, q: NDArray, T: NDArray, near: NDArray) -> NDArray:
 
 
 def limits_passed(robot: Robot, q: NDArray) -> str:
-    """Describe the joints beyond their limits, by how much, and the limits.
+    """Describe the joints beyond their limits, with their coordinates and limits.
 
     Args:
         robot: robot of n frames.
         q: (n,) [rad or m] coordinates.
 
     Returns:
-        Such as ``"leg1.rail at 0.3 m, limits -0.2 to 0.2"``; empty if there is none.
+        A text such as ``"leg1.rail at 0.3 m, limits -0.2 to 0.2"``; empty if no joint
+        is beyond its limits.
     """
     texts = []
     for frame, value in zip(robot.frames, q.tolist(), strict=True):
@@ -82,7 +83,7 @@ def limits_passed(robot: Robot, q: NDArray) -> str:
         room = _ROUNDING * (size_of(robot) if slides else 1.0)
         low, high = frame.limits[0] - room, frame.limits[1] + room
         if frame.passive and frame.joint == "revolute":
-            # whole turns of a joint that is no drive do not count
+            # whole turns of a passive joint are not counted as motion
             value -= 2 * np.pi * np.floor((value - low) / (2 * np.pi))
         if not low <= value <= high:
             texts.append(
@@ -93,14 +94,14 @@ def limits_passed(robot: Robot, q: NDArray) -> str:
 
 
 def posture_remarks(posture: Posture) -> list[str]:
-    """Return remarks on a posture, a sentence each.
+    """Return remarks on a posture, one sentence each.
 
     Args:
         posture: posture of a robot.
 
     Returns:
-        The operation mode where several meet at home, joints beyond their limits, and
-        whether a singularity lies between home and here.
+        Remarks on the operation mode if several modes meet at home, on joints beyond
+        their limits, and on a singularity between home and the posture.
     """
     robot, q, T = posture.robot, posture.coordinates, posture.transforms
     remarks = []
@@ -120,7 +121,7 @@ def posture_remarks(posture: Posture) -> list[str]:
 
 
 def _mode(home: Posture, posture: Posture) -> str:
-    """Return the name of the operation mode in which the platform came from home."""
+    """Return the name of the mode in which the platform moved away from home."""
     moved = posture.platform @ np.linalg.inv(home.platform)
     turned = np.abs(moved[:3, :3] - np.eye(3)).max() > _ROUNDING
     shift = posture.platform[:3, 3] - home.platform[:3, 3]

@@ -1,6 +1,7 @@
-"""The paper's equations (16)-(27), linear in small screws, at one posture or at many.
+"""Equations (16)-(27) of the paper, linear in small screws, at one or many postures.
 
-Begin at ``closure.py``, then ``energy.py`` (22), ``zone.py`` (21), ``pose_error.py``
-(27).  Those three call the compiled methods in ``lanes.py``.  Problems that these do
-not cover go to the numpy methods in the folder ``reference``.
+Start with ``closure.py``.  Continue with ``energy.py`` for problem (22), ``zone.py``
+for problem (21) and ``pose_error.py`` for problem (27).  These three modules call the
+compiled methods in ``lanes.py``.  The numpy methods in the folder ``reference`` solve
+the problems that the compiled methods do not cover.
 """

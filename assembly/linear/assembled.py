@@ -1,19 +1,20 @@
-"""A manipulator forced together: screws, wrenches, energy, and the certificate.
+"""Assembled manipulator of least energy: screws, wrenches, energy and certificate.
 
 ======  ====================  ========  ==============================================
 symbol  code                  shape     meaning
 ======  ====================  ========  ==============================================
-dx_p    ``platform_screw``    (6,)      platform error at its origin, base axes
-dc      ``clearance_screws``  (n, 6)    clearances, and small motions of passive joints
+dx_p    ``platform_screw``    (6,)      platform's pose error at its origin, base axes
+dc      ``clearance_screws``  (n, 6)    clearances and small motions of passive joints
 de, db  ``link_screws`` ..    (n, 6)    deformations of links and joints
-w       ``wrenches``          (n, 6)    of each link's spring, at the frame in its axes
---      ``tip_wrenches``      (n, 6)    through the section at each link's tip
-E       ``energy``            J         of all springs
+w       ``wrenches``          (n, 6)    wrenches of the links' springs, in frame axes
+--      ``tip_wrenches``      (n, 6)    wrenches through the sections at the links' tips
+E       ``energy``            J         elastic energy of all springs
 ======  ====================  ========  ==============================================
 
-Wrenches come from the multipliers of the closures, not from eqs (23)-(26).  Springs in
-series carry the same wrench, which (23) adds to itself.  The wrenches of (24)-(26),
-along the path to the platform alone, sum to zero on an unloaded platform.
+The wrenches are computed from the multipliers of the closures, not from eqs (23)-(26).
+Eq. (23) adds the wrenches of springs in series, although these springs carry one and
+the same wrench.  Eqs (24)-(26) include only the path to the platform.  Their wrenches
+add up to zero if the platform carries no load.
 """
 
 from dataclasses import dataclass
@@ -61,16 +62,17 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_ROUNDED = 1e-9  # share of the largest wrench below which a component is rounding
-_NOTHING = 1e-12  # [N m, N] size below which a component is rounding
+_ROUNDED = 1e-9  # share of the largest wrench below which a component is rounding error
+_NOTHING = 1e-12  # [N m, N] components of a wrench below this are rounding errors
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Assembly(Solution[N]):
-    """A manipulator assembled at least energy; or many points, with a leading axis.
+    """Manipulator assembled with the least energy, at one point or at many points.
 
-    Of many points ``[i]`` is one; without a solution it raises the reason.  The fields
-    are those of :class:`~forcefit.assembly.linear.solution.Solution`.
+    The arrays of many points begin with a point axis, and ``[i]`` returns point i.  If
+    point i has no solution, ``[i]`` raises the exception that explains why.  For the
+    fields see :class:`~forcefit.assembly.linear.solution.Solution`.
     """
 
     summary, plot = short_repr, show
@@ -86,7 +88,7 @@ class Assembly(Solution[N]):
                 "platform error": f"at most {largest(self.platform_screw[solved])}",
             }
         forces = np.linalg.norm(without_rounding(self.tip_wrenches)[:, 3:], axis=1)
-        most = largest_row(forces)  # links in series carry the same force
+        most = largest_row(forces)  # first of equal forces: links in series
         return {
             **forced_lines(self),
             "largest force": f"{forces[most]:.4g} N, in "
@@ -96,32 +98,32 @@ class Assembly(Solution[N]):
         }
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return a data set; see :mod:`forcefit.assembly.model.tables`."""
+        """Return a data set as described in :mod:`forcefit.assembly.model.tables`."""
         from forcefit.assembly.model.tables import assembly_dataset
 
         return super().to_xarray() if self.of_many else assembly_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a row for each frame, or each point, columns (variable, component)."""
+        """Return a table with one row per frame or point, by variable and component."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "point" if self.of_many else "frame")
 
     @property
     def ranks(self) -> dict[str, int]:
-        """Numbers of rows of one point's closures: free, elastic, rigid, redundant."""
+        """Numbers of free, elastic, rigid and redundant closure rows of one point."""
         return reduce_problem(self.linearisation, self.joints, self.frame_loads).ranks
 
     @property
     def loaded(self) -> Any:
-        """(...) bool, whether there are loads."""
+        """(...) bool, whether any load acts on the robot."""
         acting = np.any(self.frame_loads.body, axis=-1)
         acting = acting | np.any(self.frame_loads.joint, axis=-1)
         return plain(np.broadcast_to(acting, np.shape(self.energy_without_clearance)))
 
     @cached_property
     def energy(self) -> N:
-        """(...) [J] elastic energy; 0 where the certificate cannot exclude 0."""
+        """(...) [J] elastic energy; 0 if the certificate does not exclude zero."""
         nonzero = differs_from_zero(
             self.stored, self.duality_gap(), self.multipliers,
             self.closure_residual() + self.rounding,
@@ -148,12 +150,12 @@ class Assembly(Solution[N]):
 
     @property
     def _errors(self) -> NDArray:
-        """(..., n, 6) [rad, m]."""
+        """(..., n, 6) [rad, m] geometric errors of the frames."""
         return self.posture.robot.errors if self.errors is None else self.errors
 
     @cached_property
     def clearance_screws(self) -> NDArray:
-        """(..., n, 6) [rad, m] clearances, and small motions of passive joints."""
+        """(..., n, 6) [rad, m] clearances and small motions of passive joints."""
         screws = self.clearances @ self.joints.cones.T
         return _by_frames(screws + self.motions @ self.joints.free.T)
 
@@ -182,10 +184,11 @@ class Assembly(Solution[N]):
 
     @cached_property
     def closure_wrenches(self) -> NDArray:
-        """(..., closures, 6) [N m, N] each closure's second chain exerts on its first.
+        """(..., closures, 6) [N m, N] wrench of the second chain on the first chain.
 
-        At the platform's origin, base axes.  Where rigid parts are overconstrained,
-        the wrenches are not unique; these are then the smallest ones.
+        The wrenches act at the platform's origin and are expressed in base axes.  If
+        rigid parts are overconstrained, the wrenches are not unique, and the wrenches
+        of least norm are returned.
         """
         size = self.linearisation.size
         return _by_frames(self.multipliers) / np.array([1, 1, 1, size, size, size])
@@ -194,24 +197,27 @@ class Assembly(Solution[N]):
     def wrenches(self) -> NDArray:
         """(..., n, 6) [N m, N] wrench of each link's spring: K_E times its deformation.
 
-        At the frame's origin, in its axes.  The link's own weight acts at its two ends
-        here; :attr:`tip_wrenches` are the wrenches through its section at the tip.
+        Each wrench acts at the frame's origin and is expressed in the frame's axes.
+        Half of the link's own weight acts at each end of the link.  For the wrenches
+        through the section at the tip see :attr:`tip_wrenches`.
         """
         return self._closing + _by_frames(self.frame_loads.body)
 
     @cached_property
     def tip_wrenches(self) -> NDArray:
-        """(..., n, 6) [N m, N] wrench of the outer part on each body, at its tip.
+        """(..., n, 6) [N m, N] wrench that the next part exerts on each body's tip.
 
-        At the frame's origin, in its axes; the body's own weight acts along it.
+        Each wrench acts at the frame's origin and is expressed in the frame's axes.
+        The body's own weight is distributed along the body.
         """
         return self.wrenches - self.frame_loads.at_tips
 
     @cached_property
     def start_wrenches(self) -> NDArray:
-        """(..., n, 6) [N m, N] wrenches at the starts of links under their own weight.
+        """(..., n, 6) [N m, N] wrench at the start of each link under its own weight.
 
-        At the link's start, in its frame's axes; NaN for bodies without such a weight.
+        Each wrench acts at the link's start and is expressed in its frame's axes.  The
+        entries of bodies without distributed weight are NaN.
         """
         at_tips = self.frame_loads.at_tips
         starts = wrenches_at_starts(self.posture.robot, self.tip_wrenches, at_tips)
@@ -219,26 +225,28 @@ class Assembly(Solution[N]):
 
     @cached_property
     def joint_wrenches(self) -> NDArray:
-        """(..., n, 6) [N m, N] wrench through each joint: K_B times its screw.
+        """(..., n, 6) [N m, N] wrench through each joint: K_B times the joint's screw.
 
-        They differ from :attr:`tip_wrenches` by loads on the body at the frame.
+        The difference from :attr:`tip_wrenches` equals the loads that act on the body
+        at the frame.
         """
         return self._closing + _by_frames(self.frame_loads.joint)
 
     @cached_property
     def _closing(self) -> NDArray:
-        """(..., n, 6) [N m, N] through each frame from the closures alone."""
+        """(..., n, 6) [N m, N] wrench through each frame due to the closures only."""
         at_platform = closure_signs(self.posture.robot).T @ self.closure_wrenches
         return np.einsum("...nji,...nj->...ni", self.posture.paths, at_platform)
 
     @cached_property
     def bound(self) -> N:
-        """(...) [J] certified lower bound of energy minus the load's work.
+        """(...) [J] certified lower bound of the energy minus the work of the loads.
 
-        The complementary energy of these wrenches.  Every assembly has at least the
-        energy -w.dl - w.C w/2 - (largest work of w on the clearances), for any wrenches
-        w in equilibrium.  So the bound does not depend on how the problem was solved.
-        Free motions count as no larger than in this solution.
+        The bound is the complementary energy of the computed wrenches.  For any
+        wrenches w in equilibrium, the energy of every assembly is at least
+        -w.dl - w.C w/2 - (largest work of w on the clearances).  The bound therefore
+        does not depend on the solution method.  It assumes that no free motion exceeds
+        its value in this solution.
         """
         joint, springs = _flat(self.joint_wrenches), self._balancing
         clearances = cone_sizes(joint @ self.joints.cones, self.joints.group)
@@ -249,7 +257,10 @@ class Assembly(Solution[N]):
 
     @property
     def _balancing(self) -> NDArray:
-        """(..., ny) [sqrt(2 J)] springs' deformations that balance the wrenches."""
+        """(..., ny) [sqrt(2 J)] deformations of the springs that balance the wrenches.
+
+        The wrenches include those of the loads.
+        """
         columns, links = self.joints.elastic, self.joints.links
         body, joint = _flat(self.wrenches), _flat(self.joint_wrenches)
         return np.where(links, body @ columns, joint @ columns)
@@ -260,14 +271,17 @@ class Assembly(Solution[N]):
         bodies: ArrayLike | None = None,
         gravity: ArrayLike | None = None,
     ) -> bool:
-        """Return whether the assembly has these loads, see :func:`solve_assembly`."""
+        """Return whether the assembly carries these loads.
+
+        For the arguments see :func:`solve_assembly`.
+        """
         other = all_loads(self.posture, load, bodies, gravity)
         return np.array_equal(other.body, self.frame_loads.body) and np.array_equal(
             other.joint, self.frame_loads.joint
         )
 
     def closure_residual(self) -> N:
-        """Return (...) largest closure error: abs(rad), abs(m) / reference length."""
+        """Return (...) the largest closure error in rad, or m / reference length."""
         return self._residual
 
     @cached_property
@@ -276,7 +290,7 @@ class Assembly(Solution[N]):
         return plain(residual.max(axis=-1, initial=0.0))
 
     def clearance_excess(self, own_axes_free: bool = False) -> N:
-        """(...) [-] largest excess of a clearance over its cone, relative to it."""
+        """Return (...) [-] the largest relative excess of a clearance over its cone."""
         if not own_axes_free and "_excess" in vars(self):
             return self._excess
         bounds = clearance_bounds(self.posture.robot, own_axes_free)
@@ -289,17 +303,18 @@ class Assembly(Solution[N]):
 
     @cached_property
     def rounding(self) -> N:
-        """(...) [rad, lengths] bound of the closure error that rounding can cause."""
+        """(...) [rad, lengths] largest closure error that rounding can cause."""
         size = self.linearisation.size
         return plain(closure_rounding(self._errors, self.joints, size))
 
     @cached_property
     def uncertainty(self) -> N:
-        """(...) [J] duality gap computed without cancellation, with rounding added.
+        """(...) [J] duality gap computed without cancellation, plus rounding errors.
 
-        Energy minus its bound is |y - s|^2 / 2, where s are the springs' deformations
-        that balance the wrenches.  To it are added the work that each cone's wrench
-        could still gain, and the work of the multipliers on the closures' residual.
+        The energy minus its bound equals |y - s|^2 / 2.  Here y are the deformations of
+        the springs, and s the deformations that balance the wrenches.  Two terms are
+        added: the work that the wrench on each cone could still gain, and the work of
+        the multipliers on the residual of the closures.
         """
         joint, springs = _flat(self.joint_wrenches), self.elastic - self._balancing
         group, on_cones = self.joints.group, joint @ self.joints.cones
@@ -316,7 +331,7 @@ class Assembly(Solution[N]):
         )  # fmt: skip
 
     def duality_gap(self) -> N:
-        """Return (...) [J] certified bound of the energy above the least possible."""
+        """Return (...) [J] certified bound of the energy above the least energy."""
         return self._gap
 
     @cached_property
@@ -324,8 +339,12 @@ class Assembly(Solution[N]):
         return plain(np.maximum(self.potential - self.bound, 0.0))  # NaN stays NaN
 
     def relative_gap(self) -> N:
-        """Return (...) [-] duality gap over energy, or 1e-4 of that at no clearance."""
-        # inside an assembly zone the least energy is zero, so a floor replaces it
+        """Return (...) [-] the duality gap divided by the elastic energy.
+
+        The divisor is at least 1e-4 of the energy without clearance.
+        """
+        # the least energy is zero inside an assembly zone: the divisor has a lower
+        # limit
         least = np.maximum(1e-4 * np.asarray(self.energy_without_clearance), 1e-300)
         return plain(self.duality_gap() / np.maximum(self.stored, least))
 
@@ -333,7 +352,7 @@ class Assembly(Solution[N]):
     def certified(self) -> Any:
         """(...) bool: gap <= 1e-8 of the energy + 1e-12 of that without clearance.
 
-        Under loads also + 1e-12 of their work.
+        Under loads, 1e-12 of the work of the loads is added to the limit.
         """
         largest_energy = self.energy_without_clearance + np.abs(self.work)
         allowed = GAP * self.energy + GAP_WITHOUT_CLEARANCE * largest_energy
@@ -356,13 +375,14 @@ def _times(matrices: NDArray, vectors: NDArray) -> NDArray:
 
 
 def without_rounding(wrenches: NDArray) -> NDArray:
-    """Return the wrenches with components that are rounding set to 0.
+    """Return the wrenches with all components that are rounding errors set to 0.
 
     Args:
-        wrenches: (..., n, 6) [N m, N] of the n bodies of a robot.
+        wrenches: (..., n, 6) [N m, N] wrenches of the n bodies of a robot.
 
     Returns:
-        The same; 0 where below 1e-9 of the robot's largest component, or below 1e-12.
+        (..., n, 6) [N m, N]; a component is 0 if its size was below 1e-9 of the robot's
+        largest component, or below 1e-12.
     """
     sizes = np.abs(wrenches)
     largest = sizes.max(axis=(-2, -1), keepdims=True, initial=0.0)
@@ -383,11 +403,11 @@ def all_loads(
         posture: the robot's configuration.
         load: (6,) [N m, N] wrench on the platform at its origin, base axes.
         bodies: (n, 6) [N m, N] wrenches on the bodies of all frames.
-        gravity: (3,) [m/s^2] base axes.
+        gravity: (3,) [m/s^2] gravity vector in base axes.
         carried: (n, 6) [N m, N] wrenches on the parts that the frames' joints carry.
 
     Returns:
-        The loads.
+        Loads on every frame, including the weights if ``gravity`` is given.
     """
     if gravity is not None:
         on_bodies, on_parts = weights(posture, gravity)

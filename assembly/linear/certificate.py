@@ -1,18 +1,20 @@
-"""Errors that the certificate of a least energy excludes: energy, closures, screw.
+"""Errors of energy, closures and platform screw that the certificate excludes.
 
-The distance from the computed platform screw to any of least energy is bounded too.
+A certificate of least energy is a lower bound of the energy.  The distance of the
+computed platform screw from all platform screws of least energy is bounded as well.
 
-The energy is quadratic in the springs' scaled deformations y, E = y.y/2 less the work
-of the loads, and a solution whose gap is g is at most g above the least.  So, with w_k
-the wrench on cone k,
+The energy E = y.y/2 minus the work of the loads is quadratic in the scaled deformations
+y of the springs.  The energy of a solution with duality gap g exceeds the least energy
+by at most g.  Let w_k be the wrench on cone k.  Then
 
     |y - y_least| <= sqrt(2 g),          |w_k| - w_k.u_k <= g for each cone,
 
-for the computed solution and any of least energy.  So the springs are known, and so are
-the clearances whose constraint is active.  Clearances without load are not: the energy
-does not depend on them, and the minimiser is not unique.  Both sets of platform screws
-are convex; a cone programme with a certified height bounds their extent along each
-axis.
+for the computed solution and every solution of least energy.  The gap thus bounds the
+errors of the springs and of the clearances with an active constraint.  The gap does not
+bound clearances without load: the energy does not depend on them, and the minimiser is
+not unique.  The platform screws of least energy form a convex set, and so do the
+platform screws that the gap allows.  A cone programme with a certified objective value
+bounds the extent of each set along each axis.
 """
 
 from dataclasses import dataclass, replace
@@ -34,24 +36,24 @@ from forcefit.assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE, SolverFa
 
 LARGEST_RESIDUAL = 1e-9  # [rad, reference lengths] accepted residual of a closure
 LARGEST_EXCESS = 1e-9  # [-] accepted excess of a clearance over its cone
-_SCREW, _SCREW_SHARE = 1e-5, 1e-3  # [rad, m] and relative: accepted error of the screw
-_AMPLIFIED = 10.0  # factor by which closures may amplify the springs' motion
-_WIDTH = 3e-5  # required upper minus lower bound, relative to the distance
-_HELD = 0.1  # [-] share of a cone: a load that leaves more free does not fix it
+_SCREW, _SCREW_SHARE = 1e-5, 1e-3  # accepted error of the screw: [rad, m] and relative
+_AMPLIFIED = 10.0  # assumed upper limit of frame motion divided by spring deformation
+_WIDTH = 3e-5  # required difference of upper and lower bound, relative to the distance
+_HELD = 0.1  # [-] largest free share of its cone with which a clearance is fixed
 
 
 @dataclass(frozen=True)
 class ScrewBound:
-    """Distances from the computed platform screw to any of least energy.
+    """Largest distances of the computed platform screw from those of least energy.
 
     Attributes:
-        rotation: [rad] upper bound; infinite where the platform turns freely.
+        rotation: [rad] upper bound; infinite if the platform turns freely.
         translation: [m] upper bound, at the platform's origin.
-        rotation_open: [rad] part of it that clearances without load leave open: the
-            screw is not unique, and the farthest one is at most this far.
-        translation_open: [m] the same for the translation.
-        rotation_error: [rad] part of it that is numerical error.
-        translation_error: [m] the same for the translation.
+        rotation_open: [rad] part of ``rotation`` due to clearances without load.  These
+            make the screw non-unique, and the farthest screw is at most this far away.
+        translation_open: [m] part of ``translation`` due to clearances without load.
+        rotation_error: [rad] part of ``rotation`` that is numerical error.
+        translation_error: [m] part of ``translation`` that is numerical error.
     """
 
     rotation: float
@@ -65,16 +67,16 @@ class ScrewBound:
 def unproved(assembly: Assembly) -> str:
     """Return sentences on the properties that the certificate does not prove.
 
-    Proved is an assembly whose closures hold to 1e-9 (rad, or m per reference length),
-    whose clearances are within 1e-9 of their bounds, and whose energy is close to the
-    least possible: above it by at most 1e-8 of the energy and of the loads' work, plus
-    1e-12 of the energy without clearance.
+    An assembly is proved if three conditions are satisfied.  The closure residuals are
+    at most 1e-9 (rad, or m per reference length).  The clearances exceed their bounds
+    by at most 1e-9.  The energy exceeds the least energy by at most 1e-8 of the energy
+    and of the loads' work, plus 1e-12 of the energy without clearance.
 
     Args:
         assembly: assembly of least energy.
 
     Returns:
-        Sentences joined by semicolons; empty if all is proved.
+        Sentences joined by semicolons; empty if the assembly is proved.
     """
     residual, excess, gap = (
         assembly.closure_residual(), assembly.clearance_excess(),
@@ -83,7 +85,7 @@ def unproved(assembly: Assembly) -> str:
     allowed = GAP * (assembly.stored + abs(assembly.work))
     allowed += GAP_WITHOUT_CLEARANCE * assembly.energy_without_clearance
     sentences = []
-    # written so that NaN counts as not proved
+    # the condition is written so that NaN counts as not proved
     if not gap <= allowed:
         sentences.append(
             f"the minimum of the energy is certified to {gap:.1e} J only, "
@@ -101,16 +103,17 @@ def unproved(assembly: Assembly) -> str:
 
 
 def unproved_screw(assembly: Assembly, bound: ScrewBound) -> list[str]:
-    """Return which halves of the platform screw the gap does not determine.
+    """Return messages on the rotation or translation that the gap does not determine.
 
-    Only parts of the screw that are unique are judged.
+    The test covers only the parts of the platform screw that are unique.
 
     Args:
         assembly: assembly of least energy.
         bound: bound of the platform screw's error.
 
     Returns:
-        A sentence for each half whose error may exceed 1e-5 rad or m plus 1e-3 of it.
+        One message each for the rotation and the translation if the error can exceed
+        1e-5 rad or m plus 1e-3 of the value.
     """
     allowed = _allowed(assembly)
     spread = stiffness_spread(assembly.joints, assembly.linearisation.size)
@@ -131,13 +134,13 @@ def unproved_screw(assembly: Assembly, bound: ScrewBound) -> list[str]:
 
 
 def _allowed(assembly: Assembly) -> NDArray:
-    """Return the (2,) [rad, m] largest error accepted of the platform screw."""
+    """Return the (2,) [rad, m] largest accepted error of the platform screw."""
     halves = assembly.platform_screw.reshape(2, 3)
     return _SCREW + _SCREW_SHARE * np.linalg.norm(halves, axis=1)
 
 
 def _springs_determined(assembly: Assembly) -> bool:
-    """Return whether the gap limits the springs so that frames hardly move."""
+    """Return whether the error of the springs causes only negligible frame motions."""
     frames, springs = len(assembly.posture.robot.frames), assembly.elastic.size
     blocks = assembly.joints.elastic.reshape(frames, 6, springs)
     moved = np.linalg.norm(assembly.posture.paths @ blocks, axis=(0, 2))
@@ -150,11 +153,12 @@ def bound_screw(assembly: Assembly) -> ScrewBound:
     """Bound the distance to every platform screw of least energy.
 
     Args:
-        assembly: the computed one, with its wrenches.
+        assembly: the computed assembly with its wrenches.
 
     Returns:
-        The bounds, from the certificate alone.  They are bounds of boxes around the
-        sets, so up to sqrt(3) times the distances.
+        Bounds that follow from the certificate only.  They are computed for boxes
+        around the sets of screws, and can exceed the true distances by a factor of
+        sqrt(3).
     """
     gap, lin = assembly.uncertainty, assembly.linearisation
     open_closures = lin.rows @ assembly.screws.ravel()
@@ -173,7 +177,7 @@ def bound_screw(assembly: Assembly) -> ScrewBound:
         )
 
     def uncertain(joints: VirtualJoints) -> MovingCones:
-        """Return all that the gap leaves open: clearances, springs and the residual."""
+        """Return the clearances, springs and residual that the gap leaves uncertain."""
         columns, start, group, room = _room(assembly, joints, gap)
         springs = joints.elastic * np.sqrt(2.0 * gap)
         columns = np.hstack([columns * room, springs])
@@ -207,24 +211,25 @@ def bound_screw(assembly: Assembly) -> ScrewBound:
 def _room(
     assembly: Assembly, joints: VirtualJoints, gap: float
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Return the range that least energy leaves to the clearances.
+    """Return the range of each clearance among the assemblies of least energy.
 
     Returns:
-        Clearances' columns, their start values, their cones, and the range (nu,) left:
-        1 where it is the whole cone; else the largest distance, in sizes of the cone,
-        of this assembly from any of least energy.
+        Columns of the clearances; their values in this assembly; the cone of each
+        column; and (nu,) ranges relative to the size of the cone.  A range of 1 means
+        the complete cone.  A smaller range is the largest distance between this
+        assembly and any assembly of least energy.
     """
     group = joints.group
     load = cone_sizes(joints.cones.T @ assembly.joint_wrenches.ravel(), group)
     share = np.divide(gap, load, out=np.full(len(load), np.inf), where=load > 0.0)
-    # range in an interval: the distance from its end; in a disc: the width of a cap
+    # the range is measured from the end of an interval; in a disc it is a cap's width
     room = np.where(np.bincount(group) > 1, 2.0 * np.sqrt(2.0 * share), share)
     room = np.where(room < _HELD, room, 1.0)
     return joints.cones, clearances_in(assembly, joints), group, room[group]
 
 
 def _farthest(reachable: ReachableSet, part: int, box: float) -> float:
-    """Return the certified largest distance [rad or m] from the centre, at most box."""
+    """Return the certified largest distance [rad or m] of the set from its centre."""
     if not 0.0 < box < np.inf:
         return box
     about_centre = replace(reachable, centre=np.zeros(6))
@@ -235,12 +240,12 @@ def _farthest(reachable: ReachableSet, part: int, box: float) -> float:
 
 
 def _extents(reachable: ReachableSet) -> NDArray:
-    """Return the set's (6,) [rad, m] extents from its centre, larger sides."""
+    """Return (6,) [rad, m] the larger extent of the set in both senses of each axis."""
     extents = []
     for d in np.concatenate([np.eye(6), -np.eye(6)]):
         try:
             height = reachable.support(d).height
             extents.append(height - float(d @ reachable.centre))
-        except SolverFailed:  # no bound is known in that direction
+        except SolverFailed:  # no bound is known in this direction
             extents.append(np.inf)
     return np.maximum(np.reshape(extents, (2, 6)).max(axis=0), 0.0)

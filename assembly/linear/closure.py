@@ -1,20 +1,20 @@
-"""The assembly constraints, linear in the small screws.
+"""Assembly constraints, linear in the small screws.
 
-Eqs (8) and (16)-(20) for any tree with closures: the screws along the two chains that
-meet at a closure must add up to the same motion,
+Eqs (8) and (16)-(20) are applied to any tree with closures.  The two chains that meet
+at a closure must produce the same motion:
 
-    sum over frames j of  sign_kj M_j (dl_j + de_j + dc_j + db_j)  =  0,
+    sum over frames j of  sign_kj M_j (dl_j + de_j + dc_j + db_j)  =  0.
 
-sign +1 on the first chain, -1 on the second, 0 off both and on frames they share.
-All screws are read at the platform's origin in base axes, so the multiplier of closure
-k is the wrench its second chain exerts on its first, read there.
-
+The sign is +1 on the first chain and -1 on the second chain.  It is 0 for frames
+outside both chains and for frames in both.  All screws are expressed at the platform's
+origin in base axes.  The multiplier of closure k is therefore the wrench at the
+platform's origin that the second chain of k exerts on the first.
 ======  =============  ==========  ================================================
 symbol  code           shape       meaning
 ======  =============  ==========  ================================================
 y       ``elastic``    (6n, ny)    links and joint springs, scaled: energy = y.y / 2
-u       ``cones``      (6n, nu)    clearances, scaled: discs, intervals, balls, size 1
-q       ``free``       (6n, nq)    motions without bound, in units of their screws
+u       ``cones``      (6n, nu)    clearances in discs, intervals or balls of radius 1
+q       ``free``       (6n, nq)    unbounded motions, in units of their screws
 ======  =============  ==========  ================================================
 """
 
@@ -46,17 +46,17 @@ from forcefit.results.display import html_table, short_repr
 
 @dataclass(frozen=True, eq=False)
 class VirtualJoints:
-    """Columns of small screws that may move in a robot, except its drives.
+    """Columns of small screws of all parts that can move in a robot, except its drives.
 
     Attributes:
         robot: robot of n frames.
         elastic: (6n, ny) columns of links and joint springs.
-        links: (ny,) bool, columns that belong to links; the others are joints'.
-        cones: (6n, nu) columns of bounded clearances, each the size of its bound.
+        links: (ny,) bool, True for columns of links and False for columns of joints.
+        cones: (6n, nu) columns of bounded clearances; the length of each is its bound.
         group: (nu,) cone of each column: two columns for a disc, three for a ball.
         scaled: (nu,) bool, whether the margin's factor scales the column's cone.
         free: (6n, nq) unit columns of unbounded motions.
-        bounded_motion: frames whose passive joint's own motion keeps its bound.
+        bounded_motion: frames whose passive joint's bound of motion is a cone.
     """
 
     robot: Robot
@@ -75,17 +75,17 @@ def virtual_joints(
     robot: Robot, springs: bool = True, own_axes_free: bool = False,
     bounded_motion: bool | frozenset[int] = False,
 ) -> VirtualJoints:  # fmt: skip
-    """Return the columns of all screws that may move.
+    """Return the columns of all small screws that can move.
 
     Args:
-        robot: of n frames.
-        springs: whether links and joints deform; problem (21) has no springs.
+        robot: robot of n frames.
+        springs: whether links and joints deform; in problem (21) they are rigid.
         own_axes_free: whether passive joints with stiffness move freely about (or
-            along) their own z, without its spring; else that axis is elastic, or
-            without springs rigid: the two margins of problem (21).
-        bounded_motion: keep the bounds of passive joints' own motion, of all or of
-            these frames.  They are large and almost never active, so they are left
-            out first and checked afterwards.
+            along) their z axis.  If not, the z axis is elastic, or rigid without
+            springs.  The two cases give the two margins of problem (21).
+        bounded_motion: whether the motion of passive joints is bounded: for all joints,
+            or for a set of frames.  These bounds are large and rarely active.  They are
+            therefore omitted first and tested afterwards.
 
     Returns:
         The columns.
@@ -98,14 +98,14 @@ def virtual_joints(
 
 @dataclass(frozen=True)
 class _JointsKey:
-    """Robots that differ in errors and masses alone have the same virtual joints."""
+    """Cache key, equal for robots that differ only in errors and masses."""
 
     parts: tuple
     robot: Robot = field(compare=False)
 
 
 def _parts(robot: Robot) -> tuple:
-    """Return what virtual joints depend on; links by identity, the robot keeps them."""
+    """Return the data for the cache key; links are compared by identity."""
     return tuple(
         (
             f.parent, f.joint, f.pitch, f.actuated, f.clearance, id(f.link),
@@ -121,7 +121,7 @@ def _virtual_joints(
     key: _JointsKey, springs: bool, own_axes_free: bool,
     bounded_motion: frozenset[int],
 ) -> VirtualJoints:  # fmt: skip
-    """Return the columns, cached for all robots of the same parts."""
+    """Return the columns, cached for all robots with equal parts."""
     robot = key.robot
     bounds = clearance_bounds(robot, own_axes_free)
     scaled = scales_with_margin(robot)
@@ -153,7 +153,7 @@ def _virtual_joints(
 def _elastic(
     links: NDArray, joints: NDArray, robot: Robot
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the columns of links and springs, and which of them are links'."""
+    """Return the spring columns of links and joints, and (ny,) bool, True for links."""
     count = len(robot.frames)
     columns, is_link = [np.zeros((6 * count, 0))], []
     for compliances, link in ((links, True), (joints, False)):
@@ -169,7 +169,7 @@ def _elastic(
 
 
 def _cones(bounds: NDArray, scales: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Return the columns of bounded clearances, their cones and whether they scale."""
+    """Return bounded clearances: columns, cones, and whether the margin scales each."""
     rows, sizes, group, scaled = [], [], [], []
     count = 0
     for i, cone in np.argwhere((bounds > 0) & np.isfinite(bounds)):
@@ -189,7 +189,7 @@ def _cones(bounds: NDArray, scales: NDArray) -> tuple[NDArray, NDArray, NDArray]
 
 
 def _free(bounds: NDArray, robot: Robot) -> NDArray:
-    """Return the unit columns of motions without bound; of a thread [0 0 1 0 0 h]."""
+    """Return unit columns of unbounded motions; a helical joint's is [0 0 1 0 0 h]."""
     rows = [6 * i + r for i, cone in np.argwhere(np.isinf(bounds)) for r in CONES[cone]]
     columns = np.zeros((6 * len(bounds), len(rows)))
     columns[rows, np.arange(len(rows))] = 1.0
@@ -200,13 +200,13 @@ def _free(bounds: NDArray, robot: Robot) -> NDArray:
 
 
 def in_reference_lengths(size: float) -> NDArray:
-    """Return the factors that make lengths of screws comparable with angles.
+    """Return the factors that make the lengths in screws comparable with angles.
 
     Args:
         size: [m] reference length.
 
     Returns:
-        (6,) 1 for angles [-] and 1 / size for lengths [1/m].
+        (6,) factors: 1 for angles [-] and 1 / size for lengths [1/m].
     """
     return np.repeat([1.0, 1.0 / size], 3)
 
@@ -227,9 +227,9 @@ class Linearisation:
 
     @cached_property
     def rows(self) -> NDArray:
-        """(6 closures, 6 n) with rows @ screws = 0 for the total screws.
+        """(6 closures, 6 n) matrix; rows @ screws = 0 for the total screws.
 
-        The blocks sign_kj M_j; translations divided by :attr:`size`.
+        The blocks are sign_kj M_j; their translations are divided by :attr:`size`.
         """
         robot = self.posture.robot
         blocks = closure_signs(robot)[:, :, None, None] * self.posture.paths
@@ -238,7 +238,7 @@ class Linearisation:
 
     @cached_property
     def platform(self) -> NDArray:
-        """(6, 6 n) map of the frames' screws to the platform screw, (8), not scaled."""
+        """(6, 6 n) map, not scaled, from frame screws to the platform screw, (8)."""
         robot = self.posture.robot
         on_path = robot.on_path[robot.index(robot.platform)]
         platform = np.swapaxes(self.posture.paths * on_path[:, None, None], 0, 1)
@@ -246,7 +246,7 @@ class Linearisation:
 
     @cached_property
     def misfit(self) -> NDArray:
-        """(6 closures,) closure error that the geometric errors cause, scaled."""
+        """(6 closures,) scaled closure error that the geometric errors cause."""
         return self.rows @ self.posture.robot.errors.ravel()
 
 
@@ -260,14 +260,14 @@ def linearise(posture: Posture) -> Linearisation:
         The constraint matrix and the map to the platform screw.
 
     Raises:
-        BadInput: a geometric error is beyond 1e6 rad or m.
+        BadInput: the size of a geometric error exceeds 1e6 rad or m.
     """
     return Linearisation(posture, checked_size(posture.robot))
 
 
 @lru_cache(maxsize=64)
 def checked_size(robot: Robot) -> float:
-    """Return the reference length [m] of a robot, after a check of its errors.
+    """Return the reference length [m] of a robot after a check of its geometric errors.
 
     Args:
         robot: any robot.
@@ -276,7 +276,7 @@ def checked_size(robot: Robot) -> float:
         The result of :func:`forcefit.assembly.kinematics.nominal.size_of`.
 
     Raises:
-        BadInput: a geometric error is beyond 1e6 rad or m.
+        BadInput: the size of a geometric error exceeds 1e6 rad or m.
     """
     too_large = ~(np.abs(robot.errors) <= LARGEST_LENGTH).all(axis=1)
     if too_large.any():

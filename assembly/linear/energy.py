@@ -1,9 +1,9 @@
-"""The least energy that closes a manipulator, problem (22), at one point or at many.
+"""Least energy that closes a manipulator, problem (22), at one or many points.
 
 The compiled method (:mod:`forcefit.assembly.linear.lanes`) computes all steps from the
-frames' poses to the certificate, with and without loads.  The reference
-(:mod:`forcefit.assembly.linear.reference`) solves points that it does not cover or
-certify; the answer's ``method`` says so.
+poses of the frames to the certificate, with and without loads.  The reference method
+(:mod:`forcefit.assembly.linear.reference`) solves the points that the compiled method
+does not cover or certify.  The field ``method`` of the result names the method used.
 """
 
 from collections.abc import Mapping, Sequence
@@ -48,8 +48,8 @@ from forcefit.assembly.solvers.method import Method, check_method, log_reference
 
 __all__ = ["Assembly", "CannotAssemble", "solve_assembly"]
 
-# outcomes of assembly/kernels/linear/energies.h: from _LEFT on they are no answer, and
-# _AT_BOUNDS may come from a bound of a passive joint's own motion that was left out
+# outcomes of assembly/kernels/linear/energies.h: from _LEFT on, the kernel has no
+# result; _AT_BOUNDS can be caused by an omitted bound of a passive joint's motion
 _LEFT, _AT_BOUNDS = 2, (5, 6)
 _STATUS: dict[type[Exception], str] = {
     CannotAssemble: CANNOT_ASSEMBLE,
@@ -96,37 +96,39 @@ def solve_assembly(
     method: Method = "compiled",
     carried: ArrayLike | None = None,
 ) -> Assembly:
-    """Close a manipulator at least energy, problem (22), under optional loads.
+    """Close a manipulator with the least energy, problem (22), under optional loads.
 
     Args:
-        posture: the robot's configuration; its errors, clearances, links and joint
-            springs are the robot's.  Or k postures of one robot.
-        load: (6,) or (k, 6) [N m, N] wrench on the platform at its origin, base axes,
-            or by component, ``{"fz": -50}``; energy minus its work is then minimised.
+        posture: configuration of a robot, whose errors, clearances, links and joint
+            springs are used; or a sequence of k postures of one robot.
+        load: (6,) or (k, 6) [N m, N] wrench on the platform at its origin, base axes;
+            or a mapping of components such as ``{"fz": -50}``.  With a load, the energy
+            minus the work of the load is minimised.
         bodies: (n, 6) or (k, n, 6) [N m, N] wrenches on the bodies of all frames, each
             at its frame's origin, base axes.
-        gravity: (3,) or (k, 3) [m/s^2] base axes; links with a density and bodies with
-            a mass then have weight.
-        errors: (k, n, 6) [rad, m] geometric errors in place of the robot's, a set for
-            each of k postures, or k sets at one.
-        method: ``"compiled"``, with the reference for points whose answer it does not
-            prove; or ``"reference"``, numpy and Clarabel alone.  The answer's
-            ``method`` says which of them solved each point.
+        gravity: (3,) or (k, 3) [m/s^2] gravity vector in base axes.  It acts on links
+            with a density and on bodies with a mass.
+        errors: (k, n, 6) [rad, m] geometric errors in place of the robot's: one set for
+            each of k postures, or k sets at one posture.
+        method: ``"compiled"`` uses the reference method only for points that the
+            compiled method does not prove; ``"reference"`` uses only numpy and
+            Clarabel.  The field ``method`` of the result names the method per point.
         carried: (n, 6) or (k, n, 6) [N m, N] wrenches on the parts that the joints of
             all frames carry, each at its frame's origin, base axes.
 
     Returns:
-        The assembled manipulator; :func:`forcefit.assembly.linear.certificate.unproved`
-        says where the certificate falls short even so.  For many postures or sets of
-        errors, one object with all points; a point without a solution raises nothing
-        and has its reason in ``reason``.
+        The assembled manipulator.  The function
+        :func:`forcefit.assembly.linear.certificate.unproved` lists the properties that
+        remain unproved.  For many postures or sets of errors, one object contains all
+        points.  A point without a solution then raises no exception; ``reason``
+        contains its message.
 
     Raises:
-        CannotAssemble: a closure is open that no clearance and no spring can close.
+        CannotAssemble: no clearance and no spring can close an open closure.
         FreeMotion: a load drives a motion that nothing resists.
-        SolverFailed: the cone solver gave up.
-        ValueError: errors do not fit the robot or the postures, a transform is not
-            finite, an error is beyond 1e6 rad or m, or no such method.
+        SolverFailed: the cone solver did not converge.
+        ValueError: the errors do not fit the robot or the postures, a transform is not
+            finite, an error exceeds 1e6 rad or m, or ``method`` is unknown.
     """
     check_method(method)
     if not isinstance(posture, Posture):
@@ -151,7 +153,7 @@ def with_free_own_axes(assembly: Assembly) -> Assembly:
         assembly: assembly of many points.
 
     Returns:
-        The same points under the same loads, see ``own_axes_free`` of
+        Assembly of the same points under the same loads, see ``own_axes_free`` of
         :func:`forcefit.assembly.linear.closure.virtual_joints`.
     """
     posture, load, loads = assembly.posture, assembly.load, assembly.frame_loads
@@ -159,15 +161,15 @@ def with_free_own_axes(assembly: Assembly) -> Assembly:
 
 
 def together_at(posture: Posture, points: Sequence[Assembly | Exception]) -> Assembly:
-    """Return points that were solved separately as one object.
+    """Combine points that were solved separately into one object.
 
     Args:
-        posture: k postures, of a robot that may differ from the points' in its springs
-            and clearances.
-        points: k of them; an exception where there is no solution.
+        posture: k postures of a robot; its springs and clearances may differ from those
+            of the points' robots.
+        points: k assemblies; an exception replaces a point without a solution.
 
     Returns:
-        All of them; a row number gives one of them again.
+        Assembly of all points; an index selects one of them.
     """
     joints, count = virtual_joints(posture.robot), len(points)
     rows = _empty(joints, count)
@@ -196,12 +198,12 @@ def failure_status(error: Exception) -> str:
 def _solve_one(
     posture: Posture, load: NDArray, loads: FrameLoads, method: Method
 ) -> Assembly:
-    """Solve one posture, compiled; by the reference if requested or not proved."""
+    """Solve one posture compiled, or by the reference if requested or not proved."""
     robot = posture.robot
     if method == "reference":
         return least_energy(posture, load, loads)
     rounding, acting = _rounding_of(robot), loads.rows() if loads else None
-    # a copy: C++ finds the address of a writable array three times as fast
+    # a copy, because C++ obtains the address of a writable array three times as fast
     T = np.array(posture.transforms, ndmin=4)
     off = np.array([posture.mismatch])
     for bounded in (False, True):
@@ -215,7 +217,7 @@ def _solve_one(
     multipliers, residual = rows["multipliers"], rows["residual"] + rounding
     drop_zeros(rows["energy"], rows["bound"], multipliers, residual, acting is not None)
     if acting is None and not np.count_nonzero(multipliers):
-        rows["elastic"][:] = 0.0  # without wrenches, deformations are rounding
+        rows["elastic"][:] = 0.0  # without wrenches, deformations are rounding errors
     assembly = Assembly(
         linearisation=linearise(posture), joints=joints, load=load, frame_loads=loads,
         method="compiled", energy_without_clearance=float(rows["tight"][0]),
@@ -225,9 +227,9 @@ def _solve_one(
     return with_known(assembly, known)
 
 
-@lru_cache(maxsize=32)  # for one robot at many postures
+@lru_cache(maxsize=32)  # called for one robot at many postures
 def _rounding_of(robot: Robot) -> float:
-    """Return the bound [rad, lengths] of the closure error that rounding can cause."""
+    """Return the largest closure error [rad, lengths] that rounding can cause."""
     joints, _ = structure_of(robot)
     return float(closure_rounding(robot.errors, joints, checked_size(robot)))
 
@@ -236,7 +238,7 @@ def _solve_many(
     posture: Posture, errors: NDArray | None, load: NDArray, loads: FrameLoads,
     own_axes_free: bool, method: Method,
 ) -> Assembly:  # fmt: skip
-    """Solve all points compiled, and those not covered or proved by the reference."""
+    """Solve all points compiled, then unproved points by the reference method."""
     robot = posture.robot
     T, sets, off = _checked(posture, errors)
     joints, structure = structure_of(robot, True, own_axes_free)
@@ -260,7 +262,7 @@ def _solve_many(
     if left and method == "compiled":
         log_reference(robot.name, "least energy", len(left), count)
     for i in left:
-        one = points[i]  # posture and loads of the point
+        one = points[i]  # this object contains posture and loads of the point
         _record(rows, points.apart, i, _by_reference(one, own_axes_free))
     residual = rows["residual"] + closure_rounding(sets, joints, structure.size)
     _drop_rounding(rows, residual, points.loaded)
@@ -269,7 +271,7 @@ def _solve_many(
 
 
 def _bounds_matter(structure: Structure, outcome: NDArray) -> NDArray:
-    """Return the (k,) bool of points that a bound left out may hold."""
+    """Return (k,) bool, whether an omitted bound of motion can be active."""
     return np.isin(outcome, _AT_BOUNDS) & bool(np.isfinite(structure.free_bound).any())
 
 
@@ -277,12 +279,12 @@ def _within_bounds(
     joints: VirtualJoints, structure: Structure, matter: NDArray,
     given: tuple[NDArray, NDArray, NDArray, NDArray | None], rows: _Rows,
 ) -> tuple[NDArray, VirtualJoints, _Rows]:  # fmt: skip
-    """Solve again points to which bounds of passive joints' own motion matter.
+    """Solve points again at which bounds of passive joints' motions can be active.
 
     Returns:
-        Row numbers of the points solved now, with all bounds as cones; their virtual
-        joints; their rows in these.  Results of equal shape are written into ``rows``
-        too.
+        Numbers of the points solved here, with all bounds as cones; their virtual
+        joints; and their rows for these joints.  Results whose shape does not depend on
+        the virtual joints are also written into ``rows``.
     """
     held = np.flatnonzero(matter)
     T, sets, off, acting = (
@@ -304,7 +306,7 @@ def _within_bounds(
 def _checked(
     posture: Posture, errors: NDArray | None
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Return transforms, sets of errors and closure errors, per point or for all."""
+    """Return the transforms, sets of errors and closure errors, per point or common."""
     n = len(posture.robot.frames)
     given = posture.robot.errors if errors is None else errors
     T = posture.transforms.reshape(-1, *posture.transforms.shape[-3:])
@@ -334,7 +336,7 @@ def _compiled(
     joints: VirtualJoints, structure: Structure, T: NDArray, errors: NDArray,
     mismatch: NDArray, loads: NDArray | None, method: Method = "compiled",
 ) -> _Rows:  # fmt: skip
-    """Return the rows of k points, compiled; mark those for the reference."""
+    """Return the compiled rows of k points; mark the points left to the reference."""
     count = len(errors) if len(T) == 1 else len(T)
     rows = _empty(joints, count)
     given = structure, T, errors, mismatch
@@ -342,7 +344,7 @@ def _compiled(
         rows["outcome"][:] = _LEFT
     elif loads is None:
         _fill(given, rows, None)
-    else:  # points without load have the results of an unloaded call, bit for bit
+    else:  # points without load: results bit-identical to a call without loads
         loaded = np.any(loads, axis=(1, 2, 3))
         for some, acting in ((loaded, loads), (~loaded, None)):
             if some.all():
@@ -370,14 +372,14 @@ def _empty(joints: VirtualJoints, count: int) -> _Rows:
 
 
 def _unsaid(count: int) -> _Rows:
-    """Return rows of k points that the kernel does not fill: method, status, proof."""
+    """Return the rows of k points that the kernel does not fill."""
     texts = {"method": "compiled", "status": OK, "reason": ""}
     rows = {name: np.full(count, text, dtype=object) for name, text in texts.items()}
     return rows | {name: np.zeros(count) for name in ("gap", "potential", "least")}
 
 
 def _certify(rows: _Rows, points: Assembly) -> None:
-    """Fill in the gap, the potential and its lower bound from energies and bounds."""
+    """Compute the gap, the potential and its lower bound of each point in ``rows``."""
     energy, bound, loads = rows["energy"], rows["bound"], points.frame_loads
     rows["gap"][:] = np.maximum(0.0, energy - bound)
     on_errors = loads.body @ points.posture.robot.errors.ravel()
@@ -388,7 +390,7 @@ def _certify(rows: _Rows, points: Assembly) -> None:
 
 
 def _fill(given: tuple[Any, ...], rows: _Rows, loads: NDArray | None) -> None:
-    """Solve every point; the zeros stay where no error and no load acts."""
+    """Solve all points with errors or loads; the rows of the other points stay zero."""
     if loads is not None or np.count_nonzero(given[2][:1]) or given[2].any():
         structure, T, errors, mismatch = given
         assemble_side_by_side(structure, T, errors, mismatch, loads, rows)
@@ -397,7 +399,7 @@ def _fill(given: tuple[Any, ...], rows: _Rows, loads: NDArray | None) -> None:
 def _fill_some(
     some: NDArray, given: tuple[Any, ...], rows: _Rows, loads: NDArray | None
 ) -> None:
-    """Solve the selected points, and fill in their rows."""
+    """Solve the selected points and fill in their rows."""
     structure, *points = given
     part = {name: values[some] for name, values in rows.items()}
     own = (array[some] if len(array) > 1 else array for array in points)
@@ -410,7 +412,7 @@ def _of_rows(
     posture: Posture, joints: VirtualJoints, rows: _Rows, load: NDArray,
     loads: FrameLoads, errors: NDArray | None,
 ) -> Assembly:  # fmt: skip
-    """Return many assemblies as views of the rows, which may be filled later."""
+    """Return many assemblies as views of ``rows``, which can be filled in later."""
     known = {"_gap": "gap", "_residual": "residual", "_excess": "excess"}
     known |= {"bound": "least"}
     known |= {k: k for k in ("energy", "work", "platform_screw", "potential")}
@@ -425,7 +427,7 @@ def _of_rows(
 
 
 def _by_reference(where: Assembly, own_axes_free: bool) -> Assembly | Exception:
-    """Return one point solved by the reference, or the exception raised."""
+    """Return one point solved by the reference method, or the exception raised."""
     try:
         return least_energy(where.posture, where.load, where.frame_loads, own_axes_free)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
@@ -436,7 +438,7 @@ def _record(
     rows: _Rows, apart: dict[int, Assembly | Exception], i: int,
     found: Assembly | Exception,
 ) -> None:  # fmt: skip
-    """Write a point solved separately into row i; keep it if its columns differ."""
+    """Write a separately solved point into row i; store it if it has other columns."""
     rows["method"][i] = "reference"
     if isinstance(found, Exception):
         for name in (*_NUMBERS, "platform_screw", *_VECTORS):
@@ -464,15 +466,15 @@ def _record(
 
 
 def _drop_rounding(rows: _Rows, residual: NDArray, loaded: NDArray) -> None:
-    """Set to zero, in place, energies, wrenches and springs that are only rounding."""
+    """Set energies, wrenches and springs to zero, in place, if they are rounding."""
     multipliers = rows["multipliers"]
     drop_zeros(rows["energy"], rows["bound"], multipliers, residual, loaded)
-    # without loads and wrenches, deformations are rounding
+    # without loads and wrenches, all deformations are rounding errors
     rows["elastic"][~(loaded | multipliers.any(axis=1))] = 0.0
 
 
 def _excess_of(clearances: NDArray, starts: NDArray) -> NDArray:
-    """Return the (k,) [-] largest excess of clearances (k, nu) over their cones."""
+    """Return (k,) [-] the largest excess of the clearances (k, nu) over their cones."""
     if not clearances.shape[1]:
         return np.zeros(len(clearances))
     squares = np.add.reduceat(clearances.T**2, starts[:-1], axis=0)

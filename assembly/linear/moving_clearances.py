@@ -1,4 +1,4 @@
-"""The compiled search of problem (27): its arguments and its call."""
+"""Arguments and call of the compiled search of problem (27)."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -19,13 +19,13 @@ from forcefit.assembly.solvers.method import Method, check_method
 
 @dataclass(frozen=True)
 class Asked:
-    """Required bounds of the largest pose error.
+    """Settings for the bounds of the largest pose error.
 
     Attributes:
-        assumption: see the head of :mod:`forcefit.assembly.linear.pose_error`.
-        energy_budget: eta of ``budget``.
+        assumption: name from the table in :mod:`forcefit.assembly.linear.pose_error`.
+        energy_budget: eta of the assumption ``budget``.
         tolerance_rotation: [rad] required difference of upper and lower bound.
-        tolerance_translation: [m] the same for the translation.
+        tolerance_translation: [m] required difference of the bounds of the translation.
         offset: (3,) [m] from the platform's origin to the point whose error is bounded.
         method: ``"compiled"`` or ``"reference"``.
     """
@@ -46,18 +46,18 @@ class Asked:
 
 
 def compiled_bounds(assembly: Assembly, asked: Asked) -> tuple[dict[str, Any], NDArray]:
-    """Return the bounds of k points by the compiled search.
+    """Return the bounds of k points computed by the compiled search.
 
     Args:
         assembly: assembly of k points.
         asked: assumption, required widths and point.
 
     Returns:
-        ``rotation_error`` (k, 2) [rad] and ``translation_error`` (k, 2) [m], lower and
-        upper; ``rotation_screw`` and ``translation_screw`` (k, 6) [rad, m] that attain
-        the lower bound; ``supports`` (k,) number of support functions computed.  And
-        (k,) bool, rows left to numpy or without a solution of (22); their numbers are
-        NaN.
+        Mapping with ``rotation_error`` (k, 2) [rad] and ``translation_error`` (k, 2)
+        [m], lower and upper bounds; ``rotation_screw`` and ``translation_screw`` (k, 6)
+        [rad, m] that attain the lower bounds; and ``supports`` (k,) number of support
+        functions computed.  Also (k,) bool, True for points that are left to numpy or
+        that have no solution of (22); their bounds are NaN.
     """
     count, robot = len(assembly), assembly.posture.robot
     rows = {
@@ -78,8 +78,8 @@ def compiled_bounds(assembly: Assembly, asked: Asked) -> tuple[dict[str, Any], N
         return rows, np.ones(count, dtype=bool)
     solution = assembly
     if asked.assumption == "free":
-        # here the own axis turns without energy: a clearance is held only if it stays
-        # loaded without those soft springs
+        # the own axes turn without energy here: a clearance is fixed only if it remains
+        # loaded without the soft springs of these axes
         solution = with_free_own_axes(assembly)
         outcome[~np.isfinite(solution.clearances).all(axis=1)] = REFERENCE
     places = _places_of(robot, asked.assumption)
@@ -108,15 +108,16 @@ def compiled_bounds(assembly: Assembly, asked: Asked) -> tuple[dict[str, Any], N
 
 
 class _Places(NamedTuple):
-    """Columns that may move under an assumption, and their indices in (22).
+    """Columns that can move under an assumption, and their indices in problem (22).
 
     Attributes:
-        moving: the robot whose columns may move.
-        loaded: the robot in whose solution of (22) the loaded clearances are found.
-        columns: (nu,) columns in (22) of the clearances that move.
-        cone_of: (cones,) cones of ``loaded`` of the clearances that move.
+        moving: structure of the robot whose columns can move.
+        loaded: structure in whose solution of (22) the loaded clearances are
+            identified.
+        columns: (nu,) columns in (22) of the moving clearances.
+        cone_of: (cones,) cones of ``loaded`` that contain the moving clearances.
         bounded: free motions that have a bound.
-        motions: their indices in (22).
+        motions: indices of these motions in (22).
     """
 
     moving: Structure
@@ -129,7 +130,7 @@ class _Places(NamedTuple):
 
 @lru_cache(maxsize=32)
 def _places_of(robot: Robot, assumption: str) -> _Places:
-    """Return the columns that may move under one assumption, cached for each robot."""
+    """Return the columns that can move under an assumption, cached for each robot."""
     own_axes_free = assumption == "free"
     moving = structure_of(robot, False, own_axes_free)[1]
     all_of = structure_of(robot)[1]
@@ -150,10 +151,10 @@ def _places_of(robot: Robot, assumption: str) -> _Places:
 
 
 def _columns(frames: NDArray, axes: NDArray) -> list[tuple[int, int]]:
-    """Return the frame and axis of every column."""
+    """Return the pairs of frame and axis of all columns."""
     return list(zip(frames.tolist(), axes.tolist(), strict=True))
 
 
 def _indices(some: list[tuple[int, int]], among: list[tuple[int, int]]) -> NDArray:
-    """Return the indices of these frames and axes in another list of columns."""
+    """Return the indices of pairs of frame and axis in another list of pairs."""
     return np.array([among.index(one) for one in some], dtype=np.int64)

@@ -1,17 +1,19 @@
-"""Of all assemblies of least energy, the one whose platform is nearest to nominal.
+"""Assembly of least energy whose platform pose is nearest to the nominal pose.
 
-Springs and loaded clearances are the same in all of them
-(:mod:`forcefit.assembly.linear.reference.pose_error`, ``frozen``).  Unloaded clearances
-may be anywhere in their cones as long as the closures hold.  The nearest pose is
+The assembly of least energy need not be unique.  Springs and loaded clearances are
+equal in all such assemblies, see ``frozen`` in
+:mod:`forcefit.assembly.linear.reference.pose_error`.  Unloaded clearances can have any
+values in their cones that satisfy the closures.  The nearest pose is the solution of
 another second-order cone programme,
 
-    minimise  |x + X (v - u)|^2    subject to  H (v - u) = 0,  |v_k| <= 1,
+    minimise  |x + X (v - u)|^2    subject to  H (v - u) = 0,  |v_k| <= 1.
 
-where x is the deviation at the solution u, X its derivative by the unloaded clearances.
+Here x is the deviation at the solution u, X its derivative with respect to the unloaded
+clearances, v their new values, and H contains the rows of the closures.
 
 Sources:
-    Public format, section 5, item 15: the pose of least energy and, among those, of
-    least norm.
+    Public format, section 5, item 15: the pose of least energy and, among these poses,
+    the pose of least norm.
 """
 
 from collections.abc import Iterator
@@ -39,7 +41,7 @@ from forcefit.assembly.solvers.conic import minimise_energy
 from forcefit.assembly.solvers.method import Method
 from forcefit.stiffness.screws import skew
 
-_STILL = 1e-11  # [rad, m] a pose that moves less counts as fixed
+_STILL = 1e-11  # [rad, m] a pose with a smaller range counts as fixed
 
 
 def nearest_pose(
@@ -47,7 +49,7 @@ def nearest_pose(
     offset: ArrayLike = (0.0, 0.0, 0.0),
     method: Method = "compiled",
 ) -> tuple[Assembly, bool]:
-    """Return the assembly of the same energy whose pose deviates least.
+    """Return the assembly of least energy whose pose deviates least.
 
     Args:
         assembly: assembly of least energy.
@@ -56,11 +58,12 @@ def nearest_pose(
         method: method of :func:`forcefit.assembly.solvers.conic.minimise_energy`.
 
     Returns:
-        The assembly, its deviation (rotation vector [rad] and shift of the point [m])
-        of least Euclidean norm; and whether clearances leave the pose free.
+        The assembly whose deviation (rotation vector [rad] and displacement of the
+        point [m]) has the least Euclidean norm; and whether the pose is not unique
+        because of clearances.
 
     Raises:
-        SolverFailed: the cone solver gave up.
+        SolverFailed: the cone solver did not converge.
     """
     free = _free_clearances(assembly, offset)
     if free is None:
@@ -74,7 +77,7 @@ def nearest_pose(
         moved = _with_clearances(assembly, free, least.clearances)
     exceeded = moved.clearance_excess() > LARGEST_EXCESS
     if exceeded and not assembly.joints.bounded_motion:
-        # the bound of a passive joint's own motion was left out, but it is active
+        # the omitted bound of a passive joint's motion is active: solve with the bound
         robot = assembly.posture.robot
         if has_bounded_motion(robot):
             bounded = solve_with(
@@ -89,15 +92,16 @@ def nearest_pose(
 
 @dataclass(frozen=True, eq=False)
 class _FreeClearances:
-    """Unloaded clearances, and how the platform follows them.
+    """Unloaded clearances and their effect on the platform pose.
 
     Attributes:
-        unloaded: (nu,) bool, the k columns of the cones that are unloaded.
-        deviation: (6,) [rad, m] of the point, at the solution.
-        map: (6, k) [rad, m] its derivative by the clearances, with free motions.
+        unloaded: (nu,) bool, True for the k columns of unloaded clearances.
+        deviation: (6,) [rad, m] deviation of the point at the solution.
+        map: (6, k) [rad, m] derivative of the deviation with respect to the clearances;
+            free motions follow.
         rows: (p, k) orthonormal rows of the closures.
-        start: (k,) their values at the solution.
-        group: (k,) cone of each.
+        start: (k,) values of the clearances at the solution.
+        group: (k,) cone of each column.
     """
 
     unloaded: NDArray
@@ -109,7 +113,7 @@ class _FreeClearances:
 
 
 def _free_clearances(assembly: Assembly, offset: ArrayLike) -> _FreeClearances | None:
-    """Return the clearances that may move at least energy; None if there are none."""
+    """Return the clearances that can move at least energy; None if there are none."""
     joints, lin = assembly.joints, assembly.linearisation
     unloaded = ~loaded_cones(assembly, joints)
     columns = joints.cones[:, unloaded]
@@ -133,7 +137,7 @@ def _free_clearances(assembly: Assembly, offset: ArrayLike) -> _FreeClearances |
 
 
 def _with_clearances(assembly: Assembly, free: _FreeClearances, v: NDArray) -> Assembly:
-    """Return the assembly with other unloaded clearances; free motions follow."""
+    """Return the assembly for new unloaded clearances, with adapted free motions."""
     joints, lin = assembly.joints, assembly.linearisation
     u = assembly.clearances.copy()
     u[free.unloaded] = v
@@ -144,7 +148,7 @@ def _with_clearances(assembly: Assembly, free: _FreeClearances, v: NDArray) -> A
 
 
 def _moves(free: _FreeClearances, method: Method) -> bool:
-    """Return whether the closures leave the platform free to move."""
+    """Return whether the closures allow the platform to move."""
     projected = free.map - free.map @ free.rows.T @ free.rows
     U, S, _ = np.linalg.svd(projected, full_matrices=False)
     directions = U.T[S > _STILL]
@@ -154,7 +158,7 @@ def _moves(free: _FreeClearances, method: Method) -> bool:
 def _heights(
     free: _FreeClearances, direction: NDArray, method: Method
 ) -> Iterator[float]:
-    """Yield the platform's range [rad, m] in both senses of a direction."""
+    """Yield the platform's range [rad, m] in a direction and in the opposite one."""
     gradient = free.map.T @ direction
     size = float(np.linalg.norm(gradient))
     none, right = np.zeros((0, len(gradient))), free.rows @ free.start

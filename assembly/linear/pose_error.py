@@ -1,29 +1,29 @@
-"""The largest pose error of the platform: problem (27) with certified bounds.
+"""Certified bounds of the largest pose error of the platform, problem (27).
 
-As printed, (27) is degenerate: with the deformations frozen at the solution of (22),
-complementary slackness fixes every loaded clearance.  So there are three assumptions on
-the screws that may still move:
+As printed in the paper, (27) is degenerate: if the deformations keep their values of
+problem (22), complementary slackness fixes every loaded clearance.  The assumption
+names the screws that can still move:
 
 ======== =================================================================
-frozen   all deformations stay; only unloaded clearances move (the paper)
+frozen   all deformations are fixed; only unloaded clearances move (paper)
 free     compliant joints also turn freely about their own axis
-budget   everything that closes with at most (1 + eta) times the least energy
+budget   all assemblies with at most (1 + eta) times the least energy
 ======== =================================================================
 
-Passive joints keep within the bounds of their own motion.  Rotation and translation are
-bounded separately: a tool on a bearing turns freely, and its point still has a largest
-error.
+The motions of passive joints stay within their bounds.  Rotation and translation are
+bounded separately: a tool on a bearing turns freely, but the error of its point is
+bounded.
 
 The set of platform screws (:mod:`forcefit.assembly.linear.reference.pose_error`) is
-convex. With ``"compiled"``, :func:`forcefit.assembly.solvers.one_problem.farthest`
-brackets its farthest screw and calls Clarabel for single supports in doubt.  With
-``"reference"``, :func:`forcefit.assembly.solvers.outer_cuts.farthest` does so in numpy,
-and Clarabel computes every support.
+convex.  With ``"compiled"``, :func:`forcefit.assembly.solvers.one_problem.farthest`
+bounds the farthest screw of the set, and calls Clarabel only for uncertain support
+functions.  With ``"reference"``, :func:`forcefit.assembly.solvers.outer_cuts.farthest`
+does this in numpy, and Clarabel computes every support function.
 
-The first two assumptions are compiled from end to end
-(:mod:`forcefit.assembly.linear.moving_clearances`) and take some tenths of a
-millisecond a point.  For ``budget``, and for points that this does not cover, the set
-is set up in numpy, point by point.
+For ``frozen`` and ``free`` all steps are compiled
+(:mod:`forcefit.assembly.linear.moving_clearances`), which requires some tenths of a
+millisecond per point.  For ``budget``, and for points that the compiled search does not
+cover, the set is constructed in numpy, point by point.
 """
 
 from collections.abc import Callable
@@ -52,23 +52,26 @@ from forcefit.results.display import Figures, bracket, short_repr
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PoseError(PointResults):
-    """Certified bounds of the largest pose error; of many points, with a leading axis.
+    """Certified bounds of the largest pose error of one or many points.
+
+    The arrays of many points begin with a point axis.
 
     Attributes:
         assumption: ``"frozen"``, ``"free"`` or ``"budget"``.
         rotation_error: (..., 2) [rad] lower and upper bound; NaN at a point without a
             solution of (22).
         translation_error: (..., 2) [m] lower and upper bound.
-        rotation_screw: (..., 6) [rad, m] attains the lower bound of the rotation.
-        translation_screw: (..., 6) [rad, m] attains that of the translation.
+        rotation_screw: (..., 6) [rad, m] screw that attains the rotation's lower bound.
+        translation_screw: (..., 6) [rad, m] screw that attains the translation's lower
+            bound.
         supports: (...) number of support functions computed.
-        method: (...) of the search: ``"compiled"``, or ``"reference"``, numpy and
-            Clarabel.
-        one_by_one: (...) bool, True if the set of screws was set up in numpy.
+        method: (...) method of the search: ``"compiled"``, or ``"reference"`` for numpy
+            and Clarabel.
+        one_by_one: (...) bool, True if the set of screws was constructed in numpy.
         status: (...) ``"ok"``; for many points also ``"cannot assemble"``, or
-            ``"solver failed"`` if there is no solution or its certificate falls short.
-        reason: (...) message where the status is not ok.
-        proof: function that returns what is not proved of one point.
+            ``"solver failed"`` if there is no solution or its certificate is too weak.
+        reason: (...) message if the status is not ok.
+        proof: function that returns the unproved properties of one point.
     """
 
     assumption: str
@@ -101,16 +104,16 @@ class PoseError(PointResults):
 
     @property
     def reading(self) -> str:
-        """Old name of ``assumption``."""
+        """Former name of ``assumption``."""
         warn_renamed("PoseError.reading", "PoseError.assumption")
         return self.assumption
 
     @cached_property
     def unproved(self) -> Any:
-        """(...) part of the solution of (22), or of the width, that is not proved.
+        """(...) properties of the solution of (22), or of the bounds, without proof.
 
-        Empty if all is proved.  For one point it is computed on first use, because it
-        takes longer than the bounds.
+        The text is empty if everything is proved.  For one point the text is computed
+        at first use, because its computation is slower than that of the bounds.
         """
         return self.reason if self.of_many else self.reason or self.proof()
 
@@ -141,29 +144,31 @@ def bound_pose_error(
     offset: ArrayLike = (0.0, 0.0, 0.0),
     method: Method = "compiled",
 ) -> PoseError:
-    """Bracket the largest rotation and translation error of the platform.
+    """Bound the largest rotation and translation error of the platform.
 
     Args:
-        assembly: assembly of least energy, one or many, without a load for ``budget``.
-        assumption: see the head of this module.
+        assembly: assembly of least energy, of one or many points; without loads for
+            ``budget``.
+        assumption: name from the table at the head of this module.
         energy_budget: eta of ``budget``.
         tolerance_rotation: [rad] required difference of upper and lower bound.
-        tolerance_translation: [m] the same for the translation.
+        tolerance_translation: [m] required difference of the bounds of the translation.
         offset: (3,) [m] from the platform's origin to the point whose error is bounded,
             base axes.
-        method: ``"compiled"``; or ``"reference"``, numpy and Clarabel alone, which
-            takes tenths of a second.
+        method: ``"compiled"``; or ``"reference"``, which uses only numpy and Clarabel
+            and requires tenths of a second.
 
     Returns:
-        Bounds.  They are wider than required only if 400 supports did not suffice;
-        ``unproved`` then says so.  They are infinite where the platform can turn, or
-        its point move, without bound.  For many assemblies, one object with all points;
-        a point without bounds raises nothing and has its reason in ``reason``.
+        Bounds.  They are wider than required only if 400 support functions did not
+        suffice; ``unproved`` then contains a message.  They are infinite if the
+        platform can turn, or its point move, without bound.  For many assemblies, one
+        object contains all points.  A point without bounds then raises no exception;
+        ``reason`` contains its message.
 
     Raises:
-        ValueError: assumption or method is unknown, or ``budget`` has a load.
-        FreeMotion: a load drives a motion that nothing resists by this assumption.
-        SolverFailed: the cone solver gave up.
+        ValueError: ``assumption`` or ``method`` is unknown, or ``budget`` has a load.
+        FreeMotion: a load drives a motion that nothing resists under this assumption.
+        SolverFailed: the cone solver did not converge.
     """
     asked = Asked(
         assumption, energy_budget, tolerance_rotation, tolerance_translation, offset,
@@ -185,7 +190,7 @@ def bound_pose_error(
 
 
 def _bounds_of_many(assembly: Assembly, asked: Asked) -> PoseError:
-    """Return the compiled bounds; others are computed point by point."""
+    """Return the bounds of many points: compiled where possible, else one by one."""
     rows, left = compiled_bounds(assembly, asked)
     status, reason = assembly.status.copy(), assembly.reason.copy()
     left &= status == OK
@@ -205,7 +210,7 @@ def _bounds_of_many(assembly: Assembly, asked: Asked) -> PoseError:
 
 
 def _bounds_of_one(assembly: Assembly, asked: Asked) -> PoseError:
-    """Return the bounds of a set that is set up in numpy."""
+    """Return the bounds of one point, whose set of screws is constructed in numpy."""
     reachable = reachable_screws(assembly, asked.assumption, asked.energy_budget)
     reachable = reachable.at_point(asked.offset)
     rotation, rotation_screw, supports = reachable.farthest(
@@ -239,9 +244,9 @@ def _bounds_of_one(assembly: Assembly, asked: Asked) -> PoseError:
 def _too_wide(
     part: str, bounds: tuple[float, float], tolerance: float, unit: str
 ) -> str:
-    """Return a message if bounds are farther apart than required, else an empty one."""
+    """Return a message if the bounds are farther apart than required, else ``""``."""
     low, high = bounds
-    # both infinite: the platform can move without bound
+    # both bounds are infinite if the platform can move without bound
     if high - low <= tolerance or low == high:
         return ""
     return (

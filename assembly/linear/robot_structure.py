@@ -1,4 +1,4 @@
-"""A robot as the compiled methods read it: virtual joints as arrays."""
+"""Arrays of a robot's virtual joints for the compiled methods."""
 
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -19,30 +19,33 @@ from forcefit.assembly.solvers.cones import cone_starts
 
 
 class Structure(NamedTuple):
-    """Data that a robot's postures share; n frames, closures, np patterns of closures.
+    """Arrays that all postures of a robot share.
+
+    The robot has n frames and closures with np different patterns of signs.
 
     Attributes:
         size: [m] reference length.
-        platform: row of its frame.
-        on_path: (n,) 1 if on the path to the platform.
-        patterns: (np, closures) signs with which frames enter the closures.
-        pattern_of: (n,) row of ``patterns``.
-        springs: (ny, 6) spring columns in their frame's axes, sorted by group; those
-            in no closure last.
+        platform: index of the platform's frame.
+        on_path: (n,) 1 if the frame is on the path to the platform.
+        patterns: (np, closures) signs of the frames in the closures.
+        pattern_of: (n,) row of ``patterns`` for each frame.
+        springs: (ny, 6) spring columns in their frame's axes, sorted by group; springs
+            that are in no closure are last.
         spring_frame: (ny,) frame of each spring.
         spring_order: (ny,) indices of the springs among the virtual joints' columns.
         of_joint: (ny,) 1 for a joint's spring, 0 for a link's.
-        groups: (ng + 1,) first spring of each group, and of those in no closure.
-        group_pattern: (ng,) row of ``patterns``.
-        group_on_path: (ng,) 1 if on the path to the platform.
+        groups: (ng + 1,) index of the first spring of each group; the last entry is the
+            first spring in no closure.
+        group_pattern: (ng,) row of ``patterns`` for each group.
+        group_on_path: (ng,) 1 if the group is on the path to the platform.
         cone_frame: (nu,) frame of each clearance.
-        cone_axis: (nu,) component of its screw.
-        cone_size: (nu,) [rad or m].
-        starts: (cones + 1,) first clearance of each cone, and nu.
+        cone_axis: (nu,) component of each clearance in its screw.
+        cone_size: (nu,) [rad or m] bound of each clearance.
+        starts: (cones + 1,) index of the first clearance of each cone, then nu.
         free_frame: (nq,) frame of each free motion.
-        free_axis: (nq,) component of its screw.
+        free_axis: (nq,) component of each free motion in its screw.
         free_lead: (nq,) [m/rad] translation along z per angle, of a helical joint.
-        free_bound: (nq,) [rad or m] bound that was left out, inf where there is none.
+        free_bound: (nq,) [rad or m] bound that is not a cone; inf without a bound.
     """
 
     size: float
@@ -72,16 +75,16 @@ def structure_of(
     robot: Robot, springs: bool = True, own_axes_free: bool = False,
     bounded_motion: bool = False,
 ) -> tuple[VirtualJoints, Structure]:  # fmt: skip
-    """Return the screws that may move, as columns and as arrays.
+    """Return the small screws that can move, as columns and as arrays.
 
     Args:
         robot: any robot.
-        springs: as for :func:`forcefit.assembly.linear.closure.virtual_joints`.
-        own_axes_free: as for the same function.
-        bounded_motion: as for the same function.
+        springs: see :func:`forcefit.assembly.linear.closure.virtual_joints`.
+        own_axes_free: see the same function.
+        bounded_motion: see the same function.
 
     Returns:
-        The columns; the same data as arrays.
+        The columns; and the same data as arrays.
     """
     joints = virtual_joints(robot, springs, own_axes_free, bounded_motion)
     rows = tuple((robot.index(a), robot.index(b)) for a, b in robot.closures)
@@ -91,7 +94,7 @@ def structure_of(
 
 @dataclass(frozen=True)
 class _Tree:
-    """Data of a robot, besides its virtual joints, on which a structure depends."""
+    """Data on which a structure depends in addition to the virtual joints."""
 
     platform: int
     closures: tuple[tuple[int, int], ...]
@@ -100,12 +103,12 @@ class _Tree:
 
 @lru_cache(maxsize=32)
 def _structure(joints: VirtualJoints, tree: _Tree, own_axes_free: bool) -> Structure:
-    """Return the arrays, cached for robots that differ in their errors alone."""
+    """Return the arrays, cached for robots that differ only in their errors."""
     robot = tree.robot
     on_path = robot.on_path[tree.platform]
     signs = closure_signs(robot).T.astype(float)
     patterns, pattern_of = np.unique(signs, axis=0, return_inverse=True)
-    # springs in the same closures, and alike on the platform's path, act as one group
+    # springs with equal signs in all closures and on the platform's path form a group
     spring_frame, springs = _by_frame(joints.elastic)
     acting = np.any(signs[spring_frame] != 0.0, axis=1)
     key = 2 * pattern_of[spring_frame] + on_path[spring_frame]
@@ -145,7 +148,7 @@ def _structure(joints: VirtualJoints, tree: _Tree, own_axes_free: bool) -> Struc
 
 
 def _by_frame(columns: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the one frame of each column, and its (count, 6) screw in its axes."""
+    """Return the frame of each column and its (count, 6) screw in that frame's axes."""
     blocks = columns.T.reshape(columns.shape[1], len(columns) // 6, 6)
     frame = np.abs(blocks).max(axis=2).argmax(axis=1) if len(blocks) else np.zeros(0)
     frame = frame.astype(np.int64)

@@ -1,7 +1,8 @@
-"""Rounding: energies indistinguishable from zero, and ill-conditioned stiffnesses.
+"""Rounding errors: energies indistinguishable from zero, ill-conditioned stiffnesses.
 
-Closures are sums of screws that cancel.  In floating point a residual of some units in
-the last place of their terms remains.  The work of wrenches on it is no energy.
+Closures are sums of screws that cancel.  In floating point, a residual of some units in
+the last place of the summed terms remains.  The work of the wrenches on this residual
+is a rounding error and not an elastic energy.
 """
 
 from functools import lru_cache
@@ -11,12 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from forcefit.assembly.linear.closure import VirtualJoints, in_reference_lengths
 
-ROUNDING = 8 * float(np.finfo(float).eps)  # relative, of sums of some tens of terms
-SPREAD = 1e13  # ratio of stiffnesses: rounding of the stiffest is 1e-3 of the softest
+ROUNDING = 8 * float(np.finfo(float).eps)  # relative error of a sum of tens of terms
+# stiffness ratio at which the stiffest spring's rounding error is 1e-3 of the softest
+SPREAD = 1e13
 
 
 def closure_rounding(errors: NDArray, joints: VirtualJoints, size: float) -> NDArray:
-    """Return the bound (...,) [rad, lengths] of closure errors that rounding can cause.
+    """Return the largest closure error (...,) [rad, lengths] that rounding can cause.
 
     Args:
         errors: (..., n, 6) [rad, m] geometric errors.
@@ -24,7 +26,7 @@ def closure_rounding(errors: NDArray, joints: VirtualJoints, size: float) -> NDA
         size: [m] reference length.
 
     Returns:
-        8 units in the last place of the sum of errors and clearances.
+        (...,) 8 units in the last place of the sum of errors and clearances.
     """
     sums = (np.abs(errors) @ in_reference_lengths(size)).sum(axis=-1)
     return ROUNDING * (sums + _clearance_sum(joints, size))
@@ -42,17 +44,17 @@ def differs_from_zero(
 ) -> NDArray:
     """Return whether least energies exceed their certified uncertainty.
 
-    Springs are known to sqrt(2 gap), so an energy up to the gap may be zero.  The
-    wrenches' work on the closures' rounding counts as uncertainty too.
+    An energy that does not exceed the duality gap can be zero.  The work of the
+    wrenches on the rounding errors of the closures counts as uncertainty too.
 
     Args:
-        energy: (...,) [J].
+        energy: (...,) [J] least energies.
         gap: (...,) [J] energy minus its certified bound.
-        multipliers: (..., 6 closures) of the scaled closures.
-        residual: (...,) [rad, lengths] open in the closures, rounding included.
+        multipliers: (..., 6 closures) multipliers of the scaled closures.
+        residual: (...,) [rad, lengths] residual of the closures, rounding included.
 
     Returns:
-        (...,) bool; also where the energy is not a number.
+        (...,) bool; True also if the energy is NaN.
     """
     uncertainty = gap + residual * np.add.reduce(np.abs(multipliers), axis=-1)
     return ~(np.asarray(energy) <= uncertainty)
@@ -62,18 +64,18 @@ def drop_zeros(
     energy: NDArray, bound: NDArray, multipliers: NDArray, residual: NDArray,
     loaded: ArrayLike = False,
 ) -> None:  # fmt: skip
-    """Set to zero, in place, energies that do not differ from it.
+    """Set energies that do not differ from zero to zero, in place.
 
     Args:
-        energy: (k,) [J].
-        bound: (k,) [J] certified lower bound.
-        multipliers: (k, 6 closures) of the scaled closures; set to zero where, without
-            loads, they are rounding.
-        residual: (k,) [rad, lengths] open in the closures, rounding included.
+        energy: (k,) [J] least energies.
+        bound: (k,) [J] certified lower bounds.
+        multipliers: (k, 6 closures) multipliers of the scaled closures; they are set to
+            zero at unloaded points where they are only rounding errors.
+        residual: (k,) [rad, lengths] residual of the closures, rounding included.
         loaded: (k,) bool, points under loads.
     """
     zero = ~differs_from_zero(energy, energy - bound, multipliers, residual)
-    if not np.count_nonzero(zero):  # then no multiplier is rounding either
+    if not np.count_nonzero(zero):  # then no multiplier is a rounding error either
         return
     rounding = ~differs_from_zero(energy, 0.0, multipliers, residual) & ~np.array(
         loaded
@@ -84,7 +86,7 @@ def drop_zeros(
 
 @lru_cache(maxsize=64)
 def stiffness_spread(joints: VirtualJoints, size: float) -> float:
-    """Return stiffest over softest spring [-], rotations at the reference length."""
+    """Return the ratio [-] of stiffest to softest spring; angles are scaled by size."""
     weights = np.tile(in_reference_lengths(size), len(joints.elastic) // 6)
     compliance = ((joints.elastic * weights[:, None]) ** 2).sum(axis=0)
     return float(compliance.max(initial=1e-300) / compliance.min(initial=np.inf))

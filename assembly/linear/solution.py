@@ -1,7 +1,7 @@
-"""The numbers of a least energy, of one point or of many, and their selection.
+"""Numerical solution of the least-energy problem, for one or many points.
 
-:class:`forcefit.assembly.linear.assembled.Assembly` adds the quantities computed from
-them.
+:class:`forcefit.assembly.linear.assembled.Assembly` adds the quantities that are
+computed from these numbers.
 """
 
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ from forcefit.assembly.model.point_results import N, PointResults, plain
 from forcefit.assembly.model.statuses import OK
 
 _VECTORS = ("elastic", "clearances", "motions", "multipliers")
-# values that may be known in addition to the fields: properties, parts of a certificate
+# further values that can be given: properties, parts of a certificate
 KNOWN = (
     "energy", "platform_screw", "work", "potential", "bound", "_gap", "_residual",
     "_excess",
@@ -27,30 +27,33 @@ KNOWN = (
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution(PointResults, Generic[N]):
-    """The numbers of a manipulator at least energy; or many, with a leading axis.
+    """Numerical solution of least energy for one or many points of a manipulator.
+
+    The arrays of many points begin with a point axis.
 
     Attributes:
-        linearisation: the assembly constraints it satisfies, with the posture.
-        joints: the virtual joints that could move.
-        load: (..., 6) [N m, N] on the platform at its origin, base axes.
-        frame_loads: all loads, this one among them, on every small screw.
-        elastic: (..., ny) [sqrt(2 J)] scaled deformation of the springs.
-        clearances: (..., nu) clearances in units of their cones; NaN at points of many
-            where the bound of a passive joint's own motion is active (see ``[i]``).
+        linearisation: the assembly constraints, with the posture.
+        joints: the virtual joints that can move.
+        load: (..., 6) [N m, N] wrench on the platform at its origin, base axes.
+        frame_loads: all loads on every small screw, including ``load``.
+        elastic: (..., ny) [sqrt(2 J)] scaled deformations of the springs.
+        clearances: (..., nu) clearances in units of their cones.  In an object of many
+            points, NaN at points where the bound of a passive joint's motion is active;
+            ``[i]`` returns their values.
         motions: (..., nq) [rad, m] free motions; NaN at the same points.
-        multipliers: (..., 6 closures) of the scaled closure rows.
-        energy_without_clearance: (...) [J] least energy with all clearances at zero.
-        method: (...) that solved it: ``"compiled"``, or ``"reference"``, numpy and
-            Clarabel.
-        errors: (..., n, 6) [rad, m] geometric errors; the robot's if absent.
+        multipliers: (..., 6 closures) multipliers of the scaled closure rows.
+        energy_without_clearance: (...) [J] least energy with all clearances zero.
+        method: (...) method that solved the point: ``"compiled"``, or ``"reference"``
+            for numpy and Clarabel.
+        errors: (..., n, 6) [rad, m] geometric errors; None for the robot's errors.
         status: (...) ``"ok"``; for many points also ``"cannot assemble"``,
-            ``"no equilibrium"`` or ``"solver failed"``, also if its certificate falls
-            short.
-        reason: (...) message where the status is not ok.
-        apart: by row, points with other columns than ``joints``, or the exception of a
-            point without a solution.
-        held: rows, in order, of the points that bounds of passive joints' own motion
-            hold, and these points with all such bounds as cones.
+            ``"no equilibrium"``, or ``"solver failed"``.  The last status also marks a
+            certificate that is too weak.
+        reason: (...) message if the status is not ok.
+        apart: by point number, points whose columns differ from ``joints``, or the
+            exception of a point without a solution.
+        held: sorted numbers of the points at which bounds of passive joints' motions
+            are active, and an assembly of these points with all such bounds as cones.
     """
 
     linearisation: Linearisation
@@ -91,7 +94,7 @@ class Solution(PointResults, Generic[N]):
         return self.linearisation.posture
 
     def __getitem__(self, rows: Any) -> Self:
-        """Return one point, by its number, or raise its exception; or a selection."""
+        """Return one point or a selection; raise the exception of a failed point."""
         if not isinstance(rows, (int, np.integer)):
             return self._taken(np.arange(len(self))[rows])
         i = range(len(self))[rows]
@@ -106,7 +109,7 @@ class Solution(PointResults, Generic[N]):
         lin, robot = self.linearisation, self.posture.robot
         if self.posture.transforms.ndim > 3:
             lin = replace(lin, posture=self.posture[i])
-        # the robot itself where the errors are its own: its columns are cached
+        # with the robot's own errors, keep the robot object: its columns are cached
         if one.errors is not None and not np.array_equal(one.errors, robot.errors):
             robot = robot.with_errors(one.errors)
             lin = replace(lin, posture=replace(lin.posture, robot=robot))
@@ -142,7 +145,7 @@ class Solution(PointResults, Generic[N]):
             joints: virtual joints of some points in ``apart``.
 
         Returns:
-            The same points; NaN for clearances and motions of all others.
+            The points; clearances and motions of all other points are NaN.
         """
         parts = {
             "elastic": joints.elastic, "clearances": joints.cones,
@@ -165,15 +168,17 @@ class Solution(PointResults, Generic[N]):
     def with_held(
         self, rows: NDArray, joints: VirtualJoints, parts: Mapping[str, NDArray]
     ) -> Self:
-        """Return many points, some of which bounds of passive joints' own motion hold.
+        """Return many points with the points whose bounds of motion are active.
 
         Args:
-            rows: numbers of these points, in order.
-            joints: joints with all such bounds as cones.
-            parts: their ``clearances`` and ``motions`` in the columns of ``joints``.
+            rows: sorted numbers of the points whose bounds of passive joints' motions
+                are active.
+            joints: virtual joints with all such bounds as cones.
+            parts: ``clearances`` and ``motions`` of these points in the columns of
+                ``joints``.
 
         Returns:
-            The same points.
+            All points, with the field ``held`` set.
         """
         some = self._taken(rows)
         own = replace(
@@ -185,7 +190,7 @@ class Solution(PointResults, Generic[N]):
 
     @property
     def as_many(self) -> Self:
-        """The point with a leading axis."""
+        """The same point with a leading axis of length 1."""
         lin = self.linearisation
         rows: dict[str, Any] = {
             name: np.asarray(getattr(self, name))[None]
@@ -204,14 +209,14 @@ One = TypeVar("One", bound=Solution)
 
 
 def with_known(solution: One, known: Mapping[str, Any]) -> One:
-    """Store values that are known already, so that they are not computed again.
+    """Store values that are already known, so that they are not computed again.
 
     Args:
-        solution: solution of one point or of many.
-        known: values by :data:`KNOWN`; others are ignored.
+        solution: solution of one point or of many points.
+        known: values by the names in :data:`KNOWN`; other names are ignored.
 
     Returns:
-        The same object.
+        The given object.
     """
     own = vars(solution)
     for name in KNOWN:

@@ -1,11 +1,12 @@
-"""The assembly zone, problem (21), as a margin on the clearances.
+"""Assembly zone, problem (21), as a margin on the clearances.
 
-The margin t is the factor on all clearances at which the manipulator just assembles
-with every link and joint rigid.  It is assemblable where t <= 1.  The margin varies
-continuously, unlike a yes or no, and its inverse is the factor on the errors.
+The margin t is the factor on all clearances at which the manipulator can just be
+assembled with rigid links and joints.  The manipulator can be assembled if t <= 1.  The
+margin is a continuous function of the errors.  Its inverse is the factor by which the
+errors could grow.
 
-As printed, (21) makes compliant joints rigid in every direction (``"rigid"``);
-``"free"`` lets them turn about their own axis, as a hinge does.
+As printed, (21) makes compliant joints rigid in every direction (``"rigid"``).  With
+``"free"`` they turn about their own axis, as a hinge does.
 """
 
 from collections.abc import Sequence
@@ -25,30 +26,30 @@ from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.assembly.solvers.method import Method, check_method, log_reference
 from forcefit.results.display import Figures
 
-MARGIN_GAP = 1e-8  # accepted distance of a margin above its bound, relative ..
-_GAP_ABSOLUTE = 1e-12  # .. plus this, absolute [-]
+MARGIN_GAP = 1e-8  # accepted difference of margin and lower bound, share of the margin
+_GAP_ABSOLUTE = 1e-12  # [-] absolute part of that difference
 # name of each margin -> behaviour of compliant joints about their own axis
 Compliant = Literal["rigid", "free"]
 MARGINS: dict[str, Compliant] = {"margin": "rigid", "margin_free": "free"}
-ASSEMBLABLE = 1.0 + 1e-6  # largest margin that counts as assemblable: 1 and rounding
+ASSEMBLABLE = 1.0 + 1e-6  # largest margin that counts as assemblable: 1 plus rounding
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Zone(PointResults, Generic[N]):
-    """Solution of problem (21) at one posture; or at many, with a leading axis.
+    """Solution of problem (21) at one posture or at many, with a leading point axis.
 
     Attributes:
-        margin: (...) factor on the clearances at which it just assembles; inf where no
-            factor does, NaN where the solver failed; a single posture raises instead.
-        bound: (...) certified lower bound of it, within 1e-8 of the margin if the
-            compiled method solved it.
-        method: (...) that solved it: ``"compiled"``, or ``"reference"``, numpy and
-            Clarabel.
-        forces: (..., nu) on the clearances, times the cones' sizes, that prove the
-            bound;
-            the sizes on all cones add up to 1; zero where no clearance is needed, NaN
-            where the reference solved it.
-        reason: (...) message where the solver failed; else empty.
+        margin: (...) factor on the clearances at which the robot just assembles; inf if
+            there is no such factor, NaN if the solver failed.  A single posture raises
+            an exception instead of NaN.
+        bound: (...) certified lower bound of the margin; the compiled method returns it
+            within 1e-8 of the margin.
+        method: (...) method that solved the point: ``"compiled"``, or ``"reference"``
+            for numpy and Clarabel.
+        forces: (..., nu) forces on the clearances, times the cones' sizes, that prove
+            the bound; their sizes on all cones add up to 1.  Zero if no clearance is
+            needed, NaN if the reference method solved the point.
+        reason: (...) message if the solver failed; else empty.
     """
 
     margin: N
@@ -66,7 +67,7 @@ class Zone(PointResults, Generic[N]):
     }
 
     def _figures(self) -> Figures:
-        """Return the margin; of many points the largest."""
+        """Return the margin of one point, or the largest margin of many points."""
         if not self.of_many:
             margin, bound = f"{self.margin:.6g}", f"{self.bound:.6g}"
             return {"margin": margin, "bound": bound, "method": self.method}
@@ -77,7 +78,7 @@ class Zone(PointResults, Generic[N]):
         return {"points": points, "margin": f"at most {largest:.6g} where there is one"}
 
     def __getitem__(self, rows: Any) -> "Zone":
-        """Return one point, which raises if the solver failed; or a selection."""
+        """Return one point or a selection; raise SolverFailed for a failed point."""
         taken = super().__getitem__(rows)
         if not taken.of_many and np.isnan(taken.margin):
             raise SolverFailed("least factor on the clearances", taken.reason)
@@ -85,15 +86,15 @@ class Zone(PointResults, Generic[N]):
 
     @property
     def assemblable(self) -> Any:
-        """(...) whether it assembles rigidly."""
+        """(...) whether the rigid manipulator can be assembled."""
         return self.margin <= ASSEMBLABLE
 
     @property
     def unproved(self) -> Any:
-        """(...) reason why there is no margin, or why it is not proved; else empty."""
+        """(...) reason why there is no margin or why it is not proved; else empty."""
         margin, bound = np.atleast_1d(self.margin, self.bound)
         with np.errstate(invalid="ignore"):
-            # written so that NaN counts as not proved
+            # the condition is written so that NaN counts as not proved
             proved = margin - bound <= MARGIN_GAP * margin + _GAP_ABSOLUTE
         text = np.array(self.reason, dtype=object, ndmin=1)
         for i in np.flatnonzero(~proved & (margin != bound) & (text == "")):
@@ -131,20 +132,21 @@ def zone_margin(
 
     Args:
         posture: the robot's configuration; or many postures of one robot.
-        compliant: ``"rigid"`` or ``"free"``: passive joints with stiffness; see the
-            module.
+        compliant: behaviour of passive joints with stiffness about their own axis:
+            ``"rigid"`` or ``"free"``, see the head of this module.
         errors: (n, 6) [rad, m] geometric errors in place of the robot's; or (k, n, 6),
-            a set for each of k postures, or k sets at one.
-        method: ``"compiled"``, with the reference for points whose answer it does not
-            prove; or ``"reference"``, numpy and Clarabel alone.  The answer's
-            ``method`` says which of them solved each point.
+            one set for each of k postures, or k sets at one posture.
+        method: ``"compiled"`` uses the reference method only for points that the
+            compiled method does not prove; ``"reference"`` uses only numpy and
+            Clarabel.  The field ``method`` of the result names the method per point.
 
     Returns:
-        The margin with a certified lower bound; for many postures or sets, one object.
+        The margin with a certified lower bound; for many postures or sets of errors,
+        one object with all points.
 
     Raises:
-        ValueError: ``compliant`` or ``method`` is something else.
-        SolverFailed: the cone solver gave up at the only point.
+        ValueError: ``compliant`` or ``method`` is unknown.
+        SolverFailed: the cone solver did not converge at a single point.
     """
     check_method(method)
     if not isinstance(posture, Posture):
@@ -178,7 +180,7 @@ def zone_margin(
 
 
 def _erring(posture: Posture, errors: NDArray, i: int) -> Posture:
-    """Return the posture of point i with its errors."""
+    """Return the posture of point i with the geometric errors of that point."""
     if posture.transforms.ndim > 3:
         posture = posture[i if len(posture.transforms) > 1 else 0]
     own = errors if errors.ndim == 2 else errors[i]
@@ -190,7 +192,7 @@ def _erring(posture: Posture, errors: NDArray, i: int) -> Posture:
 def _compiled(
     posture: Posture, compliant: Compliant, own: NDArray, method: Method
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Return margins, bounds, forces, and whether each is for the reference."""
+    """Return margins, bounds, forces, and a mask of points left to the reference."""
     if compliant not in {"rigid", "free"}:
         raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
     joints, structure = structure_of(posture.robot, False, compliant == "free")

@@ -1,4 +1,4 @@
 """Predicted readings of a measuring device on a robot with effects.
 
-Begin at ``conditions.py`` for the conditions of each measurement, then ``predict.py``.
+Start with ``conditions.py``, the conditions of each measurement, then ``predict.py``.
 """

@@ -1,17 +1,17 @@
-"""Conditions of measurements of a robot, past or planned.
+"""Conditions of past or planned measurements of a robot.
 
 An *effect* (:mod:`forcefit.assembly.effects`) is a property that the model of a robot
-lacks.  It changes one or more of the fields below and nothing else.  So any number of
-effects can be combined, and :func:`forcefit.assembly.measurement.predict.predict` does
-not depend on the effects.
+lacks.  An effect changes one or more of the fields below and nothing else.  Any number
+of effects can therefore be combined, and
+:func:`forcefit.assembly.measurement.predict.predict` does not depend on the effects.
 
 ======  ====================  =========  =============================================
 symbol  code                  shape      meaning
 ======  ====================  =========  =============================================
 T       ``transforms``        (R,n,4,4)  nominal frames seen from the base
 dl      ``errors``            (R, n, 6)  stress-free screws, frame axes
-w       ``load``              (R, 6)     on the platform at ``point``, base axes
-g       ``gravity``           (R, 3)     base axes
+w       ``load``              (R, 6)     wrench on the platform at ``point``, base axes
+g       ``gravity``           (R, 3)     gravity vector, base axes
 ======  ====================  =========  =============================================
 """
 
@@ -31,9 +31,9 @@ COVARIATES = ("temperature", "time", "approach")
 
 @dataclass(frozen=True)
 class ContactLaw:
-    """A spring in series with a joint, with the law load = coefficient |deflection|^n.
+    """Spring in series with a joint, with the law load = coefficient |deflection|^n.
 
-    It acts along or about the joint's z axis, equally in both directions.
+    The spring acts along or about the joint's z axis, equally in both directions.
 
     Attributes:
         frame: name of the joint.
@@ -48,7 +48,7 @@ class ContactLaw:
 
 @dataclass(frozen=True, eq=False)
 class Yield:
-    """A compliant place, whose deflection follows from wrenches by a given law.
+    """Compliant place, at which a law determines the deflection from wrenches.
 
     Attributes:
         frame: name of the frame.
@@ -71,7 +71,7 @@ class Yield:
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """R rows of conditions of one robot; without effects they are the declared ones.
+    """R rows of conditions of one robot, as declared or changed by effects.
 
     Attributes:
         robot: robot of n frames; its links, springs and clearances are the same in all
@@ -81,8 +81,9 @@ class Conditions:
         mismatch: (R,) [rad, m] remaining nominal closure error.
         errors: (R, n, 6) [rad, m] stress-free screws.
         point: (3,) [m] reference point at which the load acts, platform axes.
-        load: (R, 6) [N m, N] on the platform at the reference point, base axes.
-        gravity: (R, 3) [m/s^2] base axes.
+        load: (R, 6) [N m, N] wrenches on the platform at the reference point, base
+            axes.
+        gravity: (R, 3) [m/s^2] gravity vectors in base axes.
         temperature: (R,) [K] temperature above calibration; NaN if unknown.
         time: (R,) [s] time since the first measurement; NaN if unknown.
         approach: (R,) side of approach, -1 or 1; NaN if unknown.
@@ -168,7 +169,7 @@ class Conditions:
         return (self.postures.platform[:, :3, :3] @ at[..., None])[..., 0]
 
     def load_at_origin(self) -> NDArray:
-        """Return the (R, 6) [N m, N] load read at the platform's origin, base axes."""
+        """Return the (R, 6) [N m, N] load at the platform's origin, base axes."""
         moved = self.load.copy()
         if self.point.any():
             arm = self.postures.platform[:, :3, :3] @ self.point
@@ -214,14 +215,15 @@ def as_declared(
     covariates: Mapping[str, ArrayLike] | None = None,
     target: ArrayLike | None = None,
 ) -> Conditions:
-    """Return the conditions of a robot as its file declares it.
+    """Return the conditions of a robot as declared in its file.
 
     Args:
         postures: one posture, or many with arrays of R rows.
-        load: (6,) or (R, 6) [N m, N] at the reference point, base axes; none if absent.
+        load: (6,) or (R, 6) [N m, N] wrench at the reference point, base axes; None for
+            no load.
         mismatch: (R,) [rad, m] remaining nominal closure error.
         point: (3,) [m] reference point, platform axes.
-        gravity: (3,) or (R, 3) [m/s^2] base axes.
+        gravity: (3,) or (R, 3) [m/s^2] gravity vector in base axes.
         covariates: (R,) values, or one value for all rows, by name: ``temperature``
             [K], ``time`` [s], ``approach`` -1 or 1, NaN if absent; any other names; and
             ``session``, a name or (R,) names.

@@ -1,4 +1,4 @@
-"""Contacts: springs in series with joints, load = coefficient |deflection|^exponent."""
+"""Contact springs in series with joints: load = coefficient |deflection|^exponent."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ CONVERGED = 1e-11  # relative change of a contact's deflection at convergence
 def softened(
     posture: Posture, laws: tuple[ContactLaw, ...], compliances: NDArray
 ) -> Posture:
-    """Return the posture with springs of the laws' secant compliances in series."""
+    """Return the posture with the laws' secant compliances as springs in series."""
     if not compliances.any():
         return posture
     frames = list(posture.robot.frames)
@@ -44,7 +44,7 @@ def secants(
 
 
 def _deflection(law: ContactLaw, load: float) -> float:
-    """Return the deflection [rad or m] under a load >= 0."""
+    """Return the deflection [rad or m] of a contact under a load >= 0."""
     return float((load / law.coefficient) ** (1 / law.exponent))
 
 
@@ -67,11 +67,12 @@ def contact_deflections(
 ) -> tuple[NDArray, NDArray]:
     """Return the deflections d of contacts with c |d|^n sign(d) = w + A d.
 
-    They minimise a strictly convex function, because A is negative semidefinite.
-    Newton's method is used; each step is halved until the gradient decreases.
+    The solution minimises a strictly convex function, because A is negative
+    semidefinite.  Newton's method is used; each step is halved until the gradient
+    decreases.
 
     Returns:
-        (R, s) deflections, and (R,) bool, True if they converged.
+        (R, s) deflections, and (R,) bool, True for rows that converged.
     """
     c = np.array([law.coefficient for law in laws])
     n = np.array([law.exponent for law in laws])

@@ -1,4 +1,4 @@
-r"""The exact equilibrium of a robot without clearances, for many rows together.
+r"""Exact equilibrium of a robot without clearances, for many rows together.
 
 The equations are those of :mod:`forcefit.assembly.exact.exact`: closures hold on SE(3),
 every body and spring deforms by its compliance times its wrench, and free motions carry
@@ -27,7 +27,7 @@ from forcefit.assembly.measurement.without_clearance import flexibility
 from forcefit.assembly.model.links import own_screws
 from forcefit.assembly.model.robot import Robot
 
-_MOST_ITERATIONS = 60  # largest number of iterations; 5 to 12 are usual
+_MOST_ITERATIONS = 60  # largest number of iterations; usually 5 to 12
 # [rad, reference lengths] largest change of a screw in the last iteration
 _CONVERGED = 1e-12
 _CLOSURE_TOLERANCE = 1e-11  # [rad, reference lengths] largest closure residual
@@ -46,8 +46,7 @@ def solve_rows(
     """Return the platform screws of finite motions under every row's loads.
 
     Args:
-        conditions: R rows of a robot without clearances; finite motions are used in
-            all.
+        conditions: R rows of a robot without clearances, all with finite motions.
         linear_deflections: (R, s) [rad or m] deflections of s contacts in the linear
             model.
 
@@ -73,7 +72,7 @@ def solve_rows(
 
 
 def _of_passive_joints(free: NDArray, robot: Robot) -> bool:
-    """Return whether all free motions (6n, q) are those of passive joints."""
+    """Return whether all free motions (6n, q) are motions of passive joints."""
     passive = np.array([frame.passive for frame in robot.frames])
     own = own_screws(robot) * passive[:, None]
     for column in free.T.reshape(-1, len(robot.frames), 6):
@@ -84,7 +83,7 @@ def _of_passive_joints(free: NDArray, robot: Robot) -> bool:
 
 
 def _solve(rows: Rows) -> tuple[NDArray, NDArray]:
-    """Return the (R, 6) platform screws, and (R,) bool: rows that converged."""
+    """Return (R, 6) platform screws, and (R,) bool, True for rows that converged."""
     flexible, count = rows.flexible, len(rows.conditions)
     n, K = len(rows.conditions.robot.frames), 6 * len(rows.conditions.robot.closures)
     q = flexible.free.shape[1]

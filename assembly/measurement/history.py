@@ -1,9 +1,9 @@
 """History of a machine: the rows of a campaign in the order of measurement.
 
-Some effects have memory: slow warming lags behind the temperature, and clearance is
-taken up on the side from which a joint came.  They depend on earlier rows, including
-rows that a fit leaves out.  The value of a row is assumed to apply since the row before
-it, or since time 0.
+Some effects have memory: slow warming lags behind the temperature, and a clearance is
+closed on the side from which a joint came.  Such effects depend on earlier rows,
+including rows that a fit omits.  The value of a row is assumed to apply since the
+previous row, or since time 0.
 
 Sources:
     Ljung, System Identification, section 2 (sampling of a first-order lag).
@@ -21,7 +21,7 @@ STILL = 1e-9  # [rad, m] smaller changes of a command count as no motion
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """H rows in the order of measurement, one session after the other.
+    """H rows in the order of measurement, one session after another.
 
     Attributes:
         values: (H,) values by public name of the variable; NaN if unknown.
@@ -32,14 +32,15 @@ class History:
     first: NDArray
 
     def direction(self, name: str) -> NDArray:
-        """Return the side from which a variable came: -1, 1, or 0 if unknown.
+        """Return the side from which a variable reached its value: -1, 1 or 0.
 
         Args:
             name: name of the variable; ``"approach"`` is the column of this name.
 
         Returns:
-            (H,) signs.  A variable at rest keeps its last direction.  Before its first
-            motion, the column ``approach`` is used if there is one.
+            (H,) signs, 0 if unknown.  A variable that does not change keeps its last
+            direction.  Before the first change, the column ``approach`` is used if it
+            exists.
         """
         given = np.nan_to_num(self.values["approach"])
         if name == "approach":
@@ -57,7 +58,8 @@ class History:
 
         Args:
             name: name of the variable.
-            depth: change of the variable from the middle to an end, > 0.
+            depth: change of the variable that moves the element from the middle to an
+                end, > 0.
 
         Returns:
             (H,) positions from -1 to 1.  The element follows the variable until it
@@ -82,11 +84,12 @@ class History:
         Args:
             name: name of the variable.
             time_constant: [s] time constant, > 0.
-            held: whether a value applies from the time of the row before it, as for a
-                load; otherwise it changes linearly between rows, as for a temperature.
+            held: whether each value applies since the time of the previous row, as for
+                a load.  If not, the variable changes linearly between rows, as for a
+                temperature.
 
         Returns:
-            (H,) in the unit of the variable.
+            (H,) lagged values in the unit of the variable.
         """
         u, state = self.values[name], 0.0
         past = self._elapsed / time_constant
@@ -113,7 +116,7 @@ class History:
 
     @cached_property
     def _elapsed(self) -> NDArray:
-        """(H,) [s] time since the row before, or since time 0."""
+        """(H,) [s] time since the previous row, or since time 0."""
         time = self.values["time"]
         return np.where(self.first, time, np.diff(time, prepend=0.0))
 
@@ -129,7 +132,7 @@ def in_order(
         session: (H,) names; None if there is one session.
 
     Returns:
-        The history, and (H,) the index of each given row in it.
+        The history, and (H,) the index of each given row in the history.
     """
     time = np.nan_to_num(values["time"])
     names = np.zeros(len(time)) if session is None else session

@@ -1,6 +1,6 @@
 """Predicted readings: deviation of the platform under the conditions of each row.
 
-Robots without clearances are solved together by
+Rows of robots without clearances are solved together: with small motions by
 :mod:`forcefit.assembly.measurement.without_clearance`, with finite motions by
 :mod:`forcefit.assembly.measurement.exact_rows`.  Rows with clearances, or with closures
 of ambiguous numerical rank, are solved one by one by
@@ -50,7 +50,7 @@ from forcefit.stiffness.screws import rotation_matrix, rotation_vector
 
 # largest number of configurations that are corrected to second order one by one
 _MOST_ONE_BY_ONE = 40
-# convergence criterion like CONVERGED, if the start is the linear model's solution
+# convergence criterion that replaces CONVERGED if the start is the linear solution
 _CONVERGED_FINITE = 1e-5
 
 
@@ -60,10 +60,10 @@ class Prediction:
 
     Attributes:
         deviation: (R, 6) [rad, m] rx ry rz tx ty tz, base axes; NaN without a solution.
-        reason: (R,) reason why there is no solution, or empty.
-        undetermined: (R,) bool, True if clearances leave the pose undetermined.  In a
-            closed chain the given pose is then the one nearest to nominal, in an open
-            chain the one with centred clearances.
+        reason: (R,) reason why there is no solution, or an empty text.
+        undetermined: (R,) bool, True if clearances leave the pose undetermined.  The
+            returned pose of a closed chain is then the pose nearest to nominal; that of
+            an open chain has centred clearances.
     """
 
     deviation: NDArray
@@ -85,8 +85,8 @@ def predict(conditions: Conditions) -> Prediction:
     one_by_one = None
     if has_clearance and conditions.rest is not None:
         conditions = with_clearances_at_rest(conditions)
-        # if finite motions cannot close clearances held at rest, neither model has a
-        # solution
+        # if finite motions cannot close the robot with clearances at rest, neither
+        # model has a solution
         one_by_one = 0 if conditions.exact else None
     elif has_clearance and not conditions.robot.closures and not conditions.exact:
         conditions, undetermined = with_clearances_taken_up(conditions)
@@ -137,9 +137,10 @@ def _platform_screws(
 def _nearest_assembly(
     conditions: Conditions, row: int
 ) -> tuple[Assembly | ExactAssembly, bool]:
-    """Return assembly of one row, with the possible pose that is nearest to nominal.
+    """Return the assembly of one row whose possible pose is nearest to nominal.
 
-    With finite motions, this refers to the linear solution from which they start.
+    With finite motions, the nearest pose refers to the linear solution that is the
+    start of the iteration.
 
     Returns:
         The assembly, and whether clearances leave its pose undetermined.
@@ -164,7 +165,7 @@ def _nearest_assembly(
 def with_second_order(conditions: Conditions) -> Conditions:
     """Return the conditions with the second-order effect of the declared errors added.
 
-    Near a singularity, a robot's geometric errors move it far.  The error of the linear
+    Near a singularity, geometric errors cause large motions.  The error of the linear
     model then exceeds the noise of a device, whatever the load.  The difference between
     the exact and the linear platform screw without load is computed once for each
     configuration; effects of the load remain linear.
@@ -190,8 +191,8 @@ def with_second_order(conditions: Conditions) -> Conditions:
 def with_finite_motions(conditions: Conditions) -> Conditions:
     """Return the conditions with the changes that finite motions cause.
 
-    As in :func:`with_second_order`, but for each row under its loads.  The declared
-    model is then exact, and effects are added to first order.
+    The changes are computed as in :func:`with_second_order`, but for each row under its
+    loads.  The declared model is then exact, and effects are added to first order.
 
     Args:
         conditions: R rows, as declared.
@@ -206,9 +207,6 @@ def _finite_part(conditions: Conditions, one_by_one: int | None = None) -> NDArr
     """Return (R, 6) exact minus linear platform screws; zero if a solution is missing.
 
     Compliant places with laws are solved by the linear model.
-
-    Returns:
-        The difference.
     """
     conditions = replace(conditions, yields=())
     exact, linear = (
@@ -221,8 +219,8 @@ def _finite_part(conditions: Conditions, one_by_one: int | None = None) -> NDArr
 def with_rest_positions(conditions: Conditions) -> Conditions:
     """Return the conditions with the rest positions of clearances at least energy.
 
-    Effects can then be tried at the cost of a robot without clearances.  This is
-    correct to first order as long as the contact points are the same.
+    Trying an effect then requires only the time of a robot without clearances.  The
+    result is correct to first order as long as the contact points do not change.
 
     Args:
         conditions: R rows.
@@ -261,7 +259,7 @@ def read(conditions: Conditions, screws: NDArray) -> NDArray:
     shift = screws[:, 3:] + lever + tool
     base = rotation_matrix(conditions.base[..., :3])
     # the device's rotation acts on the position itself; without a rotation there is no
-    # rounding
+    # rounding error
     translation = _turned(base - np.eye(3), p + arm) + _turned(base, shift)
     translation += conditions.base[..., 3:]
     turns = conditions.base[..., :3].any()
@@ -297,7 +295,7 @@ def assemble_row(conditions: Conditions, row: int) -> Assembly | ExactAssembly:
     load = conditions.load_at_origin()[row]
     gravity = conditions.gravity[row] if conditions.gravity[row].any() else None
     compliances = np.zeros(len(conditions.laws))
-    # the linear model gives nearly converged contacts
+    # the contacts of the linear model are nearly converged
     if conditions.exact and conditions.laws:
         linear = assemble_row(replace(conditions, exact=False), row)
         compliances = secants(linear, conditions.laws)
@@ -332,7 +330,7 @@ def _assemble_yielding(row: Conditions) -> Assembly | ExactAssembly:
 
 
 def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
-    """Return (R, 6) platform screws of a robot without clearances, and (R,) solved."""
+    """Return (R, 6) platform screws without clearances, and a mask of solved rows."""
     if not conditions.yields:
         screws, _, solved = _linear(conditions)
         return screws, solved
@@ -341,7 +339,7 @@ def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
         np.zeros(len(conditions), dtype=bool),
     )
     if conditions.exact:
-        return unsolved  # solved one by one, under the wrenches of finite motions
+        return unsolved  # these rows are solved one by one, with finite motions
     distinct, which = conditions.postures.distinct
 
     def solve(held: Conditions) -> tuple[tuple[NDArray, NDArray], NDArray]:
@@ -359,7 +357,7 @@ def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
 
 
 def _linear(conditions: Conditions) -> tuple[NDArray, NDArray, NDArray]:
-    """Solve robots without clearances and compliant places.
+    """Solve rows of robots without clearances and without compliant places.
 
     Returns:
         (R, 6) platform screws, (R, 6n) joint wrenches of the linear model, and (R,)
@@ -383,7 +381,7 @@ def _linear(conditions: Conditions) -> tuple[NDArray, NDArray, NDArray]:
         )
         deflections, settled = contact_deflections(conditions.laws, w, own[which])
         screws = screws + times(platform, deflections)
-        if flexible.system.size:  # the wrenches of an open chain follow from the loads
+        if flexible.system.size:  # wrenches of open chains depend on loads only
             wrenches = wrenches + times(everywhere, deflections)
         solved = solved & settled
     if conditions.exact:

@@ -1,12 +1,12 @@
-r"""The exact equilibrium equations of many rows, evaluated at an iterate.
+r"""Exact equilibrium equations of many rows, evaluated at an iterate.
 
 ======  =============  ===========  ==================================================
 symbol  code           shape        meaning
 ======  =============  ===========  ==================================================
 e b     ``screws``     (2, R, n, 6) deformation of bodies and of joints, logarithms
 q       ``motions``    (R, q)       free motions of passive joints
-lambda  multipliers    (R, 6K)      of the scaled closures
-d       deflections    (R, s)       of contacts
+lambda  multipliers    (R, 6K)      multipliers of the scaled closures
+d       deflections    (R, s)       deflections of contacts
 ======  =============  ===========  ==================================================
 """
 
@@ -47,7 +47,7 @@ _LINEAR_BELOW = 1e-9  # [rad or m] deflection below which the law of a contact i
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Rows to be solved, and the quantities that stay constant during the iteration.
+    """Rows to be solved, and the quantities that remain constant during the iteration.
 
     Attributes:
         conditions: R rows.
@@ -135,7 +135,7 @@ class Rows:
 
     @cached_property
     def times(self) -> Callable[[NDArray, NDArray], NDArray]:
-        """Function that multiplies matrices of postures with vectors of rows."""
+        """Function that multiplies matrices per posture with vectors per row."""
         return at_postures(self.posture_of_row)
 
     def corrected(self, right_side: NDArray) -> NDArray:
@@ -209,14 +209,14 @@ class RowState:
 
     @cached_property
     def passive_motion(self) -> NDArray:
-        """(R, n) [rad or m] motions of passive joints from their coordinates."""
+        """(R, n) [rad or m] motions of passive joints in addition to coordinates."""
         moved = self.motions @ self.rows.flexible.free.T
         own = [f.own_axis for f in self.rows.conditions.robot.frames]
         return moved.reshape(*self.screws.shape[1:])[..., np.arange(len(own)), own]
 
     @cached_property
     def poses(self) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-        """(R, n, 4, 4) poses: before and after bodies deform, after joints, final."""
+        """(R, n, 4, 4) poses before and after body deformation, after joints, final."""
         rows = self.rows
         partial = [rows.bodies]
         for frames, screws in zip(rows.elastic_frames, self.screws, strict=True):
@@ -266,7 +266,7 @@ class RowState:
     def total_wrenches(self) -> NDArray:
         """(2, R, n, 6) wrenches through bodies and through joints, base axes.
 
-        They are read at the platform's nominal origin.
+        The wrenches act at the platform's nominal origin.
         """
         conditions, loads = self.rows.conditions, self.rows.loads
         posture, robot = conditions.postures, conditions.robot

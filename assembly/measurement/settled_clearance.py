@@ -1,9 +1,10 @@
-"""Clearances taken up by the load: each joint rests in contact at its bound.
+"""Clearances closed by the load: each joint is in contact at its bound.
 
 A joint that transmits the wrench w rests at the point of its clearance cones that is
-farthest along w.  In a robot without closures the wrenches follow from the loads alone,
-and this is the exact minimum of (22).  With closures it is the limit for small
-clearances, by the envelope theorem: dE/d(bound) = -|w| in the cone's directions.
+farthest along w.  In a robot without closures, the wrenches depend only on the loads,
+and this position is the exact minimum of (22).  With closures, this position is the
+limit for small clearances.  It follows from the envelope theorem: dE/d(bound) = -|w| in
+the cone's directions.
 """
 
 from dataclasses import replace
@@ -36,8 +37,8 @@ def with_clearances_taken_up(conditions: Conditions) -> tuple[Conditions, NDArra
 
     Returns:
         The same rows for a robot without clearances, whose errors include these screws.
-        And (R,) bool, True if a joint with clearance transmits no load, so that its
-        rest position is undetermined; it is then centred.
+        Also (R,) bool, True if a joint with clearance transmits no load.  The rest
+        position of this joint is then undetermined, and the joint is centred.
     """
     tight = replace(conditions, robot=without_joint_clearances(conditions.robot))
     distinct, posture_of_row = tight.postures.distinct
@@ -65,7 +66,7 @@ def with_clearances_taken_up(conditions: Conditions) -> tuple[Conditions, NDArra
 
 
 def with_clearances_at_rest(conditions: Conditions) -> Conditions:
-    """Return the conditions with clearances replaced by their screws at rest.
+    """Return the conditions with clearances replaced by their rest positions.
 
     Args:
         conditions: R rows of a robot with clearances, and with ``rest``.
@@ -95,14 +96,14 @@ def _component_bounds(robot: Robot) -> NDArray:
 
 
 def fractions(robot: Robot, clearance_screws: NDArray) -> NDArray:
-    """Return the clearance screws relative to their bounds.
+    """Return the clearance screws divided by their bounds.
 
     Args:
         robot: robot of n frames.
         clearance_screws: (n, 6) [rad, m] clearance screws.
 
     Returns:
-        (n, 6) [-] ratios, 0 where there is no clearance.
+        (n, 6) [-] ratios; 0 for components without clearance.
     """
     bounds = _component_bounds(robot)
     finite = np.isfinite(bounds) & (bounds > 0)
@@ -111,7 +112,7 @@ def fractions(robot: Robot, clearance_screws: NDArray) -> NDArray:
 
 
 def without_joint_clearances(robot: Robot) -> Robot:
-    """Return the robot without clearances; bounds of passive joints' motion remain.
+    """Return the robot without clearances; bounds of passive joints' motions remain.
 
     Args:
         robot: robot with or without clearances.

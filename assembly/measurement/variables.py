@@ -1,6 +1,7 @@
 """Variables of effects, by public name: ``q.drive``, ``load.fz``, ``time`` ..
 
-Wrenches (``wrench.drive.mz``) are not included, because only the equilibrium has them.
+Wrenches (``wrench.drive.mz``) are not included, because they are known only after the
+equilibrium has been computed.
 """
 
 from collections.abc import Iterable
@@ -44,15 +45,15 @@ def variable(conditions: Conditions, name: str) -> NDArray:
 
 
 def past(conditions: Conditions, names: Iterable[str]) -> tuple[History, NDArray]:
-    """Return the history of the conditions' rows.
+    """Return the history that contains the rows of the conditions.
 
     Args:
         conditions: R rows.
         names: names of the required variables.
 
     Returns:
-        The history, and (R,) the indices of the rows in it; rows without a history are
-        the first rows of separate sessions.
+        The history, and (R,) the indices of the rows in it.  Rows without a history
+        become the first rows of separate sessions.
     """
     if conditions.history is not None and conditions.row is not None:
         return conditions.history, conditions.row
@@ -70,7 +71,7 @@ def with_history(conditions: Conditions) -> Conditions:
         conditions: R rows, as declared.
 
     Returns:
-        The conditions; selections by :meth:`Conditions.take` keep the whole history.
+        The conditions; selections by :meth:`Conditions.take` retain the whole history.
     """
     names = [f"q.{frame.name}" for frame in conditions.robot.frames]
     names += [f"load.{name}" for name in LOADS]

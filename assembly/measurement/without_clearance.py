@@ -1,13 +1,13 @@
 """Least energy (22) of a robot without clearances, at many postures and loads.
 
-Without clearances no unknown of (22) has a bound.  Its conditions are a linear system
-in the multipliers of the closures and the free motions,
+Without clearances, all unknowns of (22) are unbounded.  Its conditions are a linear
+system in the multipliers of the closures and the free motions,
 
     [ J C J'   J F ] [lambda]      [ J (dl + C f) ]
-    [ F' J'     0  ] [  q   ]  = - [    F' f      ]
+    [ F' J'     0  ] [  q   ]  = - [    F' f      ].
 
-with C the compliances of bodies and joints, f the loads on them, and J the closures.
-One factorisation is used for all rows at a posture.
+C contains the compliances of bodies and joints, f the loads on them, J the closures,
+and F the free motions.  One factorisation serves all rows at a posture.
 
 ======  ====================  ===========  ===========================================
 symbol  code                  shape        meaning
@@ -42,10 +42,10 @@ from forcefit.assembly.model.links import (
     own_screws,
 )
 
-# relative size below which an eigenvalue is rounding; between this and RANK the rank is
-# ambiguous
+# relative size below which an eigenvalue is a rounding error; between this size and
+# RANK, the rank is ambiguous
 _ROUNDING = 1e-13
-# largest padding relative to the number of rows; with more, rows are solved one by one
+# largest padding relative to the number of rows; beyond it, rows are solved one by one
 _PADDING = 4
 _CLOSED = 1e-9  # relative residual of a solved system
 _CLOSED_ABSOLUTE = 1e-12  # [rad, reference lengths] residual that counts as rounding
@@ -53,18 +53,18 @@ _CLOSED_ABSOLUTE = 1e-12  # [rad, reference lengths] residual that counts as rou
 
 @dataclass(frozen=True, eq=False)
 class Flexibility:
-    """A robot without clearances at c postures, prepared for any errors and loads.
+    """Robot without clearances at c postures, with factorised closures.
 
     Attributes:
         rows: (c, 6K, 6n) scaled closure rows.
         platform: (c, 6, 6n) map from small screws to the platform screw.
-        body_compliances: (n, 6, 6) compliances in the frames' axes.
-        joint_compliances: (n, 6, 6) compliances in the frames' axes.
+        body_compliances: (n, 6, 6) compliances of bodies in the frames' axes.
+        joint_compliances: (n, 6, 6) compliances of joints in the frames' axes.
         free: (6n, q) unit columns of the free motions.
         limit: (q,) [rad, m] bounds of the free motions, inf without a bound.
         inverse: (c, m, m) inverse of the scaled system, m = 6K + q.
         system: (c, m, m) the scaled system.
-        softness: divisor of the compliances with which the system is of order one.
+        softness: number by which compliances are divided to scale the system to 1.
         ambiguous: (c,) bool, True if the numerical rank is ambiguous.
     """
 
@@ -128,15 +128,16 @@ class Flexibility:
         )
 
     def self_stress(self, columns: NDArray, read: NDArray | None = None) -> NDArray:
-        """Return the forces with which the closed structure resists stress-free screws.
+        """Return the forces by which the closed structure resists stress-free screws.
 
         Args:
             columns: (6n, s) screws at the frames.
-            read: (6n, t) screws along which forces are read; by default ``columns``.
+            read: (6n, t) screws along which forces are computed; by default
+                ``columns``.
 
         Returns:
-            (c, t, s) generalised force along each read screw per unit of each column;
-            negative semidefinite if both are the same.
+            (c, t, s) generalised force along each column of ``read`` per unit of each
+            column of ``columns``; negative semidefinite if both are equal.
         """
         through = self.rows @ columns
         met = through if read is None else self.rows @ read
@@ -189,7 +190,7 @@ class FlexibleAssembly:
     """R assemblies of a robot without clearances.
 
     Attributes:
-        platform_screw: (R, 6) [rad, m] at the platform's origin, base axes.
+        platform_screw: (R, 6) [rad, m] screws at the platform's origin, base axes.
         joint_wrenches: (R, 6n) [N m, N] wrenches through all joints, in the frames'
             axes.
         multipliers: (R, 6K) multipliers of the scaled closures.
@@ -204,8 +205,8 @@ class FlexibleAssembly:
 
 @lru_cache(maxsize=4)
 def _under_load(flexible: Flexibility, loads: FrameLoads) -> NDArray | None:
-    """Return (R, 6n) screws of bodies and joints due to loads, with open closures."""
-    # equal for all conditions that differ only in errors
+    """Return (R, 6n) screws of bodies and joints that loads cause in open chains."""
+    # the result is the same for all conditions that differ only in errors
     if not loads:
         return None
     screws = _each(flexible.body_compliances, loads.body)
@@ -214,9 +215,9 @@ def _under_load(flexible: Flexibility, loads: FrameLoads) -> NDArray | None:
 
 
 def at_postures(posture: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
-    """Return a function that multiplies matrices of postures with vectors of rows.
+    """Return a function that multiplies matrices per posture with vectors per row.
 
-    Rows at one posture are multiplied together, so no matrix is copied for every row.
+    Rows at the same posture are multiplied together, so matrices are not copied.
 
     Args:
         posture: (R,) index of each row's posture.
@@ -229,11 +230,11 @@ def at_postures(posture: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
 
 @lru_cache(maxsize=8)
 def _at_postures(unchanged: Unchanged) -> Callable[[NDArray, NDArray], NDArray]:
-    """Return the function of :func:`at_postures`, from a cache."""
+    """Return the function of :func:`at_postures`, cached."""
     posture = unchanged.numbers
     names, own, count = np.unique(posture, return_inverse=True, return_counts=True)
     order = np.argsort(own, kind="stable")
-    place = np.empty_like(order)  # index of a row among the rows of its posture
+    place = np.empty_like(order)  # index of a row among the rows of the same posture
     place[order] = np.arange(len(order)) - np.repeat(np.cumsum(count) - count, count)
     most = int(count.max(initial=0))
 
@@ -265,7 +266,7 @@ def flexibility(postures: Posture) -> Flexibility:
         ValueError: the robot has clearances.
     """
     robot = postures.robot
-    # robots that differ in errors and loads alone share one factorisation
+    # robots that differ only in errors and loads share one factorisation
     springs = link_compliances(robot), joint_compliances(robot)
     arrays = *springs, clearance_bounds(robot), own_screws(robot)
     return _factorise(content_of(postures, arrays, (robot.closures, robot.platform)))
@@ -273,7 +274,7 @@ def flexibility(postures: Posture) -> Flexibility:
 
 @lru_cache(maxsize=4)
 def _factorise(content: Content) -> Flexibility:
-    """Return the system of every posture, and its inverse."""
+    """Return the system of every posture with its inverse."""
     postures, (C_body, C_joint, *_) = content.postures, content.arrays
     robot = postures.robot
     joints = virtual_joints(robot)
@@ -312,12 +313,12 @@ def _factorise(content: Content) -> Flexibility:
 
 
 def pseudo_inverse(M: NDArray) -> tuple[NDArray, NDArray]:
-    """Return (c, m, m) inverses on the range, and (c,) where the rank is ambiguous."""
+    """Return (c, m, m) inverses on the range, and (c,) bool, True if ambiguous."""
     if not M.size:
         return M, np.zeros(len(M), dtype=bool)
     values, vectors = np.linalg.eigh(M)
     size = np.abs(values)
-    largest = size.max(axis=1, keepdims=True)  # zero for a free motion
+    largest = size.max(axis=1, keepdims=True)  # zero if there is only a free motion
     kept = size > RANK * largest
     ambiguous = np.any((size > _ROUNDING * largest) & ~kept, axis=1)
     inverted = np.divide(1.0, values, out=np.zeros_like(values), where=kept)
@@ -331,7 +332,7 @@ def _limits(postures: Posture, free: NDArray) -> NDArray:
 
 
 def _each(matrices: NDArray, screws: NDArray) -> NDArray:
-    """Return (R, 6n): each frame's (6, 6) matrix times its screw or wrench."""
+    """Return (R, 6n) products of each frame's (6, 6) matrix and its screw or wrench."""
     blocks = np.swapaxes(screws.reshape(len(screws), -1, 6), 0, 1)
     products = blocks @ matrices.mT
     return np.swapaxes(products, 0, 1).reshape(screws.shape)

@@ -1,9 +1,9 @@
 """Compliant places, whose deflections follow from wrenches by given laws.
 
-Their deflections e are stress-free screws that depend on the wrenches w, which depend
-on e in turn: e = g(w), w = w0 + A e with A the self-stress.  Newton's method solves e -
-g(w) = 0 for all rows together.  In a robot without closures A is zero, and the first
-iterate is exact.
+Their deflections e are stress-free screws that depend on the wrenches w, which in turn
+depend on e: e = g(w), w = w0 + A e, where A is the self-stress.  Newton's method solves
+e - g(w) = 0 for all rows together.  In a robot without closures A is zero, and the
+first iterate is exact.
 
 ======  ===========  ===========  ====================================================
 symbol  code         shape        meaning
@@ -34,7 +34,7 @@ _STEPS = 40
 
 @dataclass(frozen=True, eq=False)
 class Yields:
-    """Compliant places of conditions, as columns of small screws.
+    """Compliant places of conditions, described by columns of small screws.
 
     Attributes:
         conditions: R rows of a robot of n frames.
@@ -89,9 +89,9 @@ class Yields:
         """Return the Newton correction of the deflections.
 
         Args:
-            give: (R, m) present deflections.
+            give: (R, m) current deflections.
             through: (R, t) wrenches at these deflections.
-            A: (R, t, m) derivative of the wrenches by the deflections.
+            A: (R, t, m) derivative of the wrenches with respect to the deflections.
 
         Returns:
             (R, m) correction to be added; zero in converged rows.
@@ -140,7 +140,8 @@ def settle_yields(
     Args:
         conditions: R rows.
         solve: function that returns solutions and (R, 6n) joint wrenches without laws.
-        A: (R, t, m) first-order derivative of the laws' wrenches by the deflections.
+        A: (R, t, m) first-order derivative of the laws' wrenches with respect to the
+            deflections.
 
     Returns:
         The solutions.
@@ -161,14 +162,14 @@ def settle_yields(
 
 
 def with_springs(conditions: Conditions, row: int) -> Conditions:
-    """Return one row with its linear compliant places in series with the joints.
+    """Return one row with its linear compliant places as springs in series with joints.
 
     Args:
         conditions: conditions of all rows.
         row: index of the row.
 
     Returns:
-        The row; places that are not springs or have no positive compliance remain.
+        The row.  Places that are not springs, or have no positive compliance, remain.
     """
     one, left = conditions.take([row]), []
     frames = list(conditions.robot.frames)

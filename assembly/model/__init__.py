@@ -1,4 +1,4 @@
 """Data of a robot: frames, joints with clearance, elastic links, geometric errors.
 
-Begin at ``robot.py``.
+Start with ``robot.py``.
 """

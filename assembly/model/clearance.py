@@ -1,4 +1,4 @@
-"""Joint clearances, eqs (1)-(5): bounds on small screws, each a cone.
+"""Joint clearances, eqs (1)-(5): bounds of small screws, each of which is a cone.
 
 ======  ====================  =======  ==========================================
 symbol  code                  shape    meaning
@@ -6,11 +6,13 @@ symbol  code                  shape    meaning
 c-bar   ``clearance_bounds``  (n, 5)   [RXY RZ TXY TZ TXYZ], 0 rigid, inf free
 ======  ====================  =======  ==========================================
 
-Four of them are the paper's.  The last one, for (TX, TY, TZ), is a ball in its socket:
-it takes the place of TXY and TZ.  A bound that a joint does not have is NaN.
+The first four bounds are those of the paper.  The last bound, for (TX, TY, TZ), is a
+ball joint's clearance in its socket and replaces TXY and TZ.  A bound that a joint does
+not have is NaN.
 
 The free motion of a passive joint is one of these directions without a bound, or with
-the bound in the file.  So a joint's own motion needs no separate treatment.
+the bound given in the file.  The motion of a joint therefore needs no special
+treatment.
 """
 
 import numpy as np
@@ -22,21 +24,21 @@ from forcefit.assembly.model.robot import Clearance, Frame, Robot
 CONES = ((0, 1), (2,), (3, 4), (5,), (3, 4, 5))
 BOUNDS = ("tilt", "spin", "radial", "axial", "ball")  # keys of the bounds, by cone
 _BALL = BOUNDS.index("ball")
-_BOUND_OF_COMPONENT = (0, 0, 1, 2, 2, 3)  # without a ball
+_BOUND_OF_COMPONENT = (0, 0, 1, 2, 2, 3)  # for joints without ball
 
 
 def clearance_bounds(robot: Robot, own_axes_free: bool = False) -> NDArray:
     """Return the bounds of every joint's clearance.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         own_axes_free: whether passive joints with stiffness move freely about or along
-            their own z; else only the spring moves there (and ``spin``, if given, is a
-            clearance in series).
+            their z axis.  If not, only the spring moves there, and ``spin``, if given,
+            is a clearance in series with the spring.
 
     Returns:
         (n, 5) [rad, rad, m, m, m] for [RXY RZ TXY TZ TXYZ]: 0 is rigid, inf is free,
-        NaN is no bound of this joint.
+        NaN means that the joint does not have this bound.
     """
     bounds = np.zeros((len(robot.frames), len(BOUNDS)))
     for i, frame in enumerate(robot.frames):
@@ -73,14 +75,14 @@ def bound_name(columns: NDArray) -> str:
 
 
 def own_cone(frame: Frame) -> int | None:
-    """Return the bound that limits a passive joint's own motion; None for a spring."""
+    """Return the index of the bound of a passive joint's motion; None for a spring."""
     if not frame.passive or frame.compliant:
         return None
     return 3 if frame.joint == "prismatic" else 1
 
 
 def scales_with_margin(robot: Robot) -> NDArray:
-    """Return (n, 5) bool: bounds of clearances, not the range of a passive joint."""
+    """Return (n, 5) bool, True for clearances, False for ranges of passive joints."""
     scaled = np.ones((len(robot.frames), len(BOUNDS)), dtype=bool)
     for i, frame in enumerate(robot.frames):
         own = own_cone(frame)
@@ -90,23 +92,23 @@ def scales_with_margin(robot: Robot) -> NDArray:
 
 
 def has_bounded_motion(robot: Robot) -> bool:
-    """Return whether a passive joint's own motion has a bound."""
+    """Return whether the motion of a passive joint is bounded."""
     own = ~scales_with_margin(robot)
     return bool(np.isfinite(clearance_bounds(robot)[own]).any())
 
 
 def clearance_components(robot: Robot, screws: NDArray) -> NDArray:
-    """Return the components of clearance screws that bounds limit.
+    """Return the components of clearance screws that the bounds limit.
 
     Component TZ of a helical joint is the translation relative to its thread,
-    TZ - h RZ; other components are those of the screw.
+    TZ - h RZ.  All other components are those of the screw.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         screws: (..., n, 6) [rad, m] clearances and motions of passive joints.
 
     Returns:
-        (..., n, 6) [rad, m]; the same object without helical joints.
+        (..., n, 6) [rad, m]; the given array if there are no helical joints.
     """
     leads = np.array([frame.lead for frame in robot.frames])
     if not leads.any():
@@ -117,15 +119,15 @@ def clearance_components(robot: Robot, screws: NDArray) -> NDArray:
 
 
 def clearance_excess(screws: NDArray, bounds: NDArray) -> NDArray:
-    """Return the largest excess of a clearance screw over its cone, eqs (2)-(5).
+    """Return the largest relative excess of clearance screws over cones, eqs (2)-(5).
 
     Args:
-        screws: (..., n, 6) [rad, m].
+        screws: (..., n, 6) [rad, m] clearance screws.
         bounds: (n, 5) [rad, rad, m, m, m], see :func:`clearance_bounds`.
 
     Returns:
-        (...) [-] largest of size / bound - 1 over the bounds that are positive and
-        finite, and of size / 1 rad or m where the bound is zero; at least 0.
+        (...) [-] largest value of size / bound - 1 over all positive finite bounds; for
+        a zero bound, the size in rad or m; at least 0.
     """
     sizes = np.stack(
         [np.linalg.norm(screws[..., list(rows)], axis=-1) for rows in CONES], axis=-1
@@ -133,7 +135,7 @@ def clearance_excess(screws: NDArray, bounds: NDArray) -> NDArray:
     limited = np.isfinite(bounds)
     where_rigid = np.where(limited & (bounds == 0.0), sizes, 0.0)
     limited = np.broadcast_to(limited & (bounds > 0.0), sizes.shape)
-    with np.errstate(over="ignore"):  # by a very small bound
+    with np.errstate(over="ignore"):  # division by a very small bound
         excess = np.divide(sizes, bounds, where=limited, out=np.ones_like(sizes)) - 1.0
     worst = np.maximum(excess, where_rigid).max(axis=(-2, -1))
     return np.maximum(0.0, worst)

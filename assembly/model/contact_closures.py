@@ -21,8 +21,9 @@ def contact_closures(robot: Robot) -> NDArray:
         robot: any robot.
 
     Returns:
-        (closures,) bool: whether nothing but clearances moves the two frames of the
-        closure against each other, and one of these clearances has no bound.
+        (closures,) bool, True if two conditions are satisfied: only clearances allow
+        the two frames of the closure to move relative to each other, and one of these
+        clearances is unbounded.
     """
     found = [_joins_contacts(robot, *pair) for pair in robot.closures]
     marks = np.array(found, dtype=bool)
@@ -39,29 +40,29 @@ def contact_frames(robot: Robot) -> frozenset[str]:
 
 
 def _apart(robot: Robot, first: str, second: str) -> list[Frame]:
-    """Frames on the path to one of two frames, but not on that to the other."""
+    """Return the frames on the path to exactly one of two frames."""
     paths = robot.on_path[[robot.index(first), robot.index(second)]]
     return [robot.frames[i] for i in np.flatnonzero(paths[0] != paths[1])]
 
 
 def _joins_contacts(robot: Robot, first: str, second: str) -> bool:
-    """Whether the chains to two frames consist of clearances, one without a bound."""
+    """Return whether the chains to two frames are clearances, one of them unbounded."""
     apart = _apart(robot, first, second)
     return all(map(_moves_by_clearance, apart)) and any(map(_is_unbounded, apart))
 
 
 def _is_unbounded(frame: Frame) -> bool:
-    """Whether a clearance of a frame has no bound."""
+    """Return whether a clearance of a frame is unbounded."""
     return frame.clearance is not None and np.inf in vars(frame.clearance).values()
 
 
 def _moves_by_clearance(frame: Frame) -> bool:
-    """Whether nothing moves a frame against its parent but its clearance."""
+    """Return whether a frame moves relative to its parent only by its clearance."""
     others = frame.locked_at, frame.link, frame.joint_stiffness
     return frame.joint == "fixed" and all(other is None for other in others)
 
 
 def loops(robot: Robot) -> tuple[tuple[str, str], ...]:
-    """Return the closures of the mechanism, without those of contacts."""
+    """Return the closures of the mechanism, without the closures of contacts."""
     pairs = zip(robot.closures, contact_closures(robot), strict=True)
     return tuple(closure for closure, of_contacts in pairs if not of_contacts)

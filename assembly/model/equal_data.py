@@ -1,8 +1,8 @@
-"""Equality of objects by their data, by a digest that each object computes once.
+"""Equality of objects by their data, by a hash that each object computes once.
 
-Numbers are compared bit by bit, so that equal objects have equal results and may share
-them: 0.0 and -0.0, at which an angle may be pi or -pi, differ.  An integer equals the
-float of its value.
+Numbers are compared bit by bit, so that equal objects have equal results and can share
+them.  For example, 0.0 and -0.0 differ, because an angle can be pi for one and -pi for
+the other.  An integer equals the float of the same value.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -19,7 +19,7 @@ _CACHED = {"_digest", "_hash"}
 
 
 class EqualData:
-    """Base of frozen dataclasses with ``eq=False`` that are equal if their data are."""
+    """Base class of frozen dataclasses (``eq=False``) that compare by their data."""
 
     def __eq__(self, other: object) -> bool:
         if self is other:
@@ -32,7 +32,7 @@ class EqualData:
         return self._hash
 
     def _data(self) -> Iterable[Any]:
-        """Return the values by which it is compared."""
+        """Return the values by which objects are compared."""
         return _fields_of(self)
 
     @cached_property
@@ -44,7 +44,7 @@ class EqualData:
 
     @cached_property
     def _hash(self) -> int:
-        return hash(self._digest)  # others may do with less work
+        return hash(self._digest)  # subclasses can compute a faster hash
 
     def __getstate__(self) -> dict[str, Any]:
         # hashes differ from process to process; pickled links lack their solutions
@@ -57,7 +57,7 @@ def _fields_of(thing: Any) -> Iterable[Any]:
 
 
 def _feed(update: Callable[[bytes], None], value: Any) -> None:
-    """Give a value to a digest, with its kind and length, so that none is ambiguous."""
+    """Add a value to a digest with its type and length, to distinguish all values."""
     kind = type(value)
     if kind is np.ndarray:
         update(_head(value.dtype.char, value.shape))
@@ -76,7 +76,7 @@ def _feed(update: Callable[[bytes], None], value: Any) -> None:
 
 
 def _feed_parts(update: Callable[[bytes], None], value: Any) -> None:
-    """Give a value of parts to a digest, or its text."""
+    """Add a value that consists of parts, or its text, to a digest."""
     if is_dataclass(value):
         update(type(value).__name__.encode())
         parts = _fields_of(value)
@@ -94,5 +94,5 @@ def _feed_parts(update: Callable[[bytes], None], value: Any) -> None:
 
 @cache
 def _head(kind: str, shape: tuple[int, ...]) -> bytes:
-    """Return what precedes the numbers of an array."""
+    """Return the bytes that precede the numbers of an array."""
     return f"a{kind}{shape}".encode()

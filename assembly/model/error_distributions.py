@@ -6,12 +6,12 @@ Each source is one component of one frame's delta l, equal to ``centre + scale s
 uniform     s between -1 and 1; sizes from ``least`` to ``most`` with random signs,
             or all positive (``signs = "literal"``, the paper's interval as printed)
 normal      s ~ N(0, 1), scale the standard deviation
-truncated   the same, cut where abs(s) exceeds ``limit`` standard deviations
+truncated   normal, cut off where abs(s) exceeds ``limit`` standard deviations
 =========== ======================================================================
 
-Draw number i takes its numbers from one position of a counter-based generator,
-independent of earlier draws.  So a run may be interrupted, resumed or distributed in
-any way.
+The random numbers of draw i come from one position of a counter-based generator and do
+not depend on earlier draws.  A run can therefore be interrupted, resumed or distributed
+among processes without a change of its results.
 
 Sources:
     Salmon, Moraes, Dror, Shaw (2011), Parallel random numbers: as easy as 1, 2, 3
@@ -33,29 +33,29 @@ from forcefit.results.display import html_table, short_repr
 
 KINDS = ("uniform", "normal", "truncated")
 _LARGEST = 1e3  # [rad, m] larger than any error
-# columns of the rows of _rows
+# names of the columns in the result of _rows
 _COLUMNS = (
     "frame", "component", "kind", "centre", "scale", "least", "limit", "signed",
 )  # fmt: skip
-_WORDS = 4  # random numbers of one step of Philox
+_WORDS = 4  # random numbers per step of Philox
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorSources:
-    """Independent random components of the geometric errors; m of them.
+    """Independent random components of the geometric errors; m components in total.
 
     Attributes:
         robot: the robot of these frames.
-        frame: (m,) row of the frame.
-        component: (m,) component of its screw.
+        frame: (m,) index of the frame.
+        component: (m,) component of the frame's screw.
         kind: (m,) index into :data:`KINDS`.
-        centre: (m,) [rad or m].
-        scale: (m,) [rad or m] >= 0.
-        least: (m,) smallest size of s, uniform sources only; below 1.
-        limit: (m,) largest size of s, truncated sources only.
-        signed: (m,) bool: s takes both signs.
-        fixed: (n, 6) [rad, m] errors that every draw has, such as the closures'
-            mismatch; zero if None.
+        centre: (m,) [rad or m] value at s = 0.
+        scale: (m,) [rad or m] factor of s, >= 0.
+        least: (m,) smallest size of s, below 1; only for uniform sources.
+        limit: (m,) largest size of s; only for truncated sources.
+        signed: (m,) bool, whether s can have both signs.
+        fixed: (n, 6) [rad, m] errors that are added to every draw, such as the
+            mismatch of the closures; None for zero.
     """
 
     robot: Robot
@@ -83,23 +83,23 @@ class ErrorSources:
         return len(self.frame)
 
     def standard(self, uniform: NDArray) -> NDArray:
-        """Return the (..., m) values s of numbers uniform between 0 and 1."""
+        """Return the (..., m) values s for numbers that are uniform between 0 and 1."""
         v = 2.0 * uniform - 1.0
         size = self.least + (1.0 - self.least) * np.where(self.signed, abs(v), uniform)
         uniform_values = np.where(self.signed, np.copysign(size, v), size)
         if not (self.kind > 0).any():
             return uniform_values
-        # a truncated source uses the normal distribution within its limits only
+        # only the part of the normal distribution within the limits is used
         tail = np.where(self.kind == 2, ndtr(-self.limit), 0.0)
         normal_values = ndtri(tail + np.maximum(uniform, 2.0**-54) * (1.0 - 2.0 * tail))
         return np.where(self.kind == 0, uniform_values, normal_values)
 
     def values(self, standard: NDArray) -> NDArray:
-        """Return the (..., m) [rad or m] errors for values s."""
+        """Return the (..., m) [rad or m] errors for the values s."""
         return self.centre + self.scale * standard
 
     def uniforms(self, first: int, count: int, seed: int, stream: int = 0) -> NDArray:
-        """Return the (count, m) numbers in [0, 1) of the draws ``first`` ..
+        """Return the (count, m) uniform random numbers in [0, 1) of some draws.
 
         Args:
             first: number of the first draw.
@@ -108,7 +108,8 @@ class ErrorSources:
             stream: number of the stream; streams are independent.
 
         Returns:
-            The numbers; those of a draw do not depend on ``first`` or ``count``.
+            The random numbers; the numbers of a draw do not depend on ``first`` or
+            ``count``.
         """
         steps = -(-max(1, len(self)) // _WORDS)
         philox = np.random.Philox(key=np.array([seed, stream], dtype=np.uint64))
@@ -134,7 +135,7 @@ class ErrorSources:
 
     @property
     def variance(self) -> NDArray:
-        """(m,) [rad^2 or m^2] of every error."""
+        """(m,) [rad^2 or m^2] variance of every error."""
         a = self.least
         uniform = np.where(self.signed, (1 + a + a**2) / 3, (1 - a) ** 2 / 12)
         cut = np.where(self.kind == 2, self.limit, 8.0)
@@ -144,7 +145,7 @@ class ErrorSources:
         return self.scale**2 * np.where(self.kind == 0, uniform, normal)
 
     def of_numbers(self, slopes: NDArray) -> NDArray:
-        """Return slopes (..., n, 6) with the errors as slopes (..., m)."""
+        """Return the columns (..., m) of these sources from slopes (..., n, 6)."""
         return np.asarray(slopes[..., self.frame, self.component])
 
     @property
@@ -154,7 +155,7 @@ class ErrorSources:
 
     @property
     def identity(self) -> list[NDArray]:
-        """Arrays that are equal if the draws are."""
+        """Arrays that are equal if and only if the draws are equal."""
         return [
             self.frame, self.component, self.kind, self.centre, self.scale,
             self.least, self.limit, self.signed,
@@ -171,11 +172,11 @@ def draw_generator(seed: int, draw: int, stream: int) -> np.random.Generator:
 
     Args:
         seed: seed of all draws, below 2^64.
-        draw: its number.
-        stream: other than those of :meth:`ErrorSources.uniforms`.
+        draw: number of the draw.
+        stream: number of a stream that :meth:`ErrorSources.uniforms` does not use.
 
     Returns:
-        A generator that depends on these three only.
+        A generator that depends only on these three numbers.
     """
     philox = np.random.Philox(
         key=np.array([seed, stream], dtype=np.uint64),
@@ -188,7 +189,7 @@ def tolerance_sources(
     robot: Robot, tolerances: NDArray, frames: tuple[str, ...] | None = None,
     distribution: str = "uniform", deviations: float = 3.0,
 ) -> ErrorSources:  # fmt: skip
-    """Return the sources within symmetric tolerances.
+    """Return the error sources for symmetric tolerances.
 
     Args:
         robot: robot of n frames.
@@ -203,7 +204,7 @@ def tolerance_sources(
         The sources, frame by frame.
 
     Raises:
-        BadInput: a frame is not the robot's.
+        BadInput: a frame does not exist in the robot.
     """
     names = frames_named(robot, frames) if frames is not None else tuple(
         f.name for f in robot.frames if f.link is not None or f.geometric_error.any()
@@ -238,13 +239,13 @@ def read_sources(
     Args:
         path: TOML file with ``[[errors]]`` tables.
         robot: the robot with the frames named in the file.
-        fixed: (n, 6) [rad, m] errors that every draw has.
+        fixed: (n, 6) [rad, m] errors that are added to every draw.
 
     Returns:
-        The sources, in the order of the file, frames in the robot's order.
+        The sources in the order of the file; frames of a table in the robot's order.
 
     Raises:
-        BadInput: the file breaks a rule.
+        BadInput: the file violates a rule.
     """
     root = read_toml(path)
     tables = root.tables("errors")
@@ -258,7 +259,7 @@ def read_sources(
     for (i, c, *_), table in rows:
         if (i, c) in seen:
             name = quoted(error_label(robot, i, c))
-            raise table.bad("", f"found {name} again, first in {seen[i, c]}")
+            raise table.bad("", f"found {name} a second time, first in {seen[i, c]}")
         seen[i, c] = table.place
     columns = zip(*(row for row, _ in rows), strict=True)
     return ErrorSources(
@@ -267,7 +268,7 @@ def read_sources(
 
 
 def _rows(table: Table, robot: Robot) -> list[tuple]:
-    """Return the sources of one ``[[errors]]`` table: a row each, and the table."""
+    """Return one row per source of an ``[[errors]]`` table."""
     names = table.require("frames", "a list of frame names")
     if not isinstance(names, list) or not all(isinstance(n, str) for n in names):
         raise table.bad("frames", "expected a list of frame names")

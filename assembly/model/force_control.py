@@ -1,4 +1,4 @@
-"""Drives that apply a force instead of holding a coordinate."""
+"""Drives that apply a force and do not control their coordinate."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -11,22 +11,23 @@ from forcefit.inputs.table import BadInput, nearest, quoted
 
 
 def with_drive_forces(robot: Robot, forces: Mapping[str, float]) -> Robot:
-    """Return a robot some of whose drives apply a force and hold no coordinate.
+    """Return a robot in which some drives apply a force and move freely.
 
-    Such a joint is passive: its own motion is free of the drive's stiffness and
-    clearance, and the force acts between its body and what it carries.
+    The joint of such a drive becomes passive.  Stiffness and clearance of the drive do
+    not act along its motion.  The force acts between its body and the part that its
+    joint carries.
 
     Args:
         robot: any robot.
-        forces: [N m or N] by the name of the drive's frame, positive where the
-            coordinate grows.
+        forces: [N m or N] forces by the name of the drive's frame, positive in the
+            direction of increasing coordinate.
 
     Returns:
         The robot; the stiffness of its joints in other directions is unchanged.
 
     Raises:
-        BadInput: no drive has this name, or its stiffness couples its motion with
-            another direction.
+        BadInput: there is no drive of this name, or its stiffness couples its motion
+            with another direction.
     """
     drives = [f.name for f in robot.frames if f.actuated or f.drive_force]
     for name in forces:
@@ -48,7 +49,7 @@ def with_drive_forces(robot: Robot, forces: Mapping[str, float]) -> Robot:
 
 
 def _released(frame: Frame, force: float) -> Frame:
-    """Return a frame whose joint is free along its motion but for a force."""
+    """Return a frame whose joint moves freely under a constant force."""
     if not frame.actuated:
         return replace(frame, drive_force=force)
     own, K, clearance = frame.own_axis, frame.joint_stiffness, frame.clearance

@@ -1,9 +1,9 @@
-"""A frame of a manipulator: one body and the joint at its far end.
+"""A frame of a manipulator: one body and the joint at the body's far end.
 
-The body reaches from the parent to the frame (``docs/robot_files.md``).  Small screws
-act at the frame in the paper's order, in its axes: geometric error, link deformation,
-joint clearance, joint deformation; then the joint's own motion about or along its z
-carries the children.
+The body connects the parent to the frame (``docs/robot_files.md``).  Small screws act
+at the frame, in its axes and in the paper's order: geometric error, link deformation,
+joint clearance, joint deformation.  The motion of the joint about or along its z axis
+follows and moves the child frames.
 """
 
 import math
@@ -24,12 +24,12 @@ from forcefit.stiffness.screws import rotation_matrix
 JOINTS = ("fixed", "revolute", "prismatic", "helical")
 BASE = "base"
 LOCKED = (
-    "found inf along the own motion of a passive joint, which would lock it; expected "
+    "found inf along the motion of a passive joint, which would lock it; expected "
     '0 (free, as a bearing), a number > 0 (a spring), or joint = "fixed"'
 )
-SLIDING_BALL = "found one on a joint that slides, expected radial"
+SLIDING_BALL = "found a bound on a sliding joint, expected radial"
 ONE_OF_BALL = 'found together with "ball", expected one of them'
-NO_SPIN = "expected none: its motion along the thread has no clearance bound"
+NO_SPIN = "expected none: the motion along the thread has no clearance"
 
 FORCE_CONTROL = (
     'expected a joint = "revolute" | "prismatic" | "helical" that is not actuated: a '
@@ -41,16 +41,16 @@ FORCE_CONTROL = (
 class Clearance:
     """Bounds of a joint's clearance, the paper's c-bar of eqs. (1)-(5).
 
-    ``None`` means "not given": no clearance, except along the free motion of a passive
-    joint, where it means unbounded.
+    ``None`` means that a bound is not given: there is no clearance in this direction,
+    except along the free motion of a passive joint, which is then unbounded.
 
     Attributes:
         radial: [m] radius of the disc for (TX, TY), eq. (2).
         axial: [m] bound of abs(TZ), eq. (3).
         tilt: [rad] radius of the disc for (RX, RY), eq. (4).
         spin: [rad] bound of abs(RZ), eq. (5).
-        ball: [m] radius of the ball for (TX, TY, TZ), in place of ``radial`` and
-            ``axial``: a ball in its socket.
+        ball: [m] radius of the ball for (TX, TY, TZ), which replaces ``radial`` and
+            ``axial`` for a ball joint.
     """
 
     radial: float | None = None
@@ -167,7 +167,7 @@ class Frame(EqualData):
         if self.locked_at is not None and (self.joint != "fixed" or self.clearance):
             raise BadInput(
                 f"frame {quoted(self.name)}.locked_at: found a joint that moves or has "
-                'a clearance besides; expected joint = "fixed"'
+                'another clearance; expected joint = "fixed"'
             )
         if (self.joint == "helical") != (self.pitch != 0.0):
             raise BadInput(
@@ -177,7 +177,7 @@ class Frame(EqualData):
             )
         if self.pitch and self.clearance and self.clearance.spin is not None:
             place = f"frame {quoted(self.name)}.clearance.spin"
-            raise BadInput(f"{place}: found one on a helical joint, {NO_SPIN}")
+            raise BadInput(f"{place}: found a bound on a helical joint, {NO_SPIN}")
         ball = self.clearance is not None and self.clearance.ball is not None
         if ball and self.joint in {"prismatic", "helical"}:
             raise BadInput(f"frame {quoted(self.name)}.clearance.ball: {SLIDING_BALL}")
@@ -194,18 +194,18 @@ class Frame(EqualData):
             fault = inertia_fault(self.inertia)
             if fault:
                 raise BadInput(f"frame {quoted(self.name)}.inertia: {fault}")
-            # files have the upper triangle
+            # files contain only the upper triangle
             J = locked((self.inertia + self.inertia.T) / 2, (3, 3), "inertia")
             object.__setattr__(self, "inertia", J)
 
     @cached_property
     def _hash(self) -> int:
-        # what differs in random errors and identified geometries
+        # these numbers differ between random errors and identified geometries
         numbers = self.translation.tobytes() + self.geometric_error.tobytes()
         return hash((self.name, numbers))
 
     def _figures(self) -> Figures:
-        """Return the fields in short; the rarest only where they are not zero."""
+        """Return the fields in short form; rarely used ones only if not zero."""
         shown = {f.name: brief(getattr(self, f.name)) for f in fields(self)[1:]}
         for name in ("drive_force", "pitch"):
             if not getattr(self, name):
@@ -217,7 +217,7 @@ class Frame(EqualData):
 
     @property
     def passive(self) -> bool:
-        """Whether the joint is passive: mobile but not driven."""
+        """Whether the joint moves and is not driven."""
         return self.joint != "fixed" and not self.actuated
 
     @property
@@ -227,7 +227,7 @@ class Frame(EqualData):
 
     @property
     def resistance(self) -> NDArray | None:
-        """(6, 6) joint's K_B, None if rigid; free along a passive joint's motion."""
+        """(6, 6) K_B of the joint, zero along a passive motion; None if rigid."""
         if self.joint_stiffness is not None or not self.passive:
             return self.joint_stiffness
         K = np.full(6, np.inf)
@@ -236,32 +236,32 @@ class Frame(EqualData):
 
     @property
     def lead(self) -> float:
-        """[m/rad] translation of a helical joint per angle, 0 of others."""
+        """[m/rad] translation of a helical joint per angle, 0 for other joints."""
         return self.pitch / (2 * math.pi)
 
     @property
     def turns(self) -> bool:
-        """Whether the coordinate is an angle: of a revolute or helical joint."""
+        """Whether the coordinate is an angle: for revolute and helical joints."""
         return self.joint in {"revolute", "helical"}
 
     @property
     def own_axis(self) -> int:
-        """Index of the joint's own component of a screw: RZ, or TZ if prismatic.
+        """Index of the component of a screw that is the joint's motion: RZ or TZ.
 
-        RZ of a helical joint is its whole motion, the translation included
-        (:func:`forcefit.assembly.model.links.motion_map`).
+        TZ applies to prismatic joints.  RZ of a helical joint is its whole motion,
+        including the translation (:func:`forcefit.assembly.model.links.motion_map`).
         """
         return 5 if self.joint == "prismatic" else 2
 
     @property
     def own_stiffness(self) -> float | None:
-        """[N m/rad or N/m] K_B along the joint's motion, None without K_B."""
+        """[N m/rad or N/m] K_B along the joint's motion; None without K_B."""
         K = self.joint_stiffness
         return None if K is None else float(K[self.own_axis, self.own_axis])
 
     @property
     def springs(self) -> NDArray | None:
-        """(6, 6) K_B of the springs: ``inf`` also along a free motion."""
+        """(6, 6) K_B of the springs, with ``inf`` along a free motion."""
         K = self.joint_stiffness
         if K is None or self.compliant or not self.passive:
             return K
@@ -285,9 +285,9 @@ def locked(value: ArrayLike, shape: tuple[int, ...], whose: str) -> NDArray:
     """Return a read-only copy of an array.
 
     Args:
-        value: the array, or a list that makes one.
+        value: the array, or a list of numbers.
         shape: the required shape.
-        whose: beginning of the message.
+        whose: name of the array, with which the error message begins.
 
     Returns:
         The array of floats.
@@ -305,7 +305,7 @@ def locked(value: ArrayLike, shape: tuple[int, ...], whose: str) -> NDArray:
 
 
 def between_origins(frame: Frame) -> NDArray:
-    """Return (3,) [m] vector from the parent's origin to the frame's, in its axes."""
+    """Return the (3,) [m] vector from parent's to frame's origin, in frame axes."""
     return np.asarray(rotation_matrix(frame.rotation).T @ frame.translation)
 
 
@@ -313,7 +313,7 @@ def beam_axis(frame: Frame) -> tuple[float, NDArray]:
     """Return the length and direction of a frame's beam.
 
     Args:
-        frame: one with a :class:`BeamLink`.
+        frame: frame whose link is a :class:`BeamLink`.
 
     Returns:
         [m] length, and (3,) unit vector from base to tip in the frame's axes.
@@ -326,9 +326,9 @@ def beam_axis(frame: Frame) -> tuple[float, NDArray]:
     if frame.link.length is not None and frame.link.axis is not None:
         axis = np.array(frame.link.axis)
         return frame.link.length, axis / np.linalg.norm(axis)
-    # a revolute parent rotates the beam about its start, which changes neither
+    # a revolute parent rotates the beam about its start: length and direction remain
     along = between_origins(frame)
     length = math.sqrt(along @ along)
     if length == 0.0:
-        raise ValueError(f"frame '{frame.name}': a beam of no length")
+        raise ValueError(f"frame '{frame.name}': the beam has length 0")
     return length, along / length

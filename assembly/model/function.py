@@ -1,34 +1,36 @@
-"""A general effect: a small screw, or a compliance, as a function of variables.
+"""General effect: a small screw or a compliance as a function of variables.
 
-:mod:`forcefit.assembly.effects.forms` defines its numbers;
-:mod:`forcefit.assembly.effects.functions` applies it.
+:mod:`forcefit.assembly.effects.forms` defines the forms and their parameters;
+:mod:`forcefit.assembly.effects.functions` applies the effect.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 KINDS = ("screw", "compliance")
-PLACES = ("base", "reading", "load")  # in addition to the frames of the robot
+PLACES = ("base", "reading", "load")  # places in addition to the frames of the robot
 
 
 @dataclass(frozen=True)
 class Function:
-    """One ``[[effect]]`` named ``function`` of a robot file.
+    """One ``[[effect]]`` of a robot file with the name ``function``.
 
     Attributes:
-        where: a frame, ``"base"``, ``"reading"`` or ``"load"``.
-        components: ``rx`` .. ``tz`` of the screw there, in its axes; ``mx`` .. ``fz``
-            where ``where`` is ``"load"``.
-        variables: one or two, such as ``q.drive``, ``load.fz``, ``cov.temperature``.
+        where: place at which the effect acts: a frame, ``"base"``, ``"reading"`` or
+            ``"load"``.
+        components: ``rx`` .. ``tz`` of the screw at this place, in its axes; ``mx`` ..
+            ``fz`` if ``where`` is ``"load"``.
+        variables: one or two variables, such as ``q.drive``, ``load.fz`` or
+            ``cov.temperature``.
         form: a name of :data:`forcefit.assembly.effects.forms.FORMS`, or ``"formula"``.
         parameters: numbers by name, in the units that follow from the variables and
-            the kind; with several components a name may begin with one of them.
-        kind: ``"screw"`` [rad, m], or ``"compliance"`` [rad/(N m), m/N]: times the
-            wrench component at the same place.
+            the kind; with several components a name can begin with a component.
+        kind: ``"screw"`` [rad, m], or ``"compliance"`` [rad/(N m), m/N], which is
+            multiplied by the wrench component at the same place.
         label: text for reports.
-        formula: with ``form = "formula"``.
-        session: the only session in which it acts; None for all.
-        std: standard deviations of some parameters, in their units.
+        formula: the formula if ``form`` is ``"formula"``.
+        session: name of the only session in which the effect acts; None for all.
+        std: standard deviations of some parameters, in the parameters' units.
     """
 
     where: str
@@ -44,6 +46,6 @@ class Function:
 
     @property
     def title(self) -> str:
-        """The label, or the place and the variables."""
+        """The label; without a label, the place and the variables."""
         acts = f"{self.where} {', '.join(self.components)}"
         return self.label or f"{acts} of {', '.join(self.variables)}"

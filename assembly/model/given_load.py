@@ -19,16 +19,16 @@ def given_load(load: Load, whose: str = "load") -> NDArray:
     """Return a load as an array.
 
     Args:
-        load: (..., 6) [N m, N] ``[mx my mz fx fy fz]``; or any of these by name, the
-            others zero: a number, or one for each of k points.
+        load: (..., 6) [N m, N] ``[mx my mz fx fy fz]``; or a mapping of some of these
+            components, the others zero, to one number or one for each of k points.
         whose: name of the argument, for messages.
 
     Returns:
-        (..., 6) [N m, N]; by name (6,) or (k, 6).
+        (..., 6) [N m, N]; (6,) or (k, 6) for a mapping.
 
     Raises:
-        BadInput: an unknown component, or not a finite number of at most 1e40; the
-            message names it.
+        BadInput: a component is unknown, or is not a finite number of at most 1e40; the
+            message names the component.
     """
     if not isinstance(load, Mapping):
         return np.array(load, dtype=float)
@@ -38,7 +38,7 @@ def given_load(load: Load, whose: str = "load") -> NDArray:
         shape = np.broadcast_shapes(*(values.shape for values in given.values()))
     except ValueError:
         counts = ", ".join(f"{name} {values.size}" for name, values in given.items())
-        expected = "expected one number or as many for each"
+        expected = "expected one number per component, or equally many"
         raise BadInput(f"{whose}: found {counts} numbers, {expected}") from None
     wrench = np.zeros((*shape, 6))
     for name, values in given.items():
@@ -50,13 +50,13 @@ def one_load(load: Load) -> NDArray:
     """Return one load as an array (6,) [N m, N].
 
     Args:
-        load: as of :func:`given_load`.
+        load: see :func:`given_load`.
 
     Returns:
         Six numbers.
 
     Raises:
-        BadInput: it is something else.
+        BadInput: the load is not six numbers or a mapping of components.
     """
     if isinstance(load, Mapping):
         load = given_load(load)
@@ -67,7 +67,7 @@ def one_load(load: Load) -> NDArray:
 
 
 def _numbers(value: ArrayLike, whose: str, name: str) -> NDArray:
-    """Return a component, or a list of them, as an array."""
+    """Return the value or values of a component as an array."""
     expected = f"expected a number [{'N m' if name.startswith('m') else 'N'}]"
     whose = f"{whose} {name}"
     try:

@@ -1,4 +1,4 @@
-"""Moments of inertia of rigid bodies: checks, axes, and bodies joined together."""
+"""Moments of inertia of rigid bodies: checks, conversion, and joined bodies."""
 
 from collections.abc import Sequence
 
@@ -8,12 +8,12 @@ from numpy.typing import ArrayLike, NDArray
 # mass [kg], centre (3,) [m] and moments of inertia (3, 3) [kg m^2] about that centre
 MassProperties = tuple[float, NDArray, NDArray]
 
-_ROUNDING = 1e-6  # [-] of the largest moment: files have few digits
+_ROUNDING = 1e-6  # [-] share of the largest moment: files have few digits
 _SIX = (np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2]))
 
 
 def inertia_matrix(six: ArrayLike) -> NDArray:
-    """Return the (3, 3) matrix of its entries Ixx, Iyy, Izz, Ixy, Ixz, Iyz."""
+    """Return the (3, 3) matrix with the entries Ixx, Iyy, Izz, Ixy, Ixz, Iyz."""
     J = np.zeros((3, 3))
     J[_SIX] = six
     J[_SIX[::-1]] = six
@@ -26,13 +26,13 @@ def six_moments(J: NDArray) -> list[float]:
 
 
 def inertia_fault(J: NDArray) -> str:
-    """Return why no body has these moments of inertia, or an empty text.
+    """Return the reason why no body has these moments of inertia, or an empty text.
 
     Args:
-        J: (3, 3) [kg m^2].
+        J: (3, 3) [kg m^2] moments of inertia.
 
     Returns:
-        What was found and expected, for a message.
+        The found and the expected values, for a message.
     """
     if not np.abs(J - J.T).max() <= _ROUNDING * np.abs(J).max():
         return "found a matrix that is not symmetric, expected a symmetric one"
@@ -47,7 +47,7 @@ def inertia_fault(J: NDArray) -> str:
 
 
 def point_inertia(mass: float, arm: NDArray) -> NDArray:
-    """Return the (3, 3) [kg m^2] of a point mass [kg] at ``arm`` (3,) [m]."""
+    """Return the (3, 3) [kg m^2] inertia of a point mass [kg] at ``arm`` (3,) [m]."""
     return np.asarray(mass * (arm @ arm * np.eye(3) - np.outer(arm, arm)))
 
 
@@ -58,8 +58,8 @@ def joined_bodies(parts: Sequence[MassProperties]) -> MassProperties:
         parts: mass properties of each body, in common axes.
 
     Returns:
-        Theirs together, by the parallel axis theorem; the centre is the origin without
-        a mass.
+        Mass properties of the rigid body, by the parallel axis theorem.  The centre is
+        the origin if the mass is zero.
     """
     masses, centres = [mass for mass, _, _ in parts], [at for _, at, _ in parts]
     total, centre, J = float(sum(masses)), np.zeros(3), np.zeros((3, 3))

@@ -16,8 +16,8 @@ from forcefit.stiffness.screws import SCREW
 
 # ends of the names of a joint's contacts (assembly/drawing/contacts.py)
 _CONTACT = re.compile(
-    r"(bore|bearing)_(start|end)|guide_(far_)?(roll|(yaw|pitch)_(start|end))"
-    r"|pad_[1-4]|contacts_(start|(far_)?end)"
+    r"(bore|bearing)_(start|end)|guide(_far)?_(roll|(yaw|pitch)_(start|end))|pad_[1-4]"
+    r"|contacts_(start|end|far_end)"
 )
 # component of the frame slide_x, whose z is the joint's x, for each of a planar joint
 _OF_PLANE = (2, 0, 1, 5, 3, 4)

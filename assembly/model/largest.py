@@ -1,4 +1,4 @@
-"""Sizes beyond any machine: larger numbers in a file or an option are mistakes."""
+"""Upper limits of numbers in files and options; larger numbers are mistakes."""
 
-LARGEST_LENGTH = 1e6  # [m] larger than any machine; also bounds angles and directions
-LARGEST = 1e40  # in SI: beyond any stiffness, section or density; 1 / it is the least
+LARGEST_LENGTH = 1e6  # [m] larger than any machine; also limits angles and directions
+LARGEST = 1e40  # in SI units: larger than any property; lower limits are its inverse

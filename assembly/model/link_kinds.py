@@ -1,4 +1,4 @@
-"""The kinds of elasticity of a body: a beam, a matrix, a mesh or a library."""
+"""Models of a body's elasticity: a beam, a matrix, a mesh or a library entry."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -15,20 +15,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class BeamLink:
-    """A straight beam between the parent's origin and the frame's.
+    """A straight beam between the origins of the parent and of the frame.
 
     Attributes:
-        section: the section's declared numbers, such as ``{"radius": 0.04}`` [m].
+        section: dimensions of the section, such as ``{"radius": 0.04}`` [m].
         young: [Pa] Young's modulus.
         poisson: [-] Poisson's ratio.
-        density: [kg/m^3] or None if the link has no declared mass.
+        density: [kg/m^3] density; None if the link has no declared mass.
         theory: ``"timoshenko"`` or ``"euler"``.
-        length: [m] if it is not the distance of the origins, else None.
+        length: [m] length of the beam; None for the distance of the origins.
         axis: unit vector from base to tip in the frame's axes, given together with
-            length.
+            ``length``.
         up: direction of the section's height in the frame's axes, or None.
-        pieces: number of springs in series for finite motions; the number does not
-            matter for small ones.
+        pieces: number of springs in series for finite motions; it has no effect on
+            small motions.
     """
 
     section: dict[str, float]
@@ -59,14 +59,14 @@ class MatrixLink(EqualData):
 
 @dataclass(frozen=True, eq=False)
 class MeshSolution(EqualData):
-    """The finite elements of a mesh link, in the mesh's axes.
+    """Finite-element solution of a mesh link, in the mesh's axes.
 
     Attributes:
         solved: stiffness and fields on the finest mesh.
         young: [Pa] modulus used in the solution.
         digest: SHA-256 of the surface file.
         mass: (12, 12) [kg m^2 .. kg] consistent mass for screws of base and tip, each
-            read at its end; zero without a density.
+            at its end; zero without a density.
     """
 
     solved: "MeshedLink"
@@ -75,32 +75,33 @@ class MeshSolution(EqualData):
     mass: NDArray
 
     def _data(self) -> tuple[Any, ...]:
-        # all fields of the finite elements follow from these
+        # all fields of the finite elements depend only on these data
         return self.solved.link.compliance, self.young, self.digest, self.mass
 
 
 @dataclass(frozen=True)
 class MeshLink:
-    """A link whose K_E comes from finite elements on its surface.
+    """A link whose K_E is computed by finite elements from its surface.
 
     Attributes:
         surface: the surface file.
-        base: interface at the parent's side, as written in robot files.
-        tip: interface at the frame's side.
+        base: interface on the parent's side, as written in robot files.
+        tip: interface on the frame's side.
         young: [Pa] Young's modulus.
         poisson: [-] Poisson's ratio.
-        density: [kg/m^3] or None.
+        density: [kg/m^3] density, or None.
         unit: length unit of the surface file.
-        up: with ``frame_up`` fixes the rotation about the axis: a direction in the
-            mesh's axes.
+        up: direction in the mesh's axes that, together with ``frame_up``, fixes the
+            rotation about the axis.
         frame_up: the same direction in the frame's axes.
-        axis: direction from base to tip in the frame's axes; None from the parent's
-            origin to the frame's.
+        axis: direction from base to tip in the frame's axes; None for the direction
+            from the parent's origin to the frame's.
         interface: ``"rigid"`` or ``"distributing"``.
-        parts: parts of another material, as read by
+        parts: parts of other materials, as read by
             :func:`forcefit.stiffness.fem.part_text.parse_part`.
-        solution: solution of its finite elements, None until
-            :func:`forcefit.assembly.files.solved_links.solve_links`; it is not pickled.
+        solution: finite-element solution; None until
+            :func:`forcefit.assembly.files.solved_links.solve_links` sets it.  It is
+            not pickled.
     """
 
     surface: Path
@@ -118,22 +119,23 @@ class MeshLink:
     solution: MeshSolution | None = field(default=None, compare=False, repr=False)
 
     def __getstate__(self) -> dict[str, Any]:
-        # tens of megabytes, which a worker computes from the same files
+        # the solution has tens of megabytes; worker processes compute it again
         return {**vars(self), "solution": None}
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "MeshLink":
-        return self  # frozen
+        return self  # the object is frozen
 
 
 @dataclass(frozen=True)
 class LibraryLink:
-    """A link whose K_E is kept in a stiffness library.
+    """A link whose K_E is an entry of a stiffness library.
 
     Attributes:
-        library: the library's path.
-        key: the entry's key.
-        compliance: (6, 6) [rad/(N m) .. m/N] of the entry, at the frame in its axes;
-            None until :func:`forcefit.assembly.files.solved_links.solve_links`.
+        library: path of the library.
+        key: key of the entry.
+        compliance: (6, 6) [rad/(N m) .. m/N] compliance of the entry at the frame, in
+            the frame's axes; None until
+            :func:`forcefit.assembly.files.solved_links.solve_links` sets it.
     """
 
     library: Path

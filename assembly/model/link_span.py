@@ -1,4 +1,4 @@
-"""Lengths of links that do not state one: from a parent's origin to a frame's."""
+"""Lengths of links without a declared length: from a parent's origin to a frame's."""
 
 from dataclasses import replace
 
@@ -11,25 +11,25 @@ from forcefit.inputs.table import BadInput, quoted
 from forcefit.stiffness.beam.beam import section_axes
 from forcefit.stiffness.screws import rotation_matrix
 
-_SAME_POINT = 1e-9  # [m] two origins nearer than this coincide
+_SAME_POINT = 1e-9  # [m] origins that are nearer to each other coincide
 
 
 def with_spans(robot: Robot, home: NDArray) -> Robot:
-    """Return the robot with every link's length known and checked.
+    """Return the robot with the lengths of all links computed and checked.
 
-    A beam connects the two origins at home.  After a prismatic or helical joint that is
-    not at zero there, this differs from the frame's translation, and the length is
-    stored.
+    A beam connects the two origins in the home pose.  If the parent's joint is
+    prismatic or helical and not at zero there, the distance differs from the frame's
+    translation, and the length is stored.
 
     Args:
-        robot: robot as read.
+        robot: robot as read from a file.
         home: (n,) [rad or m] joint coordinates in the home pose.
 
     Returns:
-        The robot; some of its beams have ``length`` and ``axis``.
+        The robot, in which some beams have ``length`` and ``axis``.
 
     Raises:
-        BadInput: two origins coincide, or a direction lies along its beam.
+        BadInput: two origins coincide, or a direction is parallel to its beam.
     """
     links: dict[str, Link] = {}
     for i, frame in enumerate(robot.frames):
@@ -46,7 +46,7 @@ def with_spans(robot: Robot, home: NDArray) -> Robot:
 
 
 def _with_span(frame: Frame, link: BeamLink, shift: float) -> BeamLink:
-    """Return a beam of known length, with its ``up`` checked."""
+    """Return a beam with a known length, after a check of its ``up``."""
     if link.length is None or link.axis is None:
         axis = _span(frame, shift)
         length = float(np.linalg.norm(axis))
@@ -63,7 +63,7 @@ def _with_span(frame: Frame, link: BeamLink, shift: float) -> BeamLink:
 
 
 def _check_mesh(frame: Frame, link: MeshLink, shift: float) -> None:
-    """Check that a mesh has a direction, and that another one fixes its rotation."""
+    """Raise BadInput if a mesh has no direction, or no rotation about it."""
     if link.axis is None and shift:
         raise BadInput(
             f"frame {quoted(frame.name)}.link.mesh: found a mesh on a frame "
@@ -80,7 +80,7 @@ def _check_mesh(frame: Frame, link: MeshLink, shift: float) -> None:
 
 
 def _span(frame: Frame, shift: float) -> NDArray:
-    """Return (3,) [m] vector from the parent's origin to the frame's, in its axes."""
+    """Return (3,) [m] the vector from parent's to frame's origin, in frame axes."""
     span = rotation_matrix(frame.rotation).T @ (frame.translation + [0.0, 0.0, shift])
     if np.linalg.norm(span) < _SAME_POINT:
         mesh = isinstance(frame.link, MeshLink)

@@ -1,11 +1,11 @@
-"""The largest stress in every link, from the wrench it transmits.
+"""Largest stress in every link, computed from the wrench that the link transmits.
 
-A link is held at its base and loaded by its frame's wrench at the tip; a beam with a
-density is also loaded by its own weight.  The formulas for beams are in
-:mod:`forcefit.stiffness.beam.beam_stress`.  Links given by a surface use the stress of
-unit wrenches by finite elements (:mod:`forcefit.stiffness.fem.stress`), without the
-points nearer than an interface's radius to a clamped, singular edge.  The stress of a
-link given by its stiffness alone is unknown.
+A link is clamped at its base and loaded by its frame's wrench at the tip; a beam with a
+density is also loaded by its weight.  The formulas for beams are in
+:mod:`forcefit.stiffness.beam.beam_stress`.  For links given by a surface, finite
+elements compute the stress of unit wrenches (:mod:`forcefit.stiffness.fem.stress`).
+Points nearer than an interface's radius to a clamped, singular edge are omitted.  The
+stress of a link given only by its stiffness is unknown.
 """
 
 from collections.abc import Callable
@@ -21,7 +21,7 @@ from forcefit.stiffness.beam.beam import section_axes
 from forcefit.stiffness.beam.beam_stress import peak_beam_stress
 
 WEIGHTLESS = np.zeros(6)  # [N m, N]
-_CHUNK = 64  # number of wrenches together: 64 x 20000 nodes x 6 numbers are 61 MB
+_CHUNK = 64  # wrenches per block: 64 x 20000 nodes x 6 numbers are 61 MB
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,11 +31,11 @@ class LinkStress:
     Attributes:
         frame: name of the frame of the body.
         row: index of that frame.
-        method: ``"beam"`` or ``"finite elements"``, with the points left out.
-        peak: function of (k, 6) [N m, N] wrenches of the link's spring and, if it has
-            its own weight, (k, 6) or (6,) the part of them due to it, at the frame in
-            its axes; it returns (k,) [Pa].
-        relative_error: [-] estimated error of the mesh; 0 for a beam's formulas.
+        method: ``"beam"`` or ``"finite elements"``, with a note on omitted points.
+        peak: function that returns (k,) [Pa] for (k, 6) [N m, N] wrenches of the link's
+            spring.  Its second argument, (k, 6) or (6,), is the part of the wrenches
+            due to the link's weight.  Both are at the frame, in its axes.
+        relative_error: [-] estimated error of the mesh; 0 for the formulas of beams.
     """
 
     frame: str
@@ -53,7 +53,7 @@ def stressed_links(robot: Robot) -> tuple[LinkStress, ...]:
         robot: any robot.
 
     Returns:
-        Beams of a declared shape and links given by a surface.
+        Beams with a declared shape of the section, and links given by a surface.
 
     Raises:
         BadInput: a mesh was not solved when the robot was loaded.
@@ -78,14 +78,15 @@ def stressed_names(robot: Robot) -> tuple[str, ...]:
 def peak_stresses(
     robot: Robot, wrenches: ArrayLike, at_tips: ArrayLike = 0.0
 ) -> NDArray:
-    """Return the largest von Mises stress in every link of known stress.
+    """Return the largest von Mises stress in every link of :func:`stressed_links`.
 
     Args:
         robot: robot of n frames.
-        wrenches: (..., n, 6) [N m, N] of every link's spring, at its frame in its axes,
-            as :attr:`forcefit.assembly.linear.assembled.Assembly.wrenches`.
-        at_tips: (..., n, 6) [N m, N] part of the wrenches due to the links' own weight,
-            as :attr:`forcefit.assembly.linear.load.FrameLoads.at_tips`.
+        wrenches: (..., n, 6) [N m, N] wrenches of every link's spring, at its frame in
+            its axes, see
+            :attr:`forcefit.assembly.linear.assembled.Assembly.wrenches`.
+        at_tips: (..., n, 6) [N m, N] part of the wrenches due to the links' weight, see
+            :attr:`forcefit.assembly.linear.load.FrameLoads.at_tips`.
 
     Returns:
         (..., links) [Pa] in the order of :func:`stressed_links`.
@@ -110,7 +111,7 @@ def peak_stresses(
 
 
 def _of_beam(frame: Frame) -> Callable[..., NDArray]:
-    """Return the peak stress of a beam."""
+    """Return the function that computes the peak stress of a beam."""
     assert isinstance(frame.link, BeamLink)
     length, axis = beam_axis(frame)
     section, R = frame.link.section, section_axes(axis, frame.link.up)
@@ -118,7 +119,7 @@ def _of_beam(frame: Frame) -> Callable[..., NDArray]:
     def peak(wrench: NDArray, at_tip: NDArray = WEIGHTLESS) -> NDArray:
         tip = wrench - at_tip
         in_section_axes = np.hstack([tip[:, :3] @ R, tip[:, 3:] @ R])
-        weight = 2 * at_tip[..., 3:] @ R  # half of it acts at the tip
+        weight = 2 * at_tip[..., 3:] @ R  # half of the weight acts at the tip
         return peak_beam_stress(section, length, in_section_axes, weight)[0]
 
     return peak

@@ -1,4 +1,4 @@
-"""The elasticity of every body and joint of a robot, as compliances."""
+"""Compliances of every body and joint of a robot."""
 
 from functools import lru_cache
 
@@ -26,7 +26,7 @@ def link_compliances(robot: Robot) -> NDArray:
         robot: robot of n frames.
 
     Returns:
-        (n, 6, 6) [rad/(N m) .. m/N] at each frame, in its axes; zero where rigid.
+        (n, 6, 6) [rad/(N m) .. m/N] at each frame, in its axes; zero for rigid bodies.
 
     Raises:
         BadInput: a mesh or a library was not read when the robot was loaded.
@@ -38,7 +38,7 @@ def link_compliances(robot: Robot) -> NDArray:
     return C
 
 
-@lru_cache(maxsize=4096)  # a robot that is changed in one frame keeps its others
+@lru_cache(maxsize=4096)  # if one frame of a robot changes, the others stay cached
 def link_compliance(frame: Frame) -> NDArray:
     """Return the (6, 6) compliance of a frame's body in its axes, a read-only array."""
     C = _compliance(frame)
@@ -66,13 +66,14 @@ def _compliance(frame: Frame) -> NDArray:
 
 
 def joint_compliances(robot: Robot) -> NDArray:
-    """Return compliance of every joint, K_B^-1; zero where rigid, free or not given.
+    """Return the compliance of every joint, K_B^-1.
 
     Args:
         robot: robot of n frames.
 
     Returns:
-        (n, 6, 6) [rad/(N m) .. m/N] at each frame, in its axes.
+        (n, 6, 6) [rad/(N m) .. m/N] at each frame, in its axes; zero for directions
+        that are rigid, free or not given.
     """
     C = spring_compliances(robot)
     for i, frame in enumerate(robot.frames):
@@ -89,7 +90,8 @@ def spring_compliances(robot: Robot) -> NDArray:
         robot: robot of n frames.
 
     Returns:
-        (n, 6, 6) [rad/(N m) .. m/N], zero where rigid, free or not given.
+        (n, 6, 6) [rad/(N m) .. m/N]; zero for directions that are rigid, free or not
+        given.
     """
     C = np.zeros((len(robot.frames), 6, 6))
     for i, frame in enumerate(robot.frames):
@@ -101,17 +103,17 @@ def spring_compliances(robot: Robot) -> NDArray:
 
 
 def compliance_factor(C: NDArray) -> NDArray:
-    """Return a factor L of a compliance, C = L L^T: screw = L y stores energy y^2/2.
+    """Return a factor L of a compliance, C = L L^T: the screw L y has energy y^2/2.
 
     Args:
-        C: (6, 6) symmetric positive semidefinite, mixed units.
+        C: (6, 6) symmetric positive semidefinite compliance in mixed units.
 
     Returns:
-        (6, r) of full column rank r.
+        (6, r) factor of full column rank r.
     """
     size = np.sqrt(np.diag(C))
     soft = np.flatnonzero(size > 0)
-    # scaled to a unit diagonal first: rad and m differ by many orders of magnitude
+    # scale to a unit diagonal first: rad and m differ by many orders of magnitude
     scaled = C[np.ix_(soft, soft)] / np.outer(size[soft], size[soft])
     L = np.zeros((6, len(soft)))
     L[soft] = size[soft, None] * np.linalg.cholesky(scaled)
@@ -119,12 +121,12 @@ def compliance_factor(C: NDArray) -> NDArray:
 
 
 def own_screw(frame: Frame) -> NDArray:
-    """Return the (6,) unit screw of a joint's own motion."""
+    """Return the (6,) unit screw of a joint's motion."""
     return motion_map(frame)[:, frame.own_axis]
 
 
 def own_screws(robot: Robot) -> NDArray:
-    """Return the (n, 6) unit screws of all joints' own motions."""
+    """Return the (n, 6) unit screws of the motions of all joints."""
     frames = robot.frames
     screws = np.zeros((len(frames), 6))
     screws[np.arange(len(frames)), [frame.own_axis for frame in frames]] = 1.0
@@ -135,15 +137,16 @@ def own_screws(robot: Robot) -> NDArray:
 def motion_map(frame: Frame) -> NDArray:
     """Return the (6, 6) map of a joint's components to its screw in the frame's axes.
 
-    The identity; of a helical joint, component RZ is the motion along the thread,
-    [0 0 1 0 0 h], and component TZ is the translation in addition, TZ - h RZ.  K_B and
-    clearances are in components, so they hold relative to the thread.
+    The map is the identity except for helical joints.  Component RZ of a helical joint
+    is the motion along the thread, [0 0 1 0 0 h].  Component TZ is the additional
+    translation, TZ - h RZ.  K_B and clearances refer to these components, and so apply
+    relative to the thread.
 
     Args:
         frame: frame of a robot.
 
     Returns:
-        (6, 6) [-; m/rad in row TZ, column RZ].
+        (6, 6) map [-; m/rad in row TZ, column RZ].
     """
     S = np.eye(6)
     S[5, 2] = frame.lead
@@ -154,12 +157,12 @@ def in_series(stiffness: NDArray | None, row: int, compliance: float) -> NDArray
     """Return K_B with a spring in series in one direction of its own axes.
 
     Args:
-        stiffness: (6, 6) declared, None if rigid.
+        stiffness: (6, 6) declared stiffness, None if rigid.
         row: index of the direction.
-        compliance: [rad/(N m) or m/N] of the spring added.
+        compliance: [rad/(N m) or m/N] compliance of the added spring.
 
     Returns:
-        (6, 6) with ``inf`` on the diagonal where rigid.
+        (6, 6) stiffness with ``inf`` on the diagonal for rigid directions.
     """
     K = np.diag(np.full(6, np.inf)) if stiffness is None else np.array(stiffness)
     free = np.diag(K) == 0.0  # a spring in series with a free motion leaves it free

@@ -1,7 +1,7 @@
-"""The stored finite-element solution of a mesh link, in its frame's axes.
+"""Stored finite-element solution of a mesh link, in its frame's axes.
 
-:func:`forcefit.assembly.files.solved_links.solve_links` solves them when a robot is
-loaded.
+:func:`forcefit.assembly.files.solved_links.solve_links` solves the finite elements when
+a robot is loaded.
 """
 
 from dataclasses import replace
@@ -22,11 +22,11 @@ def mesh_solution(frame: Frame) -> MeshSolution:
     """Return the finite-element solution of a frame's mesh link.
 
     Args:
-        frame: one with a :class:`forcefit.assembly.model.robot.MeshLink`.
+        frame: frame whose link is a :class:`forcefit.assembly.model.robot.MeshLink`.
 
     Returns:
-        The solution; for the link's own modulus multiply its stiffness by
-        :func:`modulus_factor`.
+        The solution.  Its stiffness must be multiplied by :func:`modulus_factor` to
+        obtain the stiffness for the link's own modulus.
 
     Raises:
         BadInput: the link was not solved when the robot was loaded.
@@ -38,11 +38,11 @@ def mesh_solution(frame: Frame) -> MeshSolution:
 
 
 def refuse_unsolved(frame: Frame) -> NoReturn:
-    """Reject a link whose stiffness was not computed when the robot was loaded."""
+    """Raise BadInput for a link that was not solved when the robot was loaded."""
     kind = "library" if isinstance(frame.link, LibraryLink) else "mesh"
     raise BadInput(
-        f"frame {quoted(frame.name)}.link.{kind}: found no stiffness, expected a robot "
-        "of load_robot, or of forcefit.assembly.files.solved_links.solve_links"
+        f"frame {quoted(frame.name)}.link.{kind}: found no stiffness; expected a robot "
+        "returned by load_robot or forcefit.assembly.files.solved_links.solve_links"
     )
 
 
@@ -52,13 +52,13 @@ def modulus_factor(frame: Frame) -> float:
 
 
 def mesh_link_stiffness(frame: Frame) -> LinkStiffness:
-    """Return the stiffness of a frame's mesh link by finite elements, in its axes.
+    """Return the stiffness of a frame's mesh link by finite elements, in frame axes.
 
     Args:
-        frame: one with a :class:`forcefit.assembly.model.robot.MeshLink`.
+        frame: frame whose link is a :class:`forcefit.assembly.model.robot.MeshLink`.
 
     Returns:
-        The link, read at the tip interface's centre, which is the frame's origin.
+        Stiffness at the centre of the tip interface, which is the frame's origin.
 
     Raises:
         BadInput: the link was not solved when the robot was loaded.
@@ -76,12 +76,12 @@ def mesh_link_mass(frame: Frame) -> tuple[NDArray, NDArray]:
     """Return the consistent mass of a frame's mesh link, by finite elements.
 
     Args:
-        frame: one with a :class:`forcefit.assembly.model.robot.MeshLink` that has a
-            density.
+        frame: frame whose link is a :class:`forcefit.assembly.model.robot.MeshLink`
+            with a density.
 
     Returns:
-        (12, 12) [kg m^2 .. kg] for screws of base and tip, each read at its end, in the
-        frame's axes; and (3,) [m] from base to tip, in the frame's axes.
+        (12, 12) [kg m^2 .. kg] for screws of base and tip, each at its end, in the
+        frame's axes; and the (3,) [m] vector from base to tip, in the frame's axes.
 
     Raises:
         BadInput: the link was not solved when the robot was loaded.
@@ -94,15 +94,15 @@ def mesh_link_mass(frame: Frame) -> tuple[NDArray, NDArray]:
 
 
 def mesh_turn(frame: Frame, mesh_span: NDArray) -> NDArray:
-    """Return the rotation from a frame's mesh's axes to the frame's.
+    """Return the rotation from the axes of a frame's mesh to the frame's axes.
 
     Args:
-        frame: one with a :class:`forcefit.assembly.model.robot.MeshLink`.
-        mesh_span: (3,) [m] from base to tip in the mesh's axes.
+        frame: frame whose link is a :class:`forcefit.assembly.model.robot.MeshLink`.
+        mesh_span: (3,) [m] vector from base to tip in the mesh's axes.
 
     Returns:
-        (3, 3) rotation that lays the span along the link's ``axis``, or along the line
-        from the parent's origin to the frame's if it has none.
+        (3, 3) rotation that aligns the span with the link's ``axis``; without
+        ``axis``, with the line from the parent's origin to the frame's.
     """
     link = _mesh(frame)
     span = between_origins(frame) if link.axis is None else np.array(link.axis)
@@ -115,16 +115,16 @@ def mesh_rotation(
     up: tuple[float, float, float] | None = None,
     frame_up: tuple[float, float, float] | None = None,
 ) -> NDArray:
-    """Return the rotation from mesh to frame axes that lays one span along the other.
+    """Return the rotation from mesh to frame axes that aligns one span with the other.
 
     Args:
-        mesh_span: (3,) [m] base to tip in the mesh's axes.
-        span: (3,) its direction in the frame's axes.
-        up: a direction in the mesh's axes that fixes the rotation about the span, with
-        frame_up: the same direction in the frame's axes.
+        mesh_span: (3,) [m] vector from base to tip in the mesh's axes.
+        span: (3,) direction of the span in the frame's axes.
+        up: direction in the mesh's axes that fixes the rotation about the span.
+        frame_up: direction of ``up`` in the frame's axes.
 
     Returns:
-        (3, 3) the rotation; the smallest one if ``up`` is not given.
+        (3, 3) rotation; the smallest possible rotation if ``up`` is not given.
     """
     a, b = mesh_span / np.linalg.norm(mesh_span), span / np.linalg.norm(span)
     if up is not None and frame_up is not None:
@@ -134,7 +134,7 @@ def mesh_rotation(
     if sine < 1e-15:
         if cosine > 0:
             return np.eye(3)
-        # half a turn: the axis across that is nearest to a coordinate axis
+        # half a turn about the perpendicular axis nearest to a coordinate axis
         axis = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
         return rotation_matrix(np.pi * axis / np.linalg.norm(axis))
     return rotation_matrix(np.arctan2(sine, cosine) * axis / sine)
@@ -148,7 +148,7 @@ def _triad(along: NDArray, up: NDArray) -> NDArray:
 
 
 def _mesh(frame: Frame) -> MeshLink:
-    """Return the mesh link of a frame that has one."""
+    """Return the mesh link of a frame; raise ValueError if it has none."""
     if not isinstance(frame.link, MeshLink):
         raise ValueError(f"frame '{frame.name}' has no mesh link")
     return frame.link

@@ -1,4 +1,4 @@
-"""Frames given by their home poses in base axes."""
+"""Frames defined by their home poses in base axes."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -16,11 +16,12 @@ def place_frames(placed: Iterable[PlacedFrame]) -> tuple[Frame, ...]:
     """Return the frames with the translation and rotation of their home poses.
 
     Args:
-        placed: frames, parents first.  Each has its (4, 4) home pose in base axes
-            without its own joint's motion, with every other joint at its ``position``.
+        placed: frames with (4, 4) home poses in base axes, parents first.  A home pose
+            excludes the motion of the frame's own joint; all other joints are at their
+            ``position``.
 
     Returns:
-        The same frames, relative to their parents.
+        The frames, relative to their parents.
     """
     after = {BASE: np.eye(4)}
     frames = []
@@ -33,7 +34,7 @@ def place_frames(placed: Iterable[PlacedFrame]) -> tuple[Frame, ...]:
 
 
 def own_motion(frame: Frame) -> NDArray:
-    """Return (4, 4) motion of the joint at its home position, about or along z."""
+    """Return the (4, 4) motion of a joint at its home position, about or along z."""
     along = np.array([0.0, 0.0, frame.position])
     if frame.joint == "prismatic":
         return transform(along, np.eye(3))

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-Numbers = Any  # a number of one point, or an array (k,) of many
-N = TypeVar("N", float, NDArray)  # the same, if it is known which of them
+Numbers = Any  # a number for one point, or an array (k,) for many points
+N = TypeVar("N", float, NDArray)  # the same, if the type is known
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -22,9 +22,9 @@ class PointResults:
     """A result of one point, or of many points with a leading axis in its arrays.
 
     Attributes:
-        AXES: the fields that have this axis, and their number of axes for one point; an
-            array with no more axes holds for all points.
-        VARIABLES: the array of each variable of the table of many points, by the names
+        AXES: the fields that can have the leading axis, with their number of axes for
+            one point; an array with no more axes applies to all points.
+        VARIABLES: the array of each variable in the table of many points, by the names
             of :mod:`forcefit.assembly.model.tables`.
     """
 
@@ -35,7 +35,7 @@ class PointResults:
 
     @property
     def of_many(self) -> bool:
-        """Whether there is a leading axis."""
+        """Whether the result is one of many points."""
         name, axes = next(iter(self.AXES.items()))
         return np.ndim(getattr(self, name)) > axes
 
@@ -60,7 +60,7 @@ class PointResults:
         return (self[i] for i in range(len(self)))
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return a data set over ``point``, by ``assembly.model.tables``."""
+        """Return a data set over ``point``, see ``assembly.model.tables``."""
         from forcefit.assembly.model.tables import points_dataset
 
         arrays = {name: getattr(self, own) for name, own in self.VARIABLES.items()}
@@ -69,14 +69,14 @@ class PointResults:
         return points_dataset(arrays)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a row for each point, columns (variable, component)."""
+        """Return a table with one row per point and columns (variable, component)."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "point")
 
 
 def plain(values: Any) -> Any:
-    """Return arrays unchanged; for one point the number itself."""
+    """Return arrays unchanged; convert an array without axes to a number."""
     if isinstance(values, np.ndarray):
         return values if values.ndim else values.item()
     return values.item() if isinstance(values, np.generic) else values

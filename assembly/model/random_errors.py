@@ -1,4 +1,4 @@
-"""Geometric errors drawn at random as in the paper's section IV, with a seed."""
+"""Random geometric errors as in the paper's section IV, from a seed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -38,19 +38,19 @@ class ErrorDraw:
 def draw_errors(robot: Robot, draw: ErrorDraw) -> NDArray:
     """Return the errors of one draw.
 
-    Sizes are uniform between ``least`` and ``most``, frame by frame.  The signs come
-    from the same generator afterwards, so both conventions have equal sizes.
+    Sizes are uniform between ``least`` and ``most``, frame by frame.  The signs are
+    drawn afterwards from the same generator, so both conventions have equal sizes.
 
     Args:
         robot: robot of n frames.
         draw: frames, sizes, seed and signs.
 
     Returns:
-        (n, 6) [rad, m]; zero for frames without a drawn error.
+        (n, 6) [rad, m] errors; zero for frames without a drawn error.
 
     Raises:
-        BadInput: a frame is not the robot's.
-        ValueError: ``signs`` is neither of the two.
+        BadInput: a frame does not exist in the robot.
+        ValueError: ``signs`` is unknown.
     """
     if draw.signs not in SIGNS:
         raise ValueError(f"signs is {draw.signs!r}, expected one of {SIGNS}")

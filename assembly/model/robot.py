@@ -1,7 +1,8 @@
-"""A manipulator as data: a tree of frames, and the closures that hold it together.
+"""A manipulator as data: a tree of frames with closures.
 
-:mod:`forcefit.assembly.model.frame` defines a frame,
-:mod:`forcefit.assembly.model.link_kinds` a link. Their names may be imported from here.
+:mod:`forcefit.assembly.model.frame` defines a frame, and
+:mod:`forcefit.assembly.model.link_kinds` a link.  All their names can be imported from
+this module.
 """
 
 from collections.abc import Iterable, Mapping
@@ -50,30 +51,30 @@ __all__ = [
 class Robot(EqualData):
     """A manipulator.
 
-    Frames are stored parents first.  Rows of every array below are frames in that
-    order.  Robots of equal data are equal, bit by bit.
+    Frames are stored with parents first.  The rows of every array below are frames in
+    this order.  Robots are equal if all their data are equal, bit by bit.
 
     Attributes:
         name: name of the robot.
         platform: name of the frame whose pose error is computed.
         frames: all frames.
-        closures: pairs of frames that must coincide once assembled.
-        description: one line.
+        closures: pairs of frames that must coincide after assembly.
+        description: description in one line.
         effects: parameters of the known effects of the machine, by name; see
             :mod:`forcefit.assembly.effects`.
-        session_effects: effects of one session alone, by session.
+        session_effects: for each session, the effects that act only in this session.
         functions: known general effects of the machine.
         learned_range: least and largest value of each variable in the data from which
             the effects were identified, by public name.
-        reference_point: (3,) [m] the point at which it was identified, platform axes;
-            None if it was not identified.
-        diagnosis: information in the file on its diagnosis: verdict, rows fitted,
-            hold-out error, digest of the campaign, path of the covariance.
-        remarks: defaults of its file that are easily overlooked.
-        callouts: tolerances of features, as the drawing states them.
-        fits: ISO 286 fits such as ``"12 H7/g6"`` by frame; ``radial`` of its clearance
-            is the mean.
-        fitted_ends: frames with a fit whose ``tilt`` follows from it, not ``radial``.
+        reference_point: (3,) [m] point at which the robot was identified, in platform
+            axes; None if it was not identified.
+        diagnosis: information from the file about the robot's diagnosis: verdict,
+            fitted rows, hold-out error, hash of the campaign, path of the covariance.
+        remarks: default values of the file that are easily overlooked.
+        callouts: tolerances of features, as stated in the drawing.
+        fits: ISO 286 fits such as ``"12 H7/g6"`` by frame; ``radial`` of the frame's
+            clearance is the mean clearance of the fit.
+        fitted_ends: frames with a fit that determines ``tilt`` instead of ``radial``.
     """
 
     name: str
@@ -98,7 +99,7 @@ class Robot(EqualData):
     show = show
 
     def _figures(self) -> Figures:
-        """Return the summary that is printed."""
+        """Return the numbers of the printed summary."""
         kinds = ("actuated", "passive")
         count = [f"{sum(getattr(f, k) for f in self.frames)} {k}" for k in kinds]
         titles = [function.title for function in self.functions]
@@ -119,16 +120,16 @@ class Robot(EqualData):
             self.index(name)
 
     def index(self, name: str) -> int:
-        """Return the row of a frame.
+        """Return the index of a frame.
 
         Args:
-            name: the frame's name.
+            name: name of the frame.
 
         Returns:
-            Its row in every array of this robot.
+            Index of the frame in every array of this robot.
 
         Raises:
-            BadInput: there is no such frame; the message has the nearest name.
+            BadInput: there is no such frame; the message suggests the nearest name.
         """
         try:
             return self._rows[name]
@@ -139,7 +140,7 @@ class Robot(EqualData):
             raise BadInput(f"{self.name}: no frame {quoted(name)}{hint}") from None
 
     def frame(self, name: str) -> Frame:
-        """Return the frame of a name; see :meth:`index` for the error."""
+        """Return the frame with a name; for errors see :meth:`index`."""
         return self.frames[self.index(name)]
 
     @cached_property
@@ -157,13 +158,13 @@ class Robot(EqualData):
 
     @cached_property
     def parents(self) -> NDArray:
-        """(n,) row of each frame's parent, -1 for the base."""
+        """(n,) index of each frame's parent, -1 for the base."""
         rows = {BASE: -1, **self._rows}
         return np.array([rows[f.parent] for f in self.frames], dtype=int)
 
     @cached_property
     def on_path(self) -> NDArray:
-        """(n, n) bool: row i marks the frames from the base to frame i, itself too."""
+        """(n, n) bool; row i is True for the frames on the path from the base to i."""
         count = len(self.frames)
         marks = np.eye(count, dtype=bool)
         for i, parent in enumerate(self.parents):
@@ -184,7 +185,7 @@ class Robot(EqualData):
 
     @property
     def declared_errors(self) -> NDArray:
-        """(n, 6) [rad, m] the geometric errors without clearances locked in."""
+        """(n, 6) [rad, m] geometric errors without locked-in clearances."""
         errors = self.errors.copy()
         for error, frame in zip(errors, self.frames, strict=True):
             if frame.locked_at is not None:
@@ -203,7 +204,7 @@ class Robot(EqualData):
 
     @property
     def sessions(self) -> tuple[str, ...]:
-        """Names of the sessions that have effects of their own."""
+        """Names of the sessions with additional effects."""
         named = [f.session for f in self.functions if f.session is not None]
         return tuple(dict.fromkeys([*self.session_effects, *named]))
 
@@ -221,14 +222,14 @@ class Robot(EqualData):
                 locked in before are not added to them.
 
         Returns:
-            A new robot.
+            The new robot.
         """
         rows = locked(errors, (len(self.frames), 6), f"{self.name}: errors")
         frames = zip(self.frames, rows, strict=True)
         return replace(self, frames=tuple(_with_error(f, e) for f, e in frames))
 
     def with_links(self, links: dict[str, Link]) -> "Robot":
-        """Return the same robot with other links at the frames named."""
+        """Return the same robot with new links at the named frames."""
         for name in links:
             self.index(name)
         frames = (replace(f, link=links.get(f.name, f.link)) for f in self.frames)
@@ -236,7 +237,7 @@ class Robot(EqualData):
 
 
 def _with_error(frame: Frame, error: NDArray) -> Frame:
-    """Return a frame with another geometric error, nothing locked in."""
+    """Return a frame with another geometric error and no locked-in clearance."""
     bolt = frame.locked_at
     if bolt is not None:
         bolt = replace(bolt, screw=np.zeros(6))
@@ -244,7 +245,7 @@ def _with_error(frame: Frame, error: NDArray) -> Frame:
 
 
 def _has_clearance(frame: Frame) -> bool:
-    """Return whether a clearance is given."""
+    """Return whether a frame has a clearance."""
     return frame.clearance is not None
 
 
@@ -255,10 +256,11 @@ def parents_first(frames: Iterable[Frame]) -> tuple[Frame, ...]:
         frames: frames of one robot.
 
     Returns:
-        The same frames.
+        The sorted frames.
 
     Raises:
-        BadInput: two frames share a name, a parent is missing, or parents form a ring.
+        BadInput: two frames have the same name, a parent is missing, or parents form a
+            cycle.
     """
     frames = tuple(frames)
     rows: dict[str, int] = {}
@@ -299,7 +301,7 @@ def parents_first(frames: Iterable[Frame]) -> tuple[Frame, ...]:
 
 
 def _stable(frames: tuple[Frame, ...], depth: dict[str, int]) -> tuple[Frame, ...]:
-    """Return the given order if parents already come first, else by depth."""
+    """Return the given order if parents already come first, else sort by depth."""
     seen = {BASE}
     for frame in frames:
         if frame.parent not in seen:

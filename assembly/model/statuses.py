@@ -1,6 +1,6 @@
 """Statuses of points and verdicts of comparisons, with their meanings.
 
-A status says whether a point has a result; a verdict says how good a result is.
+A status states whether a point has a result.  A verdict rates a result.
 """
 
 OK = "ok"
@@ -41,11 +41,11 @@ OF_POINTS = (
 # statuses of points at which no quantity is computed
 UNUSABLE = {OUT_OF_REACH, INVALID_ROBOT, SINGULAR, BEYOND_LIMITS}
 
-# verdicts on one value that is compared: OK, or one of these
+# verdicts on one compared value: OK, or one of the following
 FAILS = "fails"
 UNDECIDED = "undecided"
 NO_SIGNAL = "no signal"
-# .. and on a whole comparison: NO_SIGNAL, or
+# verdicts on a whole comparison: NO_SIGNAL, or one of the following
 PASSED = "passed"
 FAILED = "failed"
 NOT_DECIDED = "not decided"

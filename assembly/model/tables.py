@@ -1,8 +1,7 @@
 """Results as labelled arrays (xarray) and tables (pandas).
 
-Names, dimensions and units are those of a sweep's NetCDF file: ``units`` and
-``long_name`` are attributes of every variable.  Both packages are imported on first
-use.
+Names, dimensions and units are those of a sweep's NetCDF file.  Every variable has the
+attributes ``units`` and ``long_name``.  Both packages are imported at first use.
 """
 
 import math
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# variables whose quantity has another name in the table
+# variables whose quantity has another name in forcefit/results/quantities.py
 _RENAMED = {
     "clearance_screw": "clearance", "link_screw": "link", "joint_screw": "joint",
     "stiffness": "axis_stiffness", "stiffness_matrix": "stiffness", "read_at": "point",
@@ -40,7 +39,7 @@ class PlacedRobot(Protocol):
 
 
 class ForcedAssembly(Protocol):
-    """An assembly by the linear model or with finite motions; arrays as named."""
+    """An assembly computed by the linear model or with finite motions."""
 
     @property
     def posture(self) -> PlacedRobot:
@@ -48,27 +47,27 @@ class ForcedAssembly(Protocol):
 
     @property
     def clearance_screws(self) -> NDArray:
-        """(n, 6) [rad, m]."""
+        """(n, 6) [rad, m] clearances."""
 
     @property
     def link_screws(self) -> NDArray:
-        """(n, 6) [rad, m]."""
+        """(n, 6) [rad, m] deformations of links."""
 
     @property
     def joint_screws(self) -> NDArray:
-        """(n, 6) [rad, m]."""
+        """(n, 6) [rad, m] deformations of joints."""
 
     @property
     def tip_wrenches(self) -> NDArray:
-        """(n, 6) [N m, N] through bodies."""
+        """(n, 6) [N m, N] wrenches through bodies."""
 
     @property
     def joint_wrenches(self) -> NDArray:
-        """(n, 6) [N m, N] through joints."""
+        """(n, 6) [N m, N] wrenches through joints."""
 
     @property
     def closure_wrenches(self) -> NDArray:
-        """(closures, 6) [N m, N]."""
+        """(closures, 6) [N m, N] wrenches of closures."""
 
 
 def assembly_dataset(assembly: ForcedAssembly) -> "xarray.Dataset":
@@ -79,7 +78,7 @@ def assembly_dataset(assembly: ForcedAssembly) -> "xarray.Dataset":
 
     Returns:
         Data set with dimensions ``frame``, ``screw``, ``wrench_component`` and
-        ``closure``; the pose is in coordinates without dimension.
+        ``closure``; the components of the pose are scalar coordinates.
     """
     robot = assembly.posture.robot
     frames = {
@@ -109,35 +108,35 @@ def assembly_dataset(assembly: ForcedAssembly) -> "xarray.Dataset":
 
 
 def points_dataset(values: Mapping[str, NDArray]) -> "xarray.Dataset":
-    """Return the results of many points over ``point``.
+    """Return the results of many points as a data set over ``point``.
 
     Args:
-        values: (k, ...) by the names of a sweep's variables.
+        values: (k, ...) arrays by the names of a sweep's variables.
 
     Returns:
-        Data set with their units.
+        Data set with units.
     """
     count = len(next(iter(values.values())))
     return labelled(values, "point", np.arange(count))
 
 
 def frame_table(data: "xarray.Dataset", *rows: str) -> "pandas.DataFrame":
-    """Return variables over some dimensions as a table, a column for each component.
+    """Return variables over some dimensions as a table, one column per component.
 
     Args:
-        data: any data set; variables that lack one of the dimensions are left out.
-        rows: the dimensions that become the index, a row for each of their points.
+        data: any data set; variables that lack one of the dimensions are omitted.
+        rows: the dimensions that become the index; each row is one of their points.
 
     Returns:
-        Table whose columns are (variable, component), component empty for plain
-        numbers and joined by points where a variable has several further dimensions;
-        units by variable and dimension are in its ``attrs["units"]``.
+        Table whose columns are (variable, component).  The component is empty for plain
+        numbers; for several further dimensions, it joins their labels by dots.  Units
+        by variable and dimension are in ``attrs["units"]``.
     """
     import pandas
 
     columns: dict[tuple[str, str], NDArray] = {}
     sizes = {row: data.sizes[row] for row in rows}
-    # such as the components of postures in a list
+    # variables such as the components of postures in a list
     kept = {
         str(name): v.variable.set_dims(sizes) for name, v in data.coords.items()
         if name not in data.dims and v.dims and {*v.dims} <= {*rows}
@@ -171,11 +170,11 @@ def component_unit(unit: str, component: str) -> str:
 
     Args:
         unit: unit of the variable, such as ``"rad, m"``.
-        component: see :func:`frame_table`; its labels begin with R or T, M or F, or
-            are rotation and translation.
+        component: component as in :func:`frame_table`; its labels begin with R or T, M
+            or F, or are rotation and translation.
 
     Returns:
-        The unit of that component; the variable's if it has only one.
+        The unit of that component; the variable's unit if all components share it.
     """
     kinds = [label[:1].upper() for label in component.split(".")]
     if unit.count(", ") == 1:

@@ -1,4 +1,5 @@
-"""Errors of a robot that moves along a path, by its own inertia; drives held on it.
+"""Errors of a robot that moves along a path, including its inertia.
 
-Begin with :func:`forcefit.assembly.path.path_errors.path_errors`.
+The drives follow the path exactly.  Start with
+:func:`forcefit.assembly.path.path_errors.path_errors`.
 """

@@ -1,8 +1,8 @@
-r"""Inertia and weight of a moving beam: equivalent wrenches at its ends, its sections.
+r"""Inertia and weight of a moving beam: equivalent wrenches at its ends and sections.
 
 A beam moves almost as a rigid body.  Its load per length is then linear along it,
 q(x) = rho A (g - a(x)), and its moment per length is constant, m = -rho (J alpha +
-omega x J omega).  At a cantilever's tip this load causes the same deflection as
+omega x J omega).  At the tip of a cantilever, this load causes the same deflection as
 
     F_x = Q_0 / 2 + Q_1 / 3                M_x = m_x L / 2
     F_y = Q_0 / 2 + Q_1 (7/20 + phi/3) / (1 + phi) + m_z / (1 + phi)
@@ -10,7 +10,7 @@ omega x J omega).  At a cantilever's tip this load causes the same deflection as
 
 and so on, with Q_0 = q(0) L, Q_1 = (q(L) - q(0)) L and phi = 12 E I / (k G A L^2).  For
 phi = 0 this is the consistent mass matrix times the rigid accelerations of both ends.
-What remains of the load acts at the base.
+The remaining part of the load acts at the base.
 
 ======  =======================================================  ==============
 symbol  meaning                                                  unit
@@ -38,20 +38,20 @@ from forcefit.stiffness.beam.beam import section_axes
 from forcefit.stiffness.beam.beam_stress import peak_beam_stress, section_stress
 from forcefit.stiffness.beam.sections import declared_section
 
-_ALONG = 33  # sections; a parabola between two loses 1e-3
-_FEW = 34  # fibres by which the section of largest stress is found
+_ALONG = 33  # number of sections; a parabola between two sections differs by 1e-3
+_FEW = 34  # number of fibres used to find the section of largest stress
 
 
 @dataclass(frozen=True, eq=False)
 class BeamData:
-    """A beam with a density, as its loads need it.
+    """Properties of a beam with a density, from which its loads are computed.
 
     Attributes:
-        length: [m].
-        axes: (3, 3) of the section, seen from the frame, in columns.
-        mass: [kg/m].
+        length: [m] length of the beam.
+        axes: (3, 3) axes of the section as columns, in the frame's axes.
+        mass: [kg/m] mass per length.
         inertia: (3,) [kg m] moments of inertia per length about the section's axes.
-        shear: (2,) [-] phi of bending in the planes x y and x z.
+        shear: (2,) [-] shear parameter phi for bending in the planes x y and x z.
     """
 
     length: float
@@ -67,8 +67,8 @@ class BeamLoad:
 
     Attributes:
         data: the beam.
-        q0: (k, 3) [N/m] at the base.
-        q1: (k, 3) [N/m] increase from base to tip.
+        q0: (k, 3) [N/m] load per length at the base.
+        q1: (k, 3) [N/m] increase of the load per length from base to tip.
         m: (k, 3) [N] moment per length.
     """
 
@@ -78,17 +78,17 @@ class BeamLoad:
     m: NDArray
 
     def rows(self, which: NDArray) -> "BeamLoad":
-        """Return the load at a selection of the points."""
+        """Return the load at selected points."""
         return replace(self, q0=self.q0[which], q1=self.q1[which], m=self.m[which])
 
     def at_tip(self) -> NDArray:
-        """Return (k, 6) [N m, N] equivalent wrench at the tip, section's axes."""
+        """Return the equivalent wrench (k, 6) [N m, N] at the tip, section axes."""
         L, phi = self.data.length, self.data.shear
         Q0, Q1, m = self.q0 * L, self.q1 * L, self.m
         wrench = np.zeros((len(Q0), 6))
         wrench[:, 0] = m[:, 0] * L / 2
         wrench[:, 3] = Q0[:, 0] / 2 + Q1[:, 0] / 3
-        # a moment about z bends towards y, one about y away from z
+        # a moment about z bends the beam towards y, a moment about y away from z
         for plane, across, about, sign in ((0, 1, 2, 1.0), (1, 2, 1, -1.0)):
             p = phi[plane]
             of_increase = Q1[:, across] * (7 / 20 + p / 3) / (1 + p)
@@ -100,13 +100,13 @@ class BeamLoad:
         return wrench
 
     def at_base(self, tip: NDArray) -> NDArray:
-        """Return (k, 6) [N m, N] at the base: the whole load less the tip's share.
+        """Return the wrench (k, 6) [N m, N] at the base: total load minus tip wrench.
 
         Args:
-            tip: of :meth:`at_tip`.
+            tip: equivalent wrench at the tip, from :meth:`at_tip`.
 
         Returns:
-            Section's axes.
+            The wrench at the base, in the section's axes.
         """
         L = self.data.length
         x = np.array([1.0, 0.0, 0.0])
@@ -116,14 +116,14 @@ class BeamLoad:
         return np.concatenate([moment, force - tip[:, 3:]], axis=1)
 
     def on_sections(self, tip: NDArray, count: int = _ALONG) -> NDArray:
-        """Return the wrenches through sections, from the base to the tip.
+        """Return the wrenches that sections transmit, from the base to the tip.
 
         Args:
-            tip: (k, 6) [N m, N] through the section at the tip, section's axes.
-            count: number of sections, equally spaced.
+            tip: (k, 6) [N m, N] wrench transmitted at the tip, section's axes.
+            count: number of equally spaced sections.
 
         Returns:
-            (k, count, 6) [N m, N] of the outer part on the inner.
+            (k, count, 6) [N m, N] wrenches of the outer part on the inner part.
         """
         L, x = self.data.length, np.array([1.0, 0.0, 0.0])
         s = L * np.linspace(1, 0, count)[:, None]  # distance from the tip
@@ -136,7 +136,7 @@ class BeamLoad:
 
 @lru_cache(maxsize=256)
 def beam_data(frame: Frame) -> BeamData | None:
-    """Return the data of a frame's beam; None without a beam or its density."""
+    """Return the beam data of a frame; None without a beam or without a density."""
     link = frame.link
     if not isinstance(link, BeamLink) or not link.density:
         return None
@@ -146,7 +146,7 @@ def beam_data(frame: Frame) -> BeamData | None:
     second = np.array([section.I_y + section.I_z, section.I_y, section.I_z])
     turned = np.kron(np.eye(2), axes)
     C = turned.T @ link_compliance(frame) @ turned
-    # the deflection by a force is L^3 / 3 E I + L / k G A, the rotation by a moment
+    # a force deflects the tip by L^3 / 3 E I + L / k G A, a moment rotates it by
     # L / E I
     bending, turning = np.diag(C)[[4, 5]], np.diag(C)[[2, 1]]
     shear = 12 * (bending - turning * length**2 / 3) / (turning * length**2)
@@ -160,11 +160,11 @@ def beam_load(motion: Motion, body: int, gravity: NDArray) -> BeamLoad | None:
 
     Args:
         motion: motion at k points.
-        body: row of its frame.
-        gravity: (3,) [m/s^2] base axes.
+        body: index of the beam's frame.
+        gravity: (3,) [m/s^2] gravity in base axes.
 
     Returns:
-        The load; None without a beam or its density.
+        The load; None without a beam or without a density.
     """
     data = beam_data(motion.postures.robot.frames[body])
     if data is None:
@@ -192,13 +192,13 @@ def beam_stress(frame: Frame, load: BeamLoad, tip: NDArray) -> NDArray:
     """Return the largest von Mises stress along a beam under its distributed load.
 
     Args:
-        frame: the beam's, of a declared shape.
-        load: at k points.
-        tip: (k, 6) [N m, N] through the section at the tip, in the frame's axes.
+        frame: frame of the beam, which has a declared cross-section.
+        load: distributed load at k points.
+        tip: (k, 6) [N m, N] wrench transmitted at the tip, in the frame's axes.
 
     Returns:
-        (k,) [Pa]; 33 sections are compared at a tenth of their fibres, and the worst is
-        evaluated at all.
+        (k,) [Pa] stress. A tenth of the fibres is evaluated at 33 sections, then all
+        fibres at the worst section.
     """
     assert isinstance(frame.link, BeamLink)
     R = load.data.axes

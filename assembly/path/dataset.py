@@ -22,11 +22,11 @@ def path_dataset(errors: "PathErrors", command: str = "") -> "xarray.Dataset":
 
     Args:
         errors: errors along a path.
-        command: command line, for provenance; empty without one.
+        command: command line for the provenance; empty if there is none.
 
     Returns:
-        Data set over ``time`` with units and meaning of every variable; its attributes
-        are the robot, the profile and the program.
+        Data set over ``time`` with the unit and meaning of every variable. Its
+        attributes are the robot, the profile and the program.
     """
     import xarray
 

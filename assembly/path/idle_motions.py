@@ -1,11 +1,12 @@
-"""Rates and accelerations of idle motions, which nothing holds.
+"""Rates and accelerations of idle motions, which no constraint prevents.
 
-Neither drives nor platform nor closures hold an idle motion, such as the spin of a rod
-between two balls.  No force acts along it, so a path from rest leaves its momentum
-zero: a round rod keeps zero angular momentum about its axis, and its kinetic energy is
-the least.  Its acceleration is such that the loads do no work on it.  Both rules
-together are exact where the inertia does not depend on the idle motion, as for a body
-whose mass is round about its axis of spin.
+Neither drives nor platform nor closures prevent an idle motion, such as the spin of a
+rod between two balls.  No force acts along an idle motion, so its momentum remains zero
+on a path that starts from rest: a round rod has no angular momentum about its axis, and
+its kinetic energy is the least.  The acceleration of an idle motion is such that the
+loads do no work on it.  Together, these two rules are exact if the inertia does not
+depend on the idle motion, for example if the mass of the body is rotationally symmetric
+about its axis of spin.
 """
 
 from dataclasses import dataclass, replace
@@ -17,8 +18,8 @@ from forcefit.assembly.kinematics.nominal import motion_screws, size_of
 from forcefit.assembly.path.inertial_loads import InertialLoads, inertial_loads
 from forcefit.assembly.path.motion import Motion, carries_matrix, idle_rates
 
-_MASSLESS = 1e-12  # of the largest inertia: below it an idle motion has none
-_ROUNDING = 1e-20  # of the whole mass on the longest arm: 1e-10 of an arm, squared
+_MASSLESS = 1e-12  # inertias below this share of the largest inertia count as zero
+_ROUNDING = 1e-20  # share of (total mass x longest arm^2): arm errors of 1e-10, squared
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,10 +27,10 @@ class IdleMotions:
     """The d idle motions of a robot of n frames at k points of a path.
 
     Attributes:
-        joints: (k, n, d) [rad or m] rates of the joints for a unit of each.
-        bodies: d twists (k, n, 6) of the bodies, read at the base's origin.
-        parts: likewise of the parts that the joints carry.
-        inverse: (k, d, d) pseudoinverse of their inertia.
+        joints: (k, n, d) [rad or m] joint rates per unit of each idle motion.
+        bodies: d twists (k, n, 6) of the bodies, at the base's origin.
+        parts: d twists (k, n, 6) of the parts that the joints carry.
+        inverse: (k, d, d) pseudoinverse of the inertia of the idle motions.
     """
 
     joints: NDArray
@@ -39,7 +40,7 @@ class IdleMotions:
 
 
 def idle_motions(motion: Motion) -> IdleMotions | None:
-    """Return the idle motions of a robot along a path, None if there are none.
+    """Return the idle motions of a robot along a path; None if there are none.
 
     Args:
         motion: motion at k points; only its postures and equations are used.
@@ -61,14 +62,14 @@ def idle_motions(motion: Motion) -> IdleMotions | None:
 
 
 def momentum_free_rates(motion: Motion, idle: IdleMotions) -> NDArray:
-    """Return rates of the joints that leave no momentum along idle motions.
+    """Return joint rates for which the momentum along idle motions is zero.
 
     Args:
-        motion: motion at k points with any rates of the idle motions.
-        idle: its idle motions.
+        motion: motion at k points with arbitrary rates of the idle motions.
+        idle: idle motions of the robot.
 
     Returns:
-        (k, n) [rad/s or m/s] to be added to the rates of the motion.
+        (k, n) [rad/s or m/s] rates to be added to the rates of the motion.
     """
     momentum = _momentum(motion, idle, motion.twists)
     amounts = -idle.inverse @ momentum[..., None]
@@ -78,12 +79,12 @@ def momentum_free_rates(motion: Motion, idle: IdleMotions) -> NDArray:
 def with_idle_accelerations(
     motion: Motion, idle: IdleMotions, gravity: NDArray
 ) -> Motion:
-    """Return the motion with idle motions that accelerate under the loads.
+    """Return the motion with the accelerations of idle motions under the loads.
 
     Args:
         motion: motion at k points.
-        idle: its idle motions.
-        gravity: (3,) [m/s^2] base axes.
+        idle: idle motions of the robot.
+        gravity: (3,) [m/s^2] gravity in base axes.
     """
     driving = _work(motion, idle, inertial_loads(motion, gravity))
     second = (idle.inverse @ driving[..., None])[..., 0]
@@ -95,14 +96,14 @@ def with_idle_accelerations(
 
 
 def _momentum(motion: Motion, idle: IdleMotions, twists: NDArray) -> NDArray:
-    """Return (k, d) [kg m^2/s or kg m/s] momentum of twists along idle motions."""
-    # loads of bodies at rest are linear in their accelerations
+    """Return the momentum (k, d) [kg m^2/s or kg m/s] of twists along idle motions."""
+    # the inertial loads of bodies at rest are linear in their accelerations
     still = replace(motion, twists=np.zeros_like(twists), accelerations=twists)
     return -_work(motion, idle, inertial_loads(still))
 
 
 def _work(motion: Motion, idle: IdleMotions, loads: InertialLoads) -> NDArray:
-    """Return (k, d) the power of loads on a unit of each idle motion."""
+    """Return the power (k, d) of loads per unit rate of each idle motion."""
     p = motion.postures.transforms[..., :3, 3]
     return np.stack([
         _power(loads.bodies, body, p) + _power(loads.carried, part, p)
@@ -111,13 +112,13 @@ def _work(motion: Motion, idle: IdleMotions, loads: InertialLoads) -> NDArray:
 
 
 def _inverse(inertia: NDArray, least: NDArray) -> NDArray:
-    """Return the (k, d, d) pseudoinverse of symmetric matrices.
+    """Return the pseudoinverse (k, d, d) of symmetric matrices.
 
     Args:
-        inertia: (k, d, d) of idle motions.
-        least: (k,) eigenvalues up to it count as 0.  The inertia of a spin without
-            mass, or of masses on its axis, is rounding: the spin would accelerate
-            until the platform falls.
+        inertia: (k, d, d) inertia of the idle motions.
+        least: (k,) eigenvalues up to this value count as 0.  Without this limit, a spin
+            without mass, or with masses on its axis, would have a rounding error as
+            inertia and would accelerate without bound.
 
     Returns:
         The pseudoinverses.
@@ -129,7 +130,7 @@ def _inverse(inertia: NDArray, least: NDArray) -> NDArray:
 
 
 def _largest_inertia(motion: Motion, bodies: list[NDArray]) -> NDArray:
-    """Return (k,) the inertia if the whole mass moved as the fastest body does."""
+    """Return the inertia (k,) if the total mass moved like the fastest body."""
     along = np.zeros_like(motion.twists)
     along[..., 3] = 1.0
     still = replace(motion, twists=np.zeros_like(along), accelerations=along)
@@ -141,7 +142,7 @@ def _largest_inertia(motion: Motion, bodies: list[NDArray]) -> NDArray:
 
 
 def _power(wrenches: NDArray, twists: NDArray, points: NDArray) -> NDArray:
-    """Return (k,) power of (k, n, 6) wrenches at points on twists at the base."""
+    """Return the power (k,) of wrenches (k, n, 6) at points, on twists at the base."""
     velocity = twists[..., 3:] + np.cross(twists[..., :3], points)
     power = np.sum(wrenches[..., :3] * twists[..., :3], axis=(1, 2))
     return power + np.sum(wrenches[..., 3:] * velocity, axis=(1, 2))

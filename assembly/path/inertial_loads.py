@@ -1,14 +1,15 @@
-r"""D'Alembert loads on all bodies of a moving robot, with weight.
+r"""D'Alembert loads and weight of all bodies of a moving robot.
 
-A rigid body of mass m, centre c and moments of inertia I, at its frame's origin O:
+The loads of a rigid body of mass m, centre c and inertia tensor I, at its frame's
+origin O, are
 
     F = m (g - a_c),        M = c x F - (I alpha + omega x I omega)
 
-The inertia of a beam with a density acts along it, that of a link given by a mesh by
-its consistent mass matrix (:mod:`forcefit.assembly.path.beam_inertia`,
-:mod:`forcefit.assembly.path.mesh_inertia`): its part at the link's start acts on the
-part that carries the link.  A wrench at the tip instead would deflect a beam up to 1.5
-times too much.
+The inertia of a beam with a density is distributed along the beam
+(:mod:`forcefit.assembly.path.beam_inertia`). The inertia of a mesh link follows from
+its consistent mass matrix (:mod:`forcefit.assembly.path.mesh_inertia`).  The share at
+the link's start acts on the part that carries the link.  If the total load acted at the
+tip instead, the deflection of a beam would be up to 1.5 times too large.
 """
 
 from dataclasses import dataclass
@@ -27,11 +28,12 @@ class InertialLoads:
     """Loads on the n bodies of a robot at k points, base axes.
 
     Attributes:
-        bodies: (k, n, 6) [N m, N] on each body, at its frame's origin.
-        carried: (k, n, 6) [N m, N] on the part that each frame's joint carries, there.
-        at_tips: (k, n, 6) [N m, N] share of ``bodies`` that acts along the links, at
-            the frames in their axes.
-        beams: distributed loads of beams, by row of the frame.
+        bodies: (k, n, 6) [N m, N] loads on each body, at its frame's origin.
+        carried: (k, n, 6) [N m, N] loads on the part that each frame's joint carries,
+            at the same point.
+        at_tips: (k, n, 6) [N m, N] share of ``bodies`` that comes from distributed
+            loads of the links, at the frames in their axes.
+        beams: distributed loads of beams, by the index of the frame.
     """
 
     bodies: NDArray
@@ -41,14 +43,14 @@ class InertialLoads:
 
 
 def inertial_loads(motion: Motion, gravity: ArrayLike | None = None) -> InertialLoads:
-    """Return the loads of the bodies' accelerations and of their weight.
+    """Return the loads due to the bodies' accelerations and weight.
 
     Args:
         motion: motion of a robot of n frames at k points.
-        gravity: (3,) [m/s^2] base axes; none if absent.
+        gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
 
     Returns:
-        The loads.
+        The loads on all bodies.
 
     Raises:
         BadInput: a mesh was not solved when the robot was loaded.
@@ -75,7 +77,7 @@ def inertial_loads(motion: Motion, gravity: ArrayLike | None = None) -> Inertial
         at_tips[:, i] = tip
         bodies[:, i] += _turned(R, tip)
         parent = robot.parents[i]
-        if parent >= 0:  # otherwise the base carries it
+        if parent >= 0:  # without a parent, the base carries the load
             start = T[:, i, :3, 3] - R @ span
             arm = start - T[:, parent, :3, 3]
             wrench = _turned(R, base)
@@ -85,7 +87,7 @@ def inertial_loads(motion: Motion, gravity: ArrayLike | None = None) -> Inertial
 
 
 def _of_rigid_body(motion: Motion, i: int, gravity: NDArray) -> NDArray:
-    """Return (k, 6) [N m, N] of a body's own mass, at its frame, base axes."""
+    """Return the load (k, 6) [N m, N] of a body's rigid mass at its frame."""
     frame, T = motion.postures.robot.frames[i], motion.postures.transforms[:, i]
     R, p = T[:, :3, :3], T[:, :3, 3]
     c = R @ frame.centre_of_mass
@@ -98,6 +100,6 @@ def _of_rigid_body(motion: Motion, i: int, gravity: NDArray) -> NDArray:
 
 
 def _turned(R: NDArray, wrenches: NDArray) -> NDArray:
-    """Return (k, 6) wrenches in other axes, by one rotation or by k."""
+    """Return wrenches (k, 6) expressed in axes rotated by one or by k rotations."""
     halves = wrenches.reshape(len(wrenches), 2, 3)
     return (halves @ np.swapaxes(R, -1, -2)).reshape(len(wrenches), 6)

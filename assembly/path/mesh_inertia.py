@@ -1,9 +1,9 @@
-"""Inertia and weight of a moving link given by a mesh, as wrenches at its two ends.
+"""Inertia and weight of a moving mesh link, as wrenches at its two ends.
 
-The consistent mass matrix of its finite elements, for motions of its two interfaces,
-multiplies the accelerations of both ends.  A difference to the resultant force and
-moment of the rigid link, due to mass off the line between the ends where it turns, is
-shared by both ends.
+The consistent mass matrix of the link's finite elements, condensed to the motions of
+its two interfaces, is multiplied by the accelerations of both ends.  Mass away from the
+line between the ends can cause a difference to the resultant force and moment of the
+rigid link. This difference is divided between both ends.
 """
 
 import numpy as np
@@ -21,12 +21,12 @@ def mesh_end_wrenches(
 
     Args:
         motion: motion at k points.
-        body: row of a frame with a mesh link of a density.
-        gravity: (3,) [m/s^2] base axes.
+        body: index of a frame with a mesh link that has a density.
+        gravity: (3,) [m/s^2] gravity in base axes.
 
     Returns:
-        (k, 6) [N m, N] at the tip, which is the frame's origin, and at the base, in the
-        frame's axes; and (3,) [m] from base to tip.
+        (k, 6) [N m, N] wrenches at the tip, which is the frame's origin, and at the
+        base, in the frame's axes; and the vector (3,) [m] from base to tip.
 
     Raises:
         BadInput: the link was not solved when the robot was loaded.
@@ -47,7 +47,7 @@ def mesh_end_wrenches(
         for point in (tip, tip - R @ span)
     )
     e = span / np.linalg.norm(span)
-    # the ends' slopes in a field of acceleration that turning makes
+    # slopes of the ends in the field of acceleration due to the rotation
     slope = alpha + np.cross(e, omega) * (omega @ e)[:, None]
     wrenches = -np.hstack([slope, at_base, slope, at_tip]) @ M.T
     base, tip = wrenches[:, :6], wrenches[:, 6:]
@@ -58,7 +58,7 @@ def mesh_end_wrenches(
 
 
 def _at_tip(wrenches: NDArray, span: NDArray) -> NDArray:
-    """Return (k, 6) wrenches at the base, read at the tip."""
+    """Return base wrenches (k, 6) expressed at the tip."""
     read = wrenches.copy()
     read[:, :3] -= np.cross(span, wrenches[:, 3:])
     return read
@@ -71,13 +71,13 @@ def _rigid(
 
     Args:
         M: (12, 12) mass matrix.
-        span: (3,) [m] from base to tip.
-        omega: (k, 3) [rad/s].
-        alpha: (k, 3) [rad/s^2].
-        at_tip: (k, 3) [m/s^2] acceleration of the tip less gravity.
+        span: (3,) [m] vector from base to tip.
+        omega: (k, 3) [rad/s] angular velocity.
+        alpha: (k, 3) [rad/s^2] angular acceleration.
+        at_tip: (k, 3) [m/s^2] acceleration of the tip minus gravity.
 
     Returns:
-        [N m, N].
+        The wrench [N m, N].
     """
     ends = np.eye(12, 6)
     ends[6:] = np.eye(6)

@@ -12,12 +12,12 @@ A_j     ``accelerations``       (k, n, 6)     derivative of V_j with time
 ======  ======================  ============  =====================================
 
 With V = sum S_j q'_j over the joints that carry a body, its derivative is
-A = sum S_j q''_j + [V_j, S_j] q'_j.  At a closure the V and A of its two frames are
-equal.  These equations, and those of the prescribed components of the pose, are linear
-in q' and then in q''.  Both have the same matrix.  Its least-norm solution is used
-where neither closures nor path prescribe a rate, such as the spin of a rod between two
-balls; :mod:`forcefit.assembly.path.idle_motions` adds the rates that the inertia of the
-bodies determines.  No pose is differenced.
+A = sum S_j q''_j + [V_j, S_j] q'_j.  At a closure, V and A of its two frames are equal.
+These equations, and the equations for the prescribed components of the pose, are linear
+in q' and then in q'', with the same matrix.  If neither closures nor path prescribe a
+rate, such as the spin of a rod between two balls, the least-norm solution is used;
+:mod:`forcefit.assembly.path.idle_motions` adds the rates that the inertia of the bodies
+determines.  No finite differences of poses are used.
 
 Sources:
     Featherstone (2008), Rigid Body Dynamics Algorithms, chapters 2 and 8 (spatial
@@ -38,7 +38,7 @@ from forcefit.assembly.model.robot import Robot
 # relative size below which a singular value of closures and path counts as zero, as in
 # forcefit.assembly.kinematics.closure_rates
 _SINGULAR = 1e-6
-_NOISE = 30.0  # the same for each unit of the closures' nominal error
+_NOISE = 30.0  # the same limit, as a multiple of the closures' nominal error
 _PRESCRIBED = 1e-4  # largest relative error of a prescribed velocity
 
 
@@ -47,14 +47,14 @@ class Motion:
     """Motion of a robot of n frames at k points of a path.
 
     Attributes:
-        postures: k postures in one.
-        rates: (k, n) [rad/s or m/s] of the joint coordinates.
-        second_rates: (k, n) [rad/s^2 or m/s^2] their derivatives.
-        twists: (k, n, 6) [rad/s, m/s] of the bodies, read at the base's origin.
-        accelerations: (k, n, 6) [rad/s^2, m/s^2] derivatives of the twists.
+        postures: the k postures as one object.
+        rates: (k, n) [rad/s or m/s] first derivatives of the joint coordinates.
+        second_rates: (k, n) [rad/s^2 or m/s^2] second derivatives.
+        twists: (k, n, 6) [rad/s, m/s] twists of the bodies, at the base's origin.
+        accelerations: (k, n, 6) [rad/s^2, m/s^2] time derivatives of the twists.
         free: largest number of joint motions that neither path nor closures prescribe.
-        equations: (k, 6 closures + c, n) closures and prescribed components of the pose
-            for unit rates of the joints.
+        equations: (k, 6 closures + c, n) closures and prescribed pose components per
+            unit rate of the joints.
     """
 
     postures: Posture
@@ -69,11 +69,11 @@ class Motion:
         """Return the acceleration of points of a body.
 
         Args:
-            body: row of its frame.
-            points: (k, 3) [m] base axes.
+            body: index of the body's frame.
+            points: (k, 3) [m] points in base axes.
 
         Returns:
-            (k, 3) [m/s^2] base axes.
+            (k, 3) [m/s^2] accelerations in base axes.
         """
         V, A = self.twists[:, body], self.accelerations[:, body]
         velocity = V[:, 3:] + np.cross(V[:, :3], points)
@@ -81,10 +81,10 @@ class Motion:
 
 
 class NotFollowed(Exception):
-    """The robot cannot follow the path at some of its points.
+    """Error: the robot cannot follow the path at some of its points.
 
     Attributes:
-        row: the first of them.
+        row: index of the first such point.
     """
 
     def __init__(self, row: int) -> None:
@@ -100,9 +100,9 @@ def follow_path(
 
     Args:
         postures: k postures on the path.
-        names: c prescribed components, ``tx`` .. or ``q.<frame>``, of one kind; drives
-            that are not named among joints stay at rest.
-        path: (k, c) components [m or rad] and their first and second derivatives.
+        names: c prescribed components of one kind, ``tx`` .. or ``q.<frame>``. If joint
+            coordinates are prescribed, drives that are not named do not move.
+        path: (k, c) components [m or rad], their first and their second derivatives.
         idle: (k, n) [rad/s or m/s] joint rates that neither closures nor path prescribe
             (:func:`forcefit.assembly.path.idle_motions.momentum_free_rates`), added to
             the least-norm solution.
@@ -111,8 +111,8 @@ def follow_path(
         The motion.
 
     Raises:
-        NotFollowed: at a singular posture, where the platform cannot have the
-            prescribed velocity or acceleration.
+        NotFollowed: the platform cannot have the prescribed velocity or acceleration
+            at a singular posture.
     """
     robot = postures.robot
     if names[0] not in POSE:
@@ -139,7 +139,7 @@ def follow_path(
     carries = carries_matrix(robot)
     twists = carries @ (S * rates[..., None])
     turning = (bracket(twists) @ S[..., None])[..., 0] * rates[..., None]
-    drift = carries @ turning  # accelerations at q'' = 0
+    drift = carries @ turning  # accelerations for q'' = 0
     of_closures = _of_closures(robot, drift) / size
     own = _second_of_pose(postures, names, values, twists, drift)
     second_rates = joints(second - own, -of_closures)
@@ -150,7 +150,7 @@ def follow_path(
 def _with_all_drives(
     robot: Robot, names: tuple[str, ...], path: tuple[NDArray, NDArray, NDArray]
 ) -> tuple[tuple[str, ...], tuple[NDArray, NDArray, NDArray]]:
-    """Return a path of joints with the drives that it does not name, at rest."""
+    """Return a joint path that also contains the drives not named, at rest."""
     drives = [f"q.{f.name}" for f in robot.frames if f.actuated]
     still = [name for name in drives if name not in names]
     zero = np.zeros((len(path[0]), len(still)))
@@ -159,24 +159,24 @@ def _with_all_drives(
 
 
 def _units(robot: Robot) -> NDArray:
-    """Return (n,) the unit of each joint's coordinate: 1 rad, or the robot's size."""
+    """Return the unit (n,) of each joint coordinate: 1 rad, or the robot's size."""
     slides = np.array([f.joint == "prismatic" for f in robot.frames])
     return np.where(slides, size_of(robot), 1.0)
 
 
 def carries_matrix(robot: Robot) -> NDArray:
-    """Return (n, n): 1 where the column's joint carries the row's body."""
+    """Return an (n, n) matrix: 1 where the column's joint carries the row's body."""
     return robot.on_path - np.eye(len(robot.frames))
 
 
 def _closures(robot: Robot) -> NDArray:
-    """Return (closures, 2) rows of the frames that meet."""
+    """Return the indices (closures, 2) of the frames that each closure joins."""
     pairs = [[robot.index(name) for name in pair] for pair in robot.closures]
     return np.array(pairs, dtype=int).reshape(-1, 2)
 
 
 def _of_closures(robot: Robot, bodies: NDArray) -> NDArray:
-    """Return (k, 6 closures) difference of the (k, n, 6) screws of frames that meet."""
+    """Return the differences (k, 6 closures) of the screws (k, n, 6) at closures."""
     pairs = _closures(robot)
     first, second = bodies[:, pairs[:, 0]], bodies[:, pairs[:, 1]]
     return (first - second).reshape(len(bodies), 6 * len(pairs))
@@ -185,11 +185,12 @@ def _of_closures(robot: Robot, bodies: NDArray) -> NDArray:
 def _equations(
     postures: Posture, names: tuple[str, ...], values: NDArray, S: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return closures and prescribed components for unit rates of all joints.
+    """Return closures and prescribed pose components per unit rate of all joints.
 
     Returns:
-        (k, 6 closures + c, n), lengths of the closures' rows over the robot's size;
-        and (6 closures,) that size in these rows, 1 in those of rotations.
+        (k, 6 closures + c, n) matrix, in which lengths of the closure rows are divided
+        by the robot's size; and (6 closures,) factors: this size for rows of lengths, 1
+        for rows of rotations.
     """
     robot = postures.robot
     carries = carries_matrix(robot)
@@ -211,7 +212,7 @@ def _equations(
 
 
 def _rotations(postures: Posture, names: tuple[str, ...], values: NDArray) -> NDArray:
-    """Return (k, 3) [rad] rotation vectors of the platform, as the path counts them."""
+    """Return the platform's rotation vectors (k, 3) [rad] as the path defines them."""
     turn = pose_components(postures.platform)[:, 3:]
     for k, name in enumerate(names):
         if name[0] == "r":
@@ -220,7 +221,7 @@ def _rotations(postures: Posture, names: tuple[str, ...], values: NDArray) -> ND
 
 
 def _of_pose(postures: Posture, names: tuple[str, ...], values: NDArray) -> NDArray:
-    """Return (k, c, 6) rates of components of the pose for unit twists."""
+    """Return the rates (k, c, 6) of pose components per unit twist."""
     rates = np.zeros((len(values), 6, 6))
     p = postures.platform[:, :3, 3]
     rates[:, :3, 3:] = np.eye(3)
@@ -236,7 +237,7 @@ def _second_of_pose(
     postures: Posture, names: tuple[str, ...], values: NDArray, twists: NDArray,
     drift: NDArray,
 ) -> NDArray:  # fmt: skip
-    """Return (k, c) second derivatives of the prescribed components at q'' = 0."""
+    """Return second derivatives (k, c) of the prescribed components for q'' = 0."""
     if names[0] not in POSE:
         return np.zeros_like(values)
     row = postures.robot.index(postures.robot.platform)
@@ -255,10 +256,10 @@ def _second_of_pose(
 
 
 def _turning_of_jacobian(turn: NDArray, rate: NDArray) -> NDArray:
-    """Return (k, 3) J' r', J of :func:`turn_jacobian` along a rotation vector r(t).
+    """Return J' r' (k, 3), with J of :func:`turn_jacobian` along r(t).
 
-    J r' = r' + c_2 r x r' + c_3 r x (r x r'), and c_k has the derivative
-    (k c_(k+2) - c_(k+1)) r.r' with time.
+    For a rotation vector r, J r' = r' + c_2 r x r' + c_3 r x (r x r'). The time
+    derivative of c_k is (k c_(k+2) - c_(k+1)) r.r'.
     """
     _, _, _, c3, c4, c5 = (c[..., 0] for c in stumpff(turn))
     along = np.sum(turn * rate, axis=1, keepdims=True)
@@ -269,20 +270,20 @@ def _turning_of_jacobian(turn: NDArray, rate: NDArray) -> NDArray:
 
 
 def _inverse(values: NDArray, mismatch: Any) -> NDArray:
-    """Return the (k, m) inverse singular values; 0 for those that count as zero."""
+    """Return inverse singular values (k, m); 0 for those that count as zero."""
     least = np.maximum(_SINGULAR, _NOISE * np.broadcast_to(mismatch, len(values)))
     kept = values > least[:, None] * values[:, :1]
     return np.where(kept, 1 / np.where(kept, values, 1.0), 0.0)
 
 
 def idle_rates(motion: Motion) -> NDArray:
-    """Return joint motions that neither drives nor closures nor platform hold.
+    """Return joint motions that neither drives nor closures nor platform prevent.
 
     Args:
         motion: motion of a robot of n frames at k points.
 
     Returns:
-        (k, n, d) [rad or m] d independent ones, the least number of all points.
+        (k, n, d) [rad or m] d independent motions; d is the least number at any point.
     """
     robot = motion.postures.robot
     passive = np.array([f.passive for f in robot.frames])
@@ -296,7 +297,7 @@ def idle_rates(motion: Motion) -> NDArray:
 
 
 def _check_followed(E: NDArray, q: NDArray, right: NDArray) -> None:
-    """Refuse derivatives that the robot cannot have."""
+    """Reject derivatives that the robot cannot have."""
     left = np.abs((E @ q[..., None])[..., 0] - right).max(axis=1, initial=0.0)
     size = np.abs(right).max(axis=1, initial=0.0)
     size = np.maximum(size, 1e-6 * size.max(initial=0.0))

@@ -1,9 +1,9 @@
-"""Errors of a robot along a path: deflection, forces and stress by its acceleration.
+"""Errors of a robot along a path: deflection, forces and stress due to acceleration.
 
-At each instant the bodies' inertia and weight act as loads on the posture, and
-problem (22) is solved as at rest (quasi-static).  This leaves out vibration, damping
-and the inertia of the deflection itself: right where the motion takes many periods of
-the first natural frequency and its acceleration does not jump.
+At each instant, the bodies' inertia and weight act as loads on the posture, and problem
+(22) is solved as for a robot at rest (quasi-static).  Vibration, damping and the
+inertia of the deflection itself are neglected. This is valid if the motion takes many
+periods of the first natural frequency and its acceleration does not jump.
 """
 
 from collections.abc import Callable
@@ -37,20 +37,20 @@ from forcefit.assembly.sweeps.targets import goals_of, of_joints
 from forcefit.inputs.table import BadInput, nearest
 from forcefit.results.display import Figures, html_table, largest, short_repr
 
-ASSUMPTIONS = ("none", "frozen", "free")  # of the bounds of problem (27) under load
+ASSUMPTIONS = ("none", "frozen", "free")  # for the bounds of problem (27) under load
 if TYPE_CHECKING:
     import pandas
     import xarray
 
-_BLOCK = 2000  # points solved and stored together
-_BLOCK_OF_TANGENTS = 100  # likewise, where each has a tangent of its own
-# results that exist wherever the path does
+_BLOCK = 2000  # number of points that are solved and stored together
+_BLOCK_OF_TANGENTS = 100  # the same, if each point has its own tangent
+# results that also exist at points without a solution
 _GEOMETRIC = {
     "coordinates", "rates", "second_rates", "platform", "platform_velocity",
     "platform_acceleration", "compliance",
 }  # fmt: skip
 Progress = Callable[[int, int], None]
-# returns the arrays of a block from the number of its first point, computed or stored
+# function from the number of a block's first point to its arrays, computed or stored
 Recall = Callable[..., tuple[NDArray, ...]]
 
 
@@ -60,24 +60,24 @@ class PathErrors:
 
     Attributes:
         robot: the robot.
-        trajectory: components of the pose.
-        assumption: of the bounds of problem (27), ``"none"`` without.
-        state: in which the compliance is taken.
+        trajectory: path as components of the pose over time.
+        assumption: assumption of the bounds of problem (27); ``"none"`` for no bounds.
+        state: state in which the compliance is computed.
         frequency: [Hz] least first natural frequency along the path; NaN if unknown.
         free: largest number of joint motions that neither path nor closures prescribe;
-            they are left at rest.
+            these are kept at rest.
         arrays: results by name, k rows each; NaN where the status is not ok.
 
             - ``coordinates``, ``rates``, ``second_rates`` (k, n) of all joints
             - ``platform`` (k, 4, 4), ``platform_velocity``, ``platform_acceleration``
               (k, 6) of its origin
-            - ``platform_screw`` (k, 6) pose error by geometric errors and all loads
-            - ``inertial_screw`` (k, 6) its change by the accelerations
-            - ``energy`` (k,), ``wrench`` (k, n, 6) through bodies at their tips,
+            - ``platform_screw`` (k, 6) pose error due to geometric errors and all loads
+            - ``inertial_screw`` (k, 6) its change due to the accelerations
+            - ``energy`` (k,), ``wrench`` (k, n, 6) that bodies transmit at their tips,
               ``drive_force`` (k, drives), ``stress`` (k, links)
             - ``compliance`` (k, 6, 6) of the platform in this state
             - with an assumption ``rotation_error``, ``translation_error`` (k, 2)
-        status: (k,) ``"ok"``, or why a point has no result.
+        status: (k,) ``"ok"``, or why a point has no solution.
         reason: (k,) message where the status is not ok.
     """
 
@@ -104,35 +104,35 @@ class PathErrors:
         }
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return a data set over ``time``, as ``--output`` writes it."""
+        """Return the data set over ``time`` that ``--output`` writes."""
         from forcefit.assembly.path.dataset import path_dataset
 
         return path_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a row for each instant, columns (variable, component)."""
+        """Return a table with one row per instant, columns (variable, component)."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "time")
 
     @property
     def inertial(self) -> NDArray:
-        """(k, 6) [rad, m] change of the platform's error by the accelerations."""
+        """(k, 6) [rad, m] change of the platform's error due to the accelerations."""
         return self.arrays["inertial_screw"]
 
     @property
     def periods(self) -> float:
-        """[-] the path's time over the first period; NaN if unknown."""
+        """[-] duration of the path in periods of the first mode; NaN if unknown."""
         return self.trajectory.duration * self.frequency
 
     @property
     def drives(self) -> tuple[str, ...]:
-        """Names of the actuated joints, of the columns of ``drive_force``."""
+        """Names of the actuated joints, in the order of ``drive_force``."""
         return tuple(self.drive_units)
 
     @property
     def drive_units(self) -> dict[str, str]:
-        """Unit of each drive's force: N of a prismatic joint, N m of others."""
+        """Unit of each drive's force: N for a prismatic joint, N m for others."""
         return {
             f.name: "N" if f.joint == "prismatic" else "N m"
             for f in self.robot.frames if f.actuated
@@ -150,29 +150,29 @@ def path_errors(
     progress: Progress = lambda done, most: None,
     recall: Recall = lambda compute, *given: compute(),
 ) -> PathErrors:
-    """Return the errors of a robot along a path, its inertia included.
+    """Return the errors of a robot along a path, including its inertia.
 
     Args:
         robot: robot with masses.
-        trajectory: of :func:`forcefit.assembly.path.trajectory.timed` or
+        trajectory: result of :func:`forcefit.assembly.path.trajectory.timed` or
             :func:`~forcefit.assembly.path.trajectory.profiled`.
         load: (6,) [N m, N] constant load on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes; none if absent.
-        assumption: of bounds of the pose error, problem (27): ``"frozen"`` or
+        gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
+        assumption: assumption of the pose error bounds, problem (27): ``"frozen"`` or
             ``"free"``; ``"none"`` for no bounds.
-        state: of the compliance: ``"nominal"``, ``"contact"`` or ``"exact"``, the
+        state: state of the compliance: ``"nominal"``, ``"contact"`` or ``"exact"``; the
             latter two under the loads of each instant.
-        progress: called with the points solved, and all.
-        recall: of :class:`forcefit.assembly.statistics.replay.Replay`, which stores
-            blocks of points; by default every block is computed.
+        progress: called with the numbers of solved points and of all points.
+        recall: method of :class:`forcefit.assembly.statistics.replay.Replay`, which
+            stores blocks of points; by default every block is computed.
 
     Returns:
-        The results.
+        The results at all instants.
 
     Raises:
         BadInput: nothing has a mass, the robot has effects, a point is out of reach or
-            cannot be followed; no such assumption or state, or a link has a mass in
-            the state ``"exact"``.
+            cannot be followed, the assumption or the state is unknown, or a link has a
+            mass and the state is ``"exact"``.
     """
     if assumption not in ASSUMPTIONS:
         hint = nearest(assumption, ASSUMPTIONS)
@@ -198,7 +198,7 @@ def path_errors(
 
 @dataclass(frozen=True, eq=False)
 class _Asked:
-    """Arguments of :func:`path_errors`, the same for all blocks."""
+    """Arguments of :func:`path_errors`, which are equal for all blocks."""
 
     robot: Robot
     trajectory: Trajectory
@@ -209,7 +209,7 @@ class _Asked:
 
 
 def _recalled(asked: _Asked, rows: slice, recall: Recall) -> dict[str, NDArray]:
-    """Return the results of a block of points, computed or from a store."""
+    """Return the results of a block of points, either computed or stored."""
 
     def compute() -> tuple[NDArray, ...]:
         solved = _solve(asked, rows)
@@ -301,7 +301,7 @@ def _followed(
 
 
 def _assembled(asked: _Asked, motion: Motion, loads: InertialLoads) -> Assembly:
-    """Return the least energies under loads on bodies and platform."""
+    """Return the solutions of least energy under loads on bodies and platform."""
     return solve_assembly(
         motion.postures, asked.load, loads.bodies, carried=loads.carried
     )
@@ -319,14 +319,14 @@ def _statuses(
 
 
 def _at_origin(twists: NDArray, T: NDArray) -> NDArray:
-    """Return (k, 6) twists read at the platform's origin."""
+    """Return twists (k, 6) at the platform's origin."""
     moved = twists.copy()
     moved[:, 3:] += np.cross(twists[:, :3], T[:, :3, 3])
     return moved
 
 
 def _drive_forces(robot: Robot, joint_wrenches: NDArray) -> NDArray:
-    """Return (k, drives) [N m or N] of each drive on the part that it carries."""
+    """Return the force (k, drives) [N m or N] of each drive on the part it carries."""
     driven = [i for i, f in enumerate(robot.frames) if f.actuated]
     screws = np.array([own_screw(robot.frames[i]) for i in driven]).reshape(-1, 6)
     forces: NDArray = -np.einsum("kdi,di->kd", joint_wrenches[:, driven], screws)
@@ -334,7 +334,7 @@ def _drive_forces(robot: Robot, joint_wrenches: NDArray) -> NDArray:
 
 
 def _stresses(robot: Robot, loads: InertialLoads, tips: NDArray) -> NDArray:
-    """Return (k, links) [Pa] largest stress in every link of known stress."""
+    """Return the largest stress (k, links) [Pa] in every link with a known stress."""
     links = stressed_links(robot)
     stress = np.full((len(tips), len(links)), np.nan)
     solved = np.isfinite(tips).all(axis=(1, 2))

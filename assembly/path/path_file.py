@@ -1,4 +1,4 @@
-"""The table of a path: poses or joint coordinates, with or without times."""
+"""Table of a path: poses or joint coordinates, with or without times."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,12 +14,12 @@ from forcefit.inputs.table import BadInput, quoted
 
 @dataclass(frozen=True, eq=False)
 class PathTable:
-    """Rows through which a path leads.
+    """The rows of a path.
 
     Attributes:
-        names: components, ``tx`` .. or ``q.<frame>``, of one kind.
-        values: (rows, components) [m or rad].
-        times: (rows,) [s], increasing; None without times.
+        names: components of one kind, ``tx`` .. or ``q.<frame>``.
+        values: (rows, components) [m or rad] values.
+        times: (rows,) [s] increasing times; None if the table contains no times.
         labels: names of the rows, for messages.
     """
 
@@ -29,24 +29,24 @@ class PathTable:
     labels: tuple[str, ...] = ()
 
     def row_name(self, row: int) -> str:
-        """Return the name of a row, for messages."""
+        """Return the name of a row for messages."""
         return f"row {quoted(self.labels[row])}" if self.labels else f"row {row + 1}"
 
 
 def read_path(file: Path | str, robot: Robot) -> PathTable:
-    """Return the table of a CSV file.
+    """Read the table of a path from a CSV file.
 
     Args:
-        file: columns ``pose.tx`` .. [m, rad] or ``q.<frame>``, optionally ``time`` [s]
-            and ``id``; a row for each pose.
-        robot: robot with actuated joints that may be columns.
+        file: CSV file with one row per pose and columns ``pose.tx`` .. [m, rad] or
+            ``q.<frame>``, optionally ``time`` [s] and ``id``.
+        robot: robot whose actuated joints may be columns.
 
     Returns:
         The table.
 
     Raises:
         BadInput: the table is invalid, has fewer than two rows, or its times do not
-            increase; the message names line and column.
+            increase; the message contains line and column.
     """
     targets = read_targets(file, robot, extra=("time",))
     names = tuple(name for name in targets.names if name != "time")
@@ -60,14 +60,14 @@ def read_path(file: Path | str, robot: Robot) -> PathTable:
 
 
 def check_path(table: PathTable, where: str = "path") -> None:
-    """Reject a path of fewer than two rows, or whose times do not increase.
+    """Reject a path with fewer than two rows or with times that do not increase.
 
     Args:
         table: the path.
-        where: its file, for messages.
+        where: file of the path, for messages.
 
     Raises:
-        BadInput: as said.
+        BadInput: the path has fewer than two rows, or its times do not increase.
     """
     if len(table.values) < 2:
         raise BadInput(f"{where}: found one row, expected at least two poses")

@@ -1,4 +1,4 @@
-"""Postures along a path: rows within reach, and the first natural frequency there."""
+"""Postures along a path, and the first natural frequency at these postures."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,34 +12,34 @@ from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.assembly.sweeps.targets import goals_of, of_joints
 from forcefit.inputs.table import BadInput
 
-_FREQUENCIES = 5  # postures at which the first natural frequency is computed
+_FREQUENCIES = 5  # number of postures at which the first frequency is computed
 
 
 def placed(
     robot: Robot, names: tuple[str, ...], values: NDArray
 ) -> tuple[list[Posture | None], list[str]]:
-    """Return the postures of rows of a path, and the reason where there is none.
+    """Return the posture for each row of a path, or the reason why there is none.
 
     Args:
         robot: any robot.
         names: components, ``tx`` .. or ``q.<frame>``.
-        values: (k, components) [m or rad].
+        values: (k, components) [m or rad] values.
 
     Returns:
-        A posture or None, and an empty reason or why not, for each row.
+        For each row: a posture or None, and the reason, empty if there is a posture.
     """
     place = place_many_joints if of_joints(names) else place_many
     return place(robot, goals_of(names, robot, values))
 
 
 def check_path_robot(robot: Robot) -> None:
-    """Reject a robot without masses, or with effects, which a path leaves out.
+    """Reject a robot without masses, or with effects, which a path does not include.
 
     Args:
         robot: any robot.
 
     Raises:
-        BadInput: as said.
+        BadInput: the robot has no masses, or has effects.
     """
     if robot.has_effects:
         raise BadInput(
@@ -50,15 +50,15 @@ def check_path_robot(robot: Robot) -> None:
 
 
 def check_rows(robot: Robot, table: PathTable, where: str = "path") -> None:
-    """Reject a path with a row that the robot cannot reach.
+    """Reject a path with a row that is out of the robot's reach.
 
     Args:
         robot: any robot.
         table: rows of the path.
-        where: its file, for messages.
+        where: file of the path, for messages.
 
     Raises:
-        BadInput: names the row.
+        BadInput: a row is out of reach; the message names the row.
     """
     _, reasons = placed(robot, table.names, table.values)
     for row, reason in enumerate(reasons):
@@ -67,14 +67,14 @@ def check_rows(robot: Robot, table: PathTable, where: str = "path") -> None:
 
 
 def first_frequency(robot: Robot, trajectory: Trajectory) -> float:
-    """Return the least natural frequency at postures along a path, drives held.
+    """Return the least natural frequency along a path with locked drives.
 
     Args:
         robot: any robot.
         trajectory: the path.
 
     Returns:
-        [Hz], of the nominal robot; NaN where nothing vibrates.
+        [Hz] frequency of the nominal robot; NaN if nothing vibrates.
     """
     count = len(trajectory.times)
     rows = np.unique(np.linspace(0, count - 1, _FREQUENCIES).astype(int))

@@ -1,4 +1,4 @@
-"""Profiles of a motion from rest to rest, s from 0 to 1 in the time 1.
+"""Motion profiles from rest to rest: s increases from 0 to 1 in the time 0 to 1.
 
 ==========  ========================  ==========  ============  ====================
 name        s                         peak speed  acceleration  jumps
@@ -25,18 +25,18 @@ Law = Callable[[NDArray], tuple[NDArray, NDArray, NDArray]]
 
 
 def _polynomial(*coefficients: float) -> Law:
-    """Return the profile of a polynomial, constant term first."""
+    """Return the profile of a polynomial with given coefficients, constant first."""
     s = Polynomial(coefficients)
     return lambda t: (s(t), s.deriv()(t), s.deriv(2)(t))
 
 
 def _trapezoid(t: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Return acceleration, constant speed and deceleration, a third each."""
-    left = np.minimum(t, 1 - t)  # time since rest, or until rest
+    """Return s, s' and s'': acceleration, constant speed, deceleration in thirds."""
+    left = np.minimum(t, 1 - t)  # time from the nearer end
     ramp = left < 1 / 3
     way = np.where(ramp, 2.25 * left**2, 1.5 * left - 0.25)
     speed = np.where(ramp, 4.5 * left, 1.5)
-    # where the acceleration jumps, the value of the outer third
+    # at a jump, the acceleration of the outer third is returned
     size = np.where(left <= 1 / 3, 4.5, 0.0)
     return np.where(t <= 0.5, way, 1 - way), speed, np.where(t <= 0.5, size, -size)
 

@@ -1,4 +1,4 @@
-"""Figure and page of the errors along a path."""
+"""Figure and HTML page of the errors along a path."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -66,15 +66,15 @@ def plot_path(errors: PathErrors) -> "Figure":
 def path_page(
     summary: Mapping[str, Any], errors: PathErrors, provenance: Provenance
 ) -> str:
-    """Return the page of a path.
+    """Return the page of a path as HTML.
 
     Args:
-        summary: of :func:`forcefit.assembly.path.summary.path_summary`.
+        summary: result of :func:`forcefit.assembly.path.summary.path_summary`.
         errors: the errors along the path.
-        provenance: command and files.
+        provenance: the command and its input files.
 
     Returns:
-        HTML, which needs no other file.
+        HTML that refers to no other file.
     """
     peaks = summary.get("largest", {})
     return page(
@@ -100,7 +100,7 @@ def path_page(
 
 
 def _good(summary: Mapping[str, Any]) -> bool | None:
-    """Return whether every instant has a result; None if vibration may exceed it."""
+    """Return whether every instant is solved; None if vibration may be significant."""
     if summary["status"] != OK:
         return False
     periods = summary["periods"] or 0.0
@@ -108,7 +108,7 @@ def _good(summary: Mapping[str, Any]) -> bool | None:
 
 
 def _verdict(summary: Mapping[str, Any]) -> str:
-    """Return the conclusion in a sentence."""
+    """Return the conclusion as one sentence."""
     if "largest" not in summary:
         return f"No point has a result: {summary.get('reason', summary['status'])}."
     peak = summary["largest"].get("inertial_translation")
@@ -184,7 +184,7 @@ def _charts(errors: PathErrors) -> list[str]:
 def _chart(
     errors: PathErrors, lines: Mapping[str, NDArray], unit: str, title: str
 ) -> str:
-    """Return a chart of lines over time, with its title as the caption."""
+    """Return a chart of lines over time, with the title as its caption."""
     traces = [
         {"type": "scatter", "mode": "lines", "x": errors.trajectory.times, "y": values,
          "name": name, "line": {"color": COLOURS[k % len(COLOURS)]}}

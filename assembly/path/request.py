@@ -32,18 +32,18 @@ POINTS = 201
 
 @dataclass(frozen=True)
 class PathTimes:
-    """How a path runs in time.
+    """How a path is traversed in time.
 
     Attributes:
-        profile: from rest to rest, a name of
-            :data:`forcefit.assembly.path.profiles.PROFILES`; None where times are
-            given.
-        duration: [s] of the profile.
-        speed: [m/s, or rad/s or m/s of drives] its largest speed.
-        acceleration: [m/s^2, or rad/s^2 or m/s^2 of drives] its largest acceleration.
-        interval: [s] between the rows of a table without times.
-        ends: ``"rest"`` or ``"moving"``, of a path with times.
-        points: number of instants, equally spaced.
+        profile: name of a profile from rest to rest in
+            :data:`forcefit.assembly.path.profiles.PROFILES`; None if times are given.
+        duration: [s] duration of the profile.
+        speed: [m/s, or rad/s or m/s of drives] largest speed of the profile.
+        acceleration: [m/s^2, or rad/s^2 or m/s^2 of drives] largest acceleration of the
+            profile.
+        interval: [s] time between the rows of a table without times.
+        ends: ``"rest"`` or ``"moving"``, for a path with times.
+        points: number of equally spaced instants.
     """
 
     profile: str | None = None
@@ -69,31 +69,33 @@ def errors_along_path(
     command: str = "",
     progress: Progress = lambda done, most: None,
 ) -> PathErrors:
-    """Return the errors of a robot along a path, its inertia included.
+    """Return the errors of a robot along a path, including its inertia.
 
     Args:
         robot: a robot with masses, a robot file, or a built-in name.
-        path: rows of poses or joint coordinates, or the CSV file of them, with a column
-            ``time`` or without; see :func:`forcefit.assembly.path.path_file.read_path`.
-        times: how the path runs in time; as its times if absent.
+        path: rows of poses or joint coordinates, or a CSV file of them, with or without
+            a column ``time``; see :func:`forcefit.assembly.path.path_file.read_path`.
+        times: how the path is traversed in time; None to use the times of the path.
         load: (6,) [N m, N] constant load on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes; none if absent.
-        assumption: of bounds of the pose error, problem (27): ``"frozen"`` or
+        gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
+        assumption: assumption of the pose error bounds, problem (27): ``"frozen"`` or
             ``"free"``; ``"none"`` for no bounds.
-        state: in which the compliance of the platform is taken: ``"nominal"``;
-            ``"contact"`` or ``"exact"``, under the loads of each instant.
-        drive_force: [N m or N] by name of a drive that applies this force and holds no
-            coordinate.
-        output: NetCDF file to write.  Finished points are kept in ``<output>.journal``.
-            After an interruption the same call resumes from it.
-        command: command line, for provenance in the file; empty without one.
-        progress: called with the points solved, and all.
+        state: state in which the compliance of the platform is computed:
+            ``"nominal"``; or ``"contact"`` or ``"exact"`` under the loads of each
+            instant.
+        drive_force: [N m or N] force by drive. Such a drive applies this force instead
+            of holding its coordinate.
+        output: NetCDF file to write.  Finished points are stored in
+            ``<output>.journal``. After an interruption, the same call resumes from it.
+        command: command line for the provenance in the file; empty if there is none.
+        progress: called with the numbers of solved points and of all points.
 
     Returns:
-        The results.
+        The results at all instants.
 
     Raises:
-        BadInput: the path, its times or the robot break a rule; a row is out of reach;
+        BadInput: the path, its times or the robot violate a rule; a row is out of
+            reach;
             the journal belongs to another path, or a file cannot be written.
     """
     machine = robot if isinstance(robot, Robot) else load_robot(robot)
@@ -116,7 +118,7 @@ def errors_along_path(
 def _identity(
     robot: Robot, trajectory: Trajectory, asked: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return what must be equal for a path to be resumed from a journal."""
+    """Return the values that must be equal to resume a path from a journal."""
     digest = sha256(trajectory.law.encode())
     for name in ("times", "values", "first", "second"):
         digest.update(np.ascontiguousarray(getattr(trajectory, name)).tobytes())
@@ -137,18 +139,18 @@ def _identity(
 def trajectory_of(
     robot: Robot, path: PathTable | str | Path, times: PathTimes
 ) -> Trajectory:
-    """Return a path in time, all its rows within the robot's reach.
+    """Return a path in time, after checking that the robot reaches all its rows.
 
     Args:
         robot: robot with masses.
-        path: of :func:`errors_along_path`.
-        times: how the path runs in time.
+        path: path as for :func:`errors_along_path`.
+        times: how the path is traversed in time.
 
     Returns:
         The trajectory.
 
     Raises:
-        BadInput: as :func:`errors_along_path`.
+        BadInput: for the reasons of :func:`errors_along_path`.
     """
     check_path_robot(robot)
     where = "path" if isinstance(path, PathTable) else str(path)
@@ -165,7 +167,7 @@ def trajectory_of(
 
 
 def _with_times(table: PathTable, times: PathTimes, where: str) -> PathTable:
-    """Return the rows with their times; refuse options that contradict each other."""
+    """Return the rows with their times; reject options that contradict each other."""
     limits = {
         "--duration": (times.duration, "s"), "--speed": (times.speed, "m/s"),
         "--acceleration": (times.acceleration, "m/s^2"),
@@ -190,7 +192,7 @@ def _with_times(table: PathTable, times: PathTimes, where: str) -> PathTable:
     if times.profile is None:
         for option in ("--duration", "--speed", "--acceleration"):
             if limits[option][0] is not None:
-                raise BadInput(f"{option}: found without --profile, whose limit it is")
+                raise BadInput(f"{option}: found without --profile, which it limits")
     elif times.ends == "moving":
         raise BadInput(
             "--ends moving: found together with --profile, from rest to rest"

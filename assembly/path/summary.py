@@ -16,10 +16,10 @@ from forcefit.results.display import largest_row, listing
 from forcefit.results.text import in_unit, lines_of, table_lines
 from forcefit.results.units import FACTORS
 
-LEAST_PERIODS = 10.0  # below, vibration adds 15 % and more (quintic, undamped)
-_STARTS = 1e-6  # of the largest acceleration: more at an end is a jump from rest
+LEAST_PERIODS = 10.0  # below, vibration adds at least 15 % (quintic, undamped)
+_STARTS = 1e-6  # share of the largest acceleration; more at an end is a jump from rest
 LAWS = {"times": "spline through given times"}
-# largest values by key: words, SI unit, shown unit
+# largest values by key: description, SI unit, displayed unit
 LARGEST = {
     "inertial_translation": ("deflection by acceleration", "m", "um"),
     "inertial_rotation": ("rotation by acceleration", "rad", "mrad"),
@@ -35,14 +35,14 @@ LARGEST = {
 
 
 def sizes(errors: PathErrors) -> dict[str, NDArray]:
-    """Return the sizes of the results at each instant.
+    """Return the magnitudes of the results at each instant.
 
     Args:
         errors: errors along a path, k points.
 
     Returns:
-        By the keys of :data:`LARGEST`, (k,) in SI, or (k, bodies or links) of forces
-        and stresses.
+        Magnitudes (k,) in SI units by the keys of :data:`LARGEST`; (k, bodies or links)
+        for forces and stresses.
     """
     arrays = errors.arrays
     found: dict[str, NDArray] = {}
@@ -63,14 +63,14 @@ def sizes(errors: PathErrors) -> dict[str, NDArray]:
 
 
 def path_summary(errors: PathErrors) -> dict[str, Any]:
-    """Return the results of ``assembly path`` as plain values.
+    """Return the results of ``assembly path`` as a dictionary of plain values.
 
     Args:
         errors: errors along a path.
 
     Returns:
-        Time, frequency, largest values and the instants of them; ``status`` is that of
-        the first point without a result, with its reason, or ``"ok"``.
+        Duration, frequency, largest values and when they occur. ``status`` is ``"ok"``,
+        or the status of the first point without a solution, with its reason.
     """
     solved = errors.status == OK
     first = int(np.argmin(solved))
@@ -106,7 +106,7 @@ def _peak(
     values: NDArray, times: NDArray, owners: list[str] | None = None
 ) -> dict[str, Any]:
     """Return the largest value of (k,) or (k, owners) values, its time and owner."""
-    known = np.where(np.isfinite(values), values, -1.0)  # sizes are never negative
+    known = np.where(np.isfinite(values), values, -1.0)  # magnitudes are not negative
     over_time = known if known.ndim == 1 else known.max(axis=1)
     row = largest_row(over_time)
     peak: dict[str, Any] = {"value": float(over_time[row]), "time": float(times[row])}
@@ -116,13 +116,13 @@ def _peak(
 
 
 def remarks(errors: PathErrors) -> list[str]:
-    """Return remarks on what the quasi-static answer leaves out, a sentence each.
+    """Return remarks on what the quasi-static results neglect.
 
     Args:
         errors: errors along a path.
 
     Returns:
-        Sentences.
+        One sentence per remark.
     """
     found, path = [], errors.trajectory
     if errors.periods < LEAST_PERIODS:
@@ -132,7 +132,7 @@ def remarks(errors: PathErrors) -> list[str]:
             "leave out, may exceed them"
         )
     if not np.isfinite(errors.periods):
-        found.append("no natural frequency was found: vibration is left out unjudged")
+        found.append("no natural frequency was found: the vibration is unknown")
     ends = np.abs(path.second[[0, -1]]).max()
     if path.jumps or ends > _STARTS * np.abs(path.second).max(initial=0.0):
         found.append(

@@ -1,7 +1,7 @@
 """Compliance of the platform along a path, nominal or under the loads of each instant.
 
-The tangent is that at rest under the d'Alembert loads of the instant: these are dead
-loads, constant while the platform yields.
+The tangent is computed for a robot at rest under the d'Alembert loads of the instant.
+These are dead loads: they remain constant while the platform moves.
 """
 
 from typing import Any
@@ -25,15 +25,15 @@ STATES = ("nominal", "contact", "exact")
 
 
 def check_state(robot: Robot, state: str) -> None:
-    """Refuse an unknown state, and links with a mass in the state ``"exact"``.
+    """Reject an unknown state, and links with a mass in the state ``"exact"``.
 
     Args:
         robot: any robot.
-        state: in which the compliance is taken.
+        state: state in which the compliance is computed.
 
     Raises:
-        BadInput: the state is none of :data:`STATES`; or it is ``"exact"``, and the
-            inertia of a link acts along it, for which there is no model of finite
+        BadInput: the state is not in :data:`STATES`; or the state is ``"exact"`` and a
+            link has distributed inertia, for which there is no model of finite
             motions.
     """
     if state not in STATES:
@@ -56,15 +56,16 @@ def compliances(
         postures: k postures.
         state: ``"nominal"``, ``"contact"`` or ``"exact"``, as in
             :func:`forcefit.assembly.platform_stiffness.platform_stiffness.platform_stiffness`.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        loads: d'Alembert loads and weight of each instant.
+        load: (6,) [N m, N] load on the platform at its origin, base axes.
+        loads: d'Alembert loads and weight at each instant.
 
     Returns:
-        (k, 6, 6) [rad/(N m) .. m/N] at the platform's origin, base axes; NaN without
-        an equilibrium.  A clearance that touches its bound without a force is free.
+        (k, 6, 6) [rad/(N m) .. m/N] compliance at the platform's origin, base axes; NaN
+        without an equilibrium.  A clearance that touches its bound without a force is
+        free.
     """
     if state == "nominal":
-        many: Any = platform_stiffness(postures)  # of many postures: Stiffnesses
+        many: Any = platform_stiffness(postures)  # Stiffnesses, as k postures are given
         return np.asarray(many.compliance)
     found = np.full((len(postures.transforms), 6, 6), np.nan)
     for i in range(len(found)):
@@ -81,7 +82,7 @@ def _compliance(
     posture: Posture, state: str, load: ArrayLike | None, bodies: NDArray,
     carried: NDArray,
 ) -> NDArray:  # fmt: skip
-    """Return the (6, 6) compliance under loads on bodies and platform."""
+    """Return the compliance (6, 6) under loads on bodies and platform."""
     if state == "contact":
         assembly = solve_assembly(posture, load, bodies, carried=carried)
         return in_contact(assembly, "letting go").compliance

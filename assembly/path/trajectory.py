@@ -1,11 +1,12 @@
 """A path in time: components of the pose with their first and second derivatives.
 
-Given times are interpolated by a quintic spline through the rows, continuous up to the
-fourth derivative.  With ends at rest, speed and acceleration are zero there; two rows
-are then the quintic profile.  A path without times is a natural cubic spline through
-its rows over the length of its chords, a straight line for two rows.  A profile of
-:mod:`forcefit.assembly.path.profiles` runs along it.  Both interpolate positions,
-rotation vectors or joint coordinates, component by component.
+Rows with times are interpolated by a quintic spline, which is continuous up to the
+fourth derivative.  If the ends are at rest, speed and acceleration are zero there; two
+rows then result in the quintic profile.  Rows without times are interpolated by a
+natural cubic spline over the length of the chords, which is a straight line for two
+rows.  The path is then traversed with a profile of
+:mod:`forcefit.assembly.path.profiles`.  Both splines interpolate positions, rotation
+vectors or joint coordinates, component by component.
 """
 
 from dataclasses import dataclass
@@ -17,9 +18,9 @@ from forcefit.assembly.path.path_file import PathTable
 from forcefit.assembly.path.profiles import JUMPING, PROFILES
 from forcefit.inputs.table import BadInput, nearest
 
-MOST_POINTS = 20_000  # ten seconds and 600 MB for a hexapod
-_FINE = 4001  # instants at which peaks of speed and acceleration are searched
-_ROWS_MOVING = 6  # least number of rows that a quintic spline needs without end values
+MOST_POINTS = 20_000  # takes ten seconds and 600 MB for a hexapod
+_FINE = 4001  # number of instants searched for the largest speed and acceleration
+_ROWS_MOVING = 6  # least number of rows for a quintic spline without end conditions
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,12 +29,12 @@ class Trajectory:
 
     Attributes:
         names: components, ``tx`` .. or ``q.<frame>``.
-        times: (k,) [s].
-        values: (k, c) [m or rad].
-        first: (k, c) their derivatives.
-        second: (k, c) their second derivatives.
+        times: (k,) [s] instants.
+        values: (k, c) [m or rad] values of the components.
+        first: (k, c) first derivatives.
+        second: (k, c) second derivatives.
         law: ``"times"``, or the name of the profile.
-        jumps: whether the acceleration jumps.
+        jumps: whether the acceleration is discontinuous.
     """
 
     names: tuple[str, ...]
@@ -46,7 +47,7 @@ class Trajectory:
 
     @property
     def duration(self) -> float:
-        """[s] from the first instant to the last."""
+        """[s] time from the first to the last instant."""
         return float(self.times[-1] - self.times[0])
 
 
@@ -55,16 +56,17 @@ def timed(table: PathTable, points: int, ends: str = "rest") -> Trajectory:
 
     Args:
         table: path with times.
-        points: number of instants, equally spaced.
+        points: number of equally spaced instants.
         ends: ``"rest"``: speed and acceleration are zero at both ends; ``"moving"``:
-            they follow from the rows (the spline's fifth derivative is continuous at
-            the two knots nearest to each end).
+            they are computed from the rows (the spline's fifth derivative is
+            continuous at the two knots nearest to each end).
 
     Returns:
         The trajectory.
 
     Raises:
-        BadInput: fewer than six rows with moving ends, or another number of points.
+        BadInput: the ends are moving and there are fewer than six rows, or the number
+            of points is out of range.
     """
     from scipy.interpolate import make_interp_spline
 
@@ -94,21 +96,22 @@ def profiled(
     """Return the trajectory of a profile from rest to rest along the rows.
 
     Args:
-        table: path; times are not used.
-        points: number of instants, equally spaced.
-        profile: of :data:`forcefit.assembly.path.profiles.PROFILES`.
-        size: [m] that counts as 1 rad in the length of a chord.
-        duration: [s] of the motion.
-        speed: [m/s, or rad/s of drives] instead, the largest of the platform's origin
-            or of any joint named.
-        acceleration: [m/s^2, or rad/s^2 of drives] likewise.
+        table: path; its times are not used.
+        points: number of equally spaced instants.
+        profile: name in :data:`forcefit.assembly.path.profiles.PROFILES`.
+        size: [m] length that counts as 1 rad in the length of a chord.
+        duration: [s] duration of the motion; None if limits are given.
+        speed: [m/s, or rad/s of drives] largest speed of the platform's origin, or of
+            any named joint.
+        acceleration: [m/s^2, or rad/s^2 of drives] largest acceleration of these.
 
     Returns:
-        The trajectory; the shortest within the limits.
+        The trajectory, the shortest one within the limits.
 
     Raises:
-        BadInput: unknown profile; not exactly a duration or limits; a row equals the
-            next; or limits of a path along which nothing that they limit moves.
+        BadInput: the profile is unknown; both or neither of duration and limits are
+            given; two consecutive rows are equal; or limits are given for a platform
+            origin that does not move.
     """
     from scipy.interpolate import CubicSpline
 
@@ -140,13 +143,13 @@ def profiled(
 
 
 def _check_points(points: int) -> None:
-    """Reject a number of points that is no path, or too large."""
+    """Reject a number of points below 2 or above the largest allowed number."""
     if not 2 <= points <= MOST_POINTS:
         raise BadInput(f"--points: found {points}, expected 2 to {MOST_POINTS}")
 
 
 def _chords(table: PathTable, size: float) -> NDArray:
-    """Return (rows,) the share of the chords' length before each row."""
+    """Return the share (rows,) of the total chord length before each row."""
     turns = np.array([name[0] == "r" for name in table.names])
     steps = np.diff(table.values, axis=0) * np.where(turns, size, 1.0)
     lengths = np.linalg.norm(steps, axis=1)
@@ -164,8 +167,8 @@ def _within(
     names: tuple[str, ...], first: NDArray, second: NDArray, speed: float | None,
     acceleration: float | None,
 ) -> float:  # fmt: skip
-    """Return the shortest duration [s] of a motion given for the duration 1."""
-    # speeds fall with the duration, accelerations with its square
+    """Return the shortest duration [s] of a motion given for a duration of 1."""
+    # speeds are inversely proportional to the duration, accelerations to its square
     moved = [k for k, name in enumerate(names) if name[0] == "t"]
     if names[0].startswith("q."):
         fastest = np.abs(first).max(), np.abs(second).max()

@@ -1,4 +1,4 @@
-"""Stiffness K_C of the platform by direction, and the shares of the parts in it.
+"""Stiffness K_C of the platform by direction, and contributions of the parts.
 
-Begin at ``platform_stiffness.py``; ``matrices.py`` holds its result.
+Start with ``platform_stiffness.py``; ``matrices.py`` defines its result.
 """

@@ -1,15 +1,16 @@
-r"""Newton's method for an equilibrium whose pressed clearances are known.
+r"""Newton's method for an equilibrium whose loaded clearances are known.
 
-Cone programmes are solved to a certified gap: clearances are within 1e-6 of the bounds
-that they press, and their forces have the same accuracy.  Once the pressed clearances
-are known, the conditions of an equilibrium are equations,
+A clearance is called pressed here if it is at its bound and carries a force.  Cone
+programmes are solved up to a certified gap: pressed clearances are within 1e-6 of their
+bounds, and their forces have the same accuracy.  Once the pressed clearances are known,
+the conditions of equilibrium are equations,
 
     [ H   A'  N ] [ dx       ]     [ g ]      g = H_y y - loads - A' lambda + N f
     [ A   0   0 ] [ -dlambda ] = - [ r ],     r = A x + misfit
     [ N'  0   0 ] [ df       ]     [ c ]      c = (|u_k|^2 - 1) / 2
 
-and Newton's method solves them to rounding; N holds the normals u_k of the pressed
-bounds.
+which Newton's method solves to rounding.  N contains the normals u_k of the bounds of
+pressed clearances.
 
 Sources:
     Nocedal, Wright (2006), Numerical Optimization, sections 16.2 and 18.1.
@@ -28,28 +29,29 @@ from forcefit.assembly.linear.load import FrameLoads
 from forcefit.assembly.solvers.cones import cone_sizes
 
 AT_BOUND = 1e-6  # [-] distance within which a clearance counts as at its bound
-_NEAR_BOUND = 1e-3  # [-] distance within which it may be pressed, see ``contacts``
-_PRESSED = 1e-8  # relative to the largest force: a smaller one counts as zero
-# relative to the energy without clearance: a smaller force counts as zero
+_NEAR_BOUND = 1e-3  # [-] distance from its bound within which it can be pressed
+_PRESSED = 1e-8  # relative to the largest force: a smaller force counts as zero
+# relative to the energy without clearance: a force below this counts as zero
 _ROUNDING = 1e-12
 _RANK = 1e-10  # relative size below which a singular value counts as zero
-_FLAT = 1e-12  # relative to the largest curvature: smaller ones count as zero
+_FLAT = 1e-12  # relative to the largest curvature: smaller curvatures count as zero
 _STEPS = 4  # largest number of Newton steps; two are usual
 _SETTLED = 1e-14  # [-] accepted excess over the bounds
 _GUESSES = 3  # largest number of guesses of the pressed clearances
 
 
 def contacts(assembly: Assembly) -> tuple[NDArray, NDArray]:
-    """Return the clearances with a force, and those at their bound without one.
+    """Return the clearances that carry a force, and those at their bound without force.
 
-    A cone solver leaves a product of gap and force that is the same for all clearances.
-    Near a bound, the larger of gap and force (over the energy) decides.
+    In the solution of a cone solver, the product of gap and force is equal for all
+    clearances.  Near a bound, the larger of gap and force (relative to the energy)
+    decides whether the clearance is pressed.
 
     Args:
-        assembly: the manipulator at least energy.
+        assembly: the manipulator with least energy.
 
     Returns:
-        (cones,) bool each.
+        Two masks, each (cones,) bool.
     """
     force = bound_forces(assembly)
     gap = 1.0 - cone_sizes(assembly.clearances, assembly.joints.group)
@@ -63,20 +65,20 @@ def contacts(assembly: Assembly) -> tuple[NDArray, NDArray]:
 
 
 def bound_forces(assembly: Assembly) -> NDArray:
-    """Return the (cones,) [J] force on each clearance times its bound."""
+    """Return the (cones,) [J] products of each clearance's force and bound."""
     forces = assembly.joints.cones.T @ assembly.joint_wrenches.ravel()
     return cone_sizes(forces, assembly.joints.group)
 
 
 def settle(assembly: Assembly) -> Assembly:
-    """Refine an equilibrium of (22) to rounding, pressed clearances at their bounds.
+    """Refine an equilibrium of (22) to rounding, with pressed clearances at bounds.
 
     Args:
-        assembly: the manipulator at least energy, as computed by a cone solver.
+        assembly: the manipulator with least energy, as computed by a cone solver.
 
     Returns:
-        The result of Newton's method; the assembly itself if no clearance is pressed,
-        or if the pressed ones cannot be identified.
+        The result of Newton's method; the given assembly if no clearance is pressed, or
+        if the pressed clearances cannot be identified.
     """
     pressed, _ = contacts(assembly)
     for _ in range(_GUESSES):
@@ -86,7 +88,7 @@ def settle(assembly: Assembly) -> Assembly:
         size = cone_sizes(settled.clearances, settled.joints.group)
         if np.array_equal(contacts(settled)[0], pressed) and np.all(size <= 1 + 1e-9):
             return settled
-        # a small force was taken for zero, and its clearance leaves its bound
+        # a small force was wrongly set to zero: its clearance exceeds its bound
         beyond = size > 1.0 + 1e-9
         if not (beyond & ~pressed).any():
             break
@@ -133,12 +135,12 @@ def bounded_unknowns(joints: VirtualJoints) -> slice:
 
 
 def closure_rows(lin: Linearisation, joints: VirtualJoints) -> NDArray:
-    """Return the (6 closures, N) closure rows in all unknowns."""
+    """Return the (6 closures, N) closure rows for all unknowns."""
     return lin.rows @ np.hstack([joints.elastic, joints.cones, joints.free])
 
 
 def work_of_loads(loads: FrameLoads, joints: VirtualJoints) -> NDArray:
-    """Return the (N,) [J] work of the loads on every unknown."""
+    """Return the (N,) [J] work of the loads per unit of each unknown."""
     of_links, of_joints = (joints.elastic.T @ w for w in (loads.body, loads.joint))
     springs = np.where(joints.links, of_links, of_joints)
     others = (columns.T @ loads.joint for columns in (joints.cones, joints.free))
@@ -146,7 +148,7 @@ def work_of_loads(loads: FrameLoads, joints: VirtualJoints) -> NDArray:
 
 
 def curvature(joints: VirtualJoints, force: NDArray) -> NDArray:
-    """Return (N, N) [J] curvature of springs and of the round bounds under force."""
+    """Return the (N, N) [J] curvature of springs and of round bounds under force."""
     diagonal = [np.ones(joints.elastic.shape[1]), force[joints.group]]
     return np.diag(np.concatenate([*diagonal, np.zeros(joints.free.shape[1])]))
 
@@ -164,7 +166,7 @@ def _count(joints: VirtualJoints) -> int:
 
 
 def held_rows(assembly: Assembly, pressed: NDArray) -> NDArray:
-    """Return the (6 closures + pressed, N) rows of closures and of pressed bounds."""
+    """Return the (6 closures + pressed, N) derivatives of closures and bounds."""
     normals = _normals(assembly.joints, assembly.clearances, pressed)
     return np.vstack([closure_rows(assembly.linearisation, assembly.joints), normals.T])
 
@@ -177,12 +179,12 @@ def newton_step(
     Args:
         H: (N, N) [J] second derivative of the Lagrangian.
         held: (m, N) derivatives of the constraints: closures, and bounds.
-        left: (m,) their residuals.
-        gradient: (N,) [J] of the Lagrangian.
+        left: (m,) residuals of the constraints.
+        gradient: (N,) [J] gradient of the Lagrangian.
 
     Returns:
-        (N,) change of the unknowns, of least size if not unique, and (m,) that of the
-        multipliers, the least if not unique.
+        (N,) change of the unknowns, and (m,) change of the multipliers; each of least
+        norm if it is not unique.
     """
     closing = -np.linalg.lstsq(held, left, rcond=_RANK)[0]
     Z = null_space(held, rcond=_RANK) if len(held) else np.eye(len(H))

@@ -1,21 +1,21 @@
-r"""The load-deflection path past its limit points by arc length, without clearance.
+r"""Load-deflection path beyond limit points by arc length, without clearance.
 
-At a maximum of the load the path of equilibria turns back, and no larger load has an
-equilibrium nearby.  The load is then an unknown too.  The path (x, lambda) is followed
-in steps of given length: a prediction along the tangent, and corrections by Newton's
-method across it,
+At a maximum of the load, the path of equilibria turns back, and there is no equilibrium
+nearby for larger loads.  The load is therefore treated as an unknown.  The path
+(x, lambda) is followed in steps of given length.  Each step is a prediction along the
+tangent, followed by corrections by Newton's method perpendicular to it,
 
         [ Z'HZ   -Z'q ] [ t       ]     [ unbalanced force       ]
-        [ tau_x   tau ] [ dlambda ] = - [ error of step's length ],
+        [ tau_x   tau ] [ dlambda ] = - [ error of step's length ].
 
-with Z the motions that keep the closures, H the true second derivative of the
-potential, q the work of a unit load, tau the direction of the step.  Every equilibrium
-of the path is found, stable or not.  Clearances are held at zero.
+Z contains the motions that keep the closures, H is the exact second derivative of the
+potential, q the work of a unit load, and tau the direction of the step.  Stable and
+unstable equilibria are found.  Clearances are fixed at zero.
 
-Where an eigenvalue of Z'HZ changes its sign the load is critical.  At a limit point the
-load turns there.  Otherwise another path branches off, as at a buckled column; it is
-reported and not followed.  Motions without stiffness and load, such as a rod's spin
-between two ball joints, have no second derivative; they are left out of Z.
+The load is critical if an eigenvalue of Z'HZ changes its sign.  At a limit point, the
+load has an extremum.  Otherwise another path branches off, as for a buckled column; the
+branch is reported but not followed.  Motions without stiffness and load, such as the
+spin of a rod between two ball joints, have no second derivative and are omitted from Z.
 
 Sources:
     Riks (1979), An incremental approach to the solution of snapping and buckling
@@ -53,7 +53,7 @@ _STEPS = 400  # largest number of steps of a path
 _CORRECTIONS = 8  # largest number of corrections of a step
 _CLOSED = 1e-10  # [-] size of the last correction, relative to the step
 _SMALLEST = 1e-6  # smallest step, relative to the first
-_HALVINGS = 20  # bisections that bracket a critical load in a step
+_HALVINGS = 20  # number of bisections that bracket a critical load within a step
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,10 +61,10 @@ class _Place:
     """An equilibrium of the path.
 
     Attributes:
-        load: [N or N m].
-        local: the expansion there.
-        motion: (N,) derivative of the unknowns by arc length.
-        rise: [N or N m] derivative of the load by arc length.
+        load: [N or N m] load at the equilibrium.
+        local: expansion of the problem at the equilibrium.
+        motion: (N,) derivative of the unknowns with respect to arc length.
+        rise: [N or N m] derivative of the load with respect to arc length.
         curvatures: (k,) second derivatives of the potential along its modes, lowest
             first; only their signs are used.
         modes: (N, k) the modes.
@@ -85,15 +85,15 @@ class _Place:
 
 @dataclass(frozen=True, eq=False)
 class _Path:
-    """A path to be followed, and the definition of length on it.
+    """A path to be followed, and the definition of its arc length.
 
     Attributes:
-        posture: posture of the robot without clearance, its beams cut.
+        posture: posture of the robot without clearance, with beams cut into pieces.
         component: component of the load that changes.
         rest: (6,) [N m, N] the other components of the load.
-        gravity: (3,) [m/s^2] or None.
-        weight: weight of squared motions, relative to squared loads over the largest
-            load.
+        gravity: (3,) [m/s^2] gravity vector, or None.
+        weight: weight of squared motions, relative to squared loads divided by the
+            squared largest load.
         range: [N or N m] the largest load.
         parts: owner of each spring.
         idle: number of motions without stiffness and load.
@@ -127,7 +127,7 @@ class _Path:
         return self.weight * motion / local.placement.model.units**2
 
     def modes(self, local: Expansion) -> tuple[NDArray, NDArray]:
-        """Return potential's second derivatives, lowest first, and their motions Z."""
+        """Return second derivatives of the potential, lowest first, and motions Z."""
         B, units = local.basis, local.placement.model.units
         values, motions = curvature_modes(B, B.T @ local.hessian @ B, units)
         kept = np.sort(np.argsort(np.abs(values))[self.idle :])
@@ -148,17 +148,18 @@ def follow_load(
     """Follow the path of equilibria until the load leaves a range.
 
     Args:
-        posture: the robot's configuration, with its errors; its clearances are held at
+        posture: the robot's configuration with its errors; clearances are fixed at
             zero.
         component: component of the load that changes, 0 to 5.
         first: [N m or N] load at which the path begins.
-        last: [N m or N] load at which it ends.
+        last: [N m or N] load at which the path ends.
         load: (6,) [N m, N] the other components of the load.
-        gravity: (3,) [m/s^2] base axes.
-        count: number of steps of the first one's length from first to last load; steps
-            grow to twice that where the path is straight.
-        progress: function called with the points found and their largest number.
-        method: method of the first equilibrium; the path from it is followed in numpy.
+        gravity: (3,) [m/s^2] gravity vector in base axes.
+        count: number of steps from the first to the last load if all steps have the
+            length of the first; steps grow to twice that length where the path is
+            straight.
+        progress: function called with the number of points found and its largest value.
+        method: method of the first equilibrium; the path is then followed in numpy.
 
     Returns:
         The curve; its events are ``"critical"`` loads, with the mode.
@@ -166,9 +167,9 @@ def follow_load(
     Raises:
         CannotAssemble: the errors cannot be closed.
         FreeMotion: a load drives a motion that nothing resists.
-        NotConverged: no equilibrium was found at the first load, or the path is lost;
-            a :class:`SolverFailed`.
-        ValueError: no such method.
+        NotConverged: no equilibrium was found at the first load or along the path; a
+            :class:`SolverFailed`.
+        ValueError: the method is unknown.
     """
     check_method(method)
     frames = (replace(f, clearance=None) for f in posture.robot.frames)
@@ -176,7 +177,7 @@ def follow_load(
     rest = np.zeros(6) if load is None else np.array(load, dtype=float)
     rest[component] = first
     start = solve_exact(tight, rest, gravity=gravity, method=method)
-    # refuse a free motion that the load drives, before following the path
+    # reject a free motion that the load drives before the path is followed
     solve_assembly(tight, np.eye(6)[component], method=method)
     span = abs(last - first)
     cut = start.cut.cut(tight)
@@ -213,15 +214,15 @@ def _begin(
     values, Z = path.modes(local)
     motion = Z @ ((Z.T @ path.reference_load(local)) / values)
     size = np.linalg.norm(motion / local.placement.model.units) * path.range
-    weight = 1.0 / (size or 1.0) ** 2  # a rigid bar does not deform
-    # the load is half of the length
+    weight = 1.0 / (size or 1.0) ** 2  # the size is zero if the robot is rigid
+    # the load contributes half of the arc length
     rise = path.range / np.sqrt(2.0) * np.sign(last - first)
     place = _Place(first, local, motion * rise, float(rise), values, Z)
     return place, replace(path, weight=float(weight))
 
 
 def _advance(path: _Path, place: _Place, step: float) -> tuple[_Place | None, int]:
-    """Return the next equilibrium, None if not converged, and the corrections made."""
+    """Return the next equilibrium, None if not converged, and the correction count."""
     x0, load = place.local.placement.x, place.load
     x = x0 + step * place.motion
     load = load + step * place.rise
@@ -255,7 +256,7 @@ def _solve(
     path: _Path, local: Expansion, modes: tuple[NDArray, NDArray], tangent: NDArray,
     left: NDArray,
 ) -> NDArray | None:  # fmt: skip
-    """Return the motion along the modes and the load that remove a residual."""
+    """Return the motion along the modes and the load change that remove a residual."""
     values, Z = modes
     M = np.zeros((len(left), len(left)))
     M[:-1, :-1] = np.diag(values)
@@ -291,13 +292,13 @@ def _critical(path: _Path, low: _Place, high: _Place, step: float) -> Event:
     for _ in range(_HALVINGS):
         middle, _ = _advance(path, start, (short + long_) / 2)
         if middle is None:
-            break  # as at a branch, where the equations are singular
+            break  # for example at a branch, where the equations are singular
         if middle.unstable == start.unstable:
             low, short = middle, (short + long_) / 2
         else:
             high, long_ = middle, (short + long_) / 2
     turns = low.rise * high.rise < 0
-    # the mode that changes: the last negative one on the side with more of them
+    # the critical mode is the last negative one on the side with more negative modes
     more = high if high.unstable > low.unstable else low
     soft = more.unstable - 1
     bent = more.modes[:, soft]

@@ -1,15 +1,17 @@
 """Load against deflection: clearances, contacts, elasticity, and buckling.
 
-One component of the load takes a list of values while the others are constant.  At each
-value the equilibrium is computed, by problem (22) or with finite motions.  With finite
-motions it starts from the one before, so that a path is followed forwards or back.  The
-curve has a kink where the set of pressed clearances changes.  Where the least second
-derivative of the potential passes zero the load is critical: the equilibrium branches,
-or is lost and the platform jumps to another.  Bisection brackets these loads.
+One component of the load is changed through a list of values while the others are
+constant.  At each value, the equilibrium is computed by problem (22) or with finite
+motions.  With finite motions, each computation starts from the previous equilibrium, so
+that a path is followed forwards or backwards.  The curve has a kink where the set of
+pressed clearances (clearances that carry a force) changes.  The load is critical where
+the least second derivative of the potential passes through zero.  There, the
+equilibrium branches, or it ends and the platform jumps to another equilibrium.
+Bisection brackets these loads.
 
-The load is prescribed.  Of a path that turns back, only the part that is stable from
-one side is found, and the jump over the other part is reported; :mod:`.arc_length`
-follows that part.
+The load is prescribed.  If a path turns back, only the part that is stable from one
+side is found, and the jump over the other part is reported; :mod:`.arc_length` follows
+that part.
 """
 
 from collections.abc import Callable, Sequence
@@ -48,15 +50,15 @@ if TYPE_CHECKING:
     import xarray
 
 _HALVINGS = 14  # bisections that locate an event to 6e-5 of a load step
-_CARRIES = 1e-6  # relative to the largest force times bound: smaller ones count as zero
-# largest number of contact changes followed within a load step: in symmetric robots
-# some contacts carry rounding alone, and change with it
+_CARRIES = 1e-6  # force times bound, relative to the largest, that counts as zero
+# largest number of contact changes that are followed within a load step: in symmetric
+# robots, rounding errors can cause forces in some contacts
 _CHANGES = 8
-# relative to the largest motion in a mode: below it the platform counts as fixed
+# relative to the largest motion in a mode: the platform counts as fixed below this
 _STAYS = 1e-6
-_STILL = 1e-12  # [characteristic lengths] size below which motions are rounding
-_JUMP = 5.0  # times the motion predicted by the tangents on both sides
-# relative to the largest load: below it clearances may leave the pose open
+_STILL = 1e-12  # [characteristic lengths] smaller motions count as rounding errors
+_JUMP = 5.0  # factor on the motion that the tangents on both sides predict
+# relative to the largest load: for smaller loads, clearances can leave the pose open
 _NO_LOAD = 1e-9
 
 
@@ -65,10 +67,11 @@ class Event:
     """An event on the curve.
 
     Attributes:
-        load: [N or N m] at the event, or directly after it.
+        load: [N or N m] load at the event, or directly after it.
         kind: ``"contact"``, ``"release"``, ``"critical"`` or ``"jump"``.
         what: description: the clearances, the mode or the distance.
-        deflection: [rad or m] of the platform there, along the load's component.
+        deflection: [rad or m] deflection of the platform at the event, along the load's
+            component.
     """
 
     load: float
@@ -85,14 +88,13 @@ class DeflectionCurve:
         posture: the robot's nominal configuration.
         component: component of the wrench and of the screw, 0 to 5.
         loads: (k,) [N m or N] values of that component, in the order of application.
-        screws: (k, 6) [rad, m] of the platform at its origin, base axes.
-        energies: (k,) [J] elastic.
-        stiffness: (k,) tangent along the component, the others free.
+        screws: (k, 6) [rad, m] screws of the platform at its origin, base axes.
+        energies: (k,) [J] elastic energies.
+        stiffness: (k,) tangent stiffness along the component, with the others free.
         pressed: (k,) names of the clearances that carry a force.
-        open_: (k,) bool, True where clearances leave the pose undetermined.
-        events: in the order of the curve.
-        method: method of all equilibria, as requested: ``"compiled"`` or
-            ``"reference"``.
+        open_: (k,) bool, True if clearances leave the pose undetermined.
+        events: events in the order of the curve.
+        method: requested method of all equilibria: ``"compiled"`` or ``"reference"``.
     """
 
     posture: Posture
@@ -122,7 +124,7 @@ class DeflectionCurve:
 
     @property
     def deflection(self) -> NDArray:
-        """(k,) [rad or m] along the component."""
+        """(k,) [rad or m] deflections along the component."""
         return self.screws[:, self.component]
 
 
@@ -156,13 +158,13 @@ def deflection_curve(
     Args:
         posture: the robot's configuration, with its errors and clearances.
         component: index in ``[mx my mz fx fy fz]``, 0 to 5.
-        loads: [N m or N] its values, in the order of application.
-        load: (6,) [N m, N] the other components, at the platform's origin, base axes,
-            or by component, ``{"fz": -50}``.
-        gravity: (3,) [m/s^2] base axes.
+        loads: [N m or N] values of the component, in the order of application.
+        load: (6,) [N m, N] the other components, at the platform's origin, base axes;
+            or a mapping of components such as ``{"fz": -50}``.
+        gravity: (3,) [m/s^2] gravity vector in base axes.
         state: ``"contact"``, by problem (22); ``"exact"``, with finite motions.
-        progress: function called at each load with the steps taken there and their
-            largest number.
+        progress: function called at each load with the number of steps and its largest
+            value.
         method: method of :func:`forcefit.assembly.linear.energy.solve_assembly` or
             :func:`forcefit.assembly.exact.exact.solve_exact`.
 
@@ -172,9 +174,9 @@ def deflection_curve(
     Raises:
         CannotAssemble: the errors cannot be closed.
         FreeMotion: the load drives a motion that nothing resists.
-        SolverFailed: no equilibrium was found; the message has the load.
-        BadInput: no such component, no loads, or not numbers.
-        ValueError: no such state or method.
+        SolverFailed: no equilibrium was found; the message contains the load.
+        BadInput: the component is unknown, or the loads are missing or not numbers.
+        ValueError: ``state`` or ``method`` is unknown.
     """
     check_method(method)
     if state not in {"contact", "exact"}:
@@ -251,7 +253,7 @@ def _solve(
             posture, wrench, gravity=gravity, progress=progress, method=method
         )
     active, force = active_clearances(equilibrium.expansion)
-    # contacts that carry rounding alone change with it
+    # omit contacts with forces due to rounding errors only
     active &= force > _CARRIES * force.max(initial=0.0)
     names = clearance_names(equilibrium.expansion.placement.model.joints, active)
     return _Point(value, equilibrium, exact_tangent(equilibrium, "letting go"), names)
@@ -261,9 +263,9 @@ def _settled(
     point: _Point, largest: float, rest: NDArray, gravity: ArrayLike | None,
     method: Method,
 ) -> tuple[NDArray, bool]:  # fmt: skip
-    """Return the platform screw.
+    """Return the platform screw, and whether clearances leave the pose undetermined.
 
-    If clearances leave it open, the one nearest to nominal.
+    In that case, the screw nearest to nominal is returned.
     """
     equilibrium = point.equilibrium
     others = rest.any() or gravity is not None or driven(equilibrium.posture.robot)
@@ -279,7 +281,7 @@ def clearance_names(joints: VirtualJoints, marked: NDArray) -> frozenset[str]:
 
     Args:
         joints: the virtual joints with these clearances.
-        marked: (cones,) bool, the selection.
+        marked: (cones,) bool, True for the selected clearances.
 
     Returns:
         The names.
@@ -295,7 +297,7 @@ def clearance_names(joints: VirtualJoints, marked: NDArray) -> frozenset[str]:
 def _events(
     before: _Point, after: _Point, at: _Solver, component: int, most: int = _CHANGES
 ) -> list[Event]:
-    """Return the events between two neighbouring loads."""
+    """Return the events between two successive loads."""
     events = []
     if before.pressed != after.pressed:
         low, high = _bracket(before, after, at, lambda p: p.pressed == before.pressed)
@@ -319,7 +321,7 @@ def _events(
         low, high = _bracket(
             before, after, at, lambda p: _apart(before, p) < _apart(p, after)
         )
-        if _jumps(low, high, component):  # otherwise it was only soft in between
+        if _jumps(low, high, component):  # otherwise the robot is only compliant here
             way = numbers(
                 high.equilibrium.platform_screw - low.equilibrium.platform_screw
             )
@@ -336,18 +338,18 @@ def _event(point: _Point, kind: str, what: str, component: int) -> Event:
 def _bracket(
     low: _Point, high: _Point, at: _Solver, same: Callable[[_Point], bool]
 ) -> tuple[_Point, _Point]:
-    """Return neighbouring loads between which a property changes for the first time."""
+    """Return two close loads between which a property changes for the first time."""
     for _ in range(_HALVINGS):
         try:
             middle = at((low.load + high.load) / 2, low)
         except SolverFailed:
-            break  # as between free motion and the least load: known to this accuracy
+            break  # for example, between free motion and the smallest load
         low, high = (middle, high) if same(middle) else (low, middle)
     return low, high
 
 
 def _apart(one: _Point, other: _Point) -> float:
-    """Return the distance [m] of two platforms, rotations times the length."""
+    """Return the distance [m] of two platforms, with rotations times a length."""
     change = other.equilibrium.platform_screw - one.equilibrium.platform_screw
     return float(np.linalg.norm(change * np.repeat([one.tangent.length, 1.0], 3)))
 
@@ -362,11 +364,11 @@ def _jumps(before: _Point, after: _Point, component: int) -> bool:
     step = abs(after.load - before.load)
     apart = _apart(before, after)
     moved = apart > _STILL * before.tangent.length
-    return moved and apart > _JUMP * step * farthest  # never if the platform is free
+    return moved and apart > _JUMP * step * farthest  # False if the platform is free
 
 
 def _mode(point: _Point) -> str:
-    """Return mode of negative stiffness, by the platform and the part that bends."""
+    """Describe the mode of negative stiffness: the platform's motion, the bent part."""
     tangent = point.tangent
     soft = int(np.flatnonzero(tangent.signs < 0)[0])
     return "buckles: " + mode_text(
@@ -377,17 +379,18 @@ def _mode(point: _Point) -> str:
 def mode_text(
     screws: NDArray, mode: int, springs: NDArray, parts: Sequence[Part], length: float
 ) -> str:
-    """Describe a mode in words: the platform's motion, and the part that bends most.
+    """Return a description of a mode: the platform's motion, and the part that bends.
 
     Args:
-        screws: (6, k) [rad, m] of the platform in all modes, of any common size.
+        screws: (6, k) [rad, m] screws of the platform in all modes, of any common size.
         mode: index of the mode.
-        springs: (m,) [sqrt(2 J)] deformations of the springs in it.
+        springs: (m,) [sqrt(2 J)] deformations of the springs in this mode.
         parts: (m,) owner of each spring.
-        length: [m] factor of rotations that makes them comparable.
+        length: [m] factor that makes rotations comparable with translations.
 
     Returns:
-        The screw of unit size, or that the platform does not move, and the part.
+        Text with the unit screw, or the statement that the platform does not move, and
+        the part that bends most.
     """
     part = parts[largest_row(np.square(springs))]
     scale, screw = np.repeat([length, 1.0], 3), screws[:, mode]

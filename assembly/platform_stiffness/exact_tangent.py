@@ -1,18 +1,18 @@
-r"""The tangent of the exact equilibrium on SE(3), geometric stiffness included.
+r"""Tangent stiffness of the exact equilibrium on SE(3), with geometric stiffness.
 
-Near an equilibrium the unknowns move by Z t along closures and along pressed bounds.
-The total potential (energy minus the work of loads) changes by t.Z'HZt / 2, with H the
-true second derivative of the Lagrangian: springs, and the forces of assembly and load
-on parts that rotate.  A small additional wrench w does the work w.(V Z t), where V is
-the platform's small motion in base axes from its present pose.  The response is C = V Z
-(Z'HZ)^-1 Z'V'.
+Near an equilibrium the unknowns move by Z t, along closures and along the bounds of
+pressed clearances.  The total potential (energy minus the work of loads) changes by
+t.Z'HZt / 2.  H is the exact second derivative of the Lagrangian.  It includes the
+springs and the forces of assembly and load on parts that rotate.  A small additional
+wrench w does the work w.(V Z t), where V Z t is the platform's small motion in base
+axes from its current pose.  The compliance is C = V Z (Z'HZ)^-1 Z'V'.
 
-The potential is stationary there, so its second derivative depends on no chart of
-SE(3): C and K are symmetric in any coordinates of the platform.  They depend on the way
-in which the existing load follows the motion.  Here its force is dead, and the work of
-its moment m is m . theta, with theta the rotation vector from the nominal posture.  A
-moment constant in base axes has no potential: near theta = 0 it adds skew(m) / 2,
-antisymmetric, to the rotational block of K.
+The potential is stationary at the equilibrium, so its second derivative does not depend
+on the coordinates of SE(3): C and K are symmetric in any coordinates of the platform.
+Both depend on how the existing load follows the motion.  Here the force is dead, and
+the work of the moment m is m . theta, where theta is the rotation vector from the
+nominal posture.  A moment that is constant in base axes has no potential: near
+theta = 0 it adds the antisymmetric skew(m) / 2 to the rotational block of K.
 
 Sources:
     Zefran, Kumar (2002), A geometrical approach to the study of the Cartesian stiffness
@@ -34,7 +34,7 @@ from forcefit.assembly.platform_stiffness.matrices import (
     unit_screws,
 )
 
-FLAT = 1e-12  # relative to the largest curvature: smaller ones count as zero
+FLAT = 1e-12  # relative to the largest curvature: smaller curvatures count as zero
 
 
 def exact_tangent(
@@ -44,7 +44,8 @@ def exact_tangent(
 
     Args:
         equilibrium: the manipulator assembled with finite motions, under its loads.
-        side: state of clearances at their bound without a force.
+        side: state of clearances at their bound without a force: ``"holding"`` keeps
+            them at the bound, ``"letting go"`` releases them.
 
     Returns:
         The stiffness at the platform's displaced origin, base axes; modes of negative
@@ -72,7 +73,7 @@ def exact_tangent(
 
 
 def part_owners(equilibrium: ExactAssembly) -> tuple[Part, ...]:
-    """Return the owner of each spring; pieces belong to their beam."""
+    """Return the owner of each spring; the pieces of a beam belong to the beam."""
     cut, robot = equilibrium.cut, equilibrium.posture.robot
     parts = owners(equilibrium.expansion.placement.model.joints)
     rows = [cut.owner[row_of(cut.robot, part.frame)] for part in parts]
@@ -83,7 +84,7 @@ def part_owners(equilibrium: ExactAssembly) -> tuple[Part, ...]:
 
 
 def platform_moves(local: Expansion) -> NDArray:
-    """Return (6, N) small motion of the platform at its present origin, base axes."""
+    """Return (6, N) small motions of the platform at its current origin, base axes."""
     rows = local.placement.platform_rows.copy()
     rows[:3] = turn_jacobian(local.placement.platform_screw[:3]) @ rows[:3]
     return rows

@@ -1,17 +1,19 @@
 r"""Modes of the linear virtual-joint model: motions that the closures allow.
 
-Without loads the small motions of springs y and free joints q keep the closures,
+Without loads, the small motions of springs y and free joints q satisfy the closures,
 
     A_q q + A_y y = 0,      platform screw  P_q q + P_y y.
 
-Rows orthogonal to A_q leave Z'A_y y = 0, whose solutions y = W t, W orthonormal, are
-the modes: their energy is t.t / 2, and C = L L' with L the platform's screws.  No
-compliances are added, so that stiff and soft ones keep their digits.
+Multiplication by rows orthogonal to A_q eliminates q and gives Z'A_y y = 0.  The
+solutions y = W t, with W orthonormal, are the modes.  Their energy is t.t / 2, and
+C = L L', where L contains the platform's screws.  Compliances are not added, so stiff
+and soft ones keep their accuracy.
 
-A clearance is either held at zero (the classical model), or has the state of problem
-(22): free within its bound, or pressed against it.  A pressed clearance is rigid normal
-to its bound.  Along a round bound it is compliant: the curvature turns the force f [J,
-per unit of the bound] and so acts as a spring of stiffness f.
+A clearance is either fixed at zero (the classical model), or has the state of problem
+(22): free within its bound, or pressed against it.  A pressed clearance is rigid in the
+direction normal to its bound.  Along a round bound it is compliant: the curvature
+rotates the force f [J, per unit of the bound], which so acts as a spring of stiffness
+f.
 
 Sources:
     Pashkevich, Chablat, Wenger (2009), Stiffness analysis of overconstrained parallel
@@ -47,11 +49,11 @@ from forcefit.assembly.solvers.method import Method
 
 Side = Literal["holding", "letting go"]
 _RANK = 1e-10  # relative size below which a singular value counts as zero
-_NOISE = 1e-12  # of a column before a projection that removes it
+_NOISE = 1e-12  # rounding error of a column that a projection removes, relative to it
 
 
 def without_clearance(posture: Posture) -> PlatformStiffness:
-    """Return the classical virtual-joint model: every clearance is held at zero.
+    """Return the classical virtual-joint model, with every clearance fixed at zero.
 
     Args:
         posture: the robot's configuration.
@@ -65,11 +67,12 @@ def without_clearance(posture: Posture) -> PlatformStiffness:
 
 
 def in_contact(assembly: Assembly, side: Side = "holding") -> PlatformStiffness:
-    """Return the tangent of problem (22), with clearances free or pressed as there.
+    """Return the tangent of problem (22), with each clearance free or pressed.
 
     Args:
-        assembly: the manipulator at least energy under its loads.
-        side: state of clearances at their bound without a force.
+        assembly: the manipulator with least energy under its loads.
+        side: state of clearances at their bound without a force: ``"holding"`` keeps
+            them at the bound, ``"letting go"`` releases them.
 
     Returns:
         The stiffness at the platform's origin, from the second derivative of the least
@@ -79,11 +82,12 @@ def in_contact(assembly: Assembly, side: Side = "holding") -> PlatformStiffness:
 
 
 def active_tangent(assembly: Assembly, side: Side = "holding") -> PlatformStiffness:
-    """Return the tangent of an assembly as it is, even a small step off equilibrium.
+    """Return the tangent of an assembly that may be slightly out of equilibrium.
 
     Args:
-        assembly: assembly with clearances known to rounding.
-        side: state of clearances at their bound without a force.
+        assembly: assembly with clearances that are accurate to rounding.
+        side: state of clearances at their bound without a force, see
+            :func:`in_contact`.
 
     Returns:
         The stiffness at the platform's origin.
@@ -111,7 +115,7 @@ def active_tangent(assembly: Assembly, side: Side = "holding") -> PlatformStiffn
 
 
 def _tangents(u: NDArray) -> NDArray:
-    """Return (d - 1, d) directions along the boundary of a cone at its point (d,) u."""
+    """Return (d - 1, d) directions along the boundary of a cone at its point u (d,)."""
     if len(u) == 2:
         return np.array([[-u[1], u[0]]])
     return np.asarray(np.linalg.svd(u[None])[2][1:])

@@ -1,4 +1,4 @@
-"""The stiffness of the platform at many postures, with the parts' shares."""
+"""Stiffness of the platform at many postures, with contributions of the parts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,29 +25,30 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_RANK = 1e-10  # relative size below which a compliance's root counts as rigid
+_RANK = 1e-10  # relative size below which a square root of compliance counts as rigid
 
 
 @dataclass(frozen=True, eq=False)
 class Stiffnesses:
-    """Stiffness of the platform at k postures; ``[i]`` is one of them.
+    """Stiffness of the platform at k postures; ``[i]`` returns posture i.
 
-    A separate class, because the arrays of :class:`PlatformStiffness` have sizes that
-    differ between postures (modes, free motions, rigid directions).  Here only arrays
-    of constant shape are kept: compliances, eigen-stiffnesses, shares.
+    The sizes of the arrays of :class:`PlatformStiffness` differ between postures
+    (modes, free motions, rigid directions).  This class therefore stores only arrays of
+    constant shape: compliances, eigen-stiffnesses and shares.
 
     Attributes:
         posture: the robot's nominal configuration, k postures.
         state: state, see :class:`PlatformStiffness`.
-        point: (k, 3) [m] at which screws and wrenches are read, base axes.
+        point: (k, 3) [m] reference point of screws and wrenches, base axes.
         length: [m] characteristic length.
         springs: (k, ny, 6) [sqrt(2 J) per N m and N] deformation of every spring under
             unit wrenches at that point, base axes; NaN for postures in ``apart``.
         parts: (ny,) owner of each spring.
-        method: (k,) of the solution or of its equilibrium: ``"compiled"`` or
+        method: (k,) method of the solution or of its equilibrium: ``"compiled"`` or
             ``"reference"``.
-        apart: by row, postures whose own modes are kept: those with a free motion of
-            the platform, and all in other states than ``"nominal"``.
+        apart: stiffnesses by posture number that are stored with their modes: those of
+            postures with a free motion of the platform, and all stiffnesses in states
+            other than ``"nominal"``.
     """
 
     posture: Posture
@@ -96,13 +97,13 @@ class Stiffnesses:
         return frame_table(self.to_xarray(), "point")
 
     def at(self, points: NDArray) -> "Stiffnesses":
-        """Return the stiffnesses read at other points of the platforms.
+        """Return the stiffnesses at other points of the platforms.
 
         Args:
-            points: (k, 3) [m] base axes.
+            points: (k, 3) [m] points, base axes.
 
         Returns:
-            Their stiffnesses there.
+            The stiffnesses at these points.
         """
         move = np.swapaxes(screw_map(self.point - points), 1, 2)
         apart = {i: one.at(points[i]) for i, one in self.apart.items()}
@@ -110,7 +111,7 @@ class Stiffnesses:
 
     @cached_property
     def compliance(self) -> NDArray:
-        """(k, 6, 6) [rad/(N m) .. m/N]; NaN in components that a free motion has."""
+        """(k, 6, 6) [rad/(N m) .. m/N]; NaN in components along a free motion."""
         compliance = np.swapaxes(self.springs, 1, 2) @ self.springs
         for row, one in self.apart.items():
             compliance[row] = one.compliance
@@ -118,9 +119,9 @@ class Stiffnesses:
 
     @cached_property
     def _roots(self) -> tuple[NDArray, NDArray]:
-        """Singular values (k, 6) and vectors (k, 6, 6) of the scaled roots."""
+        """Singular values (k, 6), vectors (k, 6, 6) of the scaled compliance roots."""
         scale = np.repeat([self.length, 1.0], 3)
-        # first a triangular factor of six rows: there may be many springs
+        # reduce to six rows by a triangular factor, because there can be many springs
         known = np.isfinite(self.springs).all(axis=(1, 2))
         values = np.full((len(self.springs), 6), np.nan)
         vectors = np.full((len(self.springs), 6, 6), np.nan)
@@ -134,9 +135,9 @@ class Stiffnesses:
 
     @cached_property
     def eigen_stiffnesses(self) -> NDArray:
-        """(k, 6) [N/m] softest first, rotations times the length.
+        """(k, 6) [N/m] eigen-stiffnesses, softest first, rotations times the length.
 
-        inf if rigid, 0 for a free motion.
+        Values are inf for rigid directions and 0 for free motions.
         """
         values, _ = self._roots
         rigid = values <= _RANK * values[:, :1]
@@ -156,7 +157,7 @@ class Stiffnesses:
 
     @property
     def condition(self) -> NDArray:
-        """(k,) [-] stiffest over softest."""
+        """(k,) [-] ratio of the stiffest to the softest eigen-stiffness."""
         with np.errstate(divide="ignore"):
             return self.eigen_stiffnesses[:, -1] / self.eigen_stiffnesses[:, 0]
 
@@ -164,15 +165,15 @@ class Stiffnesses:
         """Return (k,) [N m/rad or N/m] stiffness along a direction, the others free.
 
         Args:
-            direction: (6,) unit, of a wrench.
+            direction: (6,) unit direction of a wrench.
 
         Returns:
-            1 / (d . C d); inf if rigid, 0 along a free motion.
+            1 / (d . C d); inf for a rigid direction, 0 along a free motion.
         """
         d, scale = np.asarray(direction), np.repeat([self.length, 1.0], 3)
         compliance = np.sum((self.springs @ d) ** 2, axis=1)
         largest = np.sum((self.springs * scale) ** 2, axis=(1, 2))
-        # rounding of a motion that no part makes
+        # a motion that no part makes has only rounding errors as compliance
         still = compliance <= _RANK**2 * largest * np.sum((d / scale) ** 2)
         with np.errstate(divide="ignore"):
             K = 1.0 / np.where(still, 0.0, compliance)
@@ -184,11 +185,11 @@ class Stiffnesses:
         """Return the (k,) share of each part in the compliance along a direction.
 
         Args:
-            direction: (6,) of a wrench.
+            direction: (6,) direction of a wrench.
 
         Returns:
-            By part; the sum is 1, or NaN at postures with a free motion.  Clearances
-            and forces are treated as in :meth:`PlatformStiffness.shares`.
+            Shares by part; their sum is 1, or NaN at postures with a free motion.
+            Clearances and forces are treated as in :meth:`PlatformStiffness.shares`.
         """
         energies = (self.springs @ np.asarray(direction)) ** 2
         with np.errstate(invalid="ignore"):
@@ -204,12 +205,12 @@ class Stiffnesses:
 
 
 def many_without_clearance(posture: Posture, method: Method) -> Stiffnesses:
-    """Return the classical virtual-joint model, every clearance held at zero.
+    """Return the classical virtual-joint model, with every clearance fixed at zero.
 
     Args:
         posture: k postures.
-        method: ``"compiled"``, with the reference for postures that it does not cover;
-            or ``"reference"``, numpy, one by one.
+        method: ``"compiled"``, with the reference for postures that the compiled method
+            does not cover; or ``"reference"``, in numpy, one posture at a time.
 
     Returns:
         The stiffnesses at the platform's origin.
@@ -227,7 +228,7 @@ def many_without_clearance(posture: Posture, method: Method) -> Stiffnesses:
         log_reference(posture.robot.name, "platform stiffness", count, len(left))
     size = size_of(posture.robot)
     springs = np.zeros((len(T), joints.elastic.shape[1], 6))
-    # the kernel's forces act on translations in reference lengths
+    # the translations in the kernel are divided by the reference length
     unit = np.repeat([1.0, size], 3)
     springs[:, structure.spring_order] = np.swapaxes(inner, 1, 2) * unit
     apart = {}
@@ -249,14 +250,14 @@ def many_without_clearance(posture: Posture, method: Method) -> Stiffnesses:
 
 
 def many_of_each(posture: Posture, each: Sequence[PlatformStiffness]) -> Stiffnesses:
-    """Collect stiffnesses that are known already.
+    """Collect stiffnesses that have already been computed.
 
     Args:
         posture: k postures.
-        each: k, of one state.
+        each: k stiffnesses of the same state.
 
     Returns:
-        All of them.
+        All stiffnesses in one object.
     """
     return Stiffnesses(
         posture=posture,

@@ -1,21 +1,22 @@
-r"""The platform's stiffness and compliance at a point, and derived quantities.
+r"""Stiffness and compliance of the platform at a point, and derived quantities.
 
-A small wrench w on the platform moves it by s = C w; to hold it at s takes K s.  Both
-matrices come from the modes of the manipulator: combinations of all motions that its
-closures allow, each with an energy of sigma / 2 per unit squared, sigma = +-1.
+A small wrench w on the platform moves it by s = C w.  To hold the platform at s
+requires the wrench K s.  Both matrices are computed from the modes of the manipulator:
+combinations of all motions that its closures allow.  The energy of a mode is sigma / 2
+per squared unit, with sigma = +-1.
 
 ======  ==============  ========  ====================================================
 symbol  code            shape     meaning
 ======  ==============  ========  ====================================================
 L       ``root``        (6, k)    platform screw of each mode: C = L diag(sigma) L^T
-sigma   ``signs``       (k,)      -1 only where an equilibrium is unstable
+sigma   ``signs``       (k,)      -1 only for unstable directions of an equilibrium
 Y       ``springs``     (m, k)    scaled deformation of the springs in each mode
 F       ``free``        (6, f)    unit screws of the platform without resistance
-l       ``length``      m         makes rotations lengths: eigenvalues need one unit
+l       ``length``      m         converts rotations to lengths, for eigenvalues
 ======  ==============  ========  ====================================================
 
 A free motion makes compliances infinite, a rigid direction makes stiffnesses infinite.
-Such entries are NaN; the others are not affected.
+The affected entries are NaN; all other entries remain valid.
 
 Sources:
     Salisbury (1980), Active stiffness control of a manipulator in Cartesian
@@ -68,11 +69,12 @@ class Part(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class EigenStiffnesses:
-    """Principal stiffnesses, stiffest last; rotations count as length times angle.
+    """Principal stiffnesses, the stiffest last; rotations are angle times length.
 
     Attributes:
-        values: (6,) [N/m], 0 along free motions, inf where rigid.
-        screws: (6, 6) in columns, [rad, m], of unit size with rotations times length.
+        values: (6,) [N/m], 0 along free motions, inf along rigid directions.
+        screws: (6, 6) [rad, m] screws in columns, of unit size with rotations times
+            length.
         length: [m] the characteristic length.
     """
 
@@ -84,13 +86,13 @@ class EigenStiffnesses:
 
     @property
     def condition(self) -> float:
-        """[-] stiffest over softest; inf if a motion is free or rigid."""
+        """[-] ratio of stiffest to softest; inf if a motion is free or rigid."""
         least, most = self.values[0], self.values[-1]
         return float(most / least) if least > 0.0 and np.isfinite(most) else np.inf
 
     @property
     def pitches(self) -> NDArray:
-        """(6,) [m] pitch of each screw, inf of a translation."""
+        """(6,) [m] pitch of each screw, inf for a translation."""
         turn, shift = self.screws[:3], self.screws[3:]
         squared = np.sum(turn**2, axis=0)
         turns = squared * self.length**2 > _UNTOUCHED**2
@@ -106,15 +108,15 @@ class PlatformStiffness:
     Attributes:
         posture: the robot's nominal configuration.
         state: ``"nominal"``, ``"contact"`` or ``"exact"``.
-        point: (3,) [m] at which screws and wrenches are read, base axes.
+        point: (3,) [m] reference point of screws and wrenches, base axes.
         length: [m] characteristic length.
-        root: (6, k) [rad, m] per sqrt(2 J).
-        signs: (k,) 1 or -1.
-        springs: (m, k) [sqrt(2 J)].
+        root: (6, k) [rad, m] platform screw of each mode per sqrt(2 J).
+        signs: (k,) sign of each mode's energy, 1 or -1.
+        springs: (m, k) [sqrt(2 J)] deformations of the springs in each mode.
         parts: (m,) owner of each spring.
-        free: (6, f) [rad, m].
+        free: (6, f) [rad, m] unit screws without resistance.
         method: method of the solution or of its equilibrium: ``"compiled"``, or
-            ``"reference"``, numpy and Clarabel.
+            ``"reference"`` for numpy and Clarabel.
     """
 
     posture: Posture
@@ -155,14 +157,14 @@ class PlatformStiffness:
         return frame_table(self.to_xarray(), "part")
 
     def at(self, point: ArrayLike, length: float | None = None) -> "PlatformStiffness":
-        """Return the stiffness read at another point of the platform.
+        """Return the stiffness at another point of the platform.
 
         Args:
-            point: (3,) [m] base axes.
-            length: [m] another characteristic length, if one is given.
+            point: (3,) [m] the point, base axes.
+            length: [m] new characteristic length; None to keep it.
 
         Returns:
-            Its stiffness there.
+            The stiffness at this point.
         """
         point, length = numbers_of("point", point, 3, "m"), length or self.length
         move = screw_map(self.point - point)
@@ -185,7 +187,7 @@ class PlatformStiffness:
 
     @property
     def free_text(self) -> str:
-        """Motions without resistance, in words; empty if there are none."""
+        """Text on motions without resistance; empty if there are none."""
         screws = ", ".join(numbers(screw) for screw in self.free.T)
         return f"the platform moves freely along {screws} [rad, m]" * bool(screws)
 
@@ -196,17 +198,17 @@ class PlatformStiffness:
 
     @property
     def stable(self) -> bool:
-        """Whether the potential has a minimum here."""
+        """Whether the potential has a minimum at the equilibrium."""
         return bool((self.signs > 0).all())
 
     @cached_property
     def _scale(self) -> NDArray:
-        """(6,) rotations times the characteristic length."""
+        """(6,) factors that multiply rotations by the characteristic length."""
         return np.array([*[self.length] * 3, 1.0, 1.0, 1.0])
 
     @cached_property
     def _resisted(self) -> tuple[NDArray, NDArray, NDArray]:
-        """Wrenches (6, r) of a basis, stiffness (r, r) in it, rigid wrenches (6, .)."""
+        """Basis of resisted wrenches (6, r), stiffness in it, and rigid wrenches."""
         scale = self._scale[:, None]
         basis = null_space((scale * self.free).T) if self.free.size else np.eye(6)
         whole = scale * self.root
@@ -228,7 +230,7 @@ class PlatformStiffness:
         way, core, rigid = self._resisted
         values, vectors = np.linalg.eigh(core)
         scale = self._scale[:, None]
-        # orthonormal with rotations times length
+        # screws that are orthonormal if rotations are multiplied by the length
         screws = np.hstack([
             np.linalg.qr(scale * self.free)[0],
             way @ vectors / scale,
@@ -241,17 +243,18 @@ class PlatformStiffness:
         return EigenStiffnesses(values[order], screws[:, order] / scale, self.length)
 
     def along(self, direction: ArrayLike) -> tuple[float, float]:
-        """Return the stiffness along one direction, the others free or blocked.
+        """Return the stiffness along one direction, with the others free or blocked.
 
         Args:
-            direction: (6,) of a wrench and of a screw, such as ``[0, 0, 0, 0, 0, 1]``.
+            direction: (6,) direction of a wrench and of a screw, such as
+                ``[0, 0, 0, 0, 0, 1]``.
 
         Returns:
-            [N/m or N m/rad] wrench per displacement with all other wrenches zero, and
-            with all other displacements zero.
+            [N/m or N m/rad] wrench per displacement if all other wrenches are zero, and
+            wrench per displacement if all other displacements are zero.
 
         Raises:
-            BadInput: the direction is zero, or no direction.
+            BadInput: the direction is zero or is not six numbers.
         """
         d = _direction(direction)
         with np.errstate(divide="ignore"):
@@ -266,7 +269,7 @@ class PlatformStiffness:
         screws = self.root.T @ d
         largest = np.linalg.norm(self._scale[:, None] * self.root)
         if np.linalg.norm(screws) <= _RANK * largest * np.linalg.norm(d / self._scale):
-            return 0.0  # rounding of a motion that no part makes
+            return 0.0  # the value is a rounding error of a motion that no part makes
         return float(self.signs @ screws**2)
 
     def _held(self, d: NDArray) -> float:
@@ -278,7 +281,7 @@ class PlatformStiffness:
     def centre(self) -> NDArray:
         """(3,) [m] centre of stiffness, base axes; NaN if there is none.
 
-        Read there, the block of K from translations to moments is symmetric.
+        At this point, the block of K from translations to moments is symmetric.
         """
         K = self.stiffness
         turned, shifted = K[:3, 3:], K[3:, 3:]
@@ -294,10 +297,10 @@ class PlatformStiffness:
         """Return the contribution of every part to the compliance.
 
         Returns:
-            (6, 6) by part [rad/(N m) .. m/N].  Their sum is :attr:`compliance`; in the
-            state ``"exact"`` the effect of forces on rotating parts is missing in it.
-            In the other states each is also the derivative of the compliance by the
-            logarithm of the part's own compliance (Castigliano).
+            (6, 6) by part [rad/(N m) .. m/N].  Their sum is :attr:`compliance`.  In the
+            state ``"exact"``, the sum lacks the effect of forces on rotating parts.  In
+            the other states, each contribution is also the derivative of the compliance
+            with respect to the logarithm of the part's own compliance (Castigliano).
         """
         response = self.springs @ (self.signs[:, None] * self.root.T)
         shares: dict[Part, NDArray] = {}
@@ -309,15 +312,15 @@ class PlatformStiffness:
         """Return the share of each part in the compliance along a direction.
 
         Args:
-            direction: (6,) of a wrench, such as ``[0, 0, 0, 0, 0, 1]``.
+            direction: (6,) direction of a wrench, such as ``[0, 0, 0, 0, 0, 1]``.
 
         Returns:
-            [-] by part, largest first.  The effect of existing forces on rotating parts
-            is the part ``("", "forces")``, which may be negative.  The sum is 1.  NaN
-            where the compliance is infinite or zero.
+            [-] shares by part, largest first; their sum is 1.  The part
+            ``("", "forces")`` is the effect of existing forces on rotating parts; its
+            share can be negative.  NaN if the compliance is infinite or zero.
 
         Raises:
-            BadInput: the direction is zero, or no direction.
+            BadInput: the direction is zero or is not six numbers.
         """
         d = _direction(direction)
         whole = self._compliance_along(d)
@@ -337,18 +340,18 @@ def unit_screws(screws: NDArray, length: float) -> NDArray:
     """Return the independent unit screws that span the same motions.
 
     Args:
-        screws: (6, k) [rad, m], in units of about 1 rad or length; much smaller ones
-            count as rounding.
-        length: [m] by which rotations are multiplied.
+        screws: (6, k) [rad, m] in units of about 1 rad or length; much smaller screws
+            count as rounding errors.
+        length: [m] length by which rotations are multiplied.
 
     Returns:
-        (6, f) of 1 rad, or of 1 m if they do not rotate; along the axes where possible.
+        (6, f) screws of 1 rad, or of 1 m for translations; along the axes if possible.
     """
     scale = np.array([*[length] * 3, 1.0, 1.0, 1.0])[:, None]
     U, S, _ = np.linalg.svd(scale * screws, full_matrices=False)
     basis = U[:, S > _UNTOUCHED * length]
     done = 0
-    for row in (3, 4, 5, 0, 1, 2):  # Gauss and Jordan
+    for row in (3, 4, 5, 0, 1, 2):  # Gauss-Jordan elimination
         size = np.abs(basis[row, done:])
         if size.max(initial=0.0) > _UNTOUCHED:
             pivot = done + int(size.argmax())
@@ -365,19 +368,19 @@ def unit_screws(screws: NDArray, length: float) -> NDArray:
 
 
 def numbers_of(name: str, value: ArrayLike, count: int, unit: str) -> NDArray:
-    """Return a given number of finite numbers from an argument.
+    """Return an argument as an array with a given number of finite numbers.
 
     Args:
         name: name of the argument, for error messages.
         value: the argument.
         count: the expected number of entries.
-        unit: their unit, for the message.
+        unit: unit of the entries, for the message.
 
     Returns:
-        (count,).
+        (count,) numbers.
 
     Raises:
-        BadInput: the argument is something else.
+        BadInput: the argument is not such an array.
     """
     fault = find_fault(np.asarray(value).tolist(), (count,))
     if fault:
@@ -389,7 +392,7 @@ def _direction(direction: ArrayLike) -> NDArray:
     """Return the (6,) direction scaled to unit size."""
     d = numbers_of("direction", direction, 6, "N m, N")
     if not d.any():
-        raise BadInput("direction: found 0 in all, expected 6 numbers, not all 0")
+        raise BadInput("direction: found only zeros, expected 6 numbers, not all 0")
     return d / np.linalg.norm(d)
 
 
@@ -399,7 +402,7 @@ def _touches(vectors: NDArray, d: NDArray) -> bool:
 
 
 def _blank(matrix: NDArray, unbounded: NDArray) -> NDArray:
-    """Return the matrix, NaN in rows and columns where a direction has a component."""
+    """Return the matrix with NaN in rows and columns along unbounded directions."""
     touched = np.abs(unbounded).max(axis=1, initial=0.0) > _UNTOUCHED
     matrix = np.where(touched[:, None] | touched, np.nan, matrix)
     matrix.setflags(write=False)

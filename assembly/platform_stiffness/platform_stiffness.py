@@ -1,4 +1,4 @@
-"""The platform's stiffness matrix K_C at a posture, in the requested state."""
+"""Stiffness matrix K_C of the platform at a posture, in the requested state."""
 
 from collections.abc import Sequence
 from typing import Literal, cast, get_args, overload
@@ -60,23 +60,25 @@ def platform_stiffness(
     Args:
         posture: the robot's configuration; or many postures of one robot.
         state: ``"nominal"``, the classical virtual-joint model of the nominal
-            robot, every clearance held at zero; ``"contact"``, the tangent of
+            robot, with every clearance fixed at zero; ``"contact"``, the tangent of
             problem (22) with the robot's errors, clearances and loads; ``"exact"``, the
-            tangent of the exact equilibrium, with the stiffness that internal forces
-            and loads add.
-        load: (6,) [N m, N] on the platform at its origin, base axes, or by component,
-            ``{"fz": -50}``; without effect on the classical model.
-        gravity: (3,) [m/s^2] base axes; without effect on the classical model.
-        at: (3,) [m] point of the platform, in its axes, at which screws and wrenches
-            are read.
-        side: side of a change of contact, where a clearance touches its bound without a
-            force: ``"holding"`` or ``"letting go"``.
-        method: ``"compiled"``, with the reference where that does not suffice; or
-            ``"reference"``, numpy and Clarabel alone.  In the state ``"contact"`` it is
-            the method of :func:`forcefit.assembly.linear.energy.solve_assembly`, in
-            ``"exact"`` that of :func:`forcefit.assembly.exact.exact.solve_exact`.  The
-            classical model of one posture always uses numpy, and its ``method`` says
-            so; many postures are compiled, in parallel.
+            tangent of the exact equilibrium, including the stiffness due to internal
+            forces and loads.
+        load: (6,) [N m, N] wrench on the platform at its origin, base axes; or a
+            mapping of components such as ``{"fz": -50}``.  It has no effect on the
+            classical model.
+        gravity: (3,) [m/s^2] gravity vector in base axes.  It has no effect on the
+            classical model.
+        at: (3,) [m] reference point of screws and wrenches, in platform axes.
+        side: state of clearances that touch their bound without a force: ``"holding"``
+            keeps them at the bound, ``"letting go"`` releases them.
+        method: ``"compiled"``, with the reference method where necessary; or
+            ``"reference"``, with numpy and Clarabel only.  In the state ``"contact"``,
+            the method is passed to
+            :func:`forcefit.assembly.linear.energy.solve_assembly`, in ``"exact"`` to
+            :func:`forcefit.assembly.exact.exact.solve_exact`.  The classical model of
+            one posture always uses numpy, and its field ``method`` is then
+            ``"reference"``; many postures are computed by the compiled method.
 
     Returns:
         Stiffness, compliance, free motions and shares at that point, base axes; for
@@ -87,8 +89,8 @@ def platform_stiffness(
         CannotAssemble: the errors cannot be closed.
         FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: no equilibrium was found.
-        BadInput: a point or a load is no number.
-        ValueError: no such state, side or method.
+        BadInput: a point or a load does not consist of numbers.
+        ValueError: ``state``, ``side`` or ``method`` is unknown.
     """
     check_method(method)
     offset = numbers_of("at", at, 3, "m")

@@ -1,20 +1,22 @@
-r"""Derivatives of the platform's stiffness by a number of the robot.
+r"""Derivatives of the platform's stiffness with respect to a number of the robot.
 
 The stiffness at an equilibrium depends on a number p directly, and through the
-equilibrium (x, lambda, f): unknowns, closures' multipliers and forces of the pressed
-clearances.  The equilibrium moves by the derivative of its conditions,
+equilibrium (x, lambda, f): unknowns, multipliers of the closures and forces of the
+pressed clearances.  The change of the equilibrium follows from the derivative of its
+conditions,
 
     [ H   A'  N ] [ dx       ]     [ dg/dp ]
     [ A   0   0 ] [ -dlambda ] = - [ dr/dp ] dp
     [ N'  0   0 ] [ df       ]     [   0   ]
 
-(:mod:`.active_set`), with g the gradient of the Lagrangian and r the closures at x,
-both in closed form for any p, and N the normals of the pressed bounds.  So no problem
-is solved again.  The tangent is then evaluated a step ahead and back along (p, x,
-lambda): central differences of a closed form, with an error of the square of the step.
+(:mod:`.active_set`).  Here g is the gradient of the Lagrangian, r the residual of the
+closures at x, and N the normals of the bounds of pressed clearances.  Both g and r are
+known in closed form for any p, so no problem is solved again.  The tangent is then
+evaluated one step ahead and one step back along (p, x, lambda).  The error of these
+central differences is proportional to the square of the step.
 
-Pressed clearances stay pressed.  At a change of contact the tangent has no derivative,
-and it is NaN.
+Pressed clearances are assumed to remain pressed.  At a change of contact, the tangent
+has no derivative, and the result is NaN.
 
 Sources:
     Haftka, Adelman (1989), Recent developments in structural sensitivity analysis
@@ -65,16 +67,17 @@ from forcefit.assembly.platform_stiffness.platform_stiffness import State
 
 @dataclass(frozen=True)
 class TangentState:
-    """State of the tangent, and the point at which it is read.
+    """State of the tangent stiffness, and its reference point.
 
-    See ``platform_stiffness``.
+    See
+    :func:`forcefit.assembly.platform_stiffness.platform_stiffness.platform_stiffness`.
 
     Attributes:
         state: ``"nominal"``, ``"contact"`` or ``"exact"``.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes.
-        at: (3,) [m] of the platform, in its axes.
-        side: side of a change of contact.
+        load: (6,) [N m, N] wrench on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] gravity vector in base axes.
+        at: (3,) [m] reference point, in platform axes.
+        side: state of clearances at their bound without a force.
     """
 
     state: State = "nominal"
@@ -90,24 +93,24 @@ _Moved = Callable[[Posture, float], tuple[PlatformStiffness, NDArray]]
 def compliance_slope(
     posture: Posture, ahead: Posture, back: Posture, step: float, asked: TangentState
 ) -> NDArray:
-    """Return the derivative of the platform's compliance by a number of its robot.
+    """Return the derivative of the platform's compliance with respect to a number.
 
     Args:
         posture: the robot's configuration.
-        ahead: the configuration with the number a step larger.
-        back: the configuration with the number a step smaller.
-        step: step of the number.
-        asked: state of the tangent, and its point.
+        ahead: the configuration with the number increased by a step.
+        back: the configuration with the number decreased by a step.
+        step: size of the step, in the unit of the number.
+        asked: state of the tangent, and its reference point.
 
     Returns:
-        (6, 6) [rad/(N m) .. m/N per unit of the number], base axes; NaN where a motion
-        of the platform is free, or at a change of contact.
+        (6, 6) [rad/(N m) .. m/N per unit of the number], base axes; NaN if a motion of
+        the platform is free, or at a change of contact.
 
     Raises:
         CannotAssemble: the errors cannot be closed.
         FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: no equilibrium was found.
-        BadInput: a point or a load is no number.
+        BadInput: a point or a load does not consist of numbers.
     """
     offset = numbers_of("at", asked.at, 3, "m")
     moved = _STATES[asked.state](posture, ahead, back, step, asked)
@@ -122,14 +125,14 @@ def compliance_slope(
 def _classical(
     posture: Posture, ahead: Posture, back: Posture, step: float, asked: TangentState
 ) -> _Moved:
-    """Return neighbouring tangents of the classical model, at the nominal posture."""
+    """Return a function that computes neighbouring tangents of the classical model."""
     return lambda there, by: (without_clearance(there), there.platform)
 
 
 def _linear(
     posture: Posture, ahead: Posture, back: Posture, step: float, asked: TangentState
 ) -> _Moved:
-    """Return the neighbouring tangents of problem (22), pressed clearances kept."""
+    """Return a function that computes neighbouring tangents of problem (22)."""
     start = settle(solve_assembly(posture, asked.load, gravity=asked.gravity))
     pressed, touching = contacts(start)
     x, multipliers = unknowns(start), start.multipliers
@@ -172,7 +175,7 @@ def _like(joints: VirtualJoints, there: Posture) -> VirtualJoints:
 def _exact(
     posture: Posture, ahead: Posture, back: Posture, step: float, asked: TangentState
 ) -> _Moved:
-    """Return the neighbouring tangents of the exact equilibrium."""
+    """Return a function that computes neighbouring tangents with finite motions."""
     start = solve_exact(posture, asked.load, gravity=asked.gravity)
     local = start.expansion
     at, model = local.placement, local.placement.model
@@ -220,11 +223,11 @@ def _difference(
     conditions: Callable[[Posture], tuple[NDArray, NDArray]],
     ahead: Posture, back: Posture, step: float,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return derivatives of closures and gradient by the number, at fixed unknowns."""
+    """Return the derivatives of closures and gradient for fixed unknowns."""
     there, behind = conditions(ahead), conditions(back)
     return (there[0] - behind[0]) / (2 * step), (there[1] - behind[1]) / (2 * step)
 
 
 def _unknown(tangent: PlatformStiffness) -> PlatformStiffness:
-    """Return a tangent of NaN: at a change of contact no derivative exists."""
+    """Return the tangent with NaN, because it has no derivative at a contact change."""
     return replace(tangent, root=np.full_like(tangent.root, np.nan))

@@ -1,18 +1,17 @@
-r"""Natural frequencies and modes at a posture, drives held.
+r"""Natural frequencies and modes at a posture, with the drives fixed.
 
 The stiffness is the tangent of the equilibrium, Z'HZ of
-:mod:`forcefit.assembly.platform_stiffness.exact_tangent`.  The mass is that of all
-moving
-bodies: masses and moments of inertia of frames as of rigid bodies, and beams with a
-density by their consistent mass, with a cubic motion between their clamped ends and the
-rotary inertia of their sections.
+:mod:`forcefit.assembly.platform_stiffness.exact_tangent`.  The mass M includes all
+moving bodies.  Masses and moments of inertia of frames are rigid bodies.  Beams with a
+density have a consistent mass, for a cubic motion between their clamped ends and with
+the rotary inertia of their sections.
 
     (Z'HZ - omega^2 Z'MZ) t = 0
 
-The first frequency of a cantilever in n pieces is too high by 0.5 % for n = 1 and 0.01
-% for 2, because of the cubic.  Links given by a mesh with a density have the mass of
-their finite elements, condensed on both ends; links given by a matrix or a library have
-none.
+Because of the cubic approximation, the first frequency of a cantilever in n pieces is
+too high by 0.5 % for n = 1 and by 0.01 % for n = 2.  The mass of a mesh link with a
+density is that of its finite elements, condensed to both ends.  Links given by a matrix
+or a library have no mass.
 
 Sources:
     Przemieniecki (1968), Theory of Matrix Structural Analysis, section 11.3 (consistent
@@ -49,8 +48,8 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_NULL = 1e-12  # relative to the largest eigenvalue: below it neither mass nor stiffness
-_ROUNDING = 1e-14  # of the largest entry of the mass matrix: rounding of its entries
+_NULL = 1e-12  # eigenvalues below this share of the largest are zero
+_ROUNDING = 1e-14  # rounding of the mass matrix relative to its largest entry
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,12 +59,13 @@ class NaturalModes:
     Attributes:
         posture: the robot's nominal configuration.
         frequencies: (k,) [Hz]; 0 for motions without resistance, NaN if unstable.
-        platform_screws: (6, k) [rad, m] platform's motion, of modal mass 1 kg.
+        platform_screws: (6, k) [rad, m] motions of the platform for a modal mass of
+            1 kg.
         shares: for each mode the share of every part in its elastic energy, largest
             first; empty without elastic energy.
         idle: number of motions without resistance that leave the platform fixed, such
-            as a rod's spin between two ball joints; they are not among the modes.
-        method: method of their equilibrium: ``"compiled"`` or ``"reference"``.
+            as the spin of a rod between two ball joints; they are not among the modes.
+        method: method of the equilibrium: ``"compiled"`` or ``"reference"``.
     """
 
     posture: Posture
@@ -99,15 +99,15 @@ def natural_modes(
     state: Literal["nominal", "exact"] = "nominal",
     method: Method = "compiled",
 ) -> NaturalModes:
-    """Return the natural frequencies and modes of a robot, its drives held.
+    """Return the natural frequencies and modes of a robot with fixed drives.
 
     Args:
         posture: the robot's configuration.
         count: largest number of modes.
-        load: (6,) [N m, N] on the platform, or by component, ``{"fz": -50}``, only in
-            the state ``"exact"``; it has no mass.
-        gravity: (3,) [m/s^2], only in the state ``"exact"``.
-        state: ``"nominal"``, of the nominal robot with clearances held at zero;
+        load: (6,) [N m, N] wrench on the platform; or a mapping of components such as
+            ``{"fz": -50}``.  Only for the state ``"exact"``; the load has no mass.
+        gravity: (3,) [m/s^2] gravity vector, only for the state ``"exact"``.
+        state: ``"nominal"``, for the nominal robot with clearances fixed at zero;
             ``"exact"``, around the equilibrium with errors, clearances and loads.
         method: method of :func:`forcefit.assembly.exact.exact.solve_exact`.
 
@@ -115,16 +115,16 @@ def natural_modes(
         The modes.
 
     Raises:
-        BadInput: no body that moves has a mass.
+        BadInput: no moving body has a mass.
         CannotAssemble: the errors cannot be closed.
         FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: no equilibrium was found.
-        ValueError: no such state or method.
+        ValueError: ``state`` or ``method`` is unknown.
     """
     if state not in {"nominal", "exact"}:
         raise ValueError(f"natural_modes: no state {state!r}")
     if state == "nominal":
-        # forces of drives are loads
+        # drive forces are loads, which the nominal state excludes
         frames = (
             replace(f, clearance=None, drive_force=0.0) for f in posture.robot.frames
         )
@@ -138,7 +138,7 @@ def natural_modes(
     if not np.trace(M) > 0.0:
         raise BadInput(_no_mass(posture.robot))
     squares, modes = _modes(H, M, rounding)
-    if not squares.size:  # the mass of what moves is rounding
+    if not squares.size:  # the mass of the moving parts is only a rounding error
         raise BadInput(_no_mass(posture.robot))
     squares, modes, idle = _without_idle(
         squares, modes, platform_moves(equilibrium.expansion) @ D
@@ -154,7 +154,7 @@ def natural_modes(
 
 
 def check_masses(robot: Robot) -> None:
-    """Reject a robot without any mass.
+    """Raise BadInput for a robot without any mass.
 
     Raises:
         BadInput: no body has a mass.
@@ -176,7 +176,7 @@ def _no_mass(robot: Robot) -> str:
 def _without_idle(
     squares: NDArray, modes: NDArray, moves: NDArray
 ) -> tuple[NDArray, NDArray, int]:
-    """Separate free motions that leave the platform fixed, and leave them out."""
+    """Remove free motions that leave the platform fixed, and count them."""
     free = squares == 0.0
     if not free.any():
         return squares, modes, 0
@@ -198,12 +198,12 @@ def _modes(K: NDArray, M: NDArray, rounding: NDArray) -> tuple[NDArray, NDArray]
         rounding: (k, k) bound of the rounding errors of M as a quadratic form.
 
     Returns:
-        (m,) and (k, m).
+        (m,) squared frequencies and (k, m) modes.
     """
-    shift = np.trace(K) / np.trace(M) or 1.0  # 1 if no part is elastic
+    shift = np.trace(K) / np.trace(M) or 1.0  # 1 for a robot without elastic parts
     values, vectors = np.linalg.eigh(K + shift * M)
     least = shift * np.sum(vectors * (rounding @ vectors), axis=0)
-    # no mode without mass and spring
+    # omit motions without mass and spring
     kept = values > np.maximum(_NULL * values.max(), least)
     if not kept.any():
         return np.zeros(0), np.zeros((len(K), 0))
@@ -232,10 +232,10 @@ def mass_matrix(equilibrium: ExactAssembly) -> NDArray:
     """Return the (N, N) [kg m^2 per squared unit] mass matrix in the unknowns.
 
     Args:
-        equilibrium: an equilibrium.
+        equilibrium: equilibrium of the robot.
 
     Returns:
-        Symmetric, positive semidefinite.
+        Symmetric, positive semidefinite matrix.
     """
     placement, robot = equilibrium.placement, equilibrium.cut.robot
     M = np.zeros((len(placement.x), len(placement.x)))
@@ -277,11 +277,11 @@ def _ends(
     """Return the (12, N) motion of a link's base and tip, each at its own position.
 
     Args:
-        equilibrium: an equilibrium.
-        i: the link's frame.
-        tip: (6, N) of the body's end, at the platform's nominal origin.
-        span: (3,) [m] from base to tip, in the frame's axes.
-        axes: (3, 3) axes in which motions are read, seen from the frame.
+        equilibrium: equilibrium of the robot.
+        i: index of the link's frame.
+        tip: (6, N) motion of the body's end, at the platform's nominal origin.
+        span: (3,) [m] vector from base to tip, in the frame's axes.
+        axes: (3, 3) axes of the returned motions, seen from the frame.
 
     Returns:
         Rotations and translations of the base, then of the tip.
@@ -317,7 +317,7 @@ def _beam_mass(frame: Frame) -> NDArray:
     e, f, g = 3 * length, 4 * length**2, length**2
     bends = ((4, 2, 10, 8), 1, section.I_z), ((5, 1, 11, 7), -1, section.I_y)
     for plane, sign, second in bends:
-        # a rotation about y lowers points ahead along x
+        # a rotation about y lowers points that are ahead along x
         s = np.array([1, sign, 1, sign])
         shift = np.array([
             [156, a, 54, -b], [a, c, b, -d], [54, b, 156, -a], [-b, -d, -a, c]

@@ -1,4 +1,4 @@
 """Results of assemblies as text, JSON, tables and figures.
 
-Begin at ``results.py``.
+Start with ``results.py``.
 """

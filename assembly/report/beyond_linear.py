@@ -4,7 +4,7 @@ import numpy as np
 
 from forcefit.assembly.exact.exact import ExactAssembly
 
-# relative difference from the linear model, of the platform's motion and of the energy
+# relative difference from the linear model of the platform's motion, and of the energy
 # or potential; it is smaller even for links that rotate by 0.1 rad
 _FAR = 0.3
 
@@ -12,14 +12,14 @@ _FAR = 0.3
 def far_from_linear(assembly: ExactAssembly) -> list[str]:
     """Return a remark on a loaded robot that may be beyond a critical load.
 
-    Such an equilibrium may be stable, like that of a buckled column, so stability does
-    not show it.
+    Such an equilibrium may be stable, like a buckled column, so a test of stability
+    does not detect it.
 
     Args:
         assembly: assembly with finite motions.
 
     Returns:
-        One sentence, or nothing.
+        A list with one sentence, or an empty list.
     """
     loads = assembly.loads
     if not (loads.load.any() or loads.beyond_platform or loads.drives.any()):

@@ -24,7 +24,7 @@ from forcefit.stiffness.screws import SCREW, WRENCH
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_ROWS = 25  # largest number of rows of the table in the text
+_ROWS = 25  # largest number of rows of the text table
 
 
 def deflection_of(
@@ -37,23 +37,23 @@ def deflection_of(
     follow: bool = False,
     progress: Progress = lambda what, done, most: None,
 ) -> dict[str, Any]:
-    """Return the results of ``assembly deflection`` as plain values.
+    """Return the results of ``assembly deflection`` as a dictionary of plain values.
 
     Args:
         posture: posture of the robot.
         component: component of the load that varies, 0 to 5.
-        loads: [N m or N] values of this component in the order in which they act.
+        loads: [N m or N] values of this component in the order of their application.
         load: (6,) [N m, N] constant part of the load.
-        gravity: (3,) [m/s^2] base axes.
-        state: ``"exact"`` with finite motions.
+        gravity: (3,) [m/s^2] gravity in base axes.
+        state: ``"exact"`` for finite motions, ``"contact"`` for small screws.
         follow: whether the path is followed by arc length past limit points, from the
-            first to the last load; this requires finite motions, and clearances are
-            held at zero.
+            first to the last load. This requires finite motions; clearances are then
+            kept at zero.
         progress: called with the kind of step, the number of finished steps, and the
             largest number of steps.
 
     Returns:
-        Curve and events; ``status`` is ``"ok"``, or the reason why there is no curve.
+        Curve and events; ``status`` is ``"ok"`` or the reason why there is no curve.
     """
     results: dict[str, Any] = {
         "robot": posture.robot.name, "status": "ok", "pose": posture.pose(),
@@ -90,7 +90,7 @@ def _curve_values(curve: DeflectionCurve) -> dict[str, Any]:
 
 
 def deflection_text(results: dict[str, Any]) -> str:
-    """Return a curve as text: a table, and the events."""
+    """Return a curve as text: a table and the list of events."""
     head = listing(results["robot"], lines_of(results, "pose status reason state"))
     if "loads" not in results:
         return head

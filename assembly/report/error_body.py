@@ -1,7 +1,7 @@
-"""Convex set of the possible pose errors of the platform.
+"""Convex set of possible pose errors of the platform.
 
-The set is approximated from inside by support points in many directions, and from
-outside by the support function in these directions.
+Support points in many directions approximate the set from inside; the support function
+in the same directions approximates it from outside.
 """
 
 from dataclasses import dataclass
@@ -25,8 +25,7 @@ class ErrorBody:
     Attributes:
         part: ``"rotation"`` or ``"translation"``.
         points: (k, 3) [rad or m] points of the set, base axes; vertices of the inner
-            polytope.
-        faces: (m, 3) rows of ``points`` for each face; empty if the set is flat.
+        faces: (m, 3) row indices of ``points`` for each face; empty for a flat set.
         directions: (k, 3) unit vectors.
         heights: (k,) [rad or m] certified largest component along each direction.
     """
@@ -46,7 +45,7 @@ class ErrorBody:
         return float(np.max(self.heights - inner))
 
     def contains(self, error: ArrayLike) -> bool:
-        """Return whether an error (3,) is within all heights; False is a proof."""
+        """Return whether an error (3,) may be in the set; False is a proof."""
         return bool(np.all(self.directions @ np.asarray(error) <= self.heights))
 
 
@@ -54,16 +53,16 @@ def possible_errors(assembly: Assembly, part: str, assumption: str) -> ErrorBody
     """Return the set of errors of an assembled robot's platform.
 
     Args:
-        assembly: of one point.
+        assembly: assembly at one posture.
         part: ``"rotation"`` or ``"translation"``.
-        assumption: of problem (27).
+        assumption: assumption of problem (27).
 
     Returns:
-        The set.
+        The set of possible errors.
 
     Raises:
-        BadInput: no such part, or the platform moves freely, so its errors have no
-            bound.
+        BadInput: the part is unknown, or the platform moves freely, so its errors have
+            no bound.
         SolverFailed: the cone solver failed.
     """
     if part not in PARTS:
@@ -107,7 +106,7 @@ def error_body(reachable: ReachableSet, part: str, count: int = 200) -> ErrorBod
 
 
 def _faces(points: NDArray) -> NDArray:
-    """Return the triangles of the convex hull; none if the points are in a plane."""
+    """Return the triangles of the convex hull; none if the points are coplanar."""
     try:
         return ConvexHull(points).simplices
     except QhullError:
@@ -115,7 +114,7 @@ def _faces(points: NDArray) -> NDArray:
 
 
 def even_directions(count: int) -> NDArray:
-    """Return unit vectors distributed evenly over the sphere, along a golden spiral.
+    """Return unit vectors distributed evenly over the sphere along a golden spiral.
 
     Args:
         count: number of vectors.

@@ -15,17 +15,17 @@ from forcefit.assembly.model.statuses import BEYOND_LIMITS, SINGULAR
 from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.results.display import rounded, screw_text
 
-# relative change of the energy by finite motions from which on first order is invalid
+# relative energy change by finite motions above which first order counts as invalid
 MOST_ENERGY = 0.5
-# [rad or lengths] joint motion from which on first order is invalid; the linear
-# closures then have an error of a tenth
+# [rad or lengths] joint motion above which first order counts as invalid; the error of
+# the linear closures is then a tenth
 _LARGE = 0.3
 
 
 def linearisation_of(
     assembly: Assembly, gravity: ArrayLike | None
 ) -> tuple[dict[str, Any], str]:
-    """Return linear minus exact solution as plain values, and the exact one as text."""
+    """Return linear minus exact solution as values, and the exact solution as text."""
     try:
         exact = solve_exact(assembly.posture, assembly.load, assembly, gravity=gravity)
     except SolverFailed as error:
@@ -36,15 +36,15 @@ def linearisation_of(
 def first_order_status(
     assembly: Assembly, linearisation: dict[str, Any], finite: str
 ) -> dict[str, str]:
-    """Return status and reason if the first-order analysis is invalid; else nothing.
+    """Return status and reason if the first-order analysis is invalid.
 
     Args:
-        assembly: assembly by the first-order analysis.
+        assembly: assembly from the first-order analysis.
         linearisation: difference from :func:`linearisation_of`.
         finite: text of the exact solution.
 
     Returns:
-        Keys of the public format.
+        ``status`` and ``reason`` of the public format; empty if the analysis is valid.
     """
     change = abs(linearisation.get("relative_energy", 0.0))
     scale = np.repeat([1.0, assembly.linearisation.size], 3)
@@ -70,11 +70,11 @@ def posture_status(
 
     Args:
         posture: posture of the robot.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes.
+        load: (6,) [N m, N] load on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] gravity in base axes.
 
     Returns:
-        Keys of the public format; empty for any other posture.
+        ``status`` and ``reason`` of the public format; empty for any other posture.
     """
     if passed := limits_passed(posture.robot, posture.coordinates):
         return {"status": BEYOND_LIMITS, "reason": passed}
@@ -88,11 +88,11 @@ def singular_status(
 
     Args:
         posture: posture of the robot.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes.
+        load: (6,) [N m, N] load on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] gravity in base axes.
 
     Returns:
-        Keys of the public format; empty for any other posture.
+        ``status`` and ``reason`` of the public format; empty for any other posture.
     """
     if not _singular(posture):
         return {}
@@ -104,7 +104,7 @@ def singular_status(
 
 
 def off_by(change: float) -> str:
-    """Return the reason if the first-order energy is wrong by a given share."""
+    """Return the reason if the first-order energy has a given relative error."""
     return (
         "the first-order analysis is not valid here: its energy is wrong by "
         f"{100 * abs(change):.3g} %"
@@ -117,7 +117,7 @@ def _singular(posture: Posture) -> bool:
 
 
 def _words(exact: ExactAssembly) -> str:
-    """Return energy and pose error of the solution with finite motions, as text."""
+    """Return energy and pose error of the solution with finite motions as text."""
     return (
         f"{rounded(exact.energy):.6g} J, platform error "
         f"{screw_text(exact.platform_screw)}"

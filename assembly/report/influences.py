@@ -1,4 +1,4 @@
-"""Whether the order of assembly matters, in words and plain values."""
+"""Whether the order of joining matters, as text and as plain values."""
 
 from itertools import takewhile
 from typing import Any
@@ -17,16 +17,17 @@ from forcefit.assembly.steps.state import State
 def influences_among_joins(
     machine: Machine, state: State, plan: Plan, number: int
 ) -> list[Influence]:
-    """Return the influences among the joins that begin with a step.
+    """Return the influences among consecutive joins, of which a step is the first.
 
     Args:
         machine: columns and rows of the robot.
-        state: before the step.
+        state: state before the step.
         plan: the steps.
-        number: of the step, from 0.
+        number: index of the step, from 0.
 
     Returns:
-        None where the step is not the first of its joins, or clearances are loose.
+        The influences; empty if the step is not the first of consecutive joins, or if
+        clearances are loose.
     """
     before = plan.steps[number - 1] if number else None
     if isinstance(before, Join) or not state.is_linear(machine):
@@ -36,14 +37,14 @@ def influences_among_joins(
 
 
 def about_influences(plan: Plan, found: list[Influence]) -> list[str]:
-    """Return whether the order matters, and which steps move which openings.
+    """Return sentences on whether the order matters and which steps move openings.
 
     Args:
         plan: the steps.
-        found: influences among its joins.
+        found: influences among the plan's joins.
 
     Returns:
-        Sentences.
+        The sentences.
     """
     moved: dict[str, list[str]] = {pair.locked: [] for pair in found}
     for pair in found:
@@ -63,10 +64,10 @@ def about_influences(plan: Plan, found: list[Influence]) -> list[str]:
 
 
 def influence_values(pair: Influence) -> dict[str, Any]:
-    """Return the influence of one join on another as plain values.
+    """Return the influence of one join on another as a dictionary of plain values.
 
     Args:
-        pair: the two joins.
+        pair: influence between the two joins.
 
     Returns:
         Values by name.
@@ -78,7 +79,7 @@ def influence_values(pair: Influence) -> dict[str, Any]:
 
 
 def about_order(plan: Plan) -> str:
-    """Return whether a step depends on the order, in a sentence.
+    """Return a sentence on whether the result of a plan depends on the order.
 
     Args:
         plan: the steps.

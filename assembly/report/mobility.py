@@ -1,4 +1,4 @@
-"""Mobility of a robot as plain values and in words."""
+"""Mobility of a robot as plain values and as text."""
 
 from collections.abc import Mapping, Sequence
 from itertools import groupby
@@ -17,7 +17,7 @@ from forcefit.assembly.kinematics.pure_motions import PureMotion, pure_motions
 from forcefit.results.display import listing
 from forcefit.results.text import lines_of
 
-# ratio of singular values below which a rank is not certain
+# ratio of singular values below which a rank counts as uncertain
 CERTAIN = 100.0
 _FREE = ("freedom", "freedoms")
 _OVER = ("over-constraint", "over-constraints")
@@ -29,14 +29,14 @@ _VERBS = {
 
 
 def shown_of(posture: Posture) -> dict[str, Any]:
-    """Return what ``assembly show`` tells besides the picture, as plain values.
+    """Return the numbers that ``assembly show`` prints besides the picture.
 
     Args:
-        posture: of the robot.
+        posture: posture of the robot.
 
     Returns:
-        Pose, mobility, remarks, and for each frame the point, x and z of its axes [m,
-        base axes], in which its errors, clearance and springs are.
+        Pose, mobility and remarks; and for each frame the point and the x and z axes
+        [m, base axes] in which its errors, clearance and springs are expressed.
     """
     robot = posture.robot
     axes = {
@@ -59,15 +59,15 @@ def shown_text(results: Mapping[str, Any]) -> str:
 
 
 def mobility_of(posture: Posture) -> dict[str, Any]:
-    """Return the mobility at a posture as plain values.
+    """Return the mobility at a posture as a dictionary of plain values.
 
     Args:
-        posture: of the robot.
+        posture: posture of the robot.
 
     Returns:
         The counts of :class:`forcefit.assembly.kinematics.mobility.Mobility`, the
-        platform's motions, and whether there are more freedoms than at postures nearby;
-        then the counts there, where motions lead away from the posture.
+        platform's motions, and whether there are more freedoms than at nearby postures;
+        then also the counts at the nearby postures.
     """
     here = mobility(posture)
     near = mobility_near(posture, here)
@@ -77,14 +77,14 @@ def mobility_of(posture: Posture) -> dict[str, Any]:
     singular = near.freedoms < here.freedoms
     singular |= there.freedoms_drives_locked < here.freedoms_drives_locked
     if singular and near.there is not None:
-        # without motions: several modes may meet here, with different ones
+        # motions are omitted: several modes with different motions may meet here
         counts["near"] = vars(near.there)
     counts |= {"singular": singular, "finite_freedoms": near.freedoms}
     return counts | {"words": mobility_words(counts)}
 
 
 def _motions(posture: Posture) -> list[dict[str, Any]]:
-    """Return the platform's motions as plain values; absent keys have no meaning."""
+    """Return the platform's motions as plain values, without meaningless keys."""
     screws, error = platform_screws(posture)
     motions = pure_motions(
         screws, posture.platform[:3, 3], size_of(posture.robot), error
@@ -95,13 +95,13 @@ def _motions(posture: Posture) -> list[dict[str, Any]]:
 
 
 def mobility_words(counts: Mapping[str, Any]) -> str:
-    """Return freedoms, the platform's motions and over-constraints in words.
+    """Return freedoms, the platform's motions and over-constraints as text.
 
     Args:
-        counts: of :func:`mobility_of`.
+        counts: result of :func:`mobility_of`.
 
     Returns:
-        Such as "3 freedoms: translates along x, y, z; 12 over-constraints".
+        Text such as "3 freedoms: translates along x, y, z; 12 over-constraints".
     """
     total, moved = counts["freedoms"], counts["platform_freedoms"]
     text = _number(total, *_FREE)
@@ -114,13 +114,14 @@ def mobility_words(counts: Mapping[str, Any]) -> str:
 
 
 def motion_words(motions: Sequence[PureMotion]) -> str:
-    """Return motions of a body in words.
+    """Return the motions of a body as text.
 
     Args:
-        motions: of :func:`forcefit.assembly.kinematics.pure_motions.pure_motions`.
+        motions: result of
+            :func:`forcefit.assembly.kinematics.pure_motions.pure_motions`.
 
     Returns:
-        Such as "translates along z and turns about x, y through (0, 0, 0.4) m".
+        Text such as "translates along z and turns about x, y through (0, 0, 0.4) m".
     """
     slides = [m for m in motions if m.kind == "translation"]
     others = [m for m in motions if m.kind != "translation"]
@@ -141,7 +142,7 @@ def _kind(motion: PureMotion) -> str:
 
 
 def _of_kind(kind: str, motions: Sequence[PureMotion]) -> str:
-    """Return motions of one kind in words; turns have one point in common."""
+    """Return motions of one kind as text; rotations intersect in one point."""
     along = ", ".join(_direction(motion.direction) for motion in motions)
     text = f"{_VERBS[kind]} {along}"
     first = motions[0]
@@ -153,7 +154,7 @@ def _of_kind(kind: str, motions: Sequence[PureMotion]) -> str:
 
 
 def _direction(d: Any) -> str:
-    """Return a direction: the name of an axis of the base, or its components."""
+    """Return a direction as text: the name of a base axis, or the components."""
     k = int(np.argmax(np.abs(d)))
     if abs(d[k]) > 1 - 1e-9:
         return "xyz"[k]
@@ -161,12 +162,12 @@ def _direction(d: Any) -> str:
 
 
 def _plain(value: float) -> str:
-    """Return a number of 4 digits, rounding errors as 0."""
+    """Return a number with 4 digits as text, with rounding errors as 0."""
     return f"{0.0 if abs(value) < 1e-9 else value:.4g}"
 
 
 def _number(count: int, one: str, many: str) -> str:
-    """Return a count and its noun."""
+    """Return a count followed by its noun."""
     return f"{count} {one if count == 1 else many}"
 
 
@@ -174,11 +175,11 @@ def mobility_lines(counts: Mapping[str, Any]) -> dict[str, str]:
     """Return the mobility as lines of text.
 
     Args:
-        counts: of :func:`mobility_of`.
+        counts: result of :func:`mobility_of`.
 
     Returns:
-        By words: mobility; what locked drives leave free, redundant drives, another
-        number of freedoms nearby and uncertain counts only where there are any.
+        Texts by title: always the mobility; only if they occur, freedoms with locked
+        drives, redundant drives, a different mobility nearby, and uncertain counts.
     """
     lines = {"mobility": counts["words"]}
     if held := counts["freedoms_drives_locked"]:
@@ -198,7 +199,7 @@ def mobility_lines(counts: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _singular(counts: Mapping[str, Any]) -> str:
-    """Return the mobility near a singular posture in words."""
+    """Return the mobility near a singular posture as text."""
     if "near" not in counts:
         finite = _number(counts["finite_freedoms"], *_FREE)
         return f"motions at first order only, {finite} of finite size"

@@ -30,10 +30,10 @@ from forcefit.results.text import lines_of, table_lines, value_text
 from forcefit.stiffness.screws import SCREW, WRENCH
 
 DIRECTIONS = tuple(name.lower() for name in SCREW)
-# words for the two sides of a change of contact
+# texts for the two sides of a change of contact
 _SIDES = {"holding": "loading", "letting go": "unloading"}
 _KINDS = {"link": "links", "joint": "joints", "clearance": "clearances"}
-_SHOWN = 12  # number of parts in the table and the chart; other parts share one row
+_SHOWN = 12  # number of parts in the table and the chart; all others form one row
 
 
 def stiffness_of(
@@ -45,22 +45,22 @@ def stiffness_of(
     length: float | None = None,
     direction: ArrayLike | None = None,
 ) -> dict[str, Any]:
-    """Return the results of ``assembly stiffness`` as plain values.
+    """Return the results of ``assembly stiffness`` as a dictionary of plain values.
 
     Args:
         posture: posture of the robot.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes.
-        at: (3,) [m] point of the platform, in platform axes, at which screws and
-            wrenches are read.
+        load: (6,) [N m, N] load on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] gravity in base axes.
+        at: (3,) [m] point of the platform, in platform axes, to which screws and
+            wrenches refer.
         state: ``"nominal"``, ``"contact"`` or ``"exact"``; the nominal state includes
             the tangent of problem (22) if the robot has clearances.
-        length: [m] factor on rotations; the longest body if absent.
-        direction: (6,) unit screw, base axes, along which stiffness and shares are
+        length: [m] factor on rotations; None for the length of the longest body.
+        direction: (6,) unit screw in base axes, along which stiffness and shares are
             computed.
 
     Returns:
-        The keys of the public format; ``status`` is ``"ok"``, ``"free motion"``,
+        The keys of the public format. ``status`` is ``"ok"``, ``"free motion"``,
         ``"unstable"``, or the reason why there is no equilibrium.
     """
     results: dict[str, Any] = {
@@ -91,7 +91,7 @@ def stiffness_of(
 def _tangents(
     posture: Posture, load: Any, gravity: Any, state: State
 ) -> tuple[NDArray, list[PlatformStiffness], list[str] | None]:
-    """Return the platform's pose, the tangents of one or both sides, and remarks."""
+    """Return the platform's pose, the tangents on one or both sides, and remarks."""
     if state == "nominal":
         return posture.platform, [without_clearance(posture)], None
     if state == "contact":
@@ -109,7 +109,7 @@ def _tangents(
 
 
 def _along(answer: PlatformStiffness, direction: ArrayLike) -> dict[str, Any]:
-    """Return stiffness and shares along a rotation or translation."""
+    """Return stiffness and shares along a given screw."""
     way = np.asarray(direction, dtype=float)
     free, blocked = answer.along(way)
     return {
@@ -149,11 +149,11 @@ def _status(stiffness: PlatformStiffness) -> str:
 def stiffness_values(
     platform: PlatformStiffness, point: NDArray, length: float | None = None
 ) -> dict[str, Any]:
-    """Return one stiffness as plain values, NaN or infinite where it is undefined.
+    """Return a stiffness as plain values, NaN or infinite where it is undefined.
 
     Args:
         platform: stiffness of the platform at a posture.
-        point: (3,) [m] point at which it is read, base axes.
+        point: (3,) [m] reference point in base axes.
         length: [m] factor on rotations.
 
     Returns:
@@ -200,13 +200,13 @@ def _share_values(stiffness: PlatformStiffness, axis: NDArray) -> dict[str, Any]
 
 
 def share_rows(shares: dict[str, dict[str, Any]]) -> dict[str, list[float]]:
-    """Return the shares of every part in the six directions, largest first.
+    """Return each part's shares along the six directions, largest first.
 
     Args:
         shares: shares from :func:`stiffness_values`.
 
     Returns:
-        Six shares for each part's name, such as ``"leg1.distal link"``.
+        Six shares by the name of the part, such as ``"leg1.distal link"``.
     """
     rows: dict[str, list[float]] = {}
     for k, name in enumerate(DIRECTIONS):
@@ -241,7 +241,7 @@ def stiffness_text(results: dict[str, Any]) -> str:
 
 
 def _state_lines(values: dict[str, Any]) -> list[str]:
-    """Return lines on one state: K, free motions, eigenstiffnesses, centre."""
+    """Return lines on one state: K, free motions, eigenstiffnesses and centre."""
     K = np.asarray(values["stiffness"])
     size = np.sqrt(np.abs(np.nan_to_num(np.diag(K))))
     K = np.where(np.abs(K) < 1e-10 * np.outer(size, size), 0.0, K)
@@ -267,7 +267,7 @@ def _state_lines(values: dict[str, Any]) -> list[str]:
 
 
 def _share_lines(shares: dict[str, dict[str, Any]]) -> list[str]:
-    """Return lines on the parts' shares in the compliance, in per cent."""
+    """Return lines on the parts' shares of the compliance in per cent."""
     rows = {
         name: [rounded(100 * value) for value in row]
         for name, row in largest_rows(share_rows(shares)).items()
@@ -298,7 +298,7 @@ def largest_rows(rows: dict[str, list[float]]) -> dict[str, list[float]]:
         rows: result of :func:`share_rows`, largest first.
 
     Returns:
-        All rows if there are few.
+        The rows, unchanged if there are few.
     """
     names = list(rows)
     if len(names) <= _SHOWN + 1:

@@ -1,6 +1,6 @@
-"""Plots of the deformed robot, and of the set of its possible platform errors.
+"""Plots of the deformed robot, and of the set of possible platform errors.
 
-Each function takes a result and returns a plotter.
+Each function converts a result to a plotter.
 """
 
 from dataclasses import dataclass
@@ -27,8 +27,8 @@ class DisplacedBodies:
     Attributes:
         starts: (n, 3) [m] nominal start of each frame's body, base axes.
         ends: (n, 3) [m] nominal end of each frame's body, base axes.
-        start_screws: (n, 6) [rad, m] small screw of the start, read at the start.
-        end_screws: (n, 6) [rad, m] small screw of the end, read at the end.
+        start_screws: (n, 6) [rad, m] small screw of the start, at the start.
+        end_screws: (n, 6) [rad, m] small screw of the end, at the end.
         bends: (n, 3) [rad] elastic rotation of the end relative to the start.
     """
 
@@ -50,10 +50,10 @@ def plot_assembly(
 
     Args:
         assembly: assembly of the robot.
-        exaggeration: factor on all displacements; by default a readable one.
-        errors: ``"translation"`` or ``"rotation"``; None for no set of errors.
+        exaggeration: factor on all displacements; by default a well visible one.
+        errors: ``"translation"`` or ``"rotation"``; None to draw no set of errors.
         assumption: assumption of problem (27) for the set of errors.
-        off_screen: whether no window is opened when the plotter is shown.
+        off_screen: True to open no window when the plotter is shown.
 
     Returns:
         A pyvista plotter.
@@ -80,10 +80,10 @@ def robot_plotter(
 
     Args:
         assembly: assembly of the robot.
-        exaggeration: factor on all displacements, which the plot states.  By default
+        exaggeration: factor on all displacements, which the plot displays.  By default
             the largest displacement is a tenth of the robot's size, and no rotation
             exceeds 0.5 rad.
-        off_screen: whether no window is opened.
+        off_screen: True to open no window.
 
     Returns:
         A pyvista plotter; the caller shows it or takes a screenshot.
@@ -91,7 +91,7 @@ def robot_plotter(
     import pyvista
     from vtkmodules.vtkCommonCore import vtkLogger
 
-    # without a display VTK tries other back ends, and reports this on stderr
+    # without a display, VTK tries other back ends and reports this on stderr
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
     bodies = displaced_bodies(assembly)
     size = float(np.ptp(bodies.ends, axis=0).max()) or 1.0
@@ -117,10 +117,10 @@ def add_bodies(
     plotter: Any, assembly: Assembly, bodies: DisplacedBodies, factor: float,
     size: float,
 ) -> None:  # fmt: skip
-    """Add the displaced bodies to a plot, in place of those added before.
+    """Add the displaced bodies to a plot, replacing bodies added before.
 
     Args:
-        plotter: plotter of pyvista.
+        plotter: pyvista plotter.
         assembly: assembly of the robot.
         bodies: result of :func:`displaced_bodies`.
         factor: exaggeration of the displacements.
@@ -139,7 +139,7 @@ def add_bodies(
 
 
 def _drawn_rows(robot: Robot, bodies: DisplacedBodies) -> list[int]:
-    """Return the rows of bodies that are not short, without contacts of joints."""
+    """Return the indices of bodies to draw: not short, and no contacts of joints."""
     lengths = np.linalg.norm(bodies.ends - bodies.starts, axis=1)
     contacts = contact_frames(robot)
     return [
@@ -161,8 +161,8 @@ def _add_joint_axes(plotter: Any, posture: Posture, size: float) -> None:
 
 
 def fill_window(plotter: Any) -> None:
-    """Point the camera at the middle of the scene, which then fills the window."""
-    # share of the window; captions are above and below
+    """Point the camera at the middle of the scene and let the scene fill the window."""
+    # share of the window for the scene; captions are above and below
     camera, share = plotter.camera, 0.85
     low, high = np.reshape(plotter.bounds, (3, 2)).T
     corners = np.array([[(low, high)[b][c] for c, b in enumerate(bits)]
@@ -185,7 +185,7 @@ def add_error_body(
         body: set of errors.
         origin: (3,) [m] position of zero error: the platform's nominal origin.
         size: [m] size of the largest error in the plot.
-        assumption: assumption of problem (27), which the caption states.
+        assumption: assumption of problem (27), which the caption displays.
     """
     import pyvista
 
@@ -209,11 +209,11 @@ def displaced_bodies(assembly: Assembly, closing: float = 1.0) -> DisplacedBodie
 
     Args:
         assembly: assembly of a robot of n frames.
-        closing: share of the deformations and of the joints' motions; 0: the bodies
-            have their geometric errors only, and closures are open.
+        closing: share of the deformations and of the joints' motions. For 0, the bodies
+            have only their geometric errors, and closures are open.
 
     Returns:
-        The bodies in the robot's order of frames.
+        The bodies in the order of the robot's frames.
     """
     posture = assembly.posture
     turned = screw_map(np.zeros(3), posture.transforms[:, :3, :3])
@@ -233,19 +233,19 @@ def displaced_bodies(assembly: Assembly, closing: float = 1.0) -> DisplacedBodie
 
 
 def finitely_displaced_bodies(assembly: ExactAssembly) -> DisplacedBodies:
-    """Return the displacements of all bodies by finite motions.
+    """Return the displacements of all bodies for finite motions.
 
     Args:
         assembly: assembly of a robot of n frames with finite motions.
 
     Returns:
-        The bodies; their ends have the exact displacements, and their rotations are
-        rotation vectors.
+        The bodies, whose ends have the exact displacements; rotations are rotation
+        vectors.
     """
     posture = assembly.posture
     nominal = posture.transforms
     ends = assembly.placement.body_ends[assembly.cut.last]
-    # the base stands still, at row -1
+    # row -1 is the base, which does not move
     at_start, at_end = np.zeros((len(nominal) + 1, 6)), np.zeros((len(nominal), 6))
     for screws, T in ((at_start[:-1], assembly.transforms), (at_end, ends)):
         turned = T[:, :3, :3] @ np.swapaxes(nominal[:, :3, :3], 1, 2)
@@ -259,21 +259,21 @@ def finitely_displaced_bodies(assembly: ExactAssembly) -> DisplacedBodies:
 
 
 def body_starts(posture: Posture) -> NDArray:
-    """Return (n, 3) [m] nominal starts of all bodies: their parents' origins."""
-    origins = np.vstack([posture.transforms[:, :3, 3], np.zeros(3)])  # base at row -1
+    """Return nominal starts (n, 3) [m] of all bodies: the origins of their parents."""
+    origins = np.vstack([posture.transforms[:, :3, 3], np.zeros(3)])  # row -1 is base
     return origins[posture.robot.parents]
 
 
 def readable_factor(bodies: DisplacedBodies, size: float) -> float:
-    """Return the largest of 1, 2, 5 times a power of ten with which a plot is readable.
+    """Return a factor of 1, 2 or 5 times a power of ten that keeps a plot readable.
 
     Args:
         bodies: bodies with their displacements.
         size: [m] size of the robot.
 
     Returns:
-        The exaggeration: no translation exceeds a tenth of the size, no rotation 0.5
-        rad.
+        The largest exaggeration for which no translation exceeds a tenth of the size,
+        and no rotation 0.5 rad.
     """
     shift = float(np.abs(bodies.end_screws[:, 3:]).max())
     turn = float(np.abs(bodies.end_screws[:, :3]).max())
@@ -285,14 +285,14 @@ def readable_factor(bodies: DisplacedBodies, size: float) -> float:
 
 
 def _shape(bodies: DisplacedBodies, i: int, factor: float) -> NDArray:
-    """Return (20, 3) points of a displaced body, whose deflection is a cubic."""
+    """Return 20 points (20, 3) along a displaced body with cubic deflection."""
     a = bodies.starts[i] + factor * bodies.start_screws[i, 3:]
     b = bodies.ends[i] + factor * bodies.end_screws[i, 3:]
     if not np.any(bodies.bends[i]):
         return np.linspace(a, b, 20)
     bend = rotation_matrix(factor * bodies.bends[i])
     chord = b - a
-    # the end slopes are halfway between the chord and the chord rotated by the bending
+    # end slopes are halfway between the chord and the chord rotated by the bending
     slope_a, slope_b = bend.T @ chord, bend @ chord
     slope_a, slope_b = (chord + slope_a) / 2, (chord + slope_b) / 2
     s = np.linspace(0, 1, 20)[:, None]

@@ -1,8 +1,8 @@
-"""Pictures of a robot that closes: from its free, erroneous bodies to the assembly.
+"""Pictures of a robot during closing, from bodies with errors to the assembly.
 
-The bodies first have their geometric errors only, so that closures are open.  The
-deformations and the joints' motions of the least energy, problem (22), then grow from
-zero to their values.
+In the first picture, the bodies have only their geometric errors, so closures are open.
+The deformations and joint motions of the least-energy solution, problem (22), then
+increase from zero to their values.
 """
 
 from collections.abc import Iterator
@@ -22,20 +22,20 @@ from forcefit.assembly.report.plot import (
 )
 from forcefit.inputs.errors import BadInput
 
-_STEPS = 24  # pictures from open to closed
-_STEP, _OPEN, _CLOSED = 60, 900, 1800  # [ms] of each picture, of the first, of the last
-_WINDOW = (720, 540)  # [pixels]
+_STEPS = 24  # number of pictures from open to closed
+_STEP, _OPEN, _CLOSED = 60, 900, 1800  # [ms] duration of an inner, first, last picture
+_WINDOW = (720, 540)  # [pixels] size of a picture
 
 
 def closing_gaps(assembly: Assembly, closing: float) -> NDArray:
     """Return the translations between the two frames of each closure.
 
     Args:
-        assembly: assembly of a robot of k closures.
+        assembly: assembly of a robot with k closures.
         closing: share of the deformations and of the joints' motions, 0 to 1.
 
     Returns:
-        (k, 3) [m] from the first frame to the second, base axes, to first order.
+        (k, 3) [m] vector from the first to the second frame, base axes, first order.
     """
     robot = assembly.posture.robot
     moved = displaced_bodies(assembly, closing).end_screws[:, 3:]
@@ -46,17 +46,17 @@ def closing_gaps(assembly: Assembly, closing: float) -> NDArray:
 def closing_pictures(
     assembly: Assembly, exaggeration: float | None = None
 ) -> Iterator[tuple[NDArray, int]]:
-    """Yield the pictures of a robot that closes.
+    """Yield the pictures of a robot during closing.
 
     Args:
         assembly: assembly of the robot.
-        exaggeration: factor on all displacements; by default a readable one.
+        exaggeration: factor on all displacements; by default a well visible one.
 
     Yields:
-        A picture, (rows, columns, 3) values from 0 to 255, and its duration [ms].
+        A picture as (rows, columns, 3) values from 0 to 255, and its duration [ms].
 
     Raises:
-        BadInput: no closure is open before the assembly.
+        BadInput: no closure is open before closing.
     """
     if not np.any(np.abs(closing_gaps(assembly, 0.0)) > 1e-12):
         raise BadInput(
@@ -88,7 +88,7 @@ def _draw(
     plotter: Any, assembly: Assembly, bodies: DisplacedBodies, factor: float,
     size: float,
 ) -> None:  # fmt: skip
-    """Draw the bodies, and a line across each open closure."""
+    """Draw the bodies, and a line between the two frames of each open closure."""
     import pyvista
 
     add_bodies(plotter, assembly, bodies, factor, size)

@@ -35,16 +35,16 @@ def pose_error_of(
     gravity: ArrayLike | None = None,
     **options: Any,
 ) -> dict[str, Any]:
-    """Return the results of ``assembly error`` as plain values.
+    """Return the results of ``assembly error`` as a dictionary of plain values.
 
     Args:
         posture: posture of the robot.
         assumptions: assumptions of problem (27); by default all, under a load all
             except ``budget``.
-        point: (3,) [m] point whose translation is bounded, platform axes.
-        direction: (6,) direction along which the largest error is bounded too.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes.
+        point: (3,) [m] point whose translation is bounded, in platform axes.
+        direction: (6,) direction along which the largest error is also bounded.
+        load: (6,) [N m, N] load on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] gravity in base axes.
         options: options of
             :func:`forcefit.assembly.linear.pose_error.bound_pose_error`.
 
@@ -53,7 +53,7 @@ def pose_error_of(
 
     Raises:
         BadInput: the assumption ``budget`` is requested with a load, or a joint of a
-            loaded robot is left ``"worst"``.
+            loaded robot has ``left = "worst"``.
     """
     loaded = bool(np.any(load) or np.any(gravity) or driven(posture.robot))
     if loaded and "budget" in (assumptions or ()):
@@ -84,7 +84,7 @@ def pose_error_of(
         for name in assumptions:
             try:
                 bound = bound_pose_error(assembly, name, offset=offset, **options)
-            except FreeMotion as error:  # compliant joints may have no other springs
+            except FreeMotion as error:  # freed compliant joints may have no springs
                 no_bounds = dict.fromkeys(("rotation", "translation"))
                 table[name] = no_bounds | {"reason": str(error)}
                 continue

@@ -37,11 +37,11 @@ from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.results.display import listing
 from forcefit.results.text import lines_of, value_text
 
-# numbers of a certificate: relative ones, and the gap in J
+# numbers of a certificate: relative, except the duality gap in J
 _PROOF = (
     "closure_residual clearance_excess duality_gap relative_gap stationarity iterations"
 )
-# quantities of the margins; up to a margin of 1 the clearances are sufficient
+# quantities of the margins; clearances suffice up to a margin of 1
 _ZONE = (
     "zone.assemblable zone.margin zone.assemblable_free zone.margin_free zone.status "
     "zone.reason"
@@ -53,7 +53,7 @@ _UNSTABLE = (
 
 
 def zone_of(posture: Posture) -> dict[str, Any]:
-    """Return margins of (21), with compliant joints rigid and free, as plain values."""
+    """Return the margins of (21), with compliant joints rigid and free, as values."""
     rigid, free = zone_margin(posture, "rigid"), zone_margin(posture, "free")
     unproved_parts = "; ".join(filter(None, (rigid.unproved, free.unproved)))
     return {
@@ -68,7 +68,7 @@ def zone_of(posture: Posture) -> dict[str, Any]:
 
 
 def _finite(value: float) -> float | None:
-    """Return a margin, or None if no factor assembles the robot."""
+    """Return a margin; None if no factor on the clearances assembles the robot."""
     return None if np.isinf(value) else value
 
 
@@ -86,18 +86,18 @@ def solution_of(
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
 ) -> dict[str, Any]:
-    """Return the results of ``assembly solve`` as plain values.
+    """Return the results of ``assembly solve`` as a dictionary of plain values.
 
     Args:
         posture: posture of the robot.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes.
+        load: (6,) [N m, N] load on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] gravity in base axes.
 
     Returns:
-        The keys of the public format.  ``status`` is ``"ok"``; ``"not proved"``, with
-        the solution and the gap of its certificate as ``reason``; ``"singular"``, with
-        the invalid first-order solution, and with the solution for finite motions in
-        ``reason``; or the kind of failure, without a solution.
+        The keys of the public format.  ``status`` is ``"ok"``; or ``"not proved"``,
+        with the solution, and with the gap of its certificate as ``reason``; or
+        ``"singular"``, with the invalid first-order solution, and with the solution for
+        finite motions in ``reason``; or the kind of failure, without a solution.
     """
     robot = posture.robot
     names = [f.name for f in robot.frames]
@@ -133,7 +133,7 @@ def solution_of(
             | _assembly_results(assembly, bound)
             | {"linearisation_error": linearisation, "worst_error": worst(assembly)}
             | proof_status("; ".join(unproved_parts))
-            # without errors and loads the nominal posture is a solution
+            # without errors and loads, the nominal posture is a solution
             | (first_order_status(assembly, linearisation, finite) if forced else {})
         )
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
@@ -142,7 +142,7 @@ def solution_of(
 
 
 def proof_status(reason: str) -> dict[str, str]:
-    """Return status and reason of a solution with an incomplete proof; else nothing."""
+    """Return status and reason of a solution with an incomplete proof, or nothing."""
     return {"status": NOT_PROVED, "reason": reason} if reason else {}
 
 
@@ -204,12 +204,12 @@ def exact_of(
 
     Args:
         posture: posture of the robot.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes.
+        load: (6,) [N m, N] load on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] gravity in base axes.
         progress: argument of :func:`forcefit.assembly.exact.exact.solve_exact`.
 
     Returns:
-        The keys of ``assembly solve`` for finite motions; ``status`` has the same
+        The keys of ``assembly solve`` for finite motions. ``status`` has the same
         values, or is ``"unstable"`` if the potential decreases along a motion.
     """
     results: dict[str, Any] = {
@@ -257,7 +257,7 @@ def exact_text(results: dict[str, Any]) -> str:
 
 
 def _joint_frames(robot: Robot) -> dict[str, dict[str, str]]:
-    """Return the main frame of each joint of several frames; nothing without any."""
+    """Return the main frame of each joint that consists of several frames."""
     frames = {name: joint.main for name, joint in robot.joints.items()}
     return {"joint_frames": frames} if frames else {}
 
@@ -296,8 +296,8 @@ def _linearisation_lines(results: dict[str, Any]) -> dict[str, str]:
         f"linearisation_{part}": float(np.linalg.norm(error[part]))
         for part in ("rotation", "translation")
     } | {"linearisation_energy": error["relative_energy"]}
-    # differences of equal solutions are rounding: 1e-12 rad, 1e-15 m, 1e-11 of the
-    # energy
+    # differences of equal solutions are rounding errors: 1e-12 rad, 1e-15 m, and 1e-11
+    # of the energy
     least = (1e-12, 1e-15, 1e-11)
     for name, small in zip(sizes, least, strict=True):
         sizes[name] = sizes[name] if abs(sizes[name]) >= small else 0.0
@@ -305,7 +305,7 @@ def _linearisation_lines(results: dict[str, Any]) -> dict[str, str]:
 
 
 def _bound_lines(results: dict[str, Any]) -> dict[str, str]:
-    """Return lines on the certified error and the undetermined motion of the screw."""
+    """Return lines on the certified screw error and its undetermined motion."""
     bound, largest = results["certificate"], results["worst_error"]
     lines = lines_of(bound, "screw_rotation_error screw_translation_error")
     if (
@@ -322,7 +322,7 @@ def _bound_lines(results: dict[str, Any]) -> dict[str, str]:
 
 
 def status_line(results: dict[str, Any]) -> str:
-    """Return the status and reason of a result whose status is not ok."""
+    """Return a line with status and reason of a result whose status is not ok."""
     status, reason = results["status"], results["reason"]
     return reason if reason.startswith(status) else f"{status}: {reason}"
 

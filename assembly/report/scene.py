@@ -1,4 +1,4 @@
-"""The robot as a scene of a page, which the reader rotates, exaggerates and closes."""
+"""The robot as an interactive scene of a page, which can be rotated and exaggerated."""
 
 from dataclasses import asdict
 from typing import Any
@@ -23,21 +23,22 @@ from forcefit.page.charts import scene
 from forcefit.results.units import shown_in
 from forcefit.stiffness.screws import skew
 
-# number of points along a body, which is sufficient for the cubic of a bent beam
+# number of points along a body, sufficient for the cubic shape of a bent beam
 _SAMPLES = 9
 
 
 def robot_scene(
     assembly: Assembly, closing: NDArray | None, body: ErrorBody | None, caption: str
 ) -> str:
-    """Return an assembled robot, nominal and forced, as HTML.
+    """Return the nominal and the assembled robot as HTML.
 
-    Displacements are small screws, linear in the exaggeration; a bent link is a cubic.
+    Displacements are small screws, linear in the exaggeration; a bent link is a cubic
+    curve.
 
     Args:
         assembly: assembly of a robot of n frames.
-        closing: (k, n, 4, 4) frames of a simulated closing; None without it.
-        body: set of possible platform errors; None without it.
+        closing: (k, n, 4, 4) poses of the frames in a simulated closing, or None.
+        body: set of possible platform errors, or None.
         caption: text below the figure.
 
     Returns:
@@ -49,7 +50,7 @@ def robot_scene(
 def forced_scene(
     assembly: Assembly, closing: NDArray | None = None, body: ErrorBody | None = None
 ) -> dict[str, Any]:
-    """Return the numbers that :func:`robot_scene` draws; arguments as there."""
+    """Return the data of a scene; arguments as for :func:`robot_scene`."""
     posture = assembly.posture
     ends = posture.transforms[:, :3, 3]
     moved = [] if closing is None else closing[:, :, :3, 3] - ends
@@ -59,9 +60,9 @@ def forced_scene(
 
 
 def exact_scene(assembly: ExactAssembly) -> dict[str, Any]:
-    """Return the numbers of a scene of an assembly with finite motions.
+    """Return the data of a scene of an assembly with finite motions.
 
-    Small displacements are exaggerated, large ones are drawn as they are.
+    Small displacements are exaggerated, large ones are drawn to scale.
     """
     bodies = finitely_displaced_bodies(assembly)
     forces = _forces(assembly, assembly.transforms)
@@ -74,7 +75,7 @@ def exact_scene(assembly: ExactAssembly) -> dict[str, Any]:
 
 
 def nominal_scene(posture: Posture) -> dict[str, Any]:
-    """Return the numbers of a scene of a robot without errors, clearances and loads."""
+    """Return the data of a scene of a robot without errors, clearances and loads."""
     still = np.zeros((len(posture.robot.frames), 6))
     bodies = DisplacedBodies(
         body_starts(posture), posture.transforms[:, :3, 3], still, still, still[:, :3]
@@ -85,7 +86,7 @@ def nominal_scene(posture: Posture) -> dict[str, Any]:
 def _spec(
     posture: Posture, bodies: DisplacedBodies, closing: Any, forces: Any, body: Any
 ) -> dict[str, Any]:
-    """Return the numbers of a scene, with its size, units and exaggeration."""
+    """Return the data of a scene, including its size, units and exaggeration."""
     ends = bodies.ends
     size = float(np.ptp(np.vstack([ends, np.zeros(3)]), axis=0).max()) or 1.0
     drawn = np.vstack([bodies.starts, ends])
@@ -109,7 +110,7 @@ def _spec(
 
 
 def _body(robot: Robot, bodies: DisplacedBodies, i: int) -> dict[str, Any]:
-    """Return a body: points along it, their displacements, and its joint."""
+    """Return the data of a body: points along it, their displacements, its joint."""
     frame, parent = robot.frames[i], int(robot.parents[i])
     start, end = bodies.starts[i], bodies.ends[i]
     s = np.linspace(0.0, 1.0, _SAMPLES)[:, None]
@@ -124,7 +125,7 @@ def _body(robot: Robot, bodies: DisplacedBodies, i: int) -> dict[str, Any]:
 
 
 def _moved(bodies: DisplacedBodies, i: int, s: NDArray) -> NDArray:
-    """Return (k, 3) [m] displacements along a body: a cubic by its ends' rotations."""
+    """Return displacements (k, 3) [m] along a body: a cubic from its end rotations."""
     chord = bodies.ends[i] - bodies.starts[i]
     a, b = bodies.start_screws[i, 3:], bodies.end_screws[i, 3:]
     if not np.any(bodies.bends[i]):
@@ -155,7 +156,7 @@ def _forces(
 
 
 def _error_body(body: ErrorBody, origin: NDArray) -> dict[str, Any]:
-    """Return the set of possible platform errors as plain values, with its origin."""
+    """Return the set of possible platform errors, with its origin, as plain values."""
     sizes = np.linalg.norm(body.points, axis=1)
     shown = shown_in("m", float(sizes.max(initial=0.0)))
     text = f"possible platform errors, up to {sizes.max() * shown.factor:.4g}"

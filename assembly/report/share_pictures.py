@@ -1,4 +1,4 @@
-"""Pictures of the parts' shares in the compliance of the platform."""
+"""Pictures of the parts' shares of the platform's compliance."""
 
 from collections.abc import Mapping
 from itertools import cycle
@@ -19,14 +19,15 @@ if TYPE_CHECKING:
 
 
 def plot_shares(results: Mapping[str, Any], figure: "Figure | None" = None) -> "Figure":
-    """Return a bar chart of the parts' shares in the compliance along each direction.
+    """Return a bar chart of the parts' shares of the compliance in each direction.
 
     Args:
-        results: of :func:`forcefit.assembly.report.platform_stiffness.stiffness_of`.
-        figure: an empty one in which it is drawn; else a new one.
+        results: result of
+            :func:`forcefit.assembly.report.platform_stiffness.stiffness_of`.
+        figure: empty figure to draw in; None to create a new one.
 
     Returns:
-        The figure; directions without a finite compliance are empty.
+        The figure; directions without a finite compliance are left empty.
     """
     from matplotlib.figure import Figure
 
@@ -46,14 +47,15 @@ def plot_shares(results: Mapping[str, Any], figure: "Figure | None" = None) -> "
 
 
 def share_chart(shares: Mapping[str, Any], caption: str) -> str:
-    """Return a chart of the largest shares for a page, a bar for each direction.
+    """Return an HTML chart of the largest shares, with one bar per direction.
 
     Args:
-        shares: of :func:`forcefit.assembly.report.platform_stiffness.stiffness_values`.
-        caption: below it.
+        shares: shares from
+            :func:`forcefit.assembly.report.platform_stiffness.stiffness_values`.
+        caption: caption below the chart.
 
     Returns:
-        HTML.
+        HTML of the chart.
     """
     traces = [
         {"type": "bar", "name": label(name), "x": list(DIRECTIONS), "y": row,
@@ -65,7 +67,7 @@ def share_chart(shares: Mapping[str, Any], caption: str) -> str:
 
 
 def _coloured(shares: Mapping[str, Any]) -> dict[str, tuple[list[float], str]]:
-    """Return the largest shares with their colours; the sum of the others is grey."""
+    """Return the largest shares with colours; the sum of the others is grey."""
     rows = share_rows(dict(shares))
     shown = largest_rows(rows).items()
     return {

@@ -1,4 +1,4 @@
-"""Pictures in Python: interactive in a notebook, a figure of matplotlib elsewhere."""
+"""Pictures of robots and results: interactive in a notebook, otherwise matplotlib."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -34,28 +34,30 @@ def show(
     assumption: str = "frozen",
     interactive: bool | None = None,
 ) -> "Picture | Figure":
-    """Return a picture of a robot, or of a result, of one point.
+    """Return a picture of a robot, or of a result at one point.
 
     Args:
-        thing: a robot, drawn in its home pose; a posture; an assembly, nominal and
-            forced, its displacements exaggerated; the same with finite motions, large
-            displacements as they are; or a stiffness of the platform, the
-            shares of its parts.
-        errors: ``"translation"`` or ``"rotation"`` adds the possible platform errors
+        thing: object to draw. A robot is drawn in its home pose. A posture is drawn
+            without errors. An assembly is drawn nominal and forced, with exaggerated
+            displacements. An assembly with finite motions is drawn likewise, but large
+            displacements are to scale. For a platform stiffness, the shares of its
+            parts are drawn.
+        errors: ``"translation"`` or ``"rotation"`` to add the possible platform errors
             within the clearances to an assembly.
-        assumption: of problem (27), for these errors: ``"frozen"``, ``"free"`` or
-            ``"budget"``.
-        interactive: True for the scene of reports, which a notebook shows and a browser
-            opens (its ``html``); False for a figure of matplotlib; absent, a scene in a
-            notebook and a figure elsewhere.
+        assumption: assumption of problem (27) for these errors: ``"frozen"``,
+            ``"free"`` or ``"budget"``.
+        interactive: True for an interactive scene, which a notebook displays and a
+            browser opens (attribute ``html``); False for a matplotlib figure; None for
+            a scene in a notebook and a figure elsewhere.
 
     Returns:
-        The scene; or the figure, which is not shown: ``savefig`` writes it, and
+        The scene; or the figure, which is not displayed: ``savefig`` writes it, and
         ``pyplot.show()`` opens a window.
 
     Raises:
-        BadInput: another object, many points, errors of what is no assembly or has a
-            free motion, or matplotlib is not installed.
+        BadInput: the object has another type or many points; errors are requested for
+            something else than an assembly, or for one with a free motion; or
+            matplotlib is not installed.
         SolverFailed: the cone solver failed for the errors.
     """
     if interactive is None:
@@ -75,7 +77,7 @@ def show(
 def _scene(
     thing: object, errors: str | None, assumption: str
 ) -> tuple[dict[str, Any], str, str]:
-    """Return the numbers of a scene, the robot's name, and a caption."""
+    """Return the data of a scene, the robot's name, and a caption."""
     if isinstance(thing, Robot):
         return nominal_scene(home_posture(thing)), thing.name, _NOMINAL
     if isinstance(thing, ExactAssembly):
@@ -98,7 +100,7 @@ def _scene(
 
 
 def _shares(stiffness: PlatformStiffness, interactive: bool) -> "Picture | Figure":
-    """Return the shares of the parts in the compliance."""
+    """Return a picture of the parts' shares of the compliance."""
     shares = stiffness_values(stiffness, stiffness.point)["shares"]
     name = stiffness.posture.robot.name
     if interactive:

@@ -1,4 +1,4 @@
-"""The order of assembly as plain values and as text."""
+"""Results of assembly in steps, as plain values and as text."""
 
 from collections.abc import Callable
 from typing import Any
@@ -29,7 +29,7 @@ from forcefit.results.display import listing, numbers
 from forcefit.results.text import lines_of
 
 QUANTILES = (0.05, 0.5, 0.95, 0.99)
-_BLOCK = 2_000  # machines that are carried through the steps together
+_BLOCK = 2_000  # number of machines that are computed together
 _IN_CLEARANCES = (
     "clearances that no force determines stay as close as possible to where the last "
     "step left them; a clamp or a load determines them"
@@ -46,19 +46,19 @@ def steps_of(
     best: BestOrder | None = None, objective: str = "",
     states: list[State] | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Return the results of ``assembly steps`` as plain values.
+    """Return the results of ``assembly steps`` as a dictionary of plain values.
 
     Args:
-        plan: the steps, checked.
+        plan: the steps, which have been checked.
         posture: pose at which the robot is assembled.
-        gravity: (3,) [m/s^2] base axes.
-        best: order that was searched; its plan is carried out.
-        objective: of that search.
-        states: list to which the state after each step is added.
+        gravity: (3,) [m/s^2] gravity in base axes.
+        best: result of a search for the best order, whose plan is carried out.
+        objective: objective of that search.
+        states: list to which the state after each step is appended.
 
     Returns:
-        All steps that can be carried out; ``status`` is ``"ok"``, or says why the next
-        one cannot.
+        All steps that can be carried out. ``status`` is ``"ok"``, or the reason why the
+        next step cannot be carried out.
     """
     plan = plan if best is None else best.plan
     machine = machine_at(posture)
@@ -105,7 +105,7 @@ def kind_of(step: Step) -> str:
 
 
 def _values(result: StepResult) -> dict[str, Any]:
-    """Return one step of one machine as plain values."""
+    """Return the result of one step for one machine as plain values."""
     values: dict[str, Any] = {
         "name": result.step.name, "kind": kind_of(result.step),
         "energy": float(result.energy[0]), "work": float(result.work[0]),
@@ -130,7 +130,7 @@ def _values(result: StepResult) -> dict[str, Any]:
 
 
 def _totals(results: dict[str, Any]) -> dict[str, Any]:
-    """Return the balance of all steps and the numbers of the assembled machine."""
+    """Return the energy balance of all steps and totals for the assembled machine."""
     steps = results["steps"]
     work = sum(step["work"] + step["load_work"] for step in steps)
     lost = sum(step["lost"] for step in steps)
@@ -147,25 +147,26 @@ def drawn_steps(
     plan: Plan, posture: Posture, errors: NDArray, gravity: ArrayLike | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Return quantiles of the steps over many machines.
+    """Return quantiles of the results of steps over many machines.
 
-    Ctrl-C ends with the machines that are assembled so far.
+    After Ctrl-C, the quantiles cover the machines that were assembled so far.
 
     Args:
-        plan: the steps, checked.
+        plan: the steps, which have been checked.
         posture: pose at which the robot of n frames is assembled.
         errors: (k, n, 6) [rad, m] geometric errors of the machines.
-        gravity: (3,) [m/s^2] base axes.
-        progress: called with the machines done and their number.
+        gravity: (3,) [m/s^2] gravity in base axes.
+        progress: called with the numbers of finished machines and of all machines.
 
     Returns:
         ``draws``, the number of machines, and ``quantiles`` by step and quantity.
 
     Raises:
-        CannotAssemble: rigid parts of a machine contradict each other.
-        FreeMotion: a load drives a motion that nothing resists.
-        KeyboardInterrupt: Ctrl-C before any machine is assembled.
-        SolverFailed: the solver of the clearances gave up.
+        CannotAssemble: the conditions of rigid parts of a machine contradict each
+            other.
+        FreeMotion: a load acts along a motion that nothing resists.
+        KeyboardInterrupt: Ctrl-C was pressed before any machine was assembled.
+        SolverFailed: the solver for the clearances did not converge.
     """
     machine = machine_at(posture)
     blocks: list[dict[tuple[str, str], NDArray]] = []
@@ -189,7 +190,7 @@ def drawn_steps(
 def _drawn_block(
     machine: Machine, plan: Plan, errors: NDArray, gravity: ArrayLike | None
 ) -> dict[tuple[str, str], NDArray]:
-    """Return the values of some machines by step and quantity."""
+    """Return the results of a block of machines by step and quantity."""
     state, values = first_state(machine, plan, errors, gravity), {}
     for step in plan.steps:
         state, result = carry_out(machine, state, step)
@@ -204,10 +205,10 @@ def _drawn_block(
 
 
 def steps_text(results: dict[str, Any]) -> str:
-    """Return the steps as text, a line each.
+    """Return the steps as text, with one line each.
 
     Args:
-        results: of :func:`steps_of`.
+        results: result of :func:`steps_of`.
 
     Returns:
         The text.
@@ -248,7 +249,7 @@ def steps_text(results: dict[str, Any]) -> str:
 
 
 def _extra(step: dict[str, Any]) -> str:
-    """Return what only some steps have."""
+    """Return the results that occur only for some kinds of steps, as text."""
     words = {
         "reading": "reads", "adjustment": "changed by", "left_open": "left open",
         "spring_back": "springs back",

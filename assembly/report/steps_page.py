@@ -1,4 +1,4 @@
-"""Page of the order of assembly: its steps, and the machine after each of them."""
+"""HTML page of assembly in steps, with the machine after each step."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -30,16 +30,16 @@ def steps_page(
     results: Mapping[str, Any], machine: Machine, states: Sequence[State],
     provenance: Provenance,
 ) -> str:  # fmt: skip
-    """Return the page of a plan that was carried out.
+    """Return the page of a plan that was carried out as HTML.
 
     Args:
-        results: of :func:`forcefit.assembly.report.steps.steps_of`.
+        results: result of :func:`forcefit.assembly.report.steps.steps_of`.
         machine: robot at the pose at which it is assembled.
-        states: after each step.
-        provenance: command and files.
+        states: states after each step.
+        provenance: the command and its input files.
 
     Returns:
-        HTML, which needs no other file.
+        HTML that refers to no other file.
     """
     done = results["status"] == "ok"
     return page(
@@ -63,7 +63,7 @@ def steps_page(
 
 
 def _verdict(results: Mapping[str, Any]) -> str:
-    """Return whether the steps are carried out, and the first remark."""
+    """Return a sentence on whether all steps are carried out, and the first remark."""
     verdict = results.get("reason", "")
     if results["status"] == "ok":
         verdict = f"All {len(results['steps'])} steps are carried out"
@@ -74,14 +74,14 @@ def _verdict(results: Mapping[str, Any]) -> str:
 
 
 def _good(results: Mapping[str, Any]) -> bool | None:
-    """Return whether all steps are done; None if one needs more than its force."""
+    """Return whether all steps are carried out; None if one exceeds its force."""
     if results["status"] != "ok":
         return False
     return None if any(step.get("exceeded") for step in results["steps"]) else True
 
 
 def _tiles(results: Mapping[str, Any]) -> list[Tile]:
-    """Return the main figures of the assembled machine."""
+    """Return tiles with the main numbers of the assembled machine."""
     screw = np.asarray(results["platform_screw"])
     peak, energy = results["peak_force"], results["energy"]
     turn, shift = np.linalg.norm(screw[:3]), np.linalg.norm(screw[3:])
@@ -98,7 +98,7 @@ def _tiles(results: Mapping[str, Any]) -> list[Tile]:
 
 
 def _table(results: Mapping[str, Any]) -> str:
-    """Return a row for each step."""
+    """Return the table with one row per step as HTML."""
     head: list[str | Column] = [
         "step", Column("energy", "J"), Column("work", "J"), Column("lost", "J"),
         Column("closing force", "N"), Column("closing moment", "N m"),
@@ -115,7 +115,7 @@ def _table(results: Mapping[str, Any]) -> str:
 
 
 def _charts(results: Mapping[str, Any]) -> str:
-    """Return energy and closing force of the steps."""
+    """Return charts of the energy and the closing force over the steps as HTML."""
     numbers = list(range(1, len(results["steps"]) + 1))
     charts = []
     for key, words, unit, colour in (
@@ -131,7 +131,7 @@ def _charts(results: Mapping[str, Any]) -> str:
 
 
 def _scene(machine: Machine, states: Sequence[State]) -> str:
-    """Return the machine, which the reader carries through the steps."""
+    """Return a scene in which the reader selects the state after a step, as HTML."""
     assemblies = [assembly_of(machine, state) for state in states]
     closing = np.repeat(machine.posture.transforms[None], len(states), axis=0)
     for transforms, assembly in zip(closing, assemblies, strict=True):
@@ -144,15 +144,15 @@ def _scene(machine: Machine, states: Sequence[State]) -> str:
 
 
 def assembly_of(machine: Machine, state: State) -> Assembly:
-    """Return the displacements of one partly assembled machine.
+    """Return the displacements of one partly assembled machine as an assembly.
 
     Args:
         machine: columns and rows of the robot.
-        state: of one machine.
+        state: state of one machine.
 
     Returns:
-        Its screws; closures that are not joined are open.  Wrenches are those of the
-        joined closures.
+        The screws, with open closures where none is joined yet.  The wrenches are those
+        of the joined closures.
     """
     posture, found = machine.posture, state.found
     robot = posture.robot.with_errors(state.errors[0].reshape(-1, 6))
@@ -175,7 +175,7 @@ def assembly_of(machine: Machine, state: State) -> Assembly:
 
 
 def _order(results: Mapping[str, Any]) -> str:
-    """Return the order that was searched; empty without."""
+    """Return a paragraph on the search for an order; empty without a search."""
     order = results.get("order")
     if order is None:
         return ""
@@ -191,7 +191,7 @@ def _order(results: Mapping[str, Any]) -> str:
 
 
 def _machines(results: Mapping[str, Any]) -> str:
-    """Return the quantiles of many machines; empty without."""
+    """Return the table of quantiles over many machines; empty without them."""
     if "quantiles" not in results:
         return ""
     head: list[str | Column] = [

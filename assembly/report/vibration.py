@@ -19,7 +19,7 @@ _NOMINAL = (
     "these are the frequencies of the nominal robot, without load and gravity; "
     "--state exact includes them and the stiffness due to them"
 )
-_NAMED = 3  # largest number of parts named for a mode
+_NAMED = 3  # largest number of parts that are named for a mode
 
 
 def vibration_of(
@@ -29,21 +29,22 @@ def vibration_of(
     gravity: ArrayLike | None = None,
     state: Literal["nominal", "exact"] = "nominal",
 ) -> dict[str, Any]:
-    """Return the results of ``assembly frequencies`` as plain values.
+    """Return the results of ``assembly frequencies`` as a dictionary of plain values.
 
     Args:
         posture: posture of the robot.
         count: largest number of modes.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes.
-        state: ``"exact"`` for the equilibrium with errors, clearances and loads.
+        load: (6,) [N m, N] load on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] gravity in base axes.
+        state: ``"exact"`` for the equilibrium with errors, clearances and loads,
+            ``"nominal"`` without them.
 
     Returns:
         Frequencies and modes; ``status`` is ``"ok"``, ``"free motion"``,
         ``"unstable"``, or the reason why there is no equilibrium.
 
     Raises:
-        BadInput: no part that moves has a mass.
+        BadInput: no moving part has a mass.
     """
     results: dict[str, Any] = {
         "robot": posture.robot.name, "status": "ok", "pose": posture.pose(),

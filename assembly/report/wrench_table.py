@@ -1,4 +1,4 @@
-"""Wrenches as tables of aligned columns, in SI units."""
+"""Tables of wrenches as text with aligned columns, in SI units."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,7 +13,7 @@ from forcefit.stiffness.screws import WRENCH
 _HEAD = tuple(f"{name} [{'N m' if name[0] == 'M' else 'N'}]" for name in WRENCH)
 
 
-# first parts of names of the frames that belong to a joint, after its own name
+# first words of frame names that belong to a joint, following the joint's name
 _OF_JOINT = {
     "first", "second", "third", "turn", "slide", "slide_x", "slide_y", "end"
 }  # fmt: skip
@@ -22,20 +22,20 @@ _OF_JOINT = {
 def wrench_lines(
     frames: Mapping[str, Any], closures: Sequence[Any], joints: Mapping[str, str]
 ) -> list[str]:
-    """Return the wrenches through all frames and closures as text.
+    """Return the wrenches through all frames and closures as lines of text.
 
-    A joint of several frames has one row, at its point in its axes: the wrench through
-    its other frames is the same.  The contacts of a clearance have none: together they
-    carry the wrench through their joint.
+    A joint that consists of several frames has one row, at the joint's point in its
+    axes, because the wrench through its other frames is the same.  The contacts of a
+    clearance have no row: together they carry the wrench through their joint.
 
     Args:
         frames: wrenches by frame, from
             :func:`forcefit.assembly.report.results.solution_of`.
         closures: wrenches of the closures from the same function.
-        joints: frame at the point and in the axes of each joint of several frames.
+        joints: for each joint of several frames, the frame that has its point and axes.
 
     Returns:
-        Lines of one table for each kind of wrench.
+        Lines with one table for each kind of wrench.
     """
     starts = {k: f["start_wrench"] for k, f in frames.items() if "start_wrench" in f}
     tables = {
@@ -59,7 +59,7 @@ def wrench_lines(
 
 
 def _shown(name: str, joints: Mapping[str, str]) -> str:
-    """Return the name in the table, empty for a further frame of a joint."""
+    """Return the name in the table; empty for the other frames of a joint."""
     for joint, main in joints.items():
         if name == main:
             return joint

@@ -1,6 +1,6 @@
-"""Built-in robots; each file is a table of one robot's parameters.
+"""Built-in robots; each module contains one robot with its parameters.
 
-Begin with ``five_bar.py``, a short one; ``placing.py`` makes frames from home poses.
+Start with ``five_bar.py``, a short one.  ``placing.py`` creates frames from home poses.
 """
 
 import os

@@ -1,8 +1,8 @@
 """A serial arm of six axes: the PUMA 560.
 
-The arm has no closure, so it has no internal forces: errors and clearances add up along
-the arm.  A load moves its flange by J K^-1 J^T of the drives and by the bending of its
-two long bodies.
+The arm has no closure, and therefore no internal forces: errors and clearances add up
+along the arm.  Under a load, the flange moves by J K^-1 J^T due to the drives, and by
+the bending of the two long bodies.
 
 Sources:
     Corke, Armstrong-Helouvry (1994), A search for consensus among model parameters

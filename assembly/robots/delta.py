@@ -1,8 +1,9 @@
 """Clavel's Delta, R-(SS)2: each of three driven arms moves the platform by two rods.
 
 The rods between ball joints can spin about their own axes, and each spin is a degree of
-freedom: there are 9, 3 of the platform and 6 of the rods.  The six rods constrain the
-platform exactly, so geometric errors move it without elastic energy.
+freedom.  The robot has 9 degrees of freedom: 3 of the platform and 6 of the rods.  The
+six rods constrain the platform exactly, so geometric errors move it without elastic
+energy.
 
 Sources:
     Williams, The Delta parallel robot: kinematics solutions, Ohio University (2016):
@@ -91,7 +92,7 @@ def drive_angle(
         position: (3,) [m] position of the platform.
 
     Returns:
-        [rad] the drive's coordinate.
+        [rad] coordinate of the drive.
 
     Raises:
         BadInput: the leg does not reach the position.
@@ -105,7 +106,7 @@ def drive_angle(
     rod = math.sqrt(max(0.0, P.rod**2 - float(position @ across) ** 2))
     if not abs(P.arm - rod) <= reach <= P.arm + rod:
         raise BadInput(
-            f"delta: a leg needs a reach of {reach:.6g} m, its arm and rods give "
+            f"delta: a leg requires a reach of {reach:.6g} m, its arm and rods reach "
             f"{abs(P.arm - rod):.6g} to {P.arm + rod:.6g} m"
         )
     cosine = (reach**2 + P.arm**2 - rod**2) / (2 * reach * P.arm)

@@ -1,9 +1,9 @@
 """A planar five-bar robot, 5R: two driven arms, and two arms joined by a pin.
 
 Sources:
-    Round numbers, of the size of DexTAR, whose four arms are also equal: Campos,
-    Bourbonnais, Bonev, Bigras (2010), Development of a five-bar parallel robot with
-    large workspace, ASME IDETC.  Sections and clearances are typical.
+    Campos, Bourbonnais, Bonev, Bigras (2010), Development of a five-bar parallel robot
+    with large workspace, ASME IDETC: size of DexTAR, whose four arms are also equal.
+    The dimensions here are round numbers; sections and clearances are typical.
 """
 
 from dataclasses import dataclass

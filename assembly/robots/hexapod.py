@@ -98,6 +98,6 @@ def _leg(name: str, a: NDArray, b: NDArray, P: HexapodParameters) -> list[Placed
 
 
 def _in_axes(T: NDArray, vector: NDArray) -> tuple[float, float, float]:
-    """Return a direction in the axes of a frame; it is given in base axes."""
+    """Return a direction given in base axes, expressed in the axes of a frame."""
     x, y, z = (T[:3, :3].T @ vector).tolist()
     return x, y, z

@@ -1,14 +1,14 @@
 """The IRSBot-2 of the paper's section IV, reconstructed.
 
-The two legs are in the direction of the x axis; leg 2 is leg 1 rotated by pi about z0.
-In each leg a parallelogram (proximal module) carries an elbow body of constant
-orientation. Two parallel links between universal joints (distal module) carry the
-platform.  The paper's figures that define the axes of the universal joints are not
-public.  The axes used here give the paper's mobility everywhere in the workspace; other
-axes that were tried do not.
+The two legs extend along the x axis; leg 2 is leg 1 rotated by pi about z0.  In each
+leg, a parallelogram (proximal module) carries an elbow body of constant orientation.
+Two parallel links between universal joints (distal module) carry the platform.  The
+figures of the paper that define the axes of the universal joints are not public.  With
+the axes used here, the mobility equals that of the paper everywhere in the workspace;
+with other axes that were tested, the mobility differs.
 
-Frames have names; the paper's index is their position in :data:`NAMES`, from 1.
-Errors act at the paper's frames :data:`ERROR_FRAMES`.
+Frames have names; the index of a frame in the paper is its position in :data:`NAMES`,
+counted from 1.  Errors act at the frames :data:`ERROR_FRAMES` of the paper.
 
 ======  ===========================================================================
 symbol  meaning [m, rad]
@@ -42,9 +42,9 @@ NAMES = (
     "loop1_elbow", "loop1_idler", "loop2_platform", "loop2_link", "tip",
 )  # fmt: skip
 ERROR_FRAMES = ("elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip")
-# [rad, m] smallest errors of the paper
+# [rad, m] smallest errors in the paper
 ERROR_LEAST = (1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6)
-# [rad, m] largest errors of the paper
+# [rad, m] largest errors in the paper
 ERROR_MOST = (2e-2, 2e-2, 2e-2, 2e-4, 2e-4, 2e-4)
 
 _PARENTS = {
@@ -63,7 +63,7 @@ _REVOLUTE = ("drive", "elbow", "idler", "idler_end")
 
 @dataclass(frozen=True)
 class IRSBot2Parameters:
-    """The paper's nominal parameters [m, rad, Pa, N m/rad, N/m], by its symbols."""
+    """Nominal parameters of the paper [m, rad, Pa, N m/rad, N/m], by its symbols."""
 
     a: float = 0.050
     b: float = 0.083
@@ -142,8 +142,8 @@ def drive_angle(parameters: IRSBot2Parameters, x: float, z: float) -> float:
     cosine = (n**2 + P.L1**2 - L2**2) / (2 * n * P.L1)
     if not -1.0 <= cosine <= 1.0:
         raise BadInput(
-            f"irsbot2: pose x = {x:g}, z = {z:g} m needs a reach of {n:.6g} m, "
-            f"the links give {abs(P.L1 - L2):.6g} to {P.L1 + L2:.6g} m"
+            f"irsbot2: pose x = {x:g}, z = {z:g} m requires a reach of {n:.6g} m, "
+            f"the links reach {abs(P.L1 - L2):.6g} to {P.L1 + L2:.6g} m"
         )
     return math.atan2(along[1], along[0]) + math.acos(cosine)
 

@@ -1,10 +1,10 @@
 """The Orthoglide: three perpendicular linear drives with parallelograms; it translates.
 
 Each leg is a slide, a hinge, a parallelogram and a second hinge parallel to the first:
-PRPaR.  It prevents rotation of the platform about two axes: the three legs give six
-constraints where three suffice.  Each planar parallelogram adds three redundant
-constraints.  So the robot is overconstrained twelve times, and errors cause internal
-forces.
+PRPaR.  Each leg prevents rotation of the platform about two axes, so the three legs
+impose six constraints where three suffice.  Each planar parallelogram adds three
+redundant constraints.  The robot is therefore overconstrained twelve times, and errors
+cause internal forces.
 
 With the coordinates r of the slides and the position p of the platform, each leg of
 length L keeps (p_x - r_x)^2 + p_y^2 + p_z^2 = L^2, and so on.  At home, p = 0 and
@@ -52,7 +52,7 @@ def orthoglide(parameters: OrthoglideParameters | None = None) -> Robot:
 
     Returns:
         The robot with 30 frames and 5 closures; platform ``x.tip``.  The coordinate of
-        ``x.slide`` is r_x above.
+        ``x.slide`` is r_x, as defined at the head of this module.
     """
     P = parameters or OrthoglideParameters()
     axes = np.eye(3)

@@ -1,8 +1,9 @@
-"""Frames given by their home poses in base axes.
+"""Frames defined by their home poses in base axes.
 
-A robot's table is easiest to check in base axes, while a tree of frames needs each
-frame relative to its parent, after the parent's joint.  Joints of several degrees of
-freedom are coincident revolute joints: two for a cardan joint, three for a ball joint.
+The data of a robot are easiest to check in base axes.  A tree of frames, however,
+requires each frame relative to its parent, after the parent's joint.  Joints with
+several degrees of freedom are modelled as coincident revolute joints: two for a cardan
+joint, three for a ball joint.
 """
 
 import numpy as np

@@ -65,7 +65,7 @@ def arm_angle(
     reach = math.hypot(*along)
     if not abs(near - far) <= reach <= near + far or reach == 0.0:
         raise BadInput(
-            f"{robot}: the home pose needs a reach of {reach:.6g} m, the arms give "
+            f"{robot}: the home pose requires a reach of {reach:.6g} m, the arms reach "
             f"{abs(near - far):.6g} to {near + far:.6g} m"
         )
     cosine = (reach**2 + near**2 - far**2) / (2 * reach * near)
@@ -75,7 +75,7 @@ def arm_angle(
 def two_arms(
     name: str, foot: NDArray, angle: float, tip: NDArray, leg: PlanarLeg
 ) -> list[PlacedFrame]:
-    """Return drive, elbow and the frame at the second arm's end.
+    """Return the drive, the elbow and the frame at the second arm's end.
 
     The drive's coordinate is the arm's angle to the x axis.
 

@@ -1,5 +1,5 @@
-"""Cone programmes over plain arrays, independent of robots.
+"""Solvers of cone programmes on plain arrays, independent of robots.
 
-Begin at ``conic.py``, the second-order cone programme with its proof;
+Start with ``conic.py``, the second-order cone programme with its certificate.
 ``one_problem.py`` calls the compiled methods of ``assembly/kernels/solvers``.
 """

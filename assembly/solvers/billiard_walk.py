@@ -15,11 +15,11 @@ from forcefit.assembly.kernels.choice import kernels
 
 @dataclass(frozen=True, eq=False)
 class Positions:
-    """The set of clearance positions.
+    """Set of clearance positions for the billiard walk.
 
     Attributes:
         M: (nu, n) axes of Dikin's ellipsoid.
-        starts: (cones + 1,) index of the first clearance of each cone, and nu.
+        starts: (cones + 1,) index of the first clearance of each cone, then nu.
         to_screw: (6, nu) [rad, m] map from u to the platform's screw.
     """
 
@@ -49,10 +49,10 @@ class Positions:
     def walk(
         self, u: NDArray, every: int, rng: np.random.Generator, trace: NDArray
     ) -> None:
-        """Continue a chain, and record its platform screw at regular intervals.
+        """Continue a chain and record its platform screw at regular intervals.
 
         Args:
-            u: (nu,) present point of the chain, overwritten.
+            u: (nu,) current point of the chain, overwritten.
             every: number of trajectories between two recorded screws.
             rng: generator of random numbers.
             trace: (kept, 6) [rad, m] overwritten with the recorded screws.

@@ -1,16 +1,16 @@
-"""Vectors of clearances by their cones: discs, intervals and balls of radius 1."""
+"""Operations on vectors of clearances, grouped by cones of radius 1."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 
 def cone_starts(group: NDArray) -> NDArray:
-    """Return (cones + 1,) first columns of cones, and nu, for (nu,) cones in order."""
+    """Return (cones + 1,) the index of the first column of each cone, then nu."""
     return np.append(0, np.cumsum(np.bincount(group)))
 
 
 def cone_sums(values: NDArray, group: NDArray) -> NDArray:
-    """Return (..., cones) sums of the components (..., nu) of vectors in each cone."""
+    """Return (..., cones) sums of the components of (..., nu) vectors in each cone."""
     if values.ndim == 1:
         return np.bincount(group, weights=values)
     return values @ (group[:, None] == np.arange(np.bincount(group).size))
@@ -22,5 +22,5 @@ def cone_sizes(values: NDArray, group: NDArray) -> NDArray:
 
 
 def into_cones(u: NDArray, group: NDArray) -> NDArray:
-    """Return vectors whose part in each cone is shortened to length 1 if longer."""
+    """Return the vectors with components in each cone scaled to length 1 at most."""
     return u / np.maximum(1.0, cone_sizes(u, group))[group]

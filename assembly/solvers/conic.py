@@ -1,13 +1,13 @@
-"""Second-order cone programmes in the clearances, each solution with its certificate.
+"""Second-order cone programmes in the clearances, with certified solutions.
 
-There are two problems: the least energy of a reduced problem (22), and the least factor
-on the clearances of problem (21).  Both are scaled here to size 1.  Clarabel solves the
-second problem.  With ``"reference"``, Clarabel also solves the first problem, and
-:mod:`forcefit.assembly.solvers.pressed_cones` refines each solution.  With
-``"compiled"``, the compiled interior-point method solves it, or Clarabel if in doubt,
-and Newton's method on the dual (:mod:`forcefit.assembly.solvers.one_problem`) refines
-each solution.  The certified gap, which does not depend on the solvers, decides which
-solution is kept.
+The module solves two problems: the least energy of a reduced problem (22), and the
+least factor on the clearances of problem (21).  Both are scaled here to size 1.
+Clarabel solves the second problem.  With ``"reference"``, Clarabel also solves the
+first problem, and :mod:`forcefit.assembly.solvers.pressed_cones` refines each solution.
+With ``"compiled"``, the compiled interior-point method solves the first problem, and
+Clarabel solves it if the compiled solution is not proved.  Newton's method on the dual
+(:mod:`forcefit.assembly.solvers.one_problem`) then refines each solution.  The solution
+with the smallest certified gap is returned; the gap does not depend on the solvers.
 
 Sources:
     Goulart, Chen (2024), Clarabel: an interior-point solver for conic programs with
@@ -34,14 +34,14 @@ _TOLERANCE = 1e-13
 _REGULARISATIONS = (0.0, 1e-10, 1e-8)
 # gap that counts as proved: relative to the energy, and to the energy without clearance
 GAP, GAP_WITHOUT_CLEARANCE = 1e-8, 1e-12
-_GAP_WITHIN = 1e-12  # relative gap required of the interior-point method
-# share of the proved gap that is required here, because the full problem adds to the
+_GAP_WITHIN = 1e-12  # required relative gap of the interior-point method
+# share of the proved gap that is required here, because the full problem increases the
 # gap
 _SHARE = 0.1
 _STOP = 1e-2  # share of this gap at which Newton's method stops
 # largest number of Newton steps, and first sigma of the method
 _STEPS, _FIRST_SIGMA = 150, 1e6
-_RESIDUAL = 1e-11  # accepted residual of a row without springs
+_RESIDUAL = 1e-11  # accepted residual of rows without springs
 # largest factor on the clearances, up to which infeasibility is proved
 _LARGEST_FACTOR = 1e8
 _UNPROVED = "PrimalInfeasible, but its multipliers do not prove it"
@@ -66,8 +66,8 @@ class ConicSolution:
 
     Attributes:
         clearances: (nu,) clearances relative to their bounds.
-        springs: (r,) [sqrt(2 J)] multipliers of the springs, equal to G u + h up to the
-            gap.
+        springs: (r,) [sqrt(2 J)] multipliers of the springs; they equal G u + h within
+            the duality gap.
         rigid_multipliers: (p,) [J] multipliers of the rows without springs.
         value: [J] value of the objective.
         bound: [J] certified lower bound of the objective.
@@ -111,16 +111,16 @@ def minimise_energy(
         H: (p, nu) matrix of full row rank.
         k: (p,) vector.
         group: (nu,) cone of each column, counted from 0.
-        method: ``"compiled"``, with Clarabel if in doubt; ``"reference"`` for Clarabel
-            only.
+        method: ``"compiled"``, with Clarabel if the compiled solution is not proved;
+            or ``"reference"`` for Clarabel only.
 
     Returns:
         The minimiser with a certified lower bound.
 
     Raises:
-        SolverFailed: Clarabel gave no usable solution.
+        SolverFailed: Clarabel returned no usable solution.
     """
-    if not (h.any() or d.any() or k.any()):  # no gap to close and no load
+    if not (h.any() or d.any() or k.any()):  # the closures fit and no load acts
         zeros = np.zeros(len(h)), np.zeros(len(k))
         return ConicSolution(np.zeros(len(d)), *zeros, 0.0, 0.0)
     if G.shape[1] == 0:
@@ -216,7 +216,7 @@ _SOLVERS: dict[Method, tuple[_Solver, ...]] = {
 def _certified(
     problem: ConeProgramme, u: NDArray, rigid: NDArray, method: Method
 ) -> Iterator[ConicSolution]:
-    """Return solution with the bound by its springs, or refined by Newton's method."""
+    """Yield a solution certified by its springs, then solutions refined by Newton."""
     own = _certify(problem, u, problem.G @ u + problem.h, rigid)
     if method == "reference":  # Clarabel's multipliers are rarely better
         for refined in refine(problem, u, rigid):
@@ -236,7 +236,7 @@ def _certified(
 def _checked(
     problem: ConeProgramme, u: NDArray, springs: NDArray, rigid: NDArray
 ) -> Iterator[ConicSolution]:
-    """Return the last iterate of Newton's method if it is a solution."""
+    """Yield the last iterate of Newton's method if it satisfies all constraints."""
     u = into_cones(u, problem.group)
     if all(np.isfinite(part).all() for part in (u, springs, rigid)):
         if np.abs(problem.H @ u - problem.k).max(initial=0.0) <= _RESIDUAL:
@@ -251,7 +251,7 @@ def _certify(
     value = float(strain @ strain) / 2 - float(problem.d @ u)
     bound = _energy_bound(problem, springs, rigid)
     if not problem.d.any():
-        # any multiple of the multipliers is a valid proof: f gain - f^2 cost / 2
+        # a multiple f of the multipliers is a valid proof: f gain - f^2 cost / 2
         cost = float(springs @ springs)
         factor = max(0.0, bound + cost / 2) / cost if cost > 0.0 else 0.0
         better = _energy_bound(problem, factor * springs, factor * rigid)
@@ -292,15 +292,15 @@ def least_factor(
         scaled: (nu,) bool, whether t scales the column's cone.
 
     Returns:
-        t, None if no factor is sufficient; u (nu,); and the multipliers (m,) that prove
-        it.
+        The factor t, or None if no factor suffices; the clearances u (nu,); and the
+        multipliers (m,) that prove t.
 
     Raises:
-        SolverFailed: Clarabel gave no usable solution.
+        SolverFailed: Clarabel returned no usable solution.
     """
     m, nu = B.shape
     rows = np.linalg.norm(B, axis=1)
-    # if every cone is scaled, t is proportional to the right side, so size 1 is solved
+    # if every cone is scaled, t is proportional to ``right``; it is scaled to length 1
     size = np.linalg.norm(right / rows) if scaled.all() else 1.0
     unit_cones, radii = _unit_cones(group, np.where(scaled, 0.0, 1.0))
     _, factors = _unit_cones(group, np.where(scaled, -1.0, 0.0))
@@ -342,7 +342,7 @@ def _unit_cones(group: NDArray, radius: NDArray) -> tuple[csc_matrix, NDArray]:
 
 
 class _Cones(NamedTuple):
-    """Rows of a programme: equations, inequalities, then cones of given columns."""
+    """Rows of a programme: equations, then inequalities, then cones."""
 
     equal: int
     group: NDArray
@@ -368,7 +368,7 @@ def _clarabel(
     solution = clarabel.DefaultSolver(P, q, A, b, sets, settings).solve()
     status = str(solution.status)
     x, z = np.array(solution.x), np.array(solution.z)
-    # an inaccurate solution may still be good, because its certificate decides
+    # an inaccurate solution can be good enough, because its certificate decides
     usable = {"Solved", "AlmostSolved", "InsufficientProgress", "MaxIterations"}
     if status not in usable or not (np.isfinite(x).all() and np.isfinite(z).all()):
         return None, z, status
@@ -379,8 +379,8 @@ def _proves_no_point(
     n: NDArray, H: NDArray, k: NDArray, group: NDArray, radius: NDArray
 ) -> bool:
     """Return whether n proves that no u with |u_k| <= radius_k satisfies H u = k."""
-    # n.H u is at most the sum of radius_k |(H^T n)_k|, so a larger n.k is a proof if it
-    # also exceeds the rounding of its terms
+    # n.H u is at most the sum of radius_k |(H^T n)_k|, so n.k > that sum is a proof if
+    # the difference also exceeds the rounding errors of the terms
     most = float(cone_sizes(H.T @ n, group) @ radius)
     rounding = 1e-13 * float(np.abs(n) @ (np.abs(k) + np.abs(H).sum(axis=1)))
     return bool(float(n @ k) > most + rounding)

@@ -1,4 +1,4 @@
-"""The two methods of every public solver, by name."""
+"""Names of the two methods that every public solver offers."""
 
 import logging
 from typing import Literal, get_args
@@ -27,8 +27,8 @@ def log_reference(robot: str, what: str, left: int, count: int) -> None:
     """Log that the reference solves points that the compiled method did not prove.
 
     Args:
-        robot: its name.
-        what: what is computed.
+        robot: name of the robot.
+        what: quantity that is computed.
         left: number of these points.
         count: number of all points.
     """

@@ -1,6 +1,6 @@
-"""Compiled solvers for cones of any size, and for the farthest screw of a body.
+"""Compiled solvers for cones of any dimension, and for the farthest screw of a set.
 
-They solve one problem at a time, except :func:`farthest_points`, which solves many.
+Each function solves one problem per call; :func:`farthest_points` solves many.
 """
 
 from collections.abc import Callable
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from forcefit.assembly.kernels.choice import kernels
 
 Problem = tuple[NDArray, NDArray, NDArray, NDArray, NDArray]
-# function of a direction that returns the certified height, the (6,) screw that attains
-# it (at least nearly), and the (nv,) gradient
+# function of a direction that returns the certified height, a (6,) screw that attains
+# the height approximately, and the (nv,) gradient
 Support = Callable[[NDArray], tuple[float, NDArray, NDArray]]
 
 
@@ -55,7 +55,7 @@ def interior_point(
 def newton(
     problem: Problem, starts: NDArray, limits: SolverLimits, u: NDArray, y: NDArray
 ) -> None:
-    """Minimise the same objective by Newton's method on the dual.
+    """Minimise the objective of :func:`interior_point` by Newton's method on the dual.
 
     Args:
         problem: see :func:`interior_point`.
@@ -76,15 +76,15 @@ def farthest_points(
 
     Args:
         rows: (p, nu) matrix of full row rank.
-        starts: (cones + 1,) index of the first column of each cone, and nu.
+        starts: (cones + 1,) index of the first column of each cone, then nu.
         directions: (k, nu) directions d, of length 1.
         right: (k, p) right sides.
         tolerance: (k,) accepted gap of d.u.
 
     Returns:
-        u (k, nu) and the multipliers n (k, p) of the rows at the last iterate, with d.u
-        <= n.right + sum |(d - rows^T n)_c|.  And (k,) bool, True if both sides are as
-        close as required and the rows hold to rounding.
+        u (k, nu) and the multipliers n (k, p) of the rows at the last iterate.  They
+        satisfy d.u <= n.right + sum |(d - rows^T n)_c|.  Also (k,) bool, True if the
+        gap between both sides is small enough and the rows hold to rounding.
     """
     count, (p, nu) = len(directions), rows.shape
     points, multipliers = np.zeros((count, nu)), np.zeros((count, p))
@@ -100,24 +100,24 @@ def farthest(
     centre: NDArray, X: NDArray, H: NDArray, start: NDArray, starts: NDArray,
     half: int, tolerance: float, support: Support,
 ) -> tuple[NDArray, NDArray, int]:  # fmt: skip
-    """Bracket the largest size of half a screw in {centre + X (v - start)}.
+    """Bound the largest rotation or translation among {centre + X (v - start)}.
 
     Args:
         centre: (6,) [rad, m] screw at ``start``.
         X: (6, nv) [rad, m] map to screws.
         H: (p, nv) orthonormal rows with H (v - start) = 0.
         start: (nv,) point within the unit cones.
-        starts: (cones + 1,) index of the first column of each cone, and nv.
+        starts: (cones + 1,) index of the first column of each cone, then nv.
         half: 0 for the rotation, 3 for the translation.
         tolerance: [rad or m] required difference of upper and lower bound.
-        support: function of a direction (3,) of that half, which is called if the
-            compiled method is not accurate enough; its gradient is X^T d minus the part
+        support: function of a direction (3,) of that half, called if the compiled
+            method is not accurate enough.  Its gradient is X^T d minus the contribution
             of the rows' multipliers.
 
     Returns:
-        (2,) lower and upper bound, (6,) the screw that attains the lower bound, and the
-        number of support functions.  After 400 of them the bounds may be wider than
-        required.
+        (2,) lower and upper bound; (6,) the screw that attains the lower bound; and the
+        number of support functions computed.  The bounds can be wider than required if
+        400 support functions do not suffice.
     """
 
     def asked(direction: tuple[float, float, float]) -> tuple[float, NDArray, NDArray]:
@@ -134,10 +134,10 @@ def farthest(
 
 
 def _contiguous(*arrays: NDArray) -> tuple[NDArray, ...]:
-    """Return the arrays in C++'s layout."""
+    """Return the arrays as contiguous arrays of float in C order, for C++."""
     return tuple(np.ascontiguousarray(array, dtype=float) for array in arrays)
 
 
 def _integers(array: NDArray) -> NDArray:
-    """Return integers in C++'s layout."""
+    """Return a contiguous array of 64-bit integers, for C++."""
     return np.ascontiguousarray(array, dtype=np.int64)

@@ -1,9 +1,9 @@
-"""Bounds of the farthest screw of a body by cuts, in numpy (reference method).
+"""Bounds of the farthest screw of a convex set by cuts, in numpy (reference method).
 
-Each support function d.x <= h(d) cuts off a half space; the cuts form a polytope around
-the body.  The farthest corner of the polytope is an upper bound; the farthest point
-that attains a support function is a lower bound.  The next cut is in the direction of
-that corner.
+Each support function d.x <= h(d) cuts off a half space.  The cuts form a polytope
+around the set.  The farthest corner of the polytope is an upper bound of the distance.
+The farthest point that attains a support function is a lower bound.  The next cut is
+made in the direction of that corner.
 
 Sources:
     Hoffman (1981), A method for globally minimizing concave functions over convex sets,
@@ -16,26 +16,26 @@ from numpy.typing import NDArray
 from forcefit.assembly.solvers.one_problem import Support
 
 _MOST = 400  # largest number of support functions
-# distance of every cut from the body, so that a flat body has corners too: relative to
-# the tolerance, and at least relative to the body's size
+# distance of every cut from the set, so that a flat set has corners too: relative to
+# the tolerance, and at least relative to the size of the set
 _SLACK, _LEAST_SLACK = 0.25, 1e-7
 
 
 def farthest(
     centre: NDArray, half: int, tolerance: float, support: Support
 ) -> tuple[tuple[float, float], NDArray, int]:
-    """Bracket the largest size of half a screw of a bounded convex body.
+    """Bound the largest rotation or translation of a bounded convex set of screws.
 
     Args:
-        centre: (6,) [rad, m] screw of the body.
+        centre: (6,) [rad, m] screw of the set.
         half: 0 for the rotation, 3 for the translation.
         tolerance: [rad or m] required difference of upper and lower bound.
         support: support function of a direction (3,) of that half.
 
     Returns:
-        Lower and upper bound, (6,) the screw that attains the lower bound, and the
-        number of support functions.  After 400 of them the bounds may be wider than
-        required.
+        Lower and upper bound; (6,) the screw that attains the lower bound; and the
+        number of support functions computed.  The bounds can be wider than required if
+        400 support functions do not suffice.
     """
     part = slice(half, half + 3)
     best, low = centre, float(np.linalg.norm(centre[part]))

@@ -1,8 +1,8 @@
 r"""Refinement of a minimum of :func:`.conic.minimise_energy` in numpy.
 
-A cone solver ends at a gap.  When it is known which cones are in contact with their
-bounds, with forces f, the minimum satisfies equations that Newton's method solves to
-rounding; y are the springs, n the multipliers of H:
+A cone solver stops at a small duality gap.  If the cones at their bounds, with contact
+forces f, are known, the minimum satisfies equations that Newton's method solves to
+rounding.  Let y be the springs and n the multipliers of H:
 
     G u + h - y = 0,  G' y - d - H' n + f_c u_c = 0,  H u = k,  (|u_c|^2 - 1) / 2 = 0.
 
@@ -19,8 +19,8 @@ from forcefit.assembly.solvers.cones import cone_sizes
 
 _STEPS = 4  # largest number of Newton steps; two are usual
 _SETTLED = 1e-12  # [-] size of the clearances' last step at convergence
-_GUESSES = 6  # largest number of guesses of the cones in contact; one is usual
-_NEAR = 1e-2, 0.0  # [-] slacks below which a cone with any force counts as in contact
+_GUESSES = 6  # largest number of guesses of the cones in contact; usually one suffices
+_NEAR = 1e-2, 0.0  # [-] slacks below which a cone with a force counts as in contact
 _BEYOND = 1e-9  # [-] accepted excess over the bound of a cone that is not in contact
 
 _Problem = tuple[NDArray, NDArray, NDArray, NDArray, NDArray, NDArray]
@@ -33,17 +33,18 @@ def refine(problem: _Problem, u: NDArray, n: NDArray) -> Iterator[_Point]:
     Args:
         problem: G (r, nu), h (r,), d (nu,), H (p, nu), k (p,), and the cone of each
             column (nu,).
-        u: (nu,) a solution.
-        n: (p,) its multipliers of H.
+        u: (nu,) solution to refine.
+        n: (p,) multipliers of H at this solution.
 
     Yields:
         u (nu,), y (r,) and n (p,) for each guess of the cones in contact; less accurate
-        if the cones cannot be identified.
+        if these cones cannot be identified.
     """
     G, h, d, H, _, group = problem
     y = G @ u + h
     force, slack = cone_sizes(G.T @ y - d - H.T @ n, group), 1.0 - cone_sizes(u, group)
-    # force times slack is about the solver's gap, so one of them is nearly zero
+    # the product of force and slack is about the solver's gap: one of them is nearly
+    # zero
     scale = max(float(y @ y) / 2, float(force.max()), 1e-300)
     for near in _NEAR:
         pressed = (slack < near) | (force > scale * slack)
@@ -53,7 +54,7 @@ def refine(problem: _Problem, u: NDArray, n: NDArray) -> Iterator[_Point]:
 def _settled(
     problem: _Problem, start: _Point, pressed: NDArray, force: NDArray
 ) -> _Point:
-    """Return the minimum; add exceeded cones, remove those with negative force."""
+    """Return the minimum after adding exceeded cones and removing negative forces."""
     for _ in range(_GUESSES):
         settled, forces = _with_pressed(problem, start, pressed, force)
         beyond = ~pressed & (cone_sizes(settled[0], problem[-1]) > 1.0 + _BEYOND)
@@ -67,7 +68,7 @@ def _settled(
 def _with_pressed(
     problem: _Problem, start: _Point, pressed: NDArray, force: NDArray
 ) -> tuple[_Point, NDArray]:
-    """Return result of Newton's method with given cones in contact, and all forces."""
+    """Return the Newton solution for given cones in contact, and the contact forces."""
     G, h, d, H, k, group = problem
     u, y, n = start
     held = np.flatnonzero(pressed)
@@ -93,7 +94,7 @@ def _with_pressed(
 
 
 def _derivatives(G: NDArray, H: NDArray, N: NDArray, curvature: NDArray) -> NDArray:
-    """Return the derivatives of the equations by u, y, n and f; N are the normals."""
+    """Return the Jacobian of the equations in u, y, n and f; N contains the normals."""
     r, p, m = len(G), len(H), N.shape[1]
     return np.block([
         [G, -np.eye(r), np.zeros((r, p + m))],

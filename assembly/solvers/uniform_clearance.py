@@ -1,16 +1,17 @@
-"""Uniformly distributed positions of the clearances, by the billiard walk.
+"""Uniformly distributed positions of the clearances, drawn by the billiard walk.
 
-The set is {u : rows (u - start) = 0, |u_k| <= 1 for each cone k}.  Near the edge of a
-zone it is thin in some directions, where a walk with isotropic steps would mix slowly.
-So the directions are drawn from Dikin's ellipsoid at the analytic centre, which has the
-proportions of the set: the ellipsoid is inside the set, and the set is inside the
-ellipsoid scaled by the number of cones.  The walk is affine invariant.
+The set of positions is {u : rows (u - start) = 0, |u_k| <= 1 for each cone k}.  Near
+the edge of an assembly zone this set is thin in some directions, and a walk with
+isotropic steps would mix slowly.  Directions are therefore drawn from Dikin's ellipsoid
+at the analytic centre, which has the proportions of the set.  The ellipsoid is
+contained in the set, and the set is contained in the ellipsoid scaled by the number of
+cones.  The walk is affine invariant.
 
-A trajectory is straight and is reflected at every bound, for a random time.  It crosses
-the set several times, while a step of hit-and-run ends at the first bound.  Several
-chains from different starts are compared.  Their length is doubled, and the first half
-discarded, until split R-hat and the effective sample size of every component of the
-platform's screw meet their criteria.
+A trajectory moves straight for a random time and is reflected at every bound.  It
+crosses the set several times, while a step of hit-and-run ends at the first bound.
+Several chains from different starts are compared.  The length of the chains is doubled,
+and their first half is discarded, until split R-hat and the effective sample size of
+every component of the platform's screw meet their criteria.
 
 Sources:
     Gryazina, Polyak (2014), Random sampling: billiard walk algorithm; Nesterov,
@@ -35,18 +36,18 @@ def sample_uniform_position(
     Z: NDArray, starts: NDArray, to_screw: NDArray, u: NDArray,
     rng: np.random.Generator, doublings: int = DOUBLINGS,
 ) -> bool:  # fmt: skip
-    """Return a point that is uniformly distributed over the set.
+    """Overwrite u with a point that is uniformly distributed over the set.
 
     Args:
-        Z: (nu, n) orthonormal columns: directions in which u may move.
-        starts: (cones + 1,) index of the first clearance of each cone, and nu.
+        Z: (nu, n) orthonormal columns: directions in which u can move.
+        starts: (cones + 1,) index of the first clearance of each cone, then nu.
         to_screw: (6, nu) [rad, m] map from u to the platform's screw.
         u: (nu,) a point of the set, overwritten with the new point.
         rng: generator of random numbers.
         doublings: largest number of doublings of the chains.
 
     Returns:
-        Whether the chains mixed; u is unchanged if the set has empty interior.
+        Whether the chains mixed; u is unchanged if the set has an empty interior.
     """
     from forcefit.assembly.solvers.billiard_walk import Positions
 
@@ -74,13 +75,13 @@ def sample_uniform_position(
 def _ellipsoid(
     Z: NDArray, starts: NDArray, start: NDArray
 ) -> tuple[NDArray, NDArray] | None:
-    """Return the analytic centre, and (nu, n) the axes of Dikin's ellipsoid there.
+    """Return the analytic centre, and the (nu, n) axes of Dikin's ellipsoid there.
 
-    The minimum of -sum log(rho^2 - |u_k|^2) is found by damped Newton steps, which stay
-    inside.  At first rho is large enough for the start to be inside; it decreases to 1.
+    Damped Newton steps minimise -sum log(rho^2 - |u_k|^2) and stay inside.  The first
+    rho is large enough for the start to be inside; rho then decreases to 1.
 
     Returns:
-        Centre and axes in columns; None if the set has empty interior.
+        Centre and axes in columns; None if the set has an empty interior.
     """
     u, heads = start.copy(), starts[:-1]
     cone = np.repeat(np.arange(len(heads)), np.diff(starts))
@@ -113,12 +114,12 @@ def _ellipsoid(
 
 
 def _largest(heads: NDArray, u: NDArray) -> float:
-    """Return the largest norm over the cones; 1 on the boundary."""
+    """Return the largest norm of u over the cones; 1 on the boundary."""
     return float(np.sqrt(np.add.reduceat(u * u, heads).max()))
 
 
 def is_mixed(trace: NDArray) -> bool:
-    """Return whether all varying components (chains, kept, components) have mixed."""
+    """Return whether the chains of all varying components have mixed."""
     moving = trace[:, :, trace.std(axis=(0, 1)) > _CONSTANT]
     return all(
         # written so that NaN counts as not mixed
@@ -134,8 +135,8 @@ def diagnose(x: NDArray) -> tuple[float, float]:
         x: (chains, 2 k) values along each chain; each half counts as a chain.
 
     Returns:
-        R-hat and size.  R-hat tends to 1 as the chains become independent of their
-        starts; it is infinite if no chain moves.
+        R-hat and effective sample size.  R-hat tends to 1 as the chains become
+        independent of their starts; it is infinite if no chain moves.
     """
     k = x.shape[1] // 2
     halves = x[:, : 2 * k].reshape(-1, k)

@@ -1,4 +1,4 @@
-"""Result of an allocation: tolerances, cost and proof, as values and data set."""
+"""The result of a tolerance allocation, as values, as text and as a data set."""
 
 from dataclasses import dataclass, field
 from importlib.metadata import version
@@ -33,7 +33,7 @@ _SHARE_OF = {
 
 @dataclass(frozen=True, eq=False)
 class Allocation:
-    """Tolerances and their cost, with proven bounds of both.
+    """Tolerances and their cost, with proven bounds of the cost and of the limits.
 
     Attributes:
         plan: costs and limits.
@@ -42,15 +42,16 @@ class Allocation:
         uniformly_scaled: (G,) [rad or m] tolerances in the proportions of the convex
             programme, multiplied by one factor so that they meet all limits.
         price_uniformly_scaled: cost of ``uniformly_scaled``, at least ``price``.
-        price_bound: lower bound of the cost of tolerances that always meet the convex
-            limits; NaN for a yield below 1, or if a limit is not convex.
+        price_bound: lower bound of the cost of any tolerances with which every robot
+            meets the convex limits; NaN for a yield below 1, or if a limit is not
+            convex.
         cuts: number of cutting planes in the convex programme.
-        worst: for each limit, for yield 1: the quantity at the worst corner found, and
-            its proven upper bound over all postures; NaN if not proven.
-        proven_scale: factor on the tolerances, 1 or less, at which the upper bounds
-            meet the limits too; NaN if not proven.
-        verification: results of the verification by new random draws: yields with
-            intervals.
+        worst: by limit, for a yield of 1: the value of the limited quantity at the
+            worst corner found, and its proven upper bound over all postures. The bound
+            is NaN if it could not be proven.
+        proven_scale: factor on the tolerances, at most 1, for which the proven upper
+            bounds also meet the limits; NaN if there is no proof.
+        verification: yields of new random draws, with confidence intervals.
         perfect_parts: for each limit on a pose error, the pose error [rad or m] due to
             clearances alone, and its posture.
     """
@@ -70,18 +71,18 @@ class Allocation:
     __repr__, _repr_html_ = short_repr, html_table
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return the tolerances over ``class``, as ``--output`` writes them."""
+        """Return the data set of tolerances by class that ``--output`` writes."""
         return tolerance_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a row for each class, columns (variable, component)."""
+        """Return a table with one row per class and columns (variable, component)."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "class")
 
 
 def allocation_of(allocation: Allocation) -> dict[str, Any]:
-    """Return an allocation as plain values."""
+    """Return an allocation as a dictionary of plain values."""
     plan, shares = allocation.plan, price_shares(allocation)
     classes = [
         {
@@ -126,10 +127,11 @@ def allocation_of(allocation: Allocation) -> dict[str, Any]:
 def price_shares(allocation: Allocation) -> NDArray:
     """Return the share of each class in the saving by larger tolerances.
 
-    At least cost, the saving for a relative change of a tolerance is the multiplier of
-    the limit times the change of the limited quantity.  This is cost / tolerance or,
-    for the logarithmic law, the cost.  It has no unit, so angles and lengths are
-    comparable.
+    At the least cost, the saving per relative change of a tolerance equals the
+    multiplier of the limit times the change of the limited quantity.  For the
+    reciprocal cost law this saving is cost / tolerance; for the logarithmic law it is
+    the cost coefficient.  The saving has no unit, so that angles and lengths can be
+    compared.
 
     Args:
         allocation: result of the allocation.
@@ -148,7 +150,7 @@ def price_shares(allocation: Allocation) -> NDArray:
 def _taken(
     allocation: Allocation, key: str, reached: float, at: str
 ) -> dict[str, float | str]:
-    """Return the part of a limit due to clearances, and the cost without clearances."""
+    """Return the part of a limit that clearances use, and the cost without them."""
     plan, limit = allocation.plan, allocation.plan.limits[key]
     # pose errors due to errors and to clearances nearly add up, and scale with
     # tolerances
@@ -163,7 +165,7 @@ def _taken(
 
 
 def _distribution(plan: Plan) -> dict[str, Any]:
-    """Return how errors are distributed within their tolerances."""
+    """Return the distribution of the errors within their tolerances."""
     sources = plan.sources
     own = sources.independent if isinstance(sources, CalloutSources) else sources
     kind = "as in the robot file" if own is None else KINDS[int(own.kind[0])]
@@ -172,21 +174,21 @@ def _distribution(plan: Plan) -> dict[str, Any]:
 
 
 def _contact_length(plan: Plan) -> float | None:
-    """Return the [m] contact length of the contact model; None for other models."""
+    """Return the contact length [m] of the contact model; None for other models."""
     if not plan.limits_pose or plan.clearance != "contact":
         return None
     return plan.contact_length or contact_length_of(plan.sources.robot)
 
 
 def _unit(allocation: Allocation, group: int) -> str:
-    """Return the unit of a class of tolerances."""
+    """Return the unit of the tolerances of a class."""
     first = int(np.flatnonzero(allocation.plan.group == group)[0])
-    # callouts are shifts and tilts together, within a zone of a width
+    # a callout combines shifts and tilts in one zone, whose width is a length
     return "rad" if allocation.plan.sources.units[first] == "rad" else "m"
 
 
 def _is_width(plan: Plan, group: int) -> bool:
-    """Return whether a tolerance is the full width of a zone, not to each side."""
+    """Return whether a tolerance is the full width of a zone, not a half width."""
     if not isinstance(plan.sources, CalloutSources):
         return False
     columns = set(np.flatnonzero(plan.group == group).tolist())
@@ -236,7 +238,7 @@ def allocation_text(results: dict[str, Any]) -> str:
 
 
 def _taken_text(key: str, one: dict[str, Any]) -> str:
-    """Return a sentence on the share of a limit that clearances alone use."""
+    """Return a sentence on the part of a limit that clearances use without errors."""
     reached, limit = (
         in_unit(one[k], _SHOWN[one["unit"]]) for k in ("reached", "limit")
     )
@@ -249,7 +251,7 @@ def _taken_text(key: str, one: dict[str, Any]) -> str:
 
 
 def _looks_text(check: dict[str, Any]) -> str:
-    """Return a text on the verifications: number, confidence of each and of all."""
+    """Return the number of verifications and their confidence levels as text."""
     left = check["yield"]["undecided"]
     undecided = f", {left} draws undecided" if left else ""
     return (
@@ -260,7 +262,7 @@ def _looks_text(check: dict[str, Any]) -> str:
 
 
 def _price_text(results: dict[str, Any]) -> str:
-    """Return cost of the tolerances, with its lower bound or its reduction, as text."""
+    """Return the cost of the tolerances as text, with its lower bound or reduction."""
     price, alike, bound = (results[k] for k in ("price", "price_alike", "price_bound"))
     text = f"price {price:.5g}"
     if np.isfinite(bound):

@@ -1,12 +1,13 @@
 """Tolerance allocation: tolerances of least cost within limits.
 
-Tolerances t_g, one for each class of errors, have a cost ``c_g / t_g`` (or ``-c_g log
-t_g``).  Limits of margin and energy are convex:
-:mod:`forcefit.assembly.statistics.cutting_planes` finds the least cost and proves it
-for a yield of 1.  A yield below 1, and limits of wrenches, stress and pose errors, are
-not convex; :mod:`forcefit.assembly.statistics.least_cost` continues to a local minimum.
-Finally, all tolerances are multiplied by one factor until independent draws, or the
-worst corners, just meet every limit, and new draws verify them.
+Each class g of errors has a tolerance t_g, whose cost is ``c_g / t_g`` (or ``-c_g log
+t_g``).  Limits on the margin and on the energy are convex. For these limits and a yield
+of 1, :mod:`forcefit.assembly.statistics.cutting_planes` finds the least cost and proves
+that no tolerances cost less.  A yield below 1, and limits on wrenches, stress and pose
+errors, are not convex. For these, :mod:`forcefit.assembly.statistics.least_cost`
+continues to a local minimum.  Finally, all tolerances are multiplied by one factor such
+that independent draws, or the worst corners, just meet every limit. New draws then
+verify the tolerances.
 """
 
 from collections.abc import Callable, Sequence
@@ -36,7 +37,7 @@ from forcefit.assembly.statistics.scaling import (
 from forcefit.assembly.statistics.verification import prove_worst, verify
 from forcefit.assembly.statistics.worst_case_widths import allot_worst_case
 
-# multiple of the number of training draws; many are possible for a single factor
+# number of draws for the final factor, as a multiple of the number of training draws
 _SCALING_DRAWS = 4
 
 
@@ -47,7 +48,7 @@ def allocate(
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
     replay: Replay | None = None,
 ) -> Allocation:
-    """Find and verify the tolerances of least cost that meet a plan over postures.
+    """Find the tolerances of least cost that meet a plan's limits, and verify them.
 
     Args:
         postures: postures of one robot in its workspace.
@@ -60,8 +61,8 @@ def allocate(
         The tolerances.
 
     Raises:
-        BadInput: no part can take up an error, or a limit is violated without errors or
-            with the tightest tolerances.
+        BadInput: neither clearances nor springs can take up some error, or a limit is
+            violated without errors or with the tightest tolerances.
     """
     replay = replay or Replay()
     if isinstance(plan.sources, CalloutSources) and plan.asked_yield == 1.0:
@@ -70,7 +71,7 @@ def allocate(
     perfect_parts = requirement.perfect_parts()
     convex_requirement = requirement
     if not requirement.convex:
-        # without convex limits, start from the proportions due to a limit of the energy
+        # without convex limits, start from the tolerances for a limit on the energy
         typical = _typical_energy(requirement)
         convex_requirement = Requirement(
             postures, replace(plan, limits={"energy": typical}), replay
@@ -132,7 +133,7 @@ def _scaled_tolerances(
 
 
 def _typical_energy(requirement: Requirement) -> float:
-    """Return [J] median energy of draws at the loosest tolerances, first posture."""
+    """Return the median energy [J] at the first posture for the loosest tolerances."""
     plan = requirement.plan
     values = plan.draws_of(TRAINING, 200) * plan.spread(plan.most)
     rows = requirement.experiments[0].evaluate(values, range(len(values)))

@@ -1,8 +1,9 @@
-"""Clearance positions if bounds on the motion of passive joints may be active.
+"""Clearance positions of draws in which a passive joint may reach its motion limit.
 
-Those bounds are left out of the prepared posture, because clearances can reach hardly
-any of them.  Draws in which one may be reached are computed one by one.  In these, the
-set of platform screws of problem (27), ``frozen``, has every relevant bound as a cone
+A prepared posture omits the motion limits of passive joints, because clearances rarely
+move a joint so far.  Draws in which a joint may reach a limit are solved one by one.
+For these draws, every relevant limit is an additional cone of problem (27), which
+describes the set of platform screws
 (:mod:`forcefit.assembly.linear.reference.pose_error`).
 """
 
@@ -19,7 +20,7 @@ from forcefit.assembly.linear.reference.reduction import FreeMotion
 from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.assembly.statistics.linear_response import LinearResponse
 
-# assumption of (27): every spring has its deformation in the solution of (22)
+# assumption of (27): every spring keeps its deformation from the solution of (22)
 ASSUMPTION = "frozen"
 
 
@@ -31,8 +32,9 @@ def draws_at_bounds(prepared: LinearResponse, draws: Assembly) -> NDArray:
         draws: solutions of the posture for k draws.
 
     Returns:
-        (k,) bool, True if a bound is active in the solution, if the clearances can move
-        a joint to its bound, or if only the bound holds the joint and the platform.
+        (k,) bool, True if a motion limit is active in the solution, if the clearances
+        can move a joint to its limit, or if only the limit stops a motion of the
+        platform.
     """
     solved = np.isfinite(draws.energy)
     active = solved & np.isnan(draws.clearances).any(axis=1)
@@ -51,7 +53,7 @@ def draws_at_bounds(prepared: LinearResponse, draws: Assembly) -> NDArray:
 
 
 def _moves_platform(prepared: LinearResponse) -> NDArray:
-    """Return (nq,) bool: free motions of the platform that no closure prevents."""
+    """Return (nq,) bool: free motions that move the platform and open no closure."""
     mismatch = prepared.posture.mismatch
     A_q = prepared.closures @ prepared.joints.free
     P_q = prepared.platform @ prepared.joints.free
@@ -63,18 +65,18 @@ def _moves_platform(prepared: LinearResponse) -> NDArray:
 def bounded_position(
     draws: Assembly, i: int, wrench: NDArray | None, rng: np.random.Generator
 ) -> tuple[NDArray, bool]:
-    """Return the platform screw of one draw at contact, or uniform over its set.
+    """Return the platform screw of one draw, at contact or from the uniform model.
 
     Args:
         draws: draws of one posture.
         i: index of the draw.
-        wrench: (6,) [N m, N] wrench that moves the platform to contact; None for the
-            uniform distribution.
-        rng: generator of random numbers for the uniform distribution.
+        wrench: (6,) [N m, N] wrench that moves the platform to contact; None to sample
+            the platform screw uniformly from its set.
+        rng: generator of random numbers for the uniform model.
 
     Returns:
         (6,) [rad, m] screw, NaN if the draw has no solution or the solver fails; and
-        whether the walk mixed.  Motions without any bound have their smallest size.
+        whether the random walk mixed.  Motions without any limit are minimised.
     """
     from forcefit.assembly.solvers.uniform_clearance import sample_uniform_position
 

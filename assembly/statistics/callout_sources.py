@@ -1,7 +1,7 @@
-"""Random errors of the callouts and fits of a robot, with independent errors.
+"""Random errors from the callouts and fits of a robot, and independent errors.
 
-A callout is drawn as a whole: shift and tilt of a bore in a position zone depend on
-each other.  The numbers of a draw depend on its number and the seed only, as those of
+Each callout is drawn as a whole, because shift and tilt of a bore in a position zone
+depend on each other.  A draw depends only on its number and on the seed, as in
 :mod:`forcefit.assembly.model.error_distributions`.
 """
 
@@ -28,24 +28,24 @@ from forcefit.assembly.statistics.joint_fits import (
 from forcefit.assembly.statistics.ranking import group_of, kind_of
 from forcefit.inputs.table import BadInput
 
-_SAMPLE = 1 << 14  # draws of a fit for its variance
-_WORDS = 4  # random numbers of one step of Philox
+_SAMPLE = 1 << 14  # number of draws from which the variance of a fit is estimated
+_WORDS = 4  # number of random numbers that one step of the Philox generator returns
 
 
 @dataclass(frozen=True, eq=False)
 class CalloutSources:
-    """Errors by callouts, independent errors and fits; m numbers of each draw.
+    """Random errors of callouts, independent errors and fits: m numbers per draw.
 
-    The numbers are the independent errors [rad or m], then the coordinates of the
-    callouts' zones in radii of their balls [-], then the radial clearances of the fits
-    less their means [m].
+    The m numbers are, in this order: the independent errors [rad or m]; the coordinates
+    of the callouts' zones relative to the radius of each ball [-]; and the radial
+    clearances of the fits minus their means [m].
 
     Attributes:
-        robot: of the callouts.
-        placed: its callouts.
-        independent: errors that are added, or None.
-        fixed: (n, 6) [rad, m] errors that every draw has; zero if None.
-        fits: of its joints.
+        robot: robot with the callouts.
+        placed: callouts of the robot with their zones.
+        independent: errors that are added to those of the callouts, or None.
+        fixed: (n, 6) [rad, m] errors that are added to every draw; zero if None.
+        fits: fits of the robot's joints.
     """
 
     robot: Robot
@@ -56,19 +56,19 @@ class CalloutSources:
 
     @property
     def _independent_count(self) -> int:
-        """Independent errors of a draw."""
+        """Number of independent errors per draw."""
         return 0 if self.independent is None else len(self.independent)
 
     @cached_property
     def columns(self) -> list[NDArray]:
-        """Columns of the numbers of each callout."""
+        """Indices of the numbers that belong to each callout."""
         widths = [sum(placed.zone.dimensions) for placed in self.placed]
         ends = self._independent_count + np.cumsum(widths)
         return [np.arange(e - w, e) for e, w in zip(ends, widths, strict=True)]
 
     @cached_property
     def maps(self) -> NDArray:
-        """(n, 6, m) [rad, m] delta l of all frames for a unit of each number."""
+        """(n, 6, m) [rad, m] errors delta l of all frames per unit of each number."""
         n = len(self.robot.frames)
         maps = np.zeros((n, 6, len(self)))
         if self.independent is not None:
@@ -103,9 +103,10 @@ class CalloutSources:
             by: ``"source"``, ``"frame"`` or ``"kind"``.
 
         Returns:
-            (m,) names.  A callout is always whole; by kind the callouts of the same
-            name in every leg are one group.  What depends on the size of one hole is
-            one group: its position at maximum material, the shift of a datum, its fit.
+            (m,) names.  The numbers of a callout are in one group.  By kind, callouts
+            with the same name in every leg are one group.  Numbers that depend on the
+            size of the same hole are one group too: its position at maximum material,
+            the shift of its datum, and its fit.
         """
         labels = () if self.independent is None else self.independent.labels
         names, holes, counts = list[str](), list[str](), list[int]()
@@ -127,7 +128,7 @@ class CalloutSources:
         return own
 
     def draw(self, first: int, count: int, seed: int, stream: int = 0) -> NDArray:
-        """Return the (count, m) numbers of draws; see ErrorSources.uniforms."""
+        """Return the numbers (count, m) of draws; see ErrorSources.uniforms."""
         words = [self._independent_count, *(p.zone.words for p in self.placed)]
         words += [2] * len(self.fits)
         ends = np.cumsum(words)
@@ -156,7 +157,7 @@ class CalloutSources:
         return np.hstack(parts)
 
     def _share_sizes(self, parts: list[NDArray]) -> None:
-        """Give what depends on the size of one hole the same uniform numbers of it."""
+        """Use the same uniform random number wherever the size of a hole occurs."""
         sizes: dict[str, NDArray] = {}
         for part, placed in zip(parts[1:], self.placed, strict=False):
             if placed.hole:
@@ -165,17 +166,17 @@ class CalloutSources:
             part[:, 0] = sizes.get(fit.frame, part[:, 0])
 
     def with_clearances(self, values: NDArray) -> Robot:
-        """Return the robot with the clearances of one draw's numbers (m,)."""
+        """Return the robot with the fit clearances of one draw's numbers (m,)."""
         more = values[len(self) - len(self.fits) :]
         pairs = zip(self.fits, more, strict=True)
         return self._with_radial([f.fit.mean_radial + float(v) for f, v in pairs])
 
     def with_largest_clearances(self) -> Robot:
-        """Return the robot with the largest clearance of every fit."""
+        """Return the robot in which every fit has its largest clearance."""
         return self._with_radial([one.fit.radial[1] for one in self.fits])
 
     def _with_radial(self, radial: list[float]) -> Robot:
-        """The robot with radial clearances [m] of the fits."""
+        """Return the robot with given radial clearances [m] of the fits."""
         frames = list(self.robot.frames)
         for one, bound in zip(self.fits, radial, strict=True):
             gap = max(0.0, bound)
@@ -185,17 +186,17 @@ class CalloutSources:
         return replace(self.robot, frames=tuple(frames))
 
     def errors(self, values: NDArray) -> NDArray:
-        """Return (..., n, 6) [rad, m] delta l of every frame for numbers (..., m)."""
+        """Return the errors delta l (..., n, 6) [rad, m] for numbers (..., m)."""
         full = np.einsum("nim,...m->...ni", self.maps, values)
         return full if self.fixed is None else full + self.fixed
 
     def of_numbers(self, slopes: NDArray) -> NDArray:
-        """Return slopes (..., n, 6) with the errors as slopes (..., m)."""
+        """Return slopes by the numbers (..., m) from slopes by delta l (..., n, 6)."""
         return np.einsum("...ni,nim->...m", slopes, self.maps)
 
     @cached_property
     def variance(self) -> NDArray:
-        """(m,) variance of each number."""
+        """(m,) variances of the numbers."""
         own = [] if self.independent is None else [self.independent.variance]
         for p in self.placed:
             C = p.zone.variance_of_u(p.callout.distribution, p.callout.cp)
@@ -206,18 +207,18 @@ class CalloutSources:
 
     @property
     def units(self) -> list[str]:
-        """Unit of each number: those of callouts are shifts and tilts together."""
+        """Unit of each number; a callout combines shifts and tilts."""
         own = [] if self.independent is None else self.independent.units
         return own + ["rad, m"] * (len(self) - len(own))
 
     @property
     def identity(self) -> list[NDArray]:
-        """Arrays that are equal if the draws are."""
+        """Arrays that are equal for two objects exactly if their draws are equal."""
         own = [] if self.independent is None else self.independent.identity
         for p in self.placed:
             law = [DISTRIBUTIONS.index(p.callout.distribution), p.callout.cp]
             growth = [p.zone.bonus, *law, *([1.0] if p.zone.from_zero else [])]
-            if p.hole:  # which fit has the same hole
+            if p.hole:  # index of the fit with the same hole
                 growth += [float(f.frame == p.hole_of) for f in self.fits]
             own += [*p.zone.bounds, *p.zone.cones, np.array(growth), p.errors]
         for f in self.fits:
@@ -230,19 +231,19 @@ Sources = ErrorSources | CalloutSources
 
 
 def _length(end: FittedEnd | None) -> list[float]:
-    """The length of a fitted end, nothing of a radial clearance."""
+    """Return the length of a fitted end; empty for a radial clearance."""
     return [] if end is None else [end.length]
 
 
 def _nth(uniforms: Callable[[int], list[NDArray]], i: int) -> Callable[[int], NDArray]:
-    """The uniform numbers of one callout, by attempt."""
+    """Return a function from the attempt to the uniform numbers of callout i."""
     return lambda attempt: uniforms(attempt)[i]
 
 
 def _uniforms(
     first: int, count: int, seed: int, stream: int, words: int, attempt: int
 ) -> NDArray:
-    """(count, words) uniform numbers of draws; each attempt has numbers of its own."""
+    """Return (count, words) uniform numbers, different ones for each attempt."""
     steps = -(-max(1, words) // _WORDS)
     philox = np.random.Philox(
         key=np.array([seed, stream], dtype=np.uint64),
@@ -256,18 +257,18 @@ def _uniforms(
 def sources_of(
     robot: Robot, independent: ErrorSources | None = None, fixed: NDArray | None = None
 ) -> Sources:
-    """Return the random errors of a robot: its callouts', and independent ones.
+    """Return the random errors of a robot from its callouts and independent errors.
 
     Args:
         robot: any robot.
-        independent: of an errors file, or None.
-        fixed: (n, 6) [rad, m] errors that every draw has.
+        independent: independent errors from an errors file, or None.
+        fixed: (n, 6) [rad, m] errors that are added to every draw.
 
     Returns:
-        The independent errors alone if the robot has no callouts.
+        The sources of errors; only the independent ones if the robot has no callouts.
 
     Raises:
-        BadInput: there are neither.
+        BadInput: the robot has no callouts, and there are no independent errors.
     """
     fits = fits_of(robot)
     if robot.callouts or fits:

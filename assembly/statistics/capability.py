@@ -1,6 +1,7 @@
-"""Capability: Cp, Cpk and parts per million outside, with their intervals.
+"""Capability indices Cp and Cpk and parts per million out of limits, with intervals.
 
-Normal data within two limits, and draws of any distribution below one limit.
+The indices apply to normal data within two limits, or to draws of any distribution
+below one limit.
 
 Sources:
     Rodriguez (1992), Recent developments in process capability analysis, J. Quality
@@ -18,17 +19,18 @@ from scipy.stats import chi2, nct, norm
 
 from forcefit.assembly.statistics.estimates import quantile
 
-_TAIL = 0.99865  # share below three standard deviations of a normal distribution
+_TAIL = 0.99865  # probability below mean + 3 sigma of a normal distribution
 
 
 @dataclass(frozen=True)
 class Capability:
-    """Indices of a sample, each with its interval.
+    """Capability indices of a sample, with confidence intervals.
 
     Attributes:
-        cp: value, lower, upper; NaN without two limits.
-        cpk: value, lower, upper.
-        share_outside: of the normal distribution of the sample's mean and deviation.
+        cp: value, lower and upper bound; NaN unless there are two limits.
+        cpk: value, lower and upper bound.
+        share_outside: probability outside the limits of a normal distribution with the
+            sample's mean and standard deviation.
     """
 
     cp: tuple[float, float, float]
@@ -42,13 +44,13 @@ def capability(
     """Return Cp and Cpk of normal data.
 
     Args:
-        values: (n,) n > 1, of a normal distribution.
-        lower: lower limit, -inf for none.
-        upper: upper limit, inf for none.
-        level: confidence of the intervals.
+        values: (n,) sample of a normal distribution, n > 1.
+        lower: lower limit; -inf if there is none.
+        upper: upper limit; inf if there is none.
+        level: confidence level of the intervals.
 
     Returns:
-        The indices, with the sample's standard deviation (n - 1).
+        The indices, computed with the sample's standard deviation (divisor n - 1).
 
     Raises:
         ValueError: fewer than two values, no limit, or values that do not vary.
@@ -75,14 +77,14 @@ def share_outside(cpk_upper: float, cpk_lower: float) -> float:
 
 
 def cp_interval(cp: float, n: int, level: float = 0.95) -> tuple[float, float]:
-    """Return the interval of Cp, exact for n normal values."""
+    """Return the confidence interval of Cp, which is exact for n normal values."""
     tails = chi2.ppf([(1 - level) / 2, (1 + level) / 2], n - 1)
     low, high = cp * np.sqrt(tails / (n - 1))
     return float(low), float(high)
 
 
 def cpk_interval(cpk: float, n: int, level: float = 0.95) -> tuple[float, float]:
-    """Return the approximate interval of Cpk, for two limits."""
+    """Return the approximate confidence interval of Cpk for two limits."""
     half = norm.ppf((1 + level) / 2) * np.sqrt(1 / (9 * n) + cpk**2 / (2 * (n - 1)))
     return float(cpk - half), float(cpk + half)
 
@@ -90,7 +92,7 @@ def cpk_interval(cpk: float, n: int, level: float = 0.95) -> tuple[float, float]
 def cpk_interval_one_sided(
     cpk: float, n: int, level: float = 0.95
 ) -> tuple[float, float]:
-    """Return the interval of Cpk for one limit, exact by the noncentral t."""
+    """Return the exact interval of Cpk for one limit (noncentral t distribution)."""
     from scipy.optimize import brentq
 
     # 3 sqrt(n) Cpk of the sample is a noncentral t with 3 sqrt(n) times the true one
@@ -111,17 +113,18 @@ def quantile_cpk(
 ) -> tuple[float, float, float]:
     """Return Cpk of draws of any distribution below an upper limit.
 
-    Cpk is (limit - median) / (99.865 % quantile - median), which is the usual index of
-    a normal distribution.
+    Cpk is (limit - median) / (99.865 % quantile - median).  For a normal distribution
+    this equals the usual index.
 
     Args:
-        values: (k,) draws; inf where there is no answer.
+        values: (k,) draws; inf for a draw without a solution.
         limit: upper limit.
-        level: confidence of the interval, which holds for any distribution: order
-            statistics of both quantiles, at half the error each.
+        level: confidence level of the interval.  The interval is valid for any
+            distribution; both quantiles are bounded by order statistics, each with half
+            of the error probability.
 
     Returns:
-        Value, lower, upper; 0 below a quantile that so few draws do not bound.
+        Value, lower and upper bound; 0 if the draws are too few to bound a quantile.
     """
     each = (1 + level) / 2
     middle, tail = (quantile(values, share, each) for share in (0.5, _TAIL))
@@ -139,18 +142,18 @@ def quantile_cpk(
 def quantile_cp(
     values: ArrayLike, limit: float, level: float = 0.95
 ) -> tuple[float, float, float]:
-    """Return Cp of draws of a size, which lies between zero and an upper limit.
+    """Return Cp of magnitudes, which lie between zero and an upper limit.
 
-    Cp is limit / (99.865 % quantile - 0.135 % quantile), which is the usual index of
-    a normal distribution between the limits zero and ``limit``.
+    Cp is limit / (99.865 % quantile - 0.135 % quantile).  For a normal distribution
+    between the limits zero and ``limit`` this equals the usual index.
 
     Args:
-        values: (k,) draws; inf where there is no answer.
+        values: (k,) draws; inf for a draw without a solution.
         limit: upper limit.
-        level: as for :func:`quantile_cpk`.
+        level: confidence level as for :func:`quantile_cpk`.
 
     Returns:
-        Value, lower, upper; 0 below a quantile that so few draws do not bound.
+        Value, lower and upper bound; 0 if the draws are too few to bound a quantile.
     """
     each = (1 + level) / 2
     low, tail = (quantile(values, share, each) for share in (1 - _TAIL, _TAIL))
@@ -166,17 +169,17 @@ def quantile_cp(
 def draws_capability(
     values: ArrayLike, exceeds: Mapping[str, Any], level: float = 0.95
 ) -> dict[str, Any]:
-    """Return Cpk and parts per million of draws above a limit.
+    """Return Cp, Cpk and the parts per million of draws above a limit.
 
     Args:
-        values: (k,) draws; NaN where there is no answer, which exceeds the limit.
-        exceeds: ``limit``, ``unit``, and the ``probability`` above it with ``lower``
-            and ``upper``.
-        level: level of confidence.
+        values: (k,) draws; NaN, for a draw without a solution, counts as above.
+        exceeds: ``limit``, its ``unit``, and the ``probability`` of a value above the
+            limit with the bounds ``lower`` and ``upper``.
+        level: confidence level of the intervals.
 
     Returns:
-        ``limit``, ``unit``, and ``cp``, ``cpk`` and ``ppm`` with value, lower, upper;
-        ``cp`` is that of a size, see :func:`quantile_cp`.
+        ``limit``, ``unit``, and ``cp``, ``cpk`` and ``ppm`` with value, lower and upper
+        bound; for ``cp`` see :func:`quantile_cp`.
     """
     values = np.where(np.isnan(values), np.inf, values)
     words, limit = ("value", "lower", "upper"), exceeds["limit"]
@@ -191,7 +194,7 @@ def draws_capability(
 
 
 def capability_text(results: Mapping[str, Any]) -> str:
-    """Return capabilities of draws by quantity as text, a line each."""
+    """Return the capability of draws as text, with one line per quantity."""
 
     def index(one: Mapping[str, float]) -> str:
         # a quotient by an unknown, infinite width may be -0.0

@@ -1,21 +1,21 @@
-"""Clearance models: positions of the clearances in an assembled robot.
+"""Clearance models: where the clearances of an assembled robot are.
 
-At least energy, the clearances that carry load are at their bounds.  The other
-clearances may move without changing any spring; their positions form a convex set.  The
-models are
+In the solution of least energy, clearances that carry load are at their bounds.  The
+other clearances may move without deforming any spring, and their possible positions
+form a convex set.  The models are
 
 ======== =====================================================================
-worst    any position; the largest pose errors are used, see
+worst    any position; the largest pose errors are computed, see
          :mod:`forcefit.assembly.statistics.worst_clearance`
 uniform  uniformly distributed over the set (billiard walk)
 contact  displaced by a wrench of random direction on the platform until in contact
 least    the position in the solution of (22), one of many possible ones
 ======== =====================================================================
 
-The contact model needs a length: random moments divided by this length have the size of
-random forces.  The positions depend on the length, so it is stated with every result.
-If the loads in service are known, they determine how the clearances close, and no
-length is needed.
+The contact model requires a length that relates moments to forces: random moments
+divided by this length are as large as random forces.  The positions depend on the
+length, so every result reports it.  If the service loads are known, they determine how
+the clearances close, and no length is needed.
 """
 
 from collections.abc import Sequence
@@ -50,7 +50,7 @@ def position_clearances(
     generators: Sequence[np.random.Generator],
     contact_length: float | None = None,
 ) -> tuple[NDArray, NDArray]:
-    """Return the platform screws with clearances positioned by a clearance model.
+    """Return the platform screws for the clearance positions of a clearance model.
 
     Args:
         prepared: the prepared posture.
@@ -61,7 +61,8 @@ def position_clearances(
 
     Returns:
         (k, 6) [rad, m] screws, NaN where a draw has no solution; and (k,) bool, False
-        where the walks of the uniform model had not mixed at their greatest length, see
+        where the random walk of the uniform model did not mix even at its greatest
+        length, see
         :func:`forcefit.assembly.solvers.uniform_clearance.sample_uniform_position`.
 
     Raises:
@@ -95,7 +96,7 @@ def _moved_clearances(
     prepared: LinearResponse, draws: Assembly, left: NDArray, wrenches: NDArray | None,
     generators: Sequence[np.random.Generator],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the motions of clearances in the draws ``left``; whether walks mixed."""
+    """Return the clearances of draws ``left`` after moving, and whether walks mixed."""
     clearances, mixed = draws.clearances.copy(), np.ones(len(left), dtype=bool)
     loaded = loaded_clearances(prepared, draws)
     patterns, pattern_of_draw = np.unique(loaded, axis=0, return_inverse=True)
@@ -114,7 +115,7 @@ def _moved_clearances(
 
 
 def contact_length_of(robot: Robot) -> float:
-    """Return the default contact length [m], the robot's longest body."""
+    """Return the default contact length [m]: the length of the robot's longest body."""
     return size_of(robot)
 
 
@@ -129,7 +130,7 @@ def clearance_means(clearance: str, contact_length: float | None = None) -> str:
 def _random_wrenches(
     generators: Sequence[np.random.Generator], length: float
 ) -> NDArray:
-    """Return (k, 6) random wrenches on the platform; moments include the length."""
+    """Return random platform wrenches (k, 6) with moments scaled by the length."""
     scale = np.repeat([1.0, 1.0 / length], 3)
     wrenches = np.array([rng.normal(size=6) for rng in generators])
     return wrenches.reshape(-1, 6) * scale
@@ -139,7 +140,7 @@ def _at_random(
     prepared: LinearResponse, loaded: NDArray, clearances: NDArray,
     generators: Sequence[np.random.Generator],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return clearances distributed uniformly over their set; whether walks mixed."""
+    """Return uniformly distributed clearances, and whether the random walks mixed."""
     from forcefit.assembly.solvers.uniform_clearance import sample_uniform_position
 
     free = ~loaded
@@ -159,7 +160,7 @@ def _at_random(
 def _at_contact(
     prepared: LinearResponse, loaded: NDArray, clearances: NDArray, wrenches: NDArray
 ) -> NDArray:
-    """Move clearances along wrenches (k, 6) on the platform until in contact."""
+    """Move clearances along platform wrenches (k, 6) until they are in contact."""
     from forcefit.assembly.statistics.contact_positions import move_to_contact
 
     rows, free = clearance_constraints(prepared, loaded), ~loaded
@@ -171,7 +172,7 @@ def _at_contact(
 
 
 def free_starts(prepared: LinearResponse, free: NDArray) -> NDArray:
-    """Return the (cones + 1,) first columns of the free cones among free columns."""
+    """Return the first column of each free cone among the free columns (cones + 1,)."""
     sizes = np.diff(prepared.starts)[free[prepared.starts[:-1]]]
     return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
 
@@ -183,7 +184,7 @@ def _at_contact_alone(
     clearances: NDArray,
     direction: NDArray,
 ) -> NDArray:
-    """Return the (nu,) farthest position by the interior-point method of Clarabel."""
+    """Return the farthest position (nu,) from the interior-point solver Clarabel."""
     group = np.unique(prepared.joints.group[free], return_inverse=True)[1]
     none, size = np.zeros((0, int(free.sum()))), np.linalg.norm(direction[free])
     solution = minimise_energy(
@@ -200,30 +201,30 @@ def _at_contact_alone(
 
 
 def loaded_clearances(prepared: LinearResponse, draws: Assembly) -> NDArray:
-    """Return (k, nu) bool: clearances with a force at their bound (complementarity)."""
+    """Return (k, nu) bool: whether a clearance transmits force at its bound."""
     forces = draws.multipliers @ (_cone_columns(prepared))
     if prepared.loads is not None:
         forces += prepared.loads.joint @ prepared.joints.cones
     force_sizes = _sizes(forces, prepared.starts)
     slack = np.maximum(0.0, 1.0 - _sizes(draws.clearances, prepared.starts))
-    # force times slack is about the solver's gap, so one of them is nearly zero
+    # force times slack is about the solver's gap, so one of the two is nearly zero
     scale = np.maximum(draws.energy, 1e-18)[:, None]
     loaded = (force_sizes > scale * slack) & (force_sizes > 1e-9 * scale)
     return np.repeat(loaded, np.diff(prepared.starts), axis=1)
 
 
 def clearance_constraints(prepared: LinearResponse, loaded: NDArray) -> NDArray:
-    """Return (p, nu) orthonormal rows of the equations that free clearances satisfy."""
+    """Return orthonormal rows (p, nu) of the equations that free clearances satisfy."""
     rows = np.vstack([prepared.G, prepared.H]) * ~loaded
     _, S, Vt = np.linalg.svd(rows, full_matrices=False)
     return np.ascontiguousarray(Vt[S > 1e-10 * S.max(initial=0.0)])
 
 
 def _cone_columns(prepared: LinearResponse) -> NDArray:
-    """Return the (m, nu) columns of the clearances in the closures."""
+    """Return the columns (m, nu) of the clearances in the closure equations."""
     return prepared.closures @ prepared.joints.cones
 
 
 def _sizes(values: NDArray, starts: NDArray) -> NDArray:
-    """Return the (k, cones) norm of each cone's components."""
+    """Return the norms (k, cones) of the components of each cone."""
     return np.sqrt(np.add.reduceat(values**2, starts[:-1], axis=1))

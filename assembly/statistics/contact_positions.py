@@ -1,28 +1,29 @@
-"""Farthest positions of clearances along given directions."""
+"""Farthest positions of clearances in given directions."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.assembly.solvers.one_problem import farthest_points
 
-_PRECISION = 1e-9  # relative precision of a position's component along its direction
+_PRECISION = 1e-9  # relative precision of the component in the given direction
 
 
 def move_to_contact(
     rows: NDArray, starts: NDArray, free: NDArray, positions: NDArray,
     directions: NDArray,
 ) -> NDArray:  # fmt: skip
-    """Return the point of the clearances' set that is farthest in each direction.
+    """Return the point of the set of clearances that is farthest in each direction.
 
     Args:
         rows: (p, nu) orthonormal rows, zero for clearances that are not ``free``.
-        starts: (cones + 1,) index of the first clearance of each cone, and nu.
-        free: (nu,) bool, True for clearances that may move; equal within a cone.
+        starts: (cones + 1,) index of the first clearance of each cone, and finally nu.
+        free: (nu,) bool, True for clearances that may move; the same for all components
+            of a cone.
         positions: (k, nu) points of the set.
-        directions: (k, nu) directions, in which the position is maximised.
+        directions: (k, nu) directions in which the component is maximised.
 
     Returns:
-        (k, nu) the farthest points; NaN if the interior-point method fails, which may
+        (k, nu) farthest points; NaN if the interior-point method fails, which may
         happen if the set has empty interior.
     """
     ends = positions.copy()

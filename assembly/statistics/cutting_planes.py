@@ -1,15 +1,16 @@
-"""Tolerances of least cost within convex limits, by cutting planes.
+"""Tolerances of least cost for convex limits, by the method of cutting planes.
 
 Two requirements are convex in the tolerances t:
 
-- *always* (yield 1): margin or energy at every corner of the tolerances.  For every
-  choice s of signs, ``m(t s)`` is convex in t; for the margin it is proportional to t.
-- *with a yield*: the mean over the worst (1 - yield) of many fixed draws s (the
-  conditional value at risk), which is a stricter condition than the yield.
+- *yield 1*: margin or energy at every corner of the tolerance box.  For every choice s
+  of signs, ``m(t s)`` is convex in t; the margin is also proportional to t.
+- *yield below 1*: the mean over the worst (1 - yield) of many fixed draws s (the
+  conditional value at risk), which is a stricter condition than the yield itself.
 
-Each iteration solves the programme, finds the largest violation of the requirement, and
-adds the plane of its slopes.  Every plane holds for all tolerances that meet the
-requirement, so the programme's cost is a lower bound of their cost.
+Each iteration minimises the cost within the planes found so far, finds the largest
+violation of the requirement, and adds the plane that linearises it.  Every plane holds
+for all tolerances that meet the requirement. The minimum within the planes is therefore
+a lower bound of the cost.
 
 Sources:
     Kelley (1960), The cutting-plane method for solving convex programs; Rockafellar,
@@ -25,7 +26,7 @@ from forcefit.assembly.statistics.requirement import TRAINING, Plan, Requirement
 from forcefit.assembly.statistics.worst_case import CORNERS, random_corners
 from forcefit.inputs.table import BadInput
 
-_TOLERANCE = 1e-3  # relative to a limit: largest violation that is accepted at the end
+_TOLERANCE = 1e-3  # largest accepted violation, relative to the limit
 _MOST_CUTS = 200
 
 
@@ -43,7 +44,7 @@ def cut_planes(
         planes.
 
     Raises:
-        BadInput: a limit is exceeded without errors, or with the tightest tolerances.
+        BadInput: a limit is exceeded without errors or with the tightest tolerances.
     """
     plan = requirement.plan
     planes: list[NDArray] = []
@@ -64,10 +65,10 @@ def cut_planes(
 def cheapest_within(
     plan: Plan, planes: Sequence[NDArray], least: NDArray, most: NDArray
 ) -> NDArray:
-    """Return the tolerances of least cost with ``a.t <= 1`` for all planes a.
+    """Return the tolerances of least cost with ``a.t <= 1`` for every plane a.
 
     Args:
-        plan: plan that gives the costs.
+        plan: plan with the cost coefficients.
         planes: (G,) [1/rad or 1/m] coefficients a of each plane.
         least: (G,) [rad or m] smallest tolerances.
         most: (G,) [rad or m] largest tolerances.
@@ -81,7 +82,7 @@ def cheapest_within(
     import cvxpy as cp
 
     A = np.array(planes).reshape(-1, len(plan.names))
-    # scaled so that each tolerance alone reaches its steepest plane at 1
+    # scaled such that each single tolerance reaches its steepest plane at 1
     steepest = np.maximum(A, 0.0).max(axis=0, initial=0.0)
     scale = np.minimum(most, 1.0 / np.maximum(steepest, 1e-300))
     x = cp.Variable(len(plan.names))
@@ -101,7 +102,7 @@ def cheapest_within(
 
 
 def _violated(requirement: Requirement, t: NDArray) -> Iterator[NDArray]:
-    """Yield planes ``a.t <= 1`` that cut off the tolerances t."""
+    """Yield planes ``a.t <= 1`` that exclude the tolerances t."""
     plan = requirement.plan
     spread = plan.spread(t)
     for key, prepared in requirement.convex.items():
@@ -131,7 +132,7 @@ def _violated(requirement: Requirement, t: NDArray) -> Iterator[NDArray]:
 
 
 def _plane(slopes: NDArray, value: float, t: NDArray, limit: float) -> NDArray:
-    """Return the plane ``a.t' <= 1`` of a linearised quantity with its limit."""
+    """Return the plane ``a.t' <= 1`` of a quantity linearised at t."""
     right = limit - value + float(slopes @ t)
     if right <= 0:
         raise BadInput(f"even perfect parts exceed a limit of {limit:g}")

@@ -1,4 +1,4 @@
-"""Zones of all errors and clearances of a posture, and the platform screws of them."""
+"""Zones of all errors and clearances at a posture, and their platform screws."""
 
 from dataclasses import dataclass
 
@@ -18,22 +18,22 @@ from forcefit.assembly.statistics.callout_sources import CalloutSources, Sources
 from forcefit.assembly.statistics.linear_response import LinearResponse
 from forcefit.inputs.table import BadInput
 
-_ROUNDING = 1e-9  # a row relative to the largest: smaller ones are rounding
+_ROUNDING = 1e-9  # rows smaller than this share of the largest row are rounding errors
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorSets:
-    """Zones of all errors and clearances in one vector z, with linear rows.
+    """Zones of all errors and clearances in one vector z, with linear conditions on z.
 
     Attributes:
-        names: of the zones.
-        zones: one for each, in unit coordinates.
-        columns: of z for each zone.
-        screws: (6, total) [rad, m] platform screw.
-        rigid_rows: (p, total) rows that must be zero: of rigid parts.
-        spring_rows: (r, total) rows that load springs.
-        clearances: number of coordinates of clearances.
-        contact_rows: (q, total) rows that must be zero: of parallel contacts.
+        names: names of the zones.
+        zones: the zones, each in unit coordinates.
+        columns: indices of each zone's coordinates in z.
+        screws: (6, total) [rad, m] map from z to the platform screw.
+        rigid_rows: (p, total) rows whose product with z is zero if parts are rigid.
+        spring_rows: (r, total) rows whose product with z deforms springs.
+        clearances: number of coordinates of z that are clearances.
+        contact_rows: (q, total) rows with zero product for parallel contacts.
     """
 
     names: tuple[str, ...]
@@ -46,14 +46,14 @@ class ErrorSets:
     contact_rows: NDArray
 
     def weights_on_zones(self, along: NDArray) -> NDArray:
-        """Return the weights of the coordinates less those that contacts balance.
+        """Return the weights of the coordinates that parallel contacts cannot reduce.
 
         Args:
             along: (total,) weights of the coordinates.
 
         Returns:
-            (total,) of the least sum of supports; the largest product with ``along``
-            over all positions of the contacts is that sum.
+            (total,) weights with the smallest sum of support functions. This sum equals
+            the largest product with ``along`` over all positions of the contacts.
         """
         rows = self.contact_rows
         own = rows.any(axis=0)
@@ -77,10 +77,10 @@ def error_sets(prepared: LinearResponse, sources: Sources) -> ErrorSets:
 
     Args:
         prepared: a posture without loads.
-        sources: of the errors.
+        sources: sources of the errors.
 
     Returns:
-        All zones in one vector.
+        The zones, with their coordinates in one vector.
 
     Raises:
         BadInput: an independent error is unbounded or not symmetric about zero.
@@ -164,7 +164,7 @@ def bounds_where_closed(
 
 
 def _contact_rows(prepared: LinearResponse, columns: NDArray) -> NDArray:
-    """Rows of the closures between parallel contacts, without free motions."""
+    """Return the closure rows that couple the parallel contacts of a joint."""
     found = [np.zeros((0, columns.shape[1]))]
     for k in np.flatnonzero(contact_closures(prepared.posture.robot)).tolist():
         closure = prepared.closures[6 * k : 6 * k + 6]
@@ -174,7 +174,7 @@ def _contact_rows(prepared: LinearResponse, columns: NDArray) -> NDArray:
 
 
 def _real_rows(rows: NDArray, columns: NDArray) -> NDArray:
-    """The product, independent rows only, orthonormal; none where all is rounding."""
+    """Return orthonormal rows of rows @ columns; none if all entries are rounding."""
     product = rows @ columns
     scale = np.abs(rows).max(initial=0.0) * np.linalg.norm(columns)
     _, sizes, vt = np.linalg.svd(product, full_matrices=False)
@@ -182,14 +182,14 @@ def _real_rows(rows: NDArray, columns: NDArray) -> NDArray:
 
 
 def _maps(sources: Sources) -> NDArray:
-    """(n, 6, m) errors of a unit of each number."""
+    """Return the errors (n, 6, m) of all frames per unit of each number."""
     if isinstance(sources, CalloutSources):
         return sources.maps
     return np.moveaxis(sources.errors(np.eye(len(sources))), 0, -1)
 
 
 def zones_of_errors(sources: Sources) -> list[tuple[str, Zone, NDArray]]:
-    """Return name, zone and units [rad, m or 1] of the coordinates of every error."""
+    """Return the name, the zone and the units [rad, m or 1] of every error."""
     placed: tuple[PlacedCallout, ...] = ()
     if isinstance(sources, CalloutSources):
         independent, placed = sources.independent, sources.placed
@@ -203,13 +203,13 @@ def zones_of_errors(sources: Sources) -> list[tuple[str, Zone, NDArray]]:
 
 
 def _intervals(sources: ErrorSources) -> list[tuple[str, Zone, NDArray]]:
-    """Zones of independent errors: intervals in units of their half widths."""
+    """Return the intervals of independent errors, in units of their half widths."""
     pairs = zip(sources.labels, _half_widths(sources), strict=True)
     return [(name, Zone((np.eye(6)[:1],)), np.array([width])) for name, width in pairs]
 
 
 def _half_widths(sources: ErrorSources) -> NDArray:
-    """(m,) [rad or m] half widths of independent errors."""
+    """Return the half widths (m,) [rad or m] of independent errors."""
     uniform = sources.kind == KINDS.index("uniform")
     bounded = uniform | (sources.kind == KINDS.index("truncated"))
     centred = (sources.centre == 0) & sources.signed
@@ -223,7 +223,7 @@ def _half_widths(sources: ErrorSources) -> NDArray:
 
 
 def _cone_name(prepared: LinearResponse, column: NDArray) -> str:
-    """Name of a clearance: the joint's or frame's, and its components."""
+    """Return the name of a clearance: its joint or frame, and its components."""
     row = int(np.flatnonzero(column)[0])
     kind = ("tilt", "tilt", "spin", "radial", "radial", "axial")[row % 6]
     name = clearance_name(prepared.posture.robot, row // 6, kind)

@@ -1,9 +1,9 @@
 """Estimates from a sample of draws, with confidence intervals.
 
-Intervals of probabilities are those of Clopper and Pearson, which are exact for any
-number of draws.  Intervals of quantiles are order statistics, which are valid for any
-distribution.  Intervals of means follow from the central limit theorem, those of the
-most probable value from the bootstrap.
+Intervals of probabilities are Clopper-Pearson intervals, which are exact for any number
+of draws.  Intervals of quantiles are order statistics, which are valid for any
+distribution.  Intervals of means use the central limit theorem. Intervals of the most
+probable value use the bootstrap.
 """
 
 from typing import Literal
@@ -21,7 +21,7 @@ def proportion(successes: int, count: int, level: float = 0.95) -> dict[str, flo
     Args:
         successes: number of successes in ``count`` independent trials.
         count: number of trials, > 0.
-        level: level of confidence; the coverage is at least this level.
+        level: confidence level; the coverage is at least as high.
 
     Returns:
         ``probability``, ``lower``, ``upper``.
@@ -42,11 +42,11 @@ def bracketed(
         holds: number of certain successes in ``count`` independent trials.
         fails: number of certain failures.
         count: number of trials, > 0.
-        level: level of confidence, for any outcome of the undecided trials.
+        level: confidence level, which holds whatever the undecided trials are.
 
     Returns:
-        ``probability`` of a certain success, ``lower``, ``upper``, and the number of
-        ``undecided`` trials.
+        ``probability`` of a certain success, bounds ``lower`` and ``upper``, and the
+        number of ``undecided`` trials.
     """
     surely = proportion(holds, count, level)
     perhaps = proportion(count - fails, count, level)
@@ -54,15 +54,15 @@ def bracketed(
 
 
 def quantile(values: ArrayLike, share: float, level: float = 0.95) -> dict[str, float]:
-    """Return a quantile with its interval by order statistics.
+    """Return a quantile with its confidence interval from order statistics.
 
     Args:
         values: (k,) a sample.
         share: fraction of the distribution below the quantile, in (0, 1).
-        level: level of confidence.
+        level: confidence level.
 
     Returns:
-        ``value``, ``lower``, ``upper``; infinite if the sample is too small or has
+        ``value``, ``lower``, ``upper``; infinite if the sample is too small or contains
         infinite values.
     """
     x = np.sort(np.asarray(values, dtype=float))
@@ -80,14 +80,14 @@ def quantile(values: ArrayLike, share: float, level: float = 0.95) -> dict[str, 
 
 
 def mean(values: ArrayLike, level: float = 0.95) -> dict[str, float]:
-    """Return a mean with its interval by the central limit theorem.
+    """Return a mean with its confidence interval from the central limit theorem.
 
     Args:
         values: (k,) a sample, k > 1.
-        level: level of confidence.
+        level: confidence level.
 
     Returns:
-        ``value``, ``lower``, ``upper``, and standard ``deviation`` of one draw.
+        ``value``, ``lower``, ``upper``, and the standard ``deviation`` of the sample.
     """
     x = np.asarray(values, dtype=float)
     value, deviation = float(x.mean()), float(x.std(ddof=1))
@@ -103,11 +103,11 @@ def most_probable(
 ) -> dict[str, float]:
     """Return the mode of a sample's density, with a bootstrap interval.
 
-    The density is estimated with a Gaussian kernel of Silverman's width, on 1024 bins.
+    The density is estimated on 1024 bins with a Gaussian kernel of Silverman's width.
 
     Args:
         values: (k,) a sample.
-        level: level of confidence.
+        level: confidence level.
         positive: whether the samples are magnitudes; the kernel is then reflected at
             zero.
         seed: seed of the bootstrap.
@@ -123,7 +123,7 @@ def most_probable(
     scale = min(float(x.std()), spread) or float(x.std())
     if scale <= 1e-12 * np.abs(x).max():  # all values are equal except for rounding
         return dict.fromkeys(("value", "lower", "upper"), float(x[0]))
-    # a long tail must not widen the bins, because the mode is elsewhere
+    # bins exclude a long tail, because the mode is elsewhere
     ends = np.quantile(x, [0.25, 0.75]) + np.array([-8.0, 8.0]) * scale
     low = 0.0 if positive else max(float(x.min()) - 4 * scale, float(ends[0]))
     high = min(float(x.max()) + 4 * scale, float(ends[1]))
@@ -148,7 +148,7 @@ def _modes(counts: NDArray, width: float) -> NDArray:
     inner = (i > 0) & (i < bins - 1)
     rows, middle = np.arange(len(i)), np.clip(i, 1, bins - 2)
     a, b, c = (density[rows, middle + k] for k in (-1, 0, 1))
-    # the density is flat, or its maximum is at an end
+    # without curvature the density is flat or its maximum is at an end
     with np.errstate(invalid="ignore", divide="ignore"):
         offset = (a - c) / (2 * (a - 2 * b + c))
     return np.where(inner, i + offset, i)

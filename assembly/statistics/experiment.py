@@ -1,4 +1,4 @@
-"""A Monte Carlo experiment: distributions at a posture, and quantities of each draw."""
+"""Monte Carlo experiments: error distributions and the quantities of each draw."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -31,33 +31,33 @@ from forcefit.inputs.renamed import renamed_fields, warn_renamed
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import html_table, short_repr
 
-# relative to a limit on a pose error: required difference of upper and lower bound
+# required difference of upper and lower bound, relative to the limit on a pose error
 _PRECISION = 1e-3
 
 
 @renamed_fields(clearance_model="clearance")
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """Distributions of the errors at a posture, and the quantities of each draw.
+    """Error distributions at a posture, and the quantities to compute for each draw.
 
     Attributes:
-        posture: posture of the robot; drawn errors replace the robot's own.
+        posture: posture of the robot; drawn errors replace those of the robot file.
         sources: distributions of the errors.
         seed: seed of all draws.
         clearance: one of
             :data:`forcefit.assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
-        margins: whether the zone margins are computed.
+        margins: whether the assembly margins, eq. (21), are computed.
         stress: whether the stress of the links is computed.
-        load: (6,) [N m, N] on the platform at its origin, base axes, or by component,
-            ``{"fz": -50}``; none if absent.
-        gravity: (3,) [m/s^2] base axes; none if absent.
+        load: load on the platform at its origin in base axes, (6,) [N m, N] or by
+            component, ``{"fz": -50}``; None for no load.
+        gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
         stiffness: state in which the platform's stiffness is computed, one of
             :data:`forcefit.assembly.sweeps.point_stiffness.STATES` except the nominal
             one; empty if it is not computed.
         precision: [rad, m] required difference between upper and lower bound of the
             largest pose errors in the worst clearance model; inf if not needed.
         contact_length: [m] length of the contact model; random moments divided by it
-            have the size of random forces; None for the robot's longest body.
+            are as large as random forces. None for the length of the longest body.
     """
 
     posture: Posture
@@ -85,13 +85,13 @@ class Experiment:
 
     @property
     def clearance_model(self) -> str:
-        """The old name of ``clearance``, for one release."""
+        """The former name of ``clearance``, kept for one release."""
         warn_renamed("Experiment.clearance_model", "Experiment.clearance")
         return self.clearance
 
     @cached_property
     def wrench(self) -> tuple[float, ...] | None:
-        """(6,) [N m, N] the load on the platform, None if absent."""
+        """(6,) [N m, N] load on the platform; None if there is no load."""
         return None if self.load is None else tuple(one_load(self.load).tolist())
 
     @property
@@ -103,7 +103,7 @@ class Experiment:
 
     @cached_property
     def energies(self) -> LinearResponse:
-        """The posture prepared for problem (22).
+        """The posture prepared for problem (22), the least energy.
 
         Raises:
             BadInput: the load acts along a motion without stiffness.
@@ -115,7 +115,7 @@ class Experiment:
 
     @cached_property
     def zones(self) -> dict[str, PostureMargins]:
-        """The posture prepared for problem (21), by quantity."""
+        """The posture prepared for problem (21), the margin, by quantity."""
         if not self.margins:
             return {}
         return {k: prepare_margins(self.posture, r) for k, r in MARGINS.items()}
@@ -136,7 +136,7 @@ class Experiment:
 
     @cached_property
     def record_type(self) -> np.dtype:
-        """Type of a record, which holds the quantities of one draw."""
+        """Type of a record; a record contains the quantities of one draw."""
         shapes: dict[str, tuple[int, ...]] = {
             "energy": (), "duality_gap": (), "platform_screw": (6,), "rotation": (),
             "translation": (), "force": (), "moment": (), "stress": (len(self.links),),
@@ -154,7 +154,7 @@ class Experiment:
         """Reject limits on quantities that are not computed.
 
         Raises:
-            BadInput: margins are not computed, or no link has a stress.
+            BadInput: a limited margin is not computed, or the stress of no link is.
         """
         for name in limits:
             if name.startswith("margin") and not self.margins:
@@ -166,7 +166,7 @@ class Experiment:
                 )
 
     def solve(self, first: int, count: int) -> NDArray:
-        """Return the records of the draws ``first`` .. ``first + count - 1``."""
+        """Return the records of draws ``first`` to ``first + count - 1``."""
         values = self.sources.draw(first, count, self.seed)
         return self.evaluate(values, range(first, first + count))
 
@@ -180,7 +180,7 @@ class Experiment:
         Returns:
             (k,) records of :attr:`record_type`; NaN and status 1 if there is no
             solution.  In the worst clearance model, rotation and translation are upper
-            bounds of the largest errors, and the platform's screw is that of the
+            bounds of the largest errors. The platform screw is then the screw of the
             solution of (22).
         """
         if not isinstance(self.sources, CalloutSources) or not self.sources.fits:
@@ -188,7 +188,7 @@ class Experiment:
         else:
             parts = []
             for own, draw in zip(values, np.asarray(draws).tolist(), strict=True):
-                # every draw has clearances of its own
+                # the clearances of fits differ between draws
                 robot = self.sources.with_clearances(own)
                 one = replace(self, posture=replace(self.posture, robot=robot))
                 parts += one._bolted(own[None], np.array([draw]))
@@ -202,7 +202,7 @@ class Experiment:
     def _bolted(
         self, values: NDArray, draws: NDArray
     ) -> list[tuple[NDArray, NDArray, NDArray]]:
-        """Return parts of :meth:`_without_stress`, NaN of machines without a bolt."""
+        """Return results as :meth:`_without_stress`; NaN for a draw without a bolt."""
         try:
             return [self._without_stress(values, draws)]
         except CannotBolt:
@@ -221,7 +221,7 @@ class Experiment:
     def _without_stress(
         self, values: NDArray, draws: Sequence[int] | NDArray
     ) -> tuple[NDArray, NDArray, NDArray]:
-        """Return records with the posture's clearances, wrenches, and their weights."""
+        """Return records, wrenches and weights for the clearances of the posture."""
         robot = self.posture.robot
         bolts = bolt_generators(robot, self.seed, draws)
         errors = bolted_errors(robot, self.sources.errors(values), bolts)
@@ -236,8 +236,7 @@ class Experiment:
             for i, name in enumerate(POSE_ERRORS):
                 rows[f"{name}_lower"], rows[name] = bounds[:, i].T
         else:
-            # positions in the model "least" are not random, and generators are slow to
-            # create
+            # "least" needs no random numbers, and generators are slow to create
             numbers = np.asarray(draws).tolist() if self.clearance != "least" else []
             rngs = [draw_generator(self.seed, d, CLEARANCE_STREAM) for d in numbers]
             screws, mixed = position_clearances(

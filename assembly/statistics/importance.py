@@ -1,13 +1,14 @@
 """Variance-based importance of the errors: Sobol indices.
 
 The first-order index of a source is the share of a result's variance that the source
-explains alone; the total index is the share that involves the source.  Saltelli's
-design computes both from (groups + 2) times the number of draws.  If a result is linear
-in the errors, both are equal to ``a_i^2 var_i / sum_j a_j^2 var_j``.
+explains by itself. The total index is the share in which the source is involved.
+Saltelli's design computes both indices from (groups + 2) x draws evaluations.  If a
+result is linear in the errors, both indices equal ``a_i^2 var_i / sum_j a_j^2 var_j``.
 
-A draw without a solution is discarded together with the draws that are compared with
-it, and is counted.  The errors of the remaining draws are then dependent.  So if more
-than a few are discarded, a reason is given instead of indices.
+A draw without a solution is counted and discarded, together with the draws that are
+compared with it.  The errors of the remaining draws are then no longer independent.
+If more than a small share is discarded, the result is therefore a reason instead of
+indices.
 
 Sources:
     Saltelli et al. (2010), Variance based sensitivity analysis of model output, table 2
@@ -24,9 +25,9 @@ from forcefit.assembly.model.error_distributions import ErrorSources
 from forcefit.assembly.statistics.callout_sources import CalloutSources, Sources
 from forcefit.assembly.statistics.ranking import group_of
 
-# numbers of streams of random numbers, see forcefit.assembly.model.error_distributions
+# stream numbers of random numbers, see forcefit.assembly.model.error_distributions
 STREAMS = (2, 3)
-# largest share of discarded draws, because the errors of the others are dependent
+# largest accepted share of discarded draws: discarding makes the errors dependent
 MOST_FAILED = 0.05
 _RESAMPLES = 200
 
@@ -40,8 +41,8 @@ class Importance:
         first: (s, d, 3) first-order indices: value, lower bound, upper bound.
         total: (s, d, 3) total indices: value, lower bound, upper bound.
         variance: (s,) variances of the results.
-        failed: (s, d) share of the base draws that are discarded because one of three
-            compared draws has no solution; above :data:`MOST_FAILED` the indices are
+        failed: (s, d) share of base draws that are discarded because one of three
+            compared draws has no solution. Above :data:`MOST_FAILED` the indices are
             NaN.
     """
 
@@ -54,12 +55,12 @@ class Importance:
 
 @dataclass(frozen=True, eq=False)
 class SaltelliDesign:
-    """Saltelli's design: A, B, and A with the columns of each group replaced by B's.
+    """Saltelli's design: A, B, and A with the columns of each group taken from B.
 
     Attributes:
         A: (k, m) independent draws of the errors.
         B: (k, m) second set of independent draws.
-        groups: name and columns of each of d groups.
+        groups: name and column indices of each of d groups.
     """
 
     A: NDArray
@@ -70,7 +71,7 @@ class SaltelliDesign:
         return len(self.A) * (len(self.groups) + 2)
 
     def rows(self, first: int, count: int) -> NDArray:
-        """Return (count, m) rows, beginning with row ``first``."""
+        """Return ``count`` rows (count, m) of the design from row ``first`` on."""
         matrix, base = np.divmod(np.arange(first, first + count), len(self.A))
         rows = np.where((matrix == 1)[:, None], self.B[base], self.A[base])
         for g, (_, columns) in enumerate(self.groups):
@@ -89,12 +90,12 @@ def sobol_importance(
     """Return the Sobol indices of any function of independent variables.
 
     Args:
-        evaluate: function from (k, m) variables to (k, s) results, NaN without a
-            solution.
-        sample: function from stream and count to (count, m) independent draws.
-        groups: name and columns of each group of variables.
-        count: number of base draws; (groups + 2) times as many are evaluated.
-        level: level of confidence of the bootstrap intervals.
+        evaluate: function from variables (k, m) to results (k, s), NaN for a draw
+            without a solution.
+        sample: function from stream number and count to independent draws (count, m).
+        groups: name and column indices of each group of variables.
+        count: number of base draws; (groups + 2) x count draws are evaluated.
+        level: confidence level of the bootstrap intervals.
 
     Returns:
         The indices; NaN for a result that does not vary.
@@ -111,12 +112,12 @@ def sobol_indices(
 
     Args:
         design: design of k base draws and d groups.
-        results: (k (d + 2), s) in the order of the design's rows; not finite without a
-            solution.
-        level: level of confidence of the bootstrap intervals.
+        results: (k (d + 2), s) results in the order of the design's rows; not finite
+            for a draw without a solution.
+        level: confidence level of the bootstrap intervals.
 
     Returns:
-        The indices; NaN for a result that is constant, or that fails in too many draws.
+        The indices; NaN for a result that is constant or fails in too many draws.
     """
     d, s, count = len(design.groups), results.shape[1], len(design.A)
     f = results.reshape(d + 2, count, s)
@@ -144,7 +145,7 @@ def sobol_indices(
 
 
 def _shares(f: NDArray, weights: NDArray, level: float) -> tuple[NDArray, NDArray]:
-    """Return the first-order and total index, (3,) each, from results (3, k)."""
+    """Return the first-order and the total index (3,) from results (3, k)."""
     alone, left = f[1] * (f[2] - f[0]), 0.5 * (f[2] - f[0]) ** 2
     mean = weights @ (f[0] + f[1]) / 2
     variance = weights @ (f[0] ** 2 + f[1] ** 2) / 2 - mean**2
@@ -164,10 +165,10 @@ def linear_importance(
     Args:
         slopes: (s, m) derivatives of the results by each source.
         sources: the m sources.
-        groups: name and columns of each group.
+        groups: name and column indices of each group.
 
     Returns:
-        (s, d) shares of the variance; first-order and total indices are equal.
+        (s, d) shares of the variance, which equal both the first-order and total index.
     """
     parts = slopes**2 * sources.variance
     shares = np.stack([parts[:, columns].sum(axis=1) for _, columns in groups], axis=1)
@@ -175,15 +176,15 @@ def linear_importance(
 
 
 def source_groups(sources: Sources, by: str) -> list[tuple[str, NDArray]]:
-    """Return the groups of sources: each by itself, by frame, or by kind of error.
+    """Return groups of error sources, formed by source, by frame or by kind of error.
 
     Args:
         sources: sources of a robot.
-        by: ``"source"``; ``"frame"``; or ``"kind"``: the same component of the frame
-            with the same name in every leg.
+        by: ``"source"``, ``"frame"`` or ``"kind"``. A kind comprises the same component
+            of the frames with the same name in all legs.
 
     Returns:
-        Name and columns of each group.
+        Name and column indices of each group.
 
     Raises:
         ValueError: ``by`` is not one of these words.

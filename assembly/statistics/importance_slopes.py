@@ -1,10 +1,11 @@
-"""Exact slopes of the platform's screw by groups of errors.
+"""Exact derivatives of the platform's screw with respect to groups of errors.
 
-A quotient of sampled deviations is not a derivative, because it has the noise of the
-sample.  As long as the same clearances are active, the solution of (22) is linear in
-the errors, and its slopes are known exactly
+The ratio of two sampled standard deviations is not a derivative, because it contains
+sampling noise.  As long as the active clearances do not change, the solution of (22) is
+linear in the errors, and its derivatives are exact
 (:mod:`forcefit.assembly.statistics.sensitivity`). The gain of a group is the root mean
-square of the slopes, over the group's errors weighted by variance, and over some draws.
+square of these derivatives over the group's errors, weighted by variance, and over
+several draws.
 """
 
 import numpy as np
@@ -17,20 +18,20 @@ from forcefit.assembly.statistics.importance import SaltelliDesign
 from forcefit.assembly.statistics.linear_response import LinearResponse
 from forcefit.assembly.statistics.sensitivity import solution_slopes
 
-DRAWS = 32  # number of draws over which the slopes are averaged
+DRAWS = 32  # number of draws over which the derivatives are averaged
 
 
 def platform_gains(experiment: Experiment, design: SaltelliDesign) -> NDArray:
-    """Return the gains of groups of errors: motion of the platform per unit of error.
+    """Return the gain of each group of errors: platform motion per unit of error.
 
     Args:
-        experiment: distributions and posture.
-        design: design, whose first draws and groups are used.
+        experiment: error distributions and posture.
+        design: design whose groups and first draws are used.
 
     Returns:
-        (2, d) rotation [rad] and translation [m] per rad or m of error; NaN for a group
-        of angles and lengths, if none of the draws has a solution, and for robots with
-        bolted joints, whose locked-in clearances depend on the errors too.
+        (2, d) rotation [rad] and translation [m] per rad or m of error. NaN for a group
+        that contains angles and lengths, and if no draw has a solution. NaN also for
+        robots with bolted joints, whose locked-in clearances depend on the errors.
     """
     sources = experiment.sources
     values = design.A[:DRAWS]
@@ -53,14 +54,14 @@ def platform_gains(experiment: Experiment, design: SaltelliDesign) -> NDArray:
 
 
 def platform_slopes(prepared: LinearResponse, draws: Assembly) -> NDArray:
-    """Return the slopes of the platform's screw by every geometric error.
+    """Return the derivatives of the platform's screw by every geometric error.
 
     Args:
         prepared: the prepared posture.
         draws: solutions of k draws, with clearances relative to their bounds.
 
     Returns:
-        (6, k, n, 6) [rad or m per rad or m] slopes.
+        (6, k, n, 6) [rad or m per rad or m] derivatives.
     """
     count, frames = draws.errors.shape[:2]
     repeated = draws[np.tile(np.arange(count), 6)]
@@ -71,7 +72,7 @@ def platform_slopes(prepared: LinearResponse, draws: Assembly) -> NDArray:
 
 
 def error_units(sources: Sources, design: SaltelliDesign) -> list[str]:
-    """Return the units of the errors of each group."""
+    """Return the unit of the errors of each group."""
     units = sources.units
     of_groups = [{units[i] for i in columns} for _, columns in design.groups]
     return [of.pop() if len(of) == 1 else "rad, m" for of in of_groups]

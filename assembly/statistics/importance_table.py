@@ -1,13 +1,14 @@
 """The importance of errors as a data set, as plain values and as a text table.
 
-Two values are given in addition to the shares of the variance.  The *part* of a group
-is the standard deviation of the platform's screw due to the group, from the same
-sample. The *gain* is an exact derivative, micrometres of the platform for each
-micrometre of error, see :mod:`forcefit.assembly.statistics.importance_slopes`.  Both
-are norms of the platform's vector, so a platform that follows an error has a gain of 1.
+Besides the shares of the variance, two values are reported for each group of errors.
+The *part* of a group is the standard deviation of the platform's screw due to the
+group, from the same sample. The *gain* is an exact derivative: micrometres of platform
+motion per micrometre of error, see
+:mod:`forcefit.assembly.statistics.importance_slopes`.  Both are norms, so the gain is 1
+if the platform moves by as much as the error.
 
-Shares are estimates.  Groups with overlapping intervals are not distinguished and share
-their possible ranks, see :mod:`forcefit.assembly.statistics.ranking`.
+Shares are estimates.  Groups whose intervals overlap are not distinguished and share
+the same possible ranks, see :mod:`forcefit.assembly.statistics.ranking`.
 """
 
 from collections.abc import Mapping
@@ -39,18 +40,18 @@ if TYPE_CHECKING:
     import xarray
 
 EXPLAINED = ("energy", "margin_free", "rotation", "translation", "force", "stress")
-_ROWS = 15  # largest number of rows of the table
+_ROWS = 15  # largest number of rows in the text table
 
 
 @dataclass(frozen=True)
 class ImportanceOptions:
-    """Options for the importance of errors.
+    """Options for computing the importance of errors.
 
     Attributes:
-        draws: number of base draws; (groups + 2) times as many are solved.
-        by: kind of the groups, see
+        draws: number of base draws; (groups + 2) x draws are solved.
+        by: how errors are grouped, see
             :func:`forcefit.assembly.statistics.importance.source_groups`.
-        level: level of confidence of the intervals.
+        level: confidence level of the intervals.
     """
 
     draws: int
@@ -64,11 +65,11 @@ def importance_design(
     """Return the design for the importance of an experiment's errors.
 
     Args:
-        experiment: distributions and quantities.
-        asked: number of base draws, and kind of the groups.
+        experiment: error distributions and quantities.
+        asked: number of base draws, and how errors are grouped.
 
     Returns:
-        The design.
+        The Saltelli design.
     """
     sources = experiment.sources
     A, B = (sources.draw(0, asked.draws, experiment.seed, k) for k in STREAMS)
@@ -78,7 +79,7 @@ def importance_design(
 def importance_rows(
     experiment: Experiment, design: SaltelliDesign, first: int, count: int
 ) -> NDArray:
-    """Return the records of some rows of a design.
+    """Return the records of a range of rows of a design.
 
     Random clearance positions would add variance that is not due to the errors, so the
     positions in the solution of (22) are used instead.
@@ -103,20 +104,20 @@ def importance_rows(
 
 
 def importance_clearance_model(experiment: Experiment) -> str:
-    """Return the clearance model of the importance of an experiment's errors."""
+    """Return the clearance model with which the importance of errors is computed."""
     return "worst" if experiment.clearance == "worst" else "least"
 
 
 def importance_dataset(
     experiment: Experiment, design: SaltelliDesign, rows: NDArray, level: float = 0.95
 ) -> "xarray.Dataset":
-    """Return the importance of the sources for the results of an experiment.
+    """Return the importance of the error sources for the results of an experiment.
 
     Args:
         experiment: distributions and quantities.
         design: design of the draws.
         rows: records of the experiment's record type for all rows of the design.
-        level: level of confidence of the intervals.
+        level: confidence level of the intervals.
 
     Returns:
         Data set with ``first_index`` and ``total_index`` over ``quantity``, ``group``
@@ -161,7 +162,7 @@ def importance_dataset(
 
 
 def _parts(variances: NDArray) -> NDArray:
-    """Return the (2, d) parts from the variances (6, d) of the screw due to groups."""
+    """Return the part (2, d) of each group from the screw's variances (6, d)."""
     lost = np.isnan(variances).all(axis=0)
     # a component that does not vary has no index and contributes nothing
     variances = np.maximum(np.nan_to_num(variances), 0.0)
@@ -174,12 +175,12 @@ def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
     """Return the data of :func:`importance_dataset` as plain values.
 
     Args:
-        data: result of :func:`importance_dataset`, alone or merged with the draws.
+        data: result of :func:`importance_dataset`, possibly merged with the draws.
 
     Returns:
-        Number of base draws; the indices of each quantity with the ranks that their
-        intervals allow; part and gain of each group; the share of discarded draws and,
-        without indices, the reason.
+        Number of base draws; the indices of each quantity, with the ranks that the
+        intervals allow; part and gain of each group; the share of discarded draws; and
+        a reason if there are no indices.
     """
     groups = [str(g) for g in data["group"].values]
     quantities: dict[str, Any] = {}
@@ -258,7 +259,7 @@ def importance_text(report: Mapping[str, Any]) -> str:
 
 
 def _moves_text(one: Mapping[str, Any]) -> str:
-    """Return part and exact slope of a group as columns of the table."""
+    """Return part and gain of a group as columns of the table."""
     gain = {
         "m": (f"{one['translation_gain']:11.4g}", " " * 13),
         "rad": (" " * 11, f"{1e3 * one['translation_gain']:13.4g}"),
@@ -270,6 +271,6 @@ def _moves_text(one: Mapping[str, Any]) -> str:
 
 
 def _interval_text(share: NDArray) -> str:
-    """Return a share with its interval."""
+    """Return a share and its confidence interval as text."""
     value, low, high = share
     return f"{value:.3f} ({low:.3f} to {high:.3f})"

@@ -1,4 +1,4 @@
-"""Fits of joints: the frames that a fit bounds, and frames with other clearances."""
+"""Fits of joints: the frames whose clearance a fit determines."""
 
 from dataclasses import dataclass, replace
 
@@ -6,7 +6,7 @@ from forcefit.assembly.callouts.fits import Fit, FittedEnd, parse_fit
 from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from forcefit.assembly.statistics.ranking import kind_of
 
-# frames of a universal, a cylindrical and a planar joint, whose name is before the dot
+# frames of a universal, cylindrical or planar joint; the joint's name precedes the dot
 _PARTS_OF_JOINTS = ("first", "second", "turn", "slide")
 
 
@@ -15,9 +15,10 @@ class JointFit:
     """A fit of a hole and a shaft.
 
     Attributes:
-        frame: name of the joint's frame, or of the parts.
+        frame: name of the joint's frame, or of the two parts.
         fit: the fit.
-        bounds: rows of the frames that it bounds, and how: None for ``radial``.
+        bounds: frame rows whose clearance the fit bounds, and the fitted end of each;
+            None if the fit bounds the value ``radial``.
     """
 
     frame: str
@@ -26,12 +27,12 @@ class JointFit:
 
     @property
     def name(self) -> str:
-        """Name in tables: ``"fit 12 H7/g6 of elbow"``."""
+        """Name in tables, such as ``"fit 12 H7/g6 of elbow"``."""
         return f"fit {self.fit.text} of {self.frame}"
 
 
 def fits_of(robot: Robot) -> tuple[JointFit, ...]:
-    """Return the fits of a robot, each hole and shaft once."""
+    """Return the fits of a robot, with each pair of hole and shaft listed once."""
     found: dict[str, JointFit] = {}
     for frame, text in robot.fits.items():
         end = robot.fitted_ends.get(frame)
@@ -43,7 +44,7 @@ def fits_of(robot: Robot) -> tuple[JointFit, ...]:
 
 
 def kind_of_fit(robot: Robot, fit: JointFit) -> str:
-    """Return the name of a fit without that of its leg, if it begins with one."""
+    """Return the name of a fit without the leg's name at its beginning, if any."""
     joint, _, rest = fit.frame.partition(".")
     frames = {frame.name for frame in robot.frames}
     of_joint = joint in frames or rest.split(".")[0] in _PARTS_OF_JOINTS
@@ -51,7 +52,7 @@ def kind_of_fit(robot: Robot, fit: JointFit) -> str:
 
 
 def with_clearance(frame: Frame, new: dict[str, float]) -> Frame:
-    """Return the frame with other bounds: of a bolted joint those before its bolt."""
+    """Return the frame with new clearances; for a bolted joint those before bolting."""
     bolt = frame.locked_at
     if bolt is not None:
         clearance = replace(bolt.clearance, **new)

@@ -1,16 +1,18 @@
 """Tolerances of locally least cost for nonconvex limits, by sequential programming.
 
 Wrenches, stress and pose errors are not convex in the errors, and a yield is not convex
-in the tolerances.  But the slopes of the worst samples by every error are known, and so
-are the slopes by every tolerance.  A convex programme with these planes, within a trust
-region around the present tolerances, gives a trial point.  The trial point is scaled
-uniformly until the samples just meet the limits again.  It is accepted if its cost is
-smaller; otherwise the trust region is reduced.  So the cost never increases.  The end
-is a local minimum, which is not proved to be global.
+in the tolerances.  However, the derivatives of the worst samples with respect to every
+error are known, and so are their derivatives with respect to every tolerance.  A convex
+programme with these linearised limits, within a trust region around the present
+tolerances, computes a trial point.  The trial point is scaled uniformly until the
+samples just meet the limits again.  The trial point is accepted if its cost is smaller;
+otherwise the trust region is reduced.  The cost therefore never increases.  The result
+is a local minimum; a global minimum is not proved.
 
-With a yield, the plane is the mean over the samples closest to a limit, that is the
-slope of the quantile.  For a yield of 1, each of the worst samples has a separate
-plane, and the worst corners of the tolerances are searched again at every step.
+For a yield below 1, the linearised limit is the mean over the samples closest to the
+limit, which is the derivative of the quantile.  For a yield of 1, each of the worst
+samples has a separate linearised limit, and the worst corners of the tolerance box are
+searched again at every step.
 
 Sources:
     Hong (2009), Estimating quantile sensitivities; Fletcher, Leyffer (2002), for
@@ -30,26 +32,26 @@ from forcefit.assembly.statistics.scaling import (
     with_worst_corners,
 )
 
-_COARSE = 1e-3  # relative to the limits: precision of intermediate costs
-# relative to the cost: smallest reduction by a step that continues the iteration
+_COARSE = 1e-3  # precision of intermediate costs, relative to the limits
+# smallest cost reduction per step for which iteration continues, relative to the cost
 _GAIN = 1e-4
 # factors on the tolerances that bound the trust region
 _LARGEST_RADIUS, _SMALLEST_RADIUS = 2.0, 1.01
 _MOST_STEPS = 60
-_PLANES = 200  # number of worst samples with a plane, for a yield of 1
-_NEARLY_ACTIVE = 0.8  # relative to a limit: samples above this share count as active
+_PLANES = 200  # number of worst samples that are linearised for a yield of 1
+_NEARLY_ACTIVE = 0.8  # samples above this share of the limit count as active
 
 
 def least_cost(
     requirement: Requirement, samples: Samples, t: NDArray,
     progress: Callable[[str, int, int], None],
 ) -> tuple[NDArray, Samples]:  # fmt: skip
-    """Return tolerances that cost at most as much as uniformly scaled proportions.
+    """Return tolerances that cost no more than the uniformly scaled start.
 
     Args:
         requirement: requirement at all postures.
         samples: samples of the errors that must meet the limits.
-        t: (G,) [rad or m] proportions at the start.
+        t: (G,) [rad or m] tolerances at the start; only their proportions matter.
         progress: called with the name of a step, its progress and its total.
 
     Returns:
@@ -57,7 +59,7 @@ def least_cost(
         iterations.
 
     Raises:
-        BadInput: the samples do not meet the limits at any scale.
+        BadInput: no scale factor makes the samples meet the limits.
     """
     plan, radius = requirement.plan, _LARGEST_RADIUS
     t = scale_uniformly(requirement, samples, t, _COARSE)
@@ -80,7 +82,7 @@ def least_cost(
         if _saving(plan, t, trial) > _GAIN:
             t = trial
             continue
-        # half of the rejected step, in logarithms
+        # half of the rejected step, in terms of logarithms
         radius = np.exp(np.abs(np.log(trial / t)).max() / 2)
         if radius < _SMALLEST_RADIUS:
             break
@@ -95,7 +97,7 @@ def _saving(plan: Plan, before: NDArray, after: NDArray) -> float:
 
 
 def _planes(requirement: Requirement, samples: Samples, t: NDArray) -> list[NDArray]:
-    """Return linearised planes (G,), a.t' <= 1, that keep samples within limits."""
+    """Return linearised limits a (G,), a.t' <= 1, for the critical samples."""
     values = samples.values * requirement.plan.spread(t)
     utilisations = requirement.utilisations(values)[1]
     if requirement.plan.asked_yield == 1.0:
@@ -118,7 +120,7 @@ def _planes(requirement: Requirement, samples: Samples, t: NDArray) -> list[NDAr
         )
         slopes[rows] = [requirement.plan.gather(one) for one in slopes_of_case]
     utilisation = utilisations[cases, draws]
-    relative_slopes = slopes / t  # of the utilisation by every tolerance
+    relative_slopes = slopes / t  # relative derivative of utilisation by each tolerance
     if requirement.plan.asked_yield < 1.0:
         # a draw with zero utilisation has no relative slopes
         nonzero = utilisation > 0

@@ -1,6 +1,6 @@
 """Linear response of springs, closures and platform to clearances and errors.
 
-It belongs to one posture and is the same for all draws of the errors;
+The response belongs to one posture and is common to all draws of the errors;
 :func:`forcefit.assembly.linear.energy.solve_assembly` solves the draws.
 """
 
@@ -38,30 +38,31 @@ from forcefit.assembly.solvers.cones import cone_starts
 class LinearResponse:
     """Response of a posture to clearances and errors, from :func:`linear_response`.
 
-    There are n frames, nu clearances, r springs after elimination, and m = 6 closures
-    rows. ``screws`` and ``motions`` have the columns [clearances | errors].
+    There are n frames, nu clearances, r springs after elimination, and m closure rows,
+    six for each loop. The columns of ``screws`` and ``motions`` are [clearances |
+    errors].
 
     Attributes:
-        posture: the robot's configuration; its own errors are not used.
+        posture: the robot's configuration; the errors of its robot file are not used.
         joints: virtual joints of the posture.
         starts: (cones + 1,) index of the first clearance of each cone, and nu.
         G: (r, nu) derivative of the scaled strains by the clearances.
-        H: (p, nu) rows that the clearances satisfy independently of springs.
+        H: (p, nu) rows of equations on the clearances that do not depend on springs.
         closures: (m, 6n) scaled closure rows.
         misfit: (r, 6n) derivative of the scaled strains by the errors.
         closing: (m, r) map from springs to closure multipliers.
-        redundant: (m, m - ..) orthonormal columns: combinations of closure rows without
-            free motions and springs.
+        redundant: (m, m - ..) orthonormal columns: combinations of closure rows to
+            which neither free motions nor springs contribute.
         infeasible: (m - .., 6n) infeasible component of the errors, redundant.T @
             closures.
         screws: (6, nu + 6n) derivative of the platform screw.
         platform: (6, 6n) map from the screws of all frames to the platform's screw.
         motions: (nq, nu + 6n) derivative of the free motions.
-        ranges: (nq,) [rad or m] bounds of the free motions; they are not applied.
-        wrench: (n, 6, m) [N m, N] wrenches of unit closure multipliers.
-        load: (6,) [N m, N] on the platform at its origin, base axes; None without one.
-        gravity: (3,) [m/s^2] base axes; None without one.
-        loads: load and weight on every small screw; None without them.
+        ranges: (nq,) [rad or m] limits of the free motions; they are not applied.
+        wrench: (n, 6, m) [N m, N] wrenches for unit closure multipliers.
+        load: (6,) [N m, N] load on the platform at its origin, base axes; None if none.
+        gravity: (3,) [m/s^2] gravity in base axes; None if none.
+        loads: generalised forces of load and weight on all small screws; None if none.
         load_motions: (nq,) [rad, m] free motions under the loads at zero clearance.
     """
 
@@ -92,7 +93,7 @@ class LinearResponse:
             errors: (k, n, 6) [rad, m] geometric errors delta l.
 
         Returns:
-            The assemblies under the loads; their clearances are in the columns of
+            The assemblies under the loads, with clearances in the columns of
             :attr:`joints`.
 
         Raises:
@@ -103,12 +104,12 @@ class LinearResponse:
             self.posture, self.load, gravity=self.gravity, errors=errors
         )
         if found.joints.cones.shape[1] < self.starts[-1]:
-            return found.in_columns(self.joints)  # bounds of motions are cones here
+            return found.in_columns(self.joints)  # here motion limits are cones
         return found
 
 
 def checked_errors(errors: ArrayLike, n: int) -> NDArray:
-    """Return the errors of k draws.
+    """Return the errors of k draws as an array after checking shape and values.
 
     Args:
         errors: (k, n, 6) [rad, m] geometric errors delta l.
@@ -135,12 +136,12 @@ def linear_response(
 
     Args:
         posture: the robot's configuration.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes.
+        load: (6,) [N m, N] load on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] gravity in base axes.
 
     Returns:
-        The linear response.  Bounds on the motion of passive joints are left out,
-        unless a load moves a joint to its bound.
+        The linear response.  Motion limits of passive joints are omitted unless a load
+        moves a joint to its limit.
 
     Raises:
         FreeMotion: a load acts along a motion without stiffness.
@@ -159,10 +160,10 @@ def linear_response(
         reduced = reduce_problem(lin, joints, loads)
     A, free = lin.rows, joints.free
     closing = reduced.basis @ reduced.elastic_inverse.T @ reduced.spread
-    # rows without free motions and springs, made orthonormal
+    # orthonormal rows to which neither free motions nor springs contribute
     held = np.linalg.qr(closing)[0] if closing.shape[1] else closing
     redundant = reduced.basis @ complement(reduced.basis.T @ held, RANK)
-    # free motions of least size remove the remaining closure error
+    # the smallest free motions that close the remaining closure error
     inverse = np.linalg.pinv(A @ free, rcond=RANK)
     springs = joints.elastic @ reduced.spread
     misfit = -closing.T @ A
@@ -196,8 +197,8 @@ def linear_response(
 
 
 def _bent(reduced: Reduction, closing: NDArray) -> NDArray:
-    """Return the (6n,) [rad, m] deformations due to loads at zero clearance."""
-    # wrenches that balance the free motions, of least spring energy
+    """Return the deformations (6n,) [rad, m] due to loads at zero clearance."""
+    # wrenches that balance the free motions, with the least spring energy
     bent = reduced.spread.T @ reduced.load_springs
     springs = spring_deformations(
         reduced.linearisation, reduced.joints, reduced.frame_loads,

@@ -1,9 +1,9 @@
 """Monte Carlo simulation at one posture: problems (21), (22) and (27) for each draw.
 
 Draws are solved in blocks, in any order and by any number of threads; each draw depends
-only on its number and the seed.  If a file is given, finished blocks are written to a
-journal next to it, from which an interrupted run resumes.  The rows of the design for
-the importance of errors are additional blocks.
+only on its number and the seed.  If an output file is given, finished blocks are
+written to a journal next to it, from which an interrupted run resumes.  The rows of the
+design for the importance of errors are solved as additional blocks.
 """
 
 from collections.abc import Callable, Iterator
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 BLOCK = 1024  # number of draws that are solved and written to the journal together
 # by axis: no limit is one number
-_QUEUED = 4  # number of blocks that are queued for each thread
+_QUEUED = 4  # number of queued blocks per thread
 
 
 def run_draws(
@@ -54,10 +54,10 @@ def run_draws(
     importance: ImportanceOptions | int | None = None,
     held: ExitStack | None = None,
 ) -> "xarray.Dataset":
-    """Solve the draws 0 .. count - 1.
+    """Solve draws 0 to count - 1 of an experiment and return them as a data set.
 
     Args:
-        experiment: distributions and quantities.
+        experiment: error distributions and quantities.
         count: number of draws.
         path: NetCDF file to write; its journal is used during the computation, then
             removed.
@@ -65,16 +65,16 @@ def run_draws(
         progress: called with the number of finished draws and the number of all draws.
         importance: options for the importance of errors, or its number of base draws;
             None if it is not computed.
-        held: context that keeps the journal until it is closed, as in
+        held: exit stack that keeps the journal until it is closed, as in
             :func:`forcefit.assembly.sweeps.sweep.run_sweep`.
 
     Returns:
-        Data set over ``draw``, with the importance if requested; the file has the same
-        content.
+        Data set over ``draw``, with the importance of errors if requested.  The file
+        contains the same data.
 
     Raises:
-        BadInput: the journal belongs to another run or is locked by one, or a file
-            cannot be written.
+        BadInput: the journal belongs to another run or is locked by another run, or a
+            file cannot be written.
         ModuleNotFoundError: xarray is missing.
     """
     need("xarray")
@@ -108,7 +108,7 @@ def _run_draws(
     kept: dict[int, NDArray] = {}
     journal = None
     if path is not None:
-        # the level of confidence does not change the draws
+        # the confidence level does not change the draws
         rows_of_design = importance and (importance.draws, importance.by)
         identity = provenance(experiment) | {
             "draws": count, "block": BLOCK, "importance": str(rows_of_design),
@@ -120,7 +120,7 @@ def _run_draws(
     done = sum(map(len, kept.values()))
     progress(done, count + more)
     missing = [b for b in range(len(spans)) if b not in kept]
-    with threadpool_limits(1):  # only these threads run in parallel
+    with threadpool_limits(1):  # linear algebra libraries start no further threads
         for block, rows in _solved(solve, missing, workers):
             if journal is not None:
                 journal.add(block, rows, {})
@@ -142,7 +142,7 @@ def _run_draws(
 def _solved(
     solve: Callable[[int], NDArray], blocks: list[int], workers: int
 ) -> Iterator[tuple[int, NDArray]]:
-    """Yield finished blocks; a limited number is queued, which bounds the memory."""
+    """Yield solved blocks; the number of queued blocks is limited to save memory."""
     if not blocks:
         return
     # the first block fills the caches that the threads share
@@ -167,7 +167,7 @@ def _solved(
 
 
 def provenance(experiment: Experiment) -> dict[str, str | int | float]:
-    """Return the values that must be equal for two runs to have the same draws."""
+    """Return values that are equal for two runs exactly if their draws are equal."""
     posture, sources = experiment.posture, experiment.sources
     contact = experiment.used_contact_length
     numbers = [*sources.identity, posture.transforms]

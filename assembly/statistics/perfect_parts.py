@@ -1,9 +1,10 @@
-"""Quantities of perfect parts: effect of clearances and loads without errors.
+"""Quantities of perfect parts: the effect of clearances and loads without errors.
 
-If perfect parts exceed a limit, no tolerance can meet it.  In the worst clearance model
-each joint's clearance contributes a part of the pose error.  Without errors the largest
-pose error is homogeneous in the clearances.  So by Euler's theorem it is the sum of
-each clearance times its slope, which is the multiplier of its bound.
+If a robot without errors exceeds a limit, no tolerance can meet this limit.  In the
+worst clearance model, the clearance of each joint contributes a part to the largest
+pose error.  Without errors, the largest pose error is a homogeneous function of the
+clearances. By Euler's theorem it equals the sum over the clearances of each clearance
+times its derivative, which is the multiplier of the clearance's bound.
 """
 
 import json
@@ -27,10 +28,10 @@ from forcefit.assembly.statistics.worst_clearance import (
 # number of positions of a random clearance model from which the median is taken
 _DRAWS = 200
 _PRECISION = (1e-9, 1e-9)  # [rad, m] required precision of the largest pose errors
-_SHARE = 1e-3  # relative to the largest pose error: smaller parts are not listed
-_OWN = 0.02  # relative to the largest pose error: precision of the parts
+_SHARE = 1e-3  # parts below this share of the largest pose error are not listed
+_OWN = 0.02  # required precision of the parts, relative to the largest pose error
 OWN_MOTION = "own motion of passive joints"
-_EXCEEDED = 1e-9  # relative excess above a limit that counts as exceeded
+_EXCEEDED = 1e-9  # relative excess from which a limit counts as exceeded
 
 
 def perfect_parts(experiment: Experiment) -> dict[str, Any]:
@@ -40,10 +41,10 @@ def perfect_parts(experiment: Experiment) -> dict[str, Any]:
         experiment: posture, loads and clearance model.
 
     Returns:
-        By quantity: ``reached``, which for random clearance models is the median of 200
+        By quantity: ``reached``; for random clearance models this is the median of 200
         positions.  For pose errors of the worst model without loads also
-        ``clearances``, the part [rad or m] of each kind of clearance, largest first.
-        Empty if perfect parts have no solution.
+        ``clearances``: the part [rad or m] of each kind of clearance, largest first.
+        The dictionary is empty if the robot without errors has no solution.
     """
     random = experiment.clearance in {"uniform", "contact"}
     count = _DRAWS if random else 1
@@ -62,7 +63,7 @@ def perfect_parts(experiment: Experiment) -> dict[str, Any]:
             whole = reached.get(key, {}).get("reached", np.nan)
             if np.isfinite(whole):
                 own = whole - sum(parts.values())
-                # bounds of passive joints are not clearances of the prepared posture
+                # motion limits of passive joints are not among the prepared clearances
                 if np.isfinite(prepared.ranges).any() and own > _OWN * whole:
                     parts[OWN_MOTION] = own
                 largest_first = sorted(parts.items(), key=lambda item: -item[1])
@@ -92,7 +93,7 @@ def _clearance_parts(prepared: LinearResponse) -> dict[str, dict[str, float]]:
 
 
 def _clearance_kinds(prepared: LinearResponse) -> list[str]:
-    """Return the kind of each cone, such as ``hinge.tilt``, common to all legs."""
+    """Return the kind of each cone, such as ``hinge.tilt``, without the leg's name."""
     robot, kinds = prepared.posture.robot, []
     for first, end in zip(prepared.starts[:-1], prepared.starts[1:], strict=True):
         columns: NDArray = prepared.joints.cones[:, first:end]
@@ -119,7 +120,7 @@ def limits_broken(
         limits: limits by quantity.
 
     Returns:
-        By quantity the value for perfect parts, its unit and the limit.
+        By quantity: the value for perfect parts, its unit and the limit.
     """
     return {
         key: {**parts[key], "limit": limit}
@@ -154,7 +155,7 @@ def _size_text(one: Mapping[str, Any]) -> str:
 
 
 def _of_text(one: Mapping[str, Any]) -> str:
-    """Return the two largest parts of clearances as text in brackets."""
+    """Return the two largest contributions of clearances as text in brackets."""
     parts = list(one.get("clearances", {}).items())[:2]
     if not parts:
         return ""

@@ -36,8 +36,8 @@ def figure_of_draws(
 
     Args:
         data: data set saved by ``statistics`` or ``tolerances``, or another data set.
-        kind: ``"histogram"``, ``"tornado"`` or ``"allocation"``; by default it depends
-            on the data.
+        kind: ``"histogram"``, ``"tornado"`` or ``"allocation"``; None to choose the
+            kind that fits the data.
         quantities: quantities of a histogram, by the names in
             :mod:`forcefit.assembly.sweeps.panels`.
 
@@ -45,8 +45,8 @@ def figure_of_draws(
         The figure; None for another kind of data set.
 
     Raises:
-        ValueError: the data set lacks the variables of the kind.
-        BadInput: a quantity is unknown, or is given for another kind of figure.
+        ValueError: the data set lacks the variables that this kind of figure needs.
+        BadInput: a quantity is unknown, or quantities are given for another kind.
     """
     if kind is None:
         own = {"tolerance": "allocation", "sources_and_posture_sha256": "histogram"}
@@ -72,7 +72,8 @@ def histogram_figure(
             :mod:`forcefit.assembly.sweeps.panels`; by default those with a limit.
 
     Returns:
-        A panel for each quantity that varies; bands are 95 % confidence intervals.
+        A figure with one panel per quantity that varies; bands are 95 % confidence
+        intervals.
 
     Raises:
         ValueError: the data set has no draws.
@@ -111,7 +112,7 @@ def histogram_figure(
 
 
 def _histogram(panel: Any, text: str, values: Any) -> None:
-    """Draw one panel; for a variable with components, its largest one."""
+    """Draw one histogram; of a variable with components, the largest is drawn."""
     x = values.max(axis=1) if values.ndim == 2 else values
     x = x[np.isfinite(x)]
     panel.set(xlabel=text, ylabel="draws")
@@ -136,14 +137,15 @@ def _histogram(panel: Any, text: str, values: Any) -> None:
 
 
 def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
-    """Return the tornado plot of the importance with intervals, largest share on top.
+    """Return the tornado plot of the importance of errors, largest share on top.
 
     Args:
-        data: data with ``first_index`` and ``total_index``.
-        most: largest number of bars in a panel.
+        data: data set with ``first_index`` and ``total_index``.
+        most: largest number of bars per panel.
 
     Returns:
-        A panel for each quantity: the total share is light, the first-order share dark.
+        A figure with one panel per quantity: total shares are light, first-order shares
+        dark.
 
     Raises:
         ValueError: the data set has no importance.
@@ -183,16 +185,16 @@ def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
 
 
 def allocation_figure(data: "xarray.Dataset") -> "Figure":
-    """Return a bar chart of the tolerances with upper bounds, angles and lengths apart.
+    """Return a bar chart of the tolerances and their upper bounds.
 
     Args:
         data: data of
             :func:`forcefit.assembly.statistics.allocated_tolerances.tolerance_dataset`.
 
     Returns:
-        A figure.  Wide bars are tolerances of least cost; narrow bars, where different,
-        are those of the convex programme, scaled uniformly.  The title states cost and
-        verification.
+        A figure with separate panels for angles and lengths.  Wide bars are tolerances
+        of least cost. Narrow bars, drawn where different, are the uniformly scaled
+        tolerances of the convex programme.  The title reports cost and verification.
 
     Raises:
         ValueError: the data set has no tolerances.

@@ -1,8 +1,8 @@
-"""Problem (21) at one posture for many draws of the errors, with slopes.
+"""Problem (21), the assembly margin, at one posture for many draws, with derivatives.
 
 The margin is ``max q.K e`` over multipliers q with ``sum_k |B_k^T q| <= 1``.  It is
-convex in the errors e and proportional to them; its slope is ``K^T q`` with the optimal
-q.
+convex in the errors e and positively homogeneous.  Its derivative by e is ``K^T q``
+with the optimal q.
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from forcefit.assembly.linear.zone import Compliant, Zone, zone_margin
 from forcefit.assembly.solvers.cones import cone_starts
 from forcefit.assembly.statistics.linear_response import checked_errors
 
-# [rad, reference lengths] smallest error that certainly no motion can close
+# [rad, reference lengths] errors at least this large cannot be closed by any motion
 _CLEARLY_INFEASIBLE = 1e-10
 
 
@@ -28,12 +28,13 @@ class PostureMargins:
     """A posture prepared for the margins of given errors, by :func:`prepare_margins`.
 
     Attributes:
-        posture: the robot's configuration; its own errors are not used.
-        starts: (cones + 1,) index of the first clearance of each cone, and nu.
+        posture: the robot's configuration; the errors of its robot file are not used.
+        starts: (cones + 1,) index of the first clearance of each cone, and finally nu.
         B: (p, nu) orthonormal rows of the equations for the clearances u, B u = K e.
-        K: (p, 6n) map from the errors e to the right side of these equations.
+        K: (p, 6n) map from the errors e to the right sides of these equations.
         infeasible: (.., 6n) map from the errors to their infeasible component.
-        compliant: ``"rigid"`` or ``"free"``, see :mod:`forcefit.assembly.linear.zone`.
+        compliant: whether compliant joints are ``"rigid"`` or ``"free"``, see
+            :mod:`forcefit.assembly.linear.zone`.
     """
 
     posture: Posture
@@ -50,9 +51,9 @@ class PostureMargins:
             errors: (k, n, 6) [rad, m] geometric errors delta l.
 
         Returns:
-            Margins with their certificates.  If no factor on the clearances closes the
-            errors, the forces belong to the part of the errors that clearances can
-            close.
+            Margins with their certificates.  If the errors cannot be closed even with
+            enlarged clearances, the forces belong to the part of the errors that
+            clearances can close.
 
         Raises:
             ValueError: the shape does not match the robot, or a value is not finite.
@@ -70,13 +71,14 @@ class PostureMargins:
         return found
 
     def slopes(self, zone: Zone) -> NDArray:
-        """Return the slopes of margins by each error.
+        """Return the derivatives of the margins by each error.
 
         Args:
             zone: result of :meth:`solve` for k draws.
 
         Returns:
-            (k, n, 6) [1/rad, 1/m] slopes; NaN where the reference method was needed.
+            (k, n, 6) [1/rad, 1/m] derivatives; NaN for draws that needed the reference
+            method.
         """
         slopes = zone.forces @ self.B.T @ self.K
         return slopes.reshape(len(slopes), -1, 6)
@@ -87,7 +89,8 @@ def prepare_margins(posture: Posture, compliant: Compliant = "free") -> PostureM
 
     Args:
         posture: the robot's configuration.
-        compliant: ``"rigid"`` or ``"free"``, see :mod:`forcefit.assembly.linear.zone`.
+        compliant: whether compliant joints are ``"rigid"`` or ``"free"``, see
+            :mod:`forcefit.assembly.linear.zone`.
 
     Returns:
         The prepared posture.
@@ -100,7 +103,7 @@ def prepare_margins(posture: Posture, compliant: Compliant = "free") -> PostureM
     robot = posture.robot
     lin, joints = linearise(posture), virtual_joints(robot, False, compliant == "free")
     reduced = reduce_problem(lin, joints)
-    # orthonormal rows make the result independent of the closures' units
+    # with orthonormal rows the result does not depend on the units of the closures
     U, S, B = svd(reduced.H, full_matrices=False)
     rigid = reduced.rigid
     held = np.linalg.qr(rigid)[0] if rigid.shape[1] else rigid

@@ -1,4 +1,4 @@
-"""Possible ranks of sampled shares, and joint names of undistinguished contributors."""
+"""Possible ranks of sampled shares, and summary names for equal errors of all legs."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from forcefit.stiffness.screws import SCREW
 
-_IN_SENTENCE = 3  # most contributors of a sentence
+_IN_SENTENCE = 3  # largest number of contributors in a sentence
 
 NOT_DISTINGUISHED = (
     "rank: the ranks that the intervals allow; errors with a rank in common are not "
@@ -17,14 +17,14 @@ NOT_DISTINGUISHED = (
 
 
 def possible_ranks(shares: Mapping[str, NDArray]) -> dict[str, tuple[int, int]]:
-    """Return the first and the last possible rank of each contributor.
+    """Return the best and the worst possible rank of each contributor.
 
     Args:
         shares: value, lower and upper bound of each share, by name.
 
     Returns:
-        First and last rank by name.  A share precedes another one if its lower bound is
-        above the other's upper bound.  Unknown shares have no ranks.
+        Best and worst rank by name.  A share ranks before another one only if its lower
+        bound exceeds the other's upper bound.  Unknown shares have no ranks.
     """
     known = {name: v for name, v in shares.items() if np.isfinite(v).all()}
     lower, upper = np.array([v[1:] for v in known.values()]).reshape(-1, 2).T
@@ -38,7 +38,7 @@ def possible_ranks(shares: Mapping[str, NDArray]) -> dict[str, tuple[int, int]]:
 
 
 def rank_text(rank: Sequence[int] | None) -> str:
-    """Return possible ranks as text, such as 1 or 2-4; empty without ranks."""
+    """Return possible ranks as text, such as 1 or 2-4; empty if there are none."""
     if rank is None:
         return ""
     first, last = rank
@@ -46,7 +46,7 @@ def rank_text(rank: Sequence[int] | None) -> str:
 
 
 def ranked(summary: Mapping[str, Any], key: str) -> list[tuple[str, list[float]]]:
-    """Return the total shares of a quantity's variance by error, largest first.
+    """Return each error's total share of a quantity's variance, largest first.
 
     Args:
         summary: result of :func:`forcefit.assembly.statistics.summary.summarise`.
@@ -73,9 +73,9 @@ def shares_sentence(
         quantity: name of the quantity.
 
     Returns:
-        Such as ``"position of bore 2 on link_a: 31 % of the variance of the
-        translation (27 to 36 %); .."``.  A share is between 0 and 100 %, though the
-        estimate and its interval from few draws may not be.
+        A sentence such as ``"position of bore 2 on link_a: 31 % of the variance of the
+        translation (27 to 36 %); .."``.  Estimates and intervals from few draws may
+        leave the range from 0 to 100 %; the sentence states the part within it.
     """
     parts = []
     for name, share in shares[:_IN_SENTENCE]:
@@ -86,20 +86,20 @@ def shares_sentence(
 
 
 def leaders(ranks: Mapping[str, Sequence[int]]) -> list[str]:
-    """Return the names of the contributors that may be the largest."""
+    """Return the names of the contributors that may rank first."""
     return [name for name, (first, _) in ranks.items() if first == 1]
 
 
 def named_together(names: Iterable[str], among: Iterable[str]) -> list[str]:
-    """Return the names of contributors; equal ones of all legs become one name.
+    """Return names of contributors, with equal ones of all legs merged into one name.
 
     Args:
         names: names of the contributors, such as ``leg1.hinge.RX``.
         among: all names.
 
     Returns:
-        ``hinge.RX of all legs`` if the component of each leg is among the names, in the
-        order of the names; other names are unchanged.
+        ``hinge.RX of all legs`` if this component of every leg is among the names;
+        other names are unchanged. The order of the names is kept.
     """
     names = list(names)
     of_kind: dict[str, list[str]] = {}
@@ -114,7 +114,7 @@ def named_together(names: Iterable[str], among: Iterable[str]) -> list[str]:
 
 
 def group_of(label: str, by: str) -> str:
-    """Return the group of an error ``hinge.RX`` by source, frame or kind."""
+    """Return the group name of an error ``hinge.RX`` by source, frame or kind."""
     return {
         "source": label, "frame": label.rpartition(".")[0], "kind": kind_of(label)
     }[by]  # fmt: skip

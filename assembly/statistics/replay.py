@@ -1,8 +1,9 @@
 """Results of an expensive deterministic computation, stored in a journal in order.
 
-An interrupted computation resumes when it is run again: results in the journal are read
-instead of computed.  Each result is stored with a digest of its arguments and is
-computed again if the digest differs, for example after a change of the program.
+An interrupted computation resumes when it is started again: results in the journal are
+read instead of computed.  Each result is stored with a digest of its arguments. A
+result whose digest differs, for example after a change of the program, is computed
+again.
 """
 
 import io
@@ -25,10 +26,10 @@ _DIGEST = 32
 
 @dataclass(eq=False)
 class Replay:
-    """The stored results.
+    """The stored results of a computation, which are returned in order.
 
     Attributes:
-        journal: journal of records :data:`RECORD`; None if nothing is stored.
+        journal: journal with records of type :data:`RECORD`; None to store nothing.
         asked: number of results requested so far.
     """
 
@@ -38,11 +39,11 @@ class Replay:
     def recall(
         self, compute: Callable[[], tuple[ArrayLike, ...]], *given: ArrayLike
     ) -> tuple[NDArray, ...]:
-        """Return the next result, from the journal or computed.
+        """Return the next result, either read from the journal or computed.
 
         Args:
             compute: function that computes the result.
-            given: numbers and texts on which the result depends.
+            given: numbers and texts that determine the result.
 
         Returns:
             The results of ``compute``, as arrays.
@@ -70,10 +71,10 @@ class Replay:
 def journalled(
     path: Path | None, whose: dict[str, Any]
 ) -> Generator[Replay, None, None]:
-    """Store results next to a file until the file is written.
+    """Store results in a journal next to an output file until the file is written.
 
     Args:
-        path: path of the file; None if nothing is stored.
+        path: path of the output file; None to store nothing.
         whose: values that must be equal for two computations to share results.
 
     Yields:

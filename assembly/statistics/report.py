@@ -1,4 +1,4 @@
-"""Page of draws: yields, values for perfect parts, and the main contributors."""
+"""HTML page of random draws: yields, values for perfect parts, main contributors."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import xarray
 
 _BINS = 60
-_GOOD = 0.95  # yield that the interval of a favourable result exceeds
+_GOOD = 0.95  # yield above which a result is shown as favourable
 _LISTED = 20  # largest number of errors in a table of shares
 _ASSUMED = (
     "Small screws: the closures are linear in the errors of each draw.",
@@ -38,17 +38,17 @@ def draws_page(
     summary: Mapping[str, Any], data: "xarray.Dataset", provenance: Provenance,
     robot: str = "",
 ) -> str:  # fmt: skip
-    """Return the page of an experiment.
+    """Return the page of an experiment as HTML.
 
     Args:
         summary: result of :func:`forcefit.assembly.statistics.summary.summarise`, with
-            ``robot``.
+            the robot's name as ``robot``.
         data: the draws.
-        provenance: the command and the files.
+        provenance: the command and its input files.
         robot: HTML from :func:`forcefit.assembly.statistics.scenes.drawn_robot`.
 
     Returns:
-        HTML, which needs no other file.
+        HTML that refers to no other file.
     """
     goes = summary["assembles"]["forced"]
     verdict = f"Of {summary['draws']} draws {_share_text(goes)} assemble"
@@ -73,7 +73,7 @@ def draws_page(
 def draws_sections(
     summary: Mapping[str, Any], data: "xarray.Dataset", robot: str = ""
 ) -> list[str]:
-    """Return the sections of :func:`draws_page`, for this page and for others."""
+    """Return the sections of :func:`draws_page`, which other pages also contain."""
     return [
         section("Probabilities", _yields(summary)),
         _perfect_parts(summary),
@@ -86,7 +86,7 @@ def draws_sections(
 
 
 def _share(summary: Mapping[str, Any]) -> Mapping[str, float]:
-    """Return the yield: all limits are met or, without limits, the draw assembles."""
+    """Return the probability that all limits are met, or without limits of assembly."""
     limits: Mapping[str, float] | None = summary.get("within_limits")
     forced: Mapping[str, float] = summary["assembles"]["forced"]
     return limits or forced
@@ -125,7 +125,7 @@ def _draws_tiles(summary: Mapping[str, Any]) -> list[Tile]:
 
 
 def _yields(summary: Mapping[str, Any]) -> str:
-    """Return the table of all probabilities."""
+    """Return the table of all probabilities as HTML."""
     named = {WORDS[key]: one for key, one in summary["assembles"].items()}
     for key, one in summary["exceeds"].items():
         limit = f"{one['limit']:g} {one['unit']}".removesuffix(" 1")
@@ -144,7 +144,7 @@ def _yields(summary: Mapping[str, Any]) -> str:
 
 
 def _perfect_parts(summary: Mapping[str, Any]) -> str:
-    """Return the values for perfect parts, with the part of each kind of clearance."""
+    """Return the values for perfect parts, by kind of clearance, as HTML."""
     parts = {k: v for k, v in summary["perfect_parts"].items() if v["reached"]}
     if not parts:
         return ""
@@ -167,7 +167,7 @@ def _perfect_parts(summary: Mapping[str, Any]) -> str:
 
 
 def _quantities(summary: Mapping[str, Any]) -> str:
-    """Return the table of means and quantiles."""
+    """Return the table of means and quantiles as HTML."""
     rows: list[list[Cell]] = []
     for key, one in summary["quantities"].items():
         if "mean" not in one:
@@ -182,7 +182,7 @@ def _quantities(summary: Mapping[str, Any]) -> str:
 
 
 def _histograms(summary: Mapping[str, Any], data: "xarray.Dataset") -> str:
-    """Return histograms of quantities that vary, with median and 95 % quantile."""
+    """Return histograms of the varying quantities, with median and 95 % quantile."""
     charts, still = [], []
     solved = data["status"].values == 0
     for key, one in summary["quantities"].items():
@@ -198,7 +198,7 @@ def _histograms(summary: Mapping[str, Any], data: "xarray.Dataset") -> str:
 
 
 def _histogram(name: str, one: Mapping[str, Any], values: NDArray) -> str:
-    """Return the number of draws in bins of equal width."""
+    """Return a histogram with bins of equal width as HTML."""
     counts, edges = np.histogram(values, _BINS)
     traces: list[dict[str, Any]] = [{
         "type": "bar", "x": (edges[1:] + edges[:-1]) / 2, "y": counts,
@@ -215,7 +215,7 @@ def _histogram(name: str, one: Mapping[str, Any], values: NDArray) -> str:
 
 
 def _capability(summary: Mapping[str, Any]) -> str:
-    """Return the table of Cpk and parts per million."""
+    """Return the table of Cpk and parts per million as HTML."""
     rows: list[list[Cell]] = [
         [NAMES[key], Value(one["limit"], one["unit"]),
          *(one[index][k] for index in ("cp", "cpk", "ppm")
@@ -229,7 +229,7 @@ def _capability(summary: Mapping[str, Any]) -> str:
 
 
 def _importance(summary: Mapping[str, Any]) -> str:
-    """Return the section on the errors that cause the variance."""
+    """Return the section on the errors that contribute to the variance as HTML."""
     pieces = []
     for key, one in summary.get("importance", {}).get("quantities", {}).items():
         shares = ranked(summary, key)[:_LISTED]

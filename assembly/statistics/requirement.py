@@ -1,4 +1,4 @@
-"""Requirements on tolerances: limits at every posture, for all robots or a yield."""
+"""Requirements on tolerances: limits at every posture, for all robots or a share."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -22,10 +22,10 @@ from forcefit.results.display import html_table, short_repr
 
 CONVEX = ("margin", "margin_free", "energy")
 COSTS = ("reciprocal", "logarithm")
-# relative to a limit on a pose error: required difference of upper and lower bound
+# required difference of upper and lower bound, relative to the limit on a pose error
 _PRECISION = 1e-4
 _BATCH = 512  # number of draws that are solved and stored together
-# numbers of streams of random numbers; further verifications use higher numbers
+# stream numbers of random numbers; further verifications use higher numbers
 TRAINING, SCALING, FRESH = 10, 11, 12
 
 
@@ -34,21 +34,21 @@ class Plan:
     """Costs and limits of tolerances.
 
     Attributes:
-        sources: m errors within tolerances of 1 [rad or m]; zones of callouts of
-            width 1 m.
-        group: (m,) class of each.
+        sources: m errors that are scaled to tolerances of 1 [rad or m]; zones of
+            callouts are scaled to a width of 1 m.
+        group: (m,) class of each error.
         names: names of the G classes.
         costs: (G,) cost coefficient of each class, > 0.
         least: (G,) [rad or m] smallest tolerances.
         most: (G,) [rad or m] largest tolerances.
-        cost: law of the cost, ``"reciprocal"`` or ``"logarithm"``.
+        cost: cost law, ``"reciprocal"`` or ``"logarithm"``.
         limits: limits by quantity: margin, margin_free, energy [J], force [N], moment
             [N m], stress [Pa], rotation [rad], translation [m].
         asked_yield: 1 if all robots must meet the limits; otherwise the share of robots
             that must meet every limit at every posture.
         draws: number of training draws at every posture.
         seed: seed of all draws.
-        clearance: for limits of pose errors, one of
+        clearance: clearance model for limits on pose errors, one of
             :data:`forcefit.assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
         contact_length: [m] length of the contact model, see
             :class:`forcefit.assembly.statistics.experiment.Experiment`.
@@ -70,7 +70,7 @@ class Plan:
 
     @property
     def limits_pose(self) -> bool:
-        """Whether a pose error is limited, so that the clearance model is used."""
+        """Whether a pose error is limited; only then the clearance model is used."""
         return bool(set(POSE_ERRORS) & set(self.limits))
 
     __repr__, _repr_html_ = short_repr, html_table
@@ -80,7 +80,7 @@ class Plan:
         return tolerances[self.group]
 
     def gather(self, slopes: NDArray) -> NDArray:
-        """Return the (G,) sums over the sources of each class."""
+        """Return the sums (G,) of slopes over the sources of each class."""
         return np.bincount(self.group, weights=slopes, minlength=len(self.names))
 
     def price(self, tolerances: NDArray) -> float:
@@ -90,18 +90,18 @@ class Plan:
         return float(-(self.costs * np.log(tolerances)).sum())
 
     def draws_of(self, stream: int, count: int) -> NDArray:
-        """Return (count, m) drawn errors as factors on the tolerances."""
+        """Return drawn errors (count, m), relative to the tolerances."""
         return self.sources.draw(0, count, self.seed, stream)
 
 
 @dataclass(frozen=True, eq=False)
 class Requirement:
-    """A plan at postures of one robot, prepared for the limited quantities.
+    """A plan at several postures of one robot, prepared for the limited quantities.
 
     Attributes:
         postures: postures of the workspace.
         plan: costs and limits.
-        replay: stored results.
+        replay: stored results of an earlier, interrupted computation.
     """
 
     postures: Sequence[Posture]
@@ -132,7 +132,7 @@ class Requirement:
 
     @cached_property
     def prepared(self) -> dict[str, list]:
-        """Prepared postures by limit."""
+        """Prepared postures by the name of the limited quantity."""
         return {
             key: [prepare_margins(p, MARGINS[key]) for p in self.postures]
             if key in MARGINS else [e.energies for e in self.experiments]
@@ -141,10 +141,10 @@ class Requirement:
 
     @cached_property
     def convex(self) -> dict[str, list]:
-        """Prepared postures by limit, for limits that are convex in the errors.
+        """Prepared postures by limited quantity, for limits convex in the errors.
 
-        With bolted joints none is: the clearance that is locked in is not linear in the
-        errors.
+        With bolted joints no limit is convex, because the locked-in clearance is not
+        linear in the errors.
         """
         if any(frame.locked_at for frame in self.postures[0].robot.frames):
             return {}
@@ -152,12 +152,12 @@ class Requirement:
 
     @property
     def is_convex(self) -> bool:
-        """Whether all limits are convex in the tolerances; requires a yield of 1."""
+        """Whether all limits are convex in the tolerances; True only for yield 1."""
         return self.plan.asked_yield == 1.0 and len(self.convex) == len(self.prepared)
 
     @property
     def cases(self) -> list[tuple[str, int]]:
-        """Limit and posture of every row of :meth:`utilisations`."""
+        """Limit and posture that belong to each row of :meth:`utilisations`."""
         return [(key, i) for key in self.plan.limits for i in range(len(self.postures))]
 
     def utilisations(self, values: NDArray) -> tuple[NDArray, NDArray]:
@@ -167,9 +167,9 @@ class Requirement:
             values: (k, m) [rad or m] errors.
 
         Returns:
-            (limits x postures, k) lower and upper bounds, see :attr:`cases`.  They
-            differ only for pose errors of the worst clearance model; inf without a
-            solution.
+            (limits x postures, k) lower and upper bounds; rows as in :attr:`cases`.
+            The bounds differ only for pose errors of the worst clearance model.  The
+            utilisation is inf for a draw without a solution.
         """
         chunks = [
             self._batch_utilisations(values, i) for i in range(0, len(values), _BATCH)
@@ -180,7 +180,7 @@ class Requirement:
     def _batch_utilisations(
         self, values: NDArray, first: int
     ) -> tuple[NDArray, NDArray]:
-        """Return the utilisations of a batch, one posture after the other."""
+        """Return the utilisations of one batch of errors at all postures."""
         some = values[first : first + _BATCH]
         rows = np.arange(first, first + len(some))
         keys = list(self.plan.limits)
@@ -198,7 +198,7 @@ class Requirement:
     def _quantities(
         self, i: int, values: NDArray, rows: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """Return lower and upper bounds (limits, k) of quantities at posture i."""
+        """Return lower and upper bounds (limits, k) of the quantities at posture i."""
         keys = list(self.plan.limits)
         rows_of_draws = None
         if any(not key.startswith("margin") for key in keys):
@@ -224,12 +224,12 @@ class Requirement:
         return bounds[0], bounds[1]
 
     def utilisation_slopes(self, case: int, values: NDArray) -> NDArray:
-        """Return (k, m) slopes of a row of :meth:`utilisations` by each error."""
+        """Return derivatives (k, m) of a row of :meth:`utilisations` by each error."""
         key, i = self.cases[case]
         return self.respond(key, i, values)[1] / self.plan.limits[key]
 
     def respond(self, key: str, i: int, values: NDArray) -> tuple[NDArray, NDArray]:
-        """Return a limited quantity at posture i, and its slopes by each error."""
+        """Return a limited quantity at posture i, and its derivatives by each error."""
         size, slopes = self.replay.recall(
             lambda: respond(
                 self.prepared[key][i],
@@ -246,7 +246,7 @@ class Requirement:
         return size, slopes
 
     def worst_corner(self, key: str, i: int, t: NDArray, corners: NDArray) -> Corner:
-        """Return the worst corner of tolerances (G,) found at posture i."""
+        """Return the worst corner of tolerances (G,) that is found at posture i."""
         spread, sources = self.plan.spread(t), self.plan.sources
         assert isinstance(sources, ErrorSources)  # callouts have no corners
 
@@ -261,11 +261,12 @@ class Requirement:
         return Corner(float(value), signs, slopes)
 
     def perfect_parts(self) -> dict[str, tuple[float, str]]:
-        """Return the part of each limit on a pose error that clearances alone use.
+        """Return the part of each limit on a pose error that clearances use.
 
         Returns:
-            By quantity a lower bound of the largest pose error [rad or m] over all
-            postures, and its posture; empty for clearance models other than the worst.
+            By quantity: a lower bound of the largest pose error [rad or m] without
+            errors over all postures, and its posture. The result is empty for clearance
+            models other than the worst.
 
         Raises:
             BadInput: one of the pose errors exceeds its limit.
@@ -287,7 +288,7 @@ class Requirement:
         return reached
 
     def _refuse_broken(self, reached: Mapping[str, tuple[float, str]]) -> None:
-        """Reject the limit that clearances alone exceed most."""
+        """Reject the limit that perfect parts exceed most, if any."""
         limits = self.plan.limits
         for key in sorted(reached, key=lambda k: -reached[k][0] / limits[k]):
             value, where = reached[key]
@@ -301,10 +302,10 @@ class Requirement:
                 )
 
     def check_taken_up(self) -> None:
-        """Reject errors that no clearance or spring can take up at some posture.
+        """Reject errors that neither a clearance nor a spring can close at a posture.
 
         Raises:
-            BadInput: there is such an error; the message names it.
+            BadInput: such an error exists; the message names the error.
         """
         sources, n = self.plan.sources, len(self.postures[0].robot.frames)
         for key, prepared in self.convex.items():

@@ -1,4 +1,4 @@
-"""A limited quantity as a function of the errors, with its slopes by each error."""
+"""A limited quantity as a function of the errors, with derivatives by each error."""
 
 from functools import partial
 
@@ -24,7 +24,7 @@ from forcefit.assembly.statistics.worst_clearance import (
 )
 from forcefit.assembly.steps.bolted import bolted_errors
 
-_STEP = 1e-6  # relative to a wrench: step for differences of the stress formula
+_STEP = 1e-6  # step for differences of the stress formula, relative to the wrench
 _PRECISION = 1e-9  # [rad or m] required precision of the largest pose errors
 # step for differences of bolted joints, relative to the largest value of a number, and
 # the smallest such value
@@ -37,29 +37,29 @@ def respond(
     key: str = "energy", clearance: str = "worst",
     contact_length: float | None = None,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return a quantity for given errors, with its slopes by each error.
+    """Return a quantity for given errors, with its derivatives by each error.
 
     Args:
-        prepared: a posture prepared for margins, or for energies and all other
-            quantities.
+        prepared: a posture prepared for margins, or one prepared for energies, which
+            is used for all other quantities.
         sources: m sources of errors.
         values: (k, m) [rad or m] errors.
         key: name of the quantity, for a posture prepared for energies: energy [J],
             force [N], moment [N m], stress [Pa], rotation [rad] or translation [m].
         clearance: for a pose error, one of
             :data:`forcefit.assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
-            In the worst model, value and slopes are those of the largest error found.
-            For uniform and contact positions the slopes are those of the solution of
-            (22).
+            In the worst model, the value and its derivatives belong to the largest
+            error found. For uniform and contact positions the derivatives belong to the
+            solution of (22).
         contact_length: [m] length of the contact model, see
             :class:`forcefit.assembly.statistics.experiment.Experiment`.
 
     Returns:
-        (k,) values and (k, m) slopes; NaN without a solution.  Joints are bolted with
-        these errors, at the least sum of squares.
+        (k,) values and (k, m) derivatives; NaN without a solution.  Clearances of
+        bolted joints are locked in at their least sum of squares for these errors.
 
     Raises:
-        CannotBolt: a robot cannot be assembled where its joint is bolted.
+        CannotBolt: a robot cannot be assembled at the pose where its joint is bolted.
     """
     robot = prepared.posture.robot
     errors = bolted_errors(robot, sources.errors(values))
@@ -73,7 +73,7 @@ def respond(
         return draws.energy, -by_number(draws.wrenches)
     size = np.full(len(values), np.nan)
     slopes = np.full(errors.shape, np.nan)
-    # draws whose clearances are not known have unknown active bounds
+    # the active bounds of a draw are unknown if its clearances are unknown
     known = np.isfinite(draws.energy) & np.isfinite(draws.clearances).all(axis=1)
     solved = np.flatnonzero(known)
     if len(solved):
@@ -95,10 +95,10 @@ def respond(
 def _by_number(
     robot: Robot, sources: Sources, values: NDArray, slopes: NDArray
 ) -> NDArray:
-    """Return (k, m) slopes by the numbers of the sources from those by all errors.
+    """Return derivatives (k, m) by the sources from derivatives by all frame errors.
 
-    A bolted joint locks in a clearance that depends on the errors; its derivatives are
-    central differences.
+    The clearance that a bolted joint locks in depends on the errors; its derivatives
+    are central differences.
     """
     if not any(frame.locked_at for frame in robot.frames):
         return sources.of_numbers(slopes)
@@ -114,7 +114,7 @@ def _pose_error(
     prepared: LinearResponse, draws: Assembly, key: str,
     model: tuple[str, float | None], numbers: NDArray,
 ) -> tuple[NDArray, NDArray, NDArray | None]:  # fmt: skip
-    """Return a pose error, and its slopes by platform screw and clearances."""
+    """Return a pose error, and its derivatives by platform screw and clearances."""
     part, (clearance, contact_length) = 3 * POSE_ERRORS.index(key), model
     if clearance == "worst":
         precision = (_PRECISION, np.inf) if key == "rotation" else (np.inf, _PRECISION)
@@ -134,7 +134,7 @@ def _pose_error(
 
 
 def _wrench_quantity(some: Assembly, key: str) -> tuple[NDArray, NDArray]:
-    """Return the largest moment, force or stress, and its slopes by the wrenches."""
+    """Return the largest moment, force or stress, and its derivatives by wrench."""
     wrenches, at_tips = some.wrenches, some.frame_loads.at_tips
     slopes, draws = np.zeros_like(wrenches), np.arange(len(wrenches))
     if key != "stress":
@@ -155,7 +155,7 @@ def _wrench_quantity(some: Assembly, key: str) -> tuple[NDArray, NDArray]:
 
 
 def _size(parts: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the norms of vectors, and their slopes by the components."""
+    """Return the norms of vectors, and their derivatives by the components."""
     size = np.linalg.norm(parts, axis=-1)
     return size, parts / np.maximum(size, 1e-300)[..., None]
 
@@ -163,9 +163,9 @@ def _size(parts: NDArray) -> tuple[NDArray, NDArray]:
 def _stress_slopes(
     link: LinkStress, wrenches: NDArray, at_tip: NDArray = WEIGHTLESS
 ) -> NDArray:
-    """Return the (k, 6) slopes of the peak stress by a link's wrench."""
-    # differences of the formula, not of the solution; the stress of a fibre is the root
-    # of a quadratic form, so the relative error of central differences is 1e-10
+    """Return the derivatives (k, 6) of the peak stress by the wrench of a link."""
+    # central differences of the formula, not of the solution: the stress of a fibre is
+    # the root of a quadratic form, so the relative error is 1e-10
     slopes = np.zeros_like(wrenches)
     for part in (slice(0, 3), slice(3, 6)):
         step = _STEP * np.linalg.norm(wrenches[:, part], axis=1).max(initial=1e-9)

@@ -10,16 +10,16 @@ from forcefit.assembly.statistics.requirement import Requirement
 from forcefit.assembly.statistics.worst_case import CORNERS, random_corners
 from forcefit.inputs.table import BadInput
 
-_FINE = 1e-4  # relative to the limits: precision of the largest utilisation
+_FINE = 1e-4  # precision of the largest utilisation, relative to the limits
 _MOST_TRIALS = 80
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Samples of errors that must meet every limit at every posture, except a few.
+    """Error samples that must meet every limit at every posture, with few exceptions.
 
     Attributes:
-        values: (k, m) errors within tolerances of 1.
+        values: (k, m) errors relative to their tolerances.
         allowed: number of samples that may fail.
     """
 
@@ -28,7 +28,7 @@ class Samples:
 
 
 def draw_samples(requirement: Requirement, stream: int, times: int = 1) -> Samples:
-    """Return fixed draws, or corners of the tolerances for a yield of 1.
+    """Return fixed random draws or, for a yield of 1, corners of the tolerances.
 
     Args:
         requirement: requirement at all postures.
@@ -36,11 +36,11 @@ def draw_samples(requirement: Requirement, stream: int, times: int = 1) -> Sampl
         times: factor on the number of the plan's draws.
 
     Returns:
-        The samples.  If no more than the allowed number fail, they show the required
-        yield with 95 % confidence.
+        The samples.  If at most the allowed number fail, the required yield is
+        demonstrated with 95 % confidence.
 
     Raises:
-        BadInput: there are too few draws to show that yield.
+        BadInput: the draws are too few to demonstrate that yield.
     """
     plan = requirement.plan
     if plan.asked_yield == 1.0:
@@ -54,7 +54,7 @@ def draw_samples(requirement: Requirement, stream: int, times: int = 1) -> Sampl
 def with_worst_corners(
     requirement: Requirement, samples: Samples, t: NDArray
 ) -> Samples:
-    """Return samples with the worst corners of tolerances for each limit and posture.
+    """Return samples extended by the worst corner for each limit and posture.
 
     Args:
         requirement: requirement at all postures; no failure is allowed.
@@ -62,7 +62,7 @@ def with_worst_corners(
         t: (G,) [rad or m] tolerances.
 
     Returns:
-        The samples, with the corners that were not yet among them.
+        The samples and those worst corners that were not yet among the samples.
     """
     corners = np.vstack([
         samples.values[: CORNERS // 2],
@@ -82,7 +82,7 @@ def with_worst_corners(
 def scale_uniformly(
     requirement: Requirement, samples: Samples, t: NDArray, precision: float = _FINE
 ) -> NDArray:
-    """Multiply tolerances by a factor, within bounds, until the samples just fit.
+    """Scale tolerances by one factor, within bounds, until the samples just fit.
 
     Args:
         requirement: requirement at all postures.
@@ -91,10 +91,10 @@ def scale_uniformly(
         precision: relative precision of the largest utilisation, or of the factor.
 
     Returns:
-        (G,) [rad or m] tolerances; all at their upper bounds if the samples fit there.
+        (G,) [rad or m] tolerances; the upper bounds if the samples still fit there.
 
     Raises:
-        BadInput: the samples do not fit at any scale.
+        BadInput: no scale factor makes the samples meet the limits.
     """
     plan = requirement.plan
     low, high, factor, power = 0.0, np.inf, 1.0, 1.0
@@ -127,7 +127,7 @@ def scale_uniformly(
             steep = np.log(utilisation / previous[1]) / np.log(factor / previous[0])
             power = float(np.clip(steep, 0.3, 10.0))
         previous = factor, utilisation
-        # a power law of the utilisation predicts the factor, or the interval is halved
+        # a power law of the utilisation predicts the factor, otherwise bisection
         factor = _next_factor(low, high, factor, utilisation, power, precision)
     return np.clip(low * t, plan.least, plan.most)
 
@@ -136,7 +136,7 @@ def _next_factor(
     low: float, high: float, factor: float, utilisation: float, power: float,
     precision: float,
 ) -> float:  # fmt: skip
-    """Return the factor to try next."""
+    """Return the next trial factor."""
     if 0 < utilisation < np.inf:
         guess = factor * ((1 - precision / 2) / utilisation) ** (1 / power)
         if low * (1 + precision / 4) < guess < high * (1 - precision / 4):
@@ -147,8 +147,8 @@ def _next_factor(
 
 
 def _allowed_failures(draws: int, asked: float) -> int:
-    """Return the largest number of failures that shows a yield at 95 %, one-sided."""
-    # proportion() decreases with the number of failures, so bisection is used
+    """Return the largest number of failures that still demonstrates a yield at 95 %."""
+    # proportion() decreases with the number of failures, so bisection applies
     low, high = -1, draws
     while high - low > 1:
         middle = (low + high) // 2

@@ -1,11 +1,12 @@
-"""Sensitivity to every geometric error, from multipliers and active clearances.
+"""Derivatives by every geometric error, from multipliers and active clearances.
 
-The least energy (22) is the maximum of its dual ``-w.dl - ..`` over all balanced
-wrenches w.  So its slope by delta l is minus the wrench through the body.
+The least energy (22) equals the maximum of its dual ``-w.dl - ..`` over all balanced
+wrenches w.  The derivative of the energy by delta l is therefore minus the wrench that
+the body transmits.
 
-Wrenches and the platform's screw are part of the solution.  As long as the active
-clearances are the same, the slopes of the solution follow from the differentiated
-optimality conditions:
+Wrenches and the platform's screw are part of the solution.  As long as the set of
+active clearances does not change, the derivatives of the solution follow from the
+optimality conditions, differentiated:
 
     G^T (G u + h) + H^T eta + nu u = 0,   H u = k,   |u_c| = 1 where nu_c > 0,
 
@@ -14,7 +15,7 @@ so du is orthogonal to u_c in every active cone, and
     P (G^T G + nu) P du + P H^T deta = -P G^T dh,   H P du = dk
 
 where P is the projector on these directions.  One solution of the transposed equations
-gives the slopes by any number of errors (adjoint method).
+computes the derivatives by any number of errors (adjoint method).
 """
 
 import numpy as np
@@ -24,23 +25,23 @@ from forcefit.assembly.linear.energy import Assembly
 from forcefit.assembly.solvers.conic import GAP_WITHOUT_CLEARANCE
 from forcefit.assembly.statistics.linear_response import LinearResponse
 
-# relative to the largest force on any cone; smaller forces count as zero
+# forces below this share of the largest force on any cone count as zero
 _ACTIVE = 1e-7
-# relative rank tolerance; undetermined directions are assumed not to move
+# relative rank tolerance; no motion is assumed along undetermined directions
 _RANK = 1e-10
 
 
 def energy_slopes(assembly: Assembly) -> NDArray:
-    """Return the slopes of the least energy by every geometric error.
+    """Return the derivatives of the least energy by every geometric error.
 
     Args:
-        assembly: the assembly at least energy; under a load the slopes are those of the
-            energy minus the work of the load.
+        assembly: the assembly at least energy. Under a load, the result is the
+            derivative of the energy minus the work of the load.
 
     Returns:
-        (n, 6) [J/rad, J/m] slopes by delta l of every frame in its axes.  If rigid
-        parts are overconstrained, the wrenches are not unique; the least wrenches and
-        their slopes are returned.
+        (n, 6) [J/rad, J/m] derivatives by delta l of every frame in its axes.  If rigid
+        parts are overconstrained, the wrenches are not unique; the smallest wrenches
+        and the corresponding derivatives are returned.
     """
     return -assembly.wrenches
 
@@ -49,19 +50,20 @@ def solution_slopes(
     prepared: LinearResponse, draws: Assembly, by_wrench: NDArray, by_screw: NDArray,
     by_clearance: NDArray | None = None,
 ) -> NDArray:  # fmt: skip
-    """Return the slopes of a function of wrenches and platform screw by each error.
+    """Return the derivatives of a function of wrenches and platform screw by errors.
 
     Args:
         prepared: the prepared posture.
         draws: solutions of k draws, from :meth:`LinearResponse.solve`.
-        by_wrench: (k, n, 6) slopes of the function by the wrench through every body.
-        by_screw: (k, 6) slopes by the platform's screw.
-        by_clearance: (k, nu) slopes by the clearances, relative to their bounds.
+        by_wrench: (k, n, 6) derivatives of the function by the wrench of every body.
+        by_screw: (k, 6) derivatives by the platform's screw.
+        by_clearance: (k, nu) derivatives by the clearances, relative to their bounds.
 
     Returns:
-        (k, n, 6) slopes by delta l of every frame in its axes; one of several if a
-        clearance is weakly active.  Undetermined clearances do not move.  A passive
-        joint at a bound of its motion is treated as if there were no bound.
+        (k, n, 6) derivatives by delta l of every frame in its axes. If a clearance is
+        weakly active, one of several one-sided derivatives is returned.  Undetermined
+        clearances are assumed not to move.  Motion limits of passive joints are
+        ignored.
     """
     A, nu, k = prepared.closures, prepared.starts[-1], len(draws.energy)
     closure_columns = A @ prepared.joints.cones
@@ -93,11 +95,11 @@ def solution_slopes(
 def _active_clearances(
     prepared: LinearResponse, draws: Assembly, forces: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return (k, nu, nu) projectors normal to active clearances, and multipliers."""
+    """Return projectors (k, nu, nu) normal to active clearances, and multipliers."""
     k, nu = forces.shape
     P, N = np.tile(np.eye(nu), (k, 1, 1)), np.zeros((k, nu, nu))
-    # inside a zone the multipliers y are due to rounding: energies y^2 / 2 are far
-    # below the forces G y
+    # inside an assembly zone the multipliers y are rounding errors: the energies
+    # y^2 / 2 are far below the forces G y
     pressed = draws.energy > GAP_WITHOUT_CLEARANCE * np.abs(forces).sum(
         axis=1, initial=0.0
     )

@@ -1,8 +1,8 @@
 """Distribution of the platform's stiffness over draws of errors and clearances.
 
-Errors do not change the nominal K_C.  They change which clearances are in contact, so
-the tangent of (22) differs between draws.  The tangent of the exact equilibrium also
-contains the effects of internal forces and rotated parts.
+Errors do not change the nominal platform stiffness K_C.  They change which clearances
+are in contact, so the tangent stiffness of (22) differs between draws.  The tangent of
+the exact equilibrium also includes the effects of internal forces and of rotated parts.
 """
 
 from collections.abc import Mapping
@@ -25,26 +25,26 @@ from forcefit.results.display import numbers
 from forcefit.stiffness.screws import WRENCH
 
 _NAMED = 5  # largest number of free motions that are reported, most frequent first
-_ALIKE = 2  # number of decimals in which the motions of two draws are compared
+_ALIKE = 2  # number of decimals to which the motions of two draws are compared
 
 
 def draw_stiffnesses(
     posture: Posture, errors: NDArray, state: str,
     load: ArrayLike | None = None, gravity: ArrayLike | None = None,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the stiffness along every axis, with the other axes free, of each draw.
+    """Return the stiffness of each draw along every axis, with the other axes free.
 
     Args:
         posture: the robot's configuration.
         errors: (k, n, 6) [rad, m] errors of the frames.
         state: ``"contact"`` or ``"exact"``.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes.
+        load: (6,) [N m, N] load on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] gravity in base axes.
 
     Returns:
         (k, 6) [N m/rad, N/m] for ``[mx my mz fx fy fz]``: 0 for a free motion, such as
         one within a clearance; NaN without equilibrium.  And (k, 6, 6) [rad, m] unit
-        screws of free motions in rows; other rows are NaN.
+        screws of the free motions in rows; unused rows are NaN.
     """
     stiffnesses = np.full((len(errors), 6), np.nan)
     motions = np.full((len(errors), 6, 6), np.nan)
@@ -72,13 +72,13 @@ def stiffness_report(
     Args:
         stiffnesses: (k, 6) result of :func:`draw_stiffnesses`.
         motions: (k, 6, 6) free motions from the same function.
-        state: state of the tangents.
-        level: level of confidence.
+        state: state of the tangents, ``"contact"`` or ``"exact"``.
+        level: confidence level.
 
     Returns:
-        By axis: the number of draws with a result, the shares of draws with a free
-        motion and (if any) with a rigid platform, and of the other draws mean and
-        quantiles with intervals.  And the free motions of most draws.
+        By axis: the number of draws with a result; the shares of draws with a free
+        motion and, if any, with a rigid platform; mean and quantiles of the other
+        draws, with intervals.  Also the most frequent free motions.
     """
     axes: dict[str, Any] = {}
     for name, values in zip(WRENCH, stiffnesses.T, strict=True):

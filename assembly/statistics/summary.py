@@ -1,8 +1,8 @@
 """Summary of the draws of an experiment: yields, quantiles, most probable values.
 
-Yields count all draws.  Energies, wrenches and pose errors exist only for the draws
-that assemble, and the number of these is stated.  Margins exist for all draws and are
-also summarised for all.  Every pose error is stated with its clearance model.
+Yields count all draws.  Energies, wrenches and pose errors exist only for draws that
+assemble, whose number is reported.  Margins exist for all draws and are also summarised
+over all draws.  Every pose error is reported with its clearance model.
 """
 
 import json
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     import xarray
 
 QUANTILES = (0.05, 0.5, 0.95, 0.99)
-_ROUNDING = 1e-18  # relative to the largest value: smaller values count as zero
+_ROUNDING = 1e-18  # values below this share of the largest value count as zero
 _MARGINS = {"margin": "rigid", "margin_free": "rigid_compliant_free"}
 WORDS = {
     "forced": "assembles, by force if necessary",
@@ -61,17 +61,17 @@ def summarise(
         data: the draws.
         limits: limits by quantity; a draw meets the limits if it exceeds none.
         strength: [Pa] yield strength of the links.
-        level: level of confidence of all intervals.
-        capable: whether Cpk and parts per million of every limit are added.
+        level: confidence level of all intervals.
+        capable: whether Cpk and parts per million are computed for every limit.
 
     Returns:
-        ``draws`` and the number of them that are ``assembled``; ``clearance``, its
-        meaning and its ``contact_length`` [m].  Probabilities among all draws:
-        ``assembles`` (with any energy, or by clearances with compliant joints rigid or
-        free), ``exceeds`` and ``within_limits``.  ``perfect_parts`` and the limits that
-        these exceed.  Mean, quantiles and most probable value of every quantity among
-        the assembled draws, for margins also among all draws.  Mean, covariance and
-        most probable platform screw.
+        ``draws``, and how many of them are ``assembled``; ``clearance``, its meaning
+        and its ``contact_length`` [m].  Probabilities among all draws: ``assembles``
+        (with any energy, or by clearances with compliant joints rigid or free),
+        ``exceeds`` and ``within_limits``.  ``perfect_parts``, and the limits that
+        perfect parts exceed.  Mean, quantiles and most probable value of every quantity
+        among the assembled draws, for margins also among all draws.  Mean, covariance
+        and most probable value of the platform screw.
 
     Raises:
         BadInput: the quantity of a limit was not computed.
@@ -141,7 +141,7 @@ def summarise(
 def _yields(
     data: "xarray.Dataset", solved: NDArray, limits: Mapping[str, float], level: float
 ) -> dict[str, Any]:
-    """Return how often each limit and any limit is exceeded, with undecided draws."""
+    """Return how often each limit, and at least one limit, is exceeded."""
     count = len(solved)
     met, failed, exceeds = solved.copy(), ~solved, {}
     for key, limit in limits.items():
@@ -152,8 +152,8 @@ def _yields(
             )
         values, lower = _worst(data, key), f"{key}_lower"
         over = ~(values <= limit)
-        # for a largest pose error the draws have two bounds, for other quantities one
-        # value
+        # a draw has two bounds of a largest pose error, but one value of any other
+        # quantity
         least = data[lower].values if lower in data else values
         surely = ~solved | (least > limit)
         met &= ~over
@@ -174,7 +174,7 @@ def _yields(
 
 
 def _worst(data: "xarray.Dataset", key: str) -> NDArray:
-    """Return the (k,) values of a quantity; of several links the largest."""
+    """Return the values (k,) of a quantity, the largest of all links."""
     values = np.asarray(data[key].values, dtype=float)
     return values.max(axis=1) if values.ndim == 2 else values
 
@@ -182,7 +182,7 @@ def _worst(data: "xarray.Dataset", key: str) -> NDArray:
 def _described(
     data: "xarray.Dataset", key: str, solved: NDArray, level: float
 ) -> dict[str, Any]:
-    """Return mean, quantiles and most probable value, 0 if most values are zero."""
+    """Return mean, quantiles and mode, which is 0 if most values are zero."""
     every = _worst(data, key)
     values = every[solved]
     finite = values[np.isfinite(values)]
@@ -200,7 +200,7 @@ def _described(
         }
     if len(finite) < 2:
         return description
-    # draws inside a zone store no energy, so many values are zero up to rounding
+    # draws inside an assembly zone store no energy: their values are rounding errors
     zero = finite <= _ROUNDING * finite.max()
     often = dict.fromkeys(("value", "lower", "upper"), 0.0)
     if zero.sum() <= len(finite) / 2:
@@ -270,7 +270,7 @@ def summary_text(summary: Mapping[str, Any]) -> str:
 
 
 def _titled(name: str, results: Mapping[str, Any]) -> str:
-    """Return a name with its clearance model, if it depends on one."""
+    """Return a name, followed by the clearance model if the value depends on one."""
     return (
         f"{name} [clearance {results['clearance']}]" if "clearance" in results else name
     )

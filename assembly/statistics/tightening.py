@@ -1,4 +1,4 @@
-"""The error or clearance that dominates a result, and advice to tighten it."""
+"""Summary tiles: the error or clearance that dominates a result."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,13 +12,13 @@ _NAMED = 3  # largest number of contributors named in a tile
 
 
 def tightening_tiles(summary: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles: values for perfect parts, the main contributor, what to tighten.
+    """Return tiles: values for perfect parts, main contributor, advice to tighten.
 
     Args:
         summary: result of :func:`forcefit.assembly.statistics.summary.summarise`.
 
     Returns:
-        The tiles; without importance there are no tiles on errors.
+        The tiles; tiles on errors are included only if their importance is known.
     """
     tiles = _clearance_tiles(summary)
     broken, key = summary["perfect_parts_break"], _deciding(summary)
@@ -48,7 +48,7 @@ def tightening_tiles(summary: Mapping[str, Any]) -> list[Tile]:
 
 
 def _deciding(summary: Mapping[str, Any]) -> str:
-    """Return the limit exceeded most often; without limits translation or energy."""
+    """Return the quantity that is exceeded most often, or translation or energy."""
     exceeds = sorted(
         summary["exceeds"], key=lambda k: -summary["exceeds"][k]["probability"]
     )
@@ -89,6 +89,6 @@ def _broken_tile(broken: Mapping[str, Any]) -> Tile:
 
 
 def _listed(names: list[str]) -> str:
-    """Return the first names, and the number of further ones."""
+    """Return the first names, and how many more there are, as text."""
     more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
     return ", ".join(names[:_NAMED]) + more

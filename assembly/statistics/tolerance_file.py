@@ -24,7 +24,7 @@ from forcefit.assembly.steps.bolted import refuse_bolted
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 from forcefit.stiffness.screws import SCREW
 
-# [rad, m] largest accepted tolerances, up to which screws are small
+# [rad, m] largest accepted tolerances, for which screws are still small
 _LOOSEST = (0.1, 0.01)
 
 
@@ -39,8 +39,8 @@ def read_plan(path: Path | str, robot: Robot) -> Plan:
         The plan.
 
     Raises:
-        BadInput: the file violates a rule, or a joint of the robot is bolted at a pose
-            and the worst case of callouts is asked for.
+        BadInput: the file violates a rule; or the worst case of callouts is requested
+            for a robot with a joint that is bolted at a pose.
     """
     root = read_toml(path)
     cost = _choice(root, "cost", COSTS)
@@ -88,7 +88,7 @@ def read_plan(path: Path | str, robot: Robot) -> Plan:
 def _independent(
     robot: Robot, groups: "_Groups", distribution: str, deviations: float
 ) -> ErrorSources:
-    """Independent errors within tolerances of 1."""
+    """Return the independent errors, scaled to tolerances of 1."""
     frame, component = np.array(list(groups.of), dtype=int).reshape(-1, 2).T
     count = len(groups.of)
     return ErrorSources(
@@ -107,7 +107,7 @@ def _independent(
 def _with_callouts(
     robot: Robot, groups: "_Groups", independent: ErrorSources | None
 ) -> tuple[CalloutSources, list[int]]:
-    """Errors with callouts of width 1 m, and the classes of the callouts' numbers."""
+    """Return the errors with callouts scaled to a width of 1 m, and their classes."""
     placed = place_callouts(home_posture(robot))
     unit = [
         replace(placed[k], errors=placed[k].errors / placed[k].callout.first_width)
@@ -133,7 +133,7 @@ class _Groups(NamedTuple):
 
 
 def _groups(root: Table, tables: Sequence[Table], robot: Robot) -> _Groups:
-    """Return the groups of errors of a file."""
+    """Return the groups of errors that the tables define."""
     rows, callouts, names, costs, least, most = groups = _Groups({}, {}, [], [], [], [])
     for number, table in enumerate(tables):
         if table.has("callouts"):
@@ -147,7 +147,7 @@ def _groups(root: Table, tables: Sequence[Table], robot: Robot) -> _Groups:
                 label = error_label(robot, *place)
                 first = rows[place]
                 where = "this table" if first == number else quoted(names[first])
-                raise table.bad("", f"found {quoted(label)} again, first in {where}")
+                raise table.bad("", f"found {quoted(label)} twice, first in {where}")
             rows[place] = number
         names.append(table.text("name", default))
         symbol = ("rad", "m")[unit]
@@ -165,13 +165,13 @@ def _groups(root: Table, tables: Sequence[Table], robot: Robot) -> _Groups:
 
 
 def _callouts(table: Table, robot: Robot, callouts: dict[int, int], number: int) -> str:
-    """Add the callouts of a table to its class; return the default of its name."""
+    """Add the callouts of a table to its class; return the default class name."""
     value = table.content["callouts"]
     if not isinstance(value, list) or not all(isinstance(v, str) for v in value):
         raise table.bad("callouts", "expected a list of names of [[tolerance]]")
     names = [callout.name for callout in robot.callouts]
     for name in value:
-        # a name without its leg's is that of every leg
+        # a name without a leg's name selects the callout in every leg
         found = [k for k, own in enumerate(names) if name in (own, kind_of(own))]
         if not found:
             raise table.bad("callouts", f"found {quoted(name)}{nearest(name, names)}")
@@ -182,7 +182,7 @@ def _callouts(table: Table, robot: Robot, callouts: dict[int, int], number: int)
                 expected = "expected callouts without (M): their zones have one width"
                 raise table.bad("callouts", f"{fault}, {expected}")
             if callouts.setdefault(k, number) != number:
-                raise table.bad("callouts", f"found {quoted(names[k])} again")
+                raise table.bad("callouts", f"found {quoted(names[k])} twice")
     if not value:
         raise table.bad("callouts", "expected at least one")
     words = robot.callouts[next(k for k, n in callouts.items() if n == number)].words
@@ -190,7 +190,7 @@ def _callouts(table: Table, robot: Robot, callouts: dict[int, int], number: int)
 
 
 def _choice(table: Table, key: str, valid: tuple[str, ...]) -> str:
-    """Return one of the valid words; the first if the key is absent."""
+    """Return the value of a key, one of the valid words; by default the first."""
     word = table.text(key, valid[0])
     if word not in valid:
         raise table.bad(key, f"found {quoted(word)}{nearest(word, valid)}")
@@ -209,7 +209,7 @@ def _limits(table: Table) -> dict[str, float]:
 
 
 def _places(table: Table, robot: Robot) -> tuple[list[tuple[int, int]], int]:
-    """Return the frames and components of a table; 0 for angles, 1 for lengths."""
+    """Return frames and components of a table, and 0 for angles or 1 for lengths."""
     names = table.require("frames", "a list of frame names")
     parts = table.require("components", 'a list such as ["TX"]')
     for key, value in (("frames", names), ("components", parts)):

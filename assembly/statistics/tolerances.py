@@ -1,4 +1,4 @@
-"""Postures of a workspace, and an assessment of a robot's present errors there."""
+"""Postures of a workspace, and the assessment of a robot's present errors there."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -26,7 +26,7 @@ from forcefit.inputs.table import BadInput
 
 
 def grid_postures(robot: Robot, grid: str) -> tuple[list[Posture], dict[str, int]]:
-    """Return the postures of a grid that the robot can reach and use.
+    """Return the postures of a grid that the robot can reach and that are usable.
 
     Args:
         robot: the robot.
@@ -61,7 +61,7 @@ def grid_postures(robot: Robot, grid: str) -> tuple[list[Posture], dict[str, int
 
 
 def left_out_text(left_out: dict[str, int]) -> str:
-    """Return a line on the postures that were omitted."""
+    """Return a line of text that counts the omitted postures by reason."""
     counts = ", ".join(f"{status}: {n}" for status, n in left_out.items())
     text = f"postures left out: {counts}"
     if SINGULAR in left_out:
@@ -96,17 +96,19 @@ def present_errors(
     compliant: Compliant = "free",
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[str, Any]:
-    """Assess the robot's own errors: largest margin over the postures, and its causes.
+    """Assess the errors of the robot file: largest margin over postures, and causes.
 
     Args:
         postures: postures of a robot with errors.
-        compliant: ``"free"`` or ``"rigid"``, for the axis of compliant joints.
-        progress: called with the number of finished postures and of all postures.
+        compliant: whether compliant joints are ``"free"`` or ``"rigid"`` about their
+            axis.
+        progress: called with the number of finished postures and the number of all
+            postures.
 
     Returns:
-        The margins, the largest margin and its posture; the factor on all errors at
-        which it is 1; slopes of the margin and of the energy at this posture by error,
-        largest first.
+        The margins; the largest margin and its posture; the factor on all errors for
+        which the largest margin is 1; derivatives of margin and energy by each error
+        at this posture, largest first.
     """
     prepared, zones = [], []
     for i, posture in enumerate(postures):

@@ -1,4 +1,4 @@
-"""Page of tolerances: requirement, tolerances, and the share of clearances."""
+"""HTML page of tolerances: requirement, tolerances, and the part used by clearances."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -33,17 +33,17 @@ _GOVERNED = {
 def tolerances_page(
     results: Mapping[str, Any], provenance: Provenance, pictures: Sequence[str] = ()
 ) -> str:
-    """Return the page of ``assembly tolerances``.
+    """Return the page of ``assembly tolerances`` as HTML.
 
     Args:
-        results: results with ``present``, ``allocation`` or both, the number of
+        results: results that contain ``present``, ``allocation`` or both, the number of
             ``postures`` and their ``grid``.
-        provenance: the command and the files.
+        provenance: the command and its input files.
         pictures: HTML from :mod:`forcefit.assembly.statistics.scenes`, with the present
             errors.
 
     Returns:
-        HTML, which needs no other file.
+        HTML that refers to no other file.
     """
     present, allocation = (results.get(key) for key in ("present", "allocation"))
     tiles, body, sentences = [], [], []
@@ -78,7 +78,7 @@ def tolerances_page(
 
 
 def _sentence(parts: Sequence[str]) -> str:
-    """Return the parts as one sentence."""
+    """Join the parts to one sentence and return it."""
     text = "; ".join(parts)
     return f"{text[:1].upper()}{text[1:]}."
 
@@ -86,9 +86,9 @@ def _sentence(parts: Sequence[str]) -> str:
 def _good(
     present: Mapping[str, Any] | None, allocation: Mapping[str, Any] | None
 ) -> bool | None:
-    """Return whether all postures assemble and the yield is shown by new draws.
+    """Return whether all postures assemble and new draws demonstrate the yield.
 
-    None if some postures assemble only by force, or if new draws do not decide.
+    Return None if some postures assemble only by force, or if new draws are undecided.
     """
     verdict = "shown"
     if allocation is not None:
@@ -141,7 +141,7 @@ def _error_unit(name: str) -> str:
 
 
 def _allocation_sentence(allocation: Mapping[str, Any]) -> str:
-    """Return sentence on whether the tolerances meet the limits, by proof and draws."""
+    """Return a sentence that says whether the tolerances meet the limits."""
     text = f"tolerances for a yield of {allocation['yield']:g}"
     proven = allocation["proven_scale"]
     if np.isfinite(proven):
@@ -153,7 +153,7 @@ def _allocation_sentence(allocation: Mapping[str, Any]) -> str:
 
 
 def _allocation_tiles(allocation: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles: yield, share of clearances, and the tolerances with most cost."""
+    """Return tiles: yield, part used by clearances, tolerances of largest cost."""
     tiles = []
     check = allocation["verification"]
     if check:
@@ -190,7 +190,7 @@ def _tighten_tile(allocation: Mapping[str, Any]) -> Tile:
 
 
 def _asked_section(results: Mapping[str, Any], allocation: Mapping[str, Any]) -> str:
-    """Return table of limits, yield, clearances, distribution, cost and postures."""
+    """Return the table of the requirement: limits, yield, distribution, postures."""
     rows: list[list[Cell]] = [
         [f"{NAMES[key]}, at most", Value(limit, UNITS[key].removesuffix("1"), 6)]
         for key, limit in allocation["limits"].items()
@@ -256,7 +256,7 @@ def _allocation_section(allocation: Mapping[str, Any]) -> str:
 
 
 def _price_paragraph(allocation: Mapping[str, Any]) -> str:
-    """Return a paragraph on the cost, and on a lower bound if one is proved."""
+    """Return a paragraph on the cost, and on its lower bound if one is proved."""
     price, bound = (allocation[key] for key in ("price", "price_bound"))
     if np.isfinite(bound):
         return paragraph(
@@ -271,7 +271,7 @@ def _price_paragraph(allocation: Mapping[str, Any]) -> str:
 
 
 def _clearance_sections(allocation: Mapping[str, Any]) -> list[str]:
-    """Return sections on the share of clearances alone in the limits on the pose."""
+    """Return sections on the part of pose limits that clearances use by themselves."""
     taken = {k: v for k, v in allocation["perfect_parts"].items() if v["reached"] > 0.0}
     if not taken:
         return []

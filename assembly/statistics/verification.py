@@ -18,7 +18,7 @@ from forcefit.assembly.statistics.worst_case import (
 )
 
 _BATCH = 256  # number of draws between two progress reports
-_ROUNDING = 1e-9  # relative to a limit: excess that counts as rounding
+_ROUNDING = 1e-9  # relative excess above a limit that counts as rounding
 # largest number of verifications, and their joint confidence
 LOOKS, CONFIDENCE = 4, 0.95
 
@@ -26,7 +26,7 @@ LOOKS, CONFIDENCE = 4, 0.95
 def prove_worst(
     requirement: Requirement, t: NDArray, progress: Callable[[str, int, int], None]
 ) -> tuple[dict[str, tuple[float, float]], float]:
-    """Return bounds of the worst case of errors within tolerances, over all postures.
+    """Return bounds of the worst case over all errors in tolerance and all postures.
 
     Args:
         requirement: requirement at all postures.
@@ -34,9 +34,9 @@ def prove_worst(
         progress: called with the name of a step, its progress and its total.
 
     Returns:
-        For each limit the value at the worst corner found, and the proven upper bound,
-        NaN if the limit is not convex.  And the factor on the tolerances, 1 or less, at
-        which the upper bounds meet all limits, NaN if a limit is not convex.
+        For each limit: the value at the worst corner found, and the proven upper bound,
+        NaN if the limit is not convex.  Also the factor on the tolerances, at most 1,
+        for which the upper bounds meet all limits; NaN if a limit is not convex.
     """
     plan = requirement.plan
     spread, worst, scale = plan.spread(t), {}, np.inf
@@ -75,10 +75,10 @@ def verify(
     fresh: int,
     progress: Callable[[str, int, int], None],
 ) -> tuple[NDArray, dict[str, Any]]:
-    """Verify tolerances by new draws; tighten tolerances that fail.
+    """Verify tolerances by new draws, and tighten tolerances that fail.
 
-    Each verification uses independent draws.  The error probability of the confidence
-    is divided among all verifications (Bonferroni).
+    Each verification uses independent draws.  The error probability is divided equally
+    among all verifications (Bonferroni).
 
     Args:
         requirement: requirement at all postures.
@@ -111,20 +111,20 @@ def verify_yield(
     progress: Callable[[str, int, int], None], stream: int = FRESH,
     level: float = CONFIDENCE,
 ) -> dict[str, Any]:  # fmt: skip
-    """Compute the yield of new draws for each posture, and for all together.
+    """Compute the yield of new draws at each posture, and at all postures together.
 
     Args:
         requirement: requirement at all postures.
         t: (G,) [rad or m] tolerances.
-        fresh: number of draws; they are used only here.
+        fresh: number of draws, which are used only in this verification.
         progress: called with the name of a step, its progress and its total.
         stream: stream of random numbers.
-        level: level of confidence of the interval.
+        level: confidence level of the interval.
 
     Returns:
-        Plain values: the yield with its interval, the yield of every posture, the
-        verdict.  A draw whose pose error is undecided counts as failed; the interval
-        holds for both outcomes.
+        A dictionary with the yield and its interval, the yield at every posture, and
+        the verdict.  A draw whose pose error is undecided counts as failed; the
+        interval is valid for both outcomes.
     """
     plan = requirement.plan
     values = plan.draws_of(stream, fresh) * plan.spread(t)

@@ -1,12 +1,13 @@
-"""Worst case of errors within tolerances: lower and upper bounds.
+"""Lower and upper bounds of the worst case of errors within tolerances.
 
-Margin and energy are convex in the errors, so their worst case is a corner, where every
-error is at one end of its tolerance.  The slopes at a corner determine another corner,
-whose value is never lower.  Repeated from many corners, this gives a lower bound.  For
-a wrench, a stress or a pose error, whose worst case need not be a corner, the same
-search gives a lower bound too.  For an upper bound the clearances are affine in the
-errors, ``u = sum_i V_i s_i`` for errors ``t_i s_i``, abs(s_i) <= 1.  A single cone
-programme computes V, which certifies the bound.
+Margin and energy are convex in the errors, so their worst case is a corner of the
+tolerance box, where every error is at one end of its tolerance.  The derivatives at a
+corner point to another corner whose value is at least as large.  Repeating this step
+from many corners finds a lower bound.  The worst case of a wrench, a stress or a pose
+error need not be a corner; the same search still finds a lower bound.  The upper bound
+restricts the clearances to affine functions of the errors: ``u = sum_i V_i s_i`` for
+errors ``t_i s_i``, abs(s_i) <= 1.  A single cone programme computes V, which certifies
+the bound.
 
 Sources:
     Ben-Tal, El Ghaoui, Nemirovski (2009), Robust Optimization, ch. 14 (affinely
@@ -24,18 +25,18 @@ from forcefit.assembly.statistics.posture_margins import PostureMargins
 from forcefit.assembly.statistics.responses import respond
 
 CORNERS = 24  # number of random corners from which the search starts
-# largest number of steps from corner to corner; three are usually sufficient
+# largest number of steps from corner to corner; three usually suffice
 _ITERATIONS = 12
 
 
 @dataclass(frozen=True, eq=False)
 class Corner:
-    """The worst corner of the tolerances that a search found.
+    """The worst corner of the tolerance box that a search found.
 
     Attributes:
         value: the quantity at the corner, a lower bound of the worst case.
         signs: (m,) signs of the errors, -1 or 1.
-        slopes: (m,) [unit of the value per rad or m] slopes of the value by each error.
+        slopes: (m,) [unit of the value per rad or m] derivatives by each error.
     """
 
     value: float
@@ -49,11 +50,11 @@ def worst_corner(
     clearance: str = "worst",
     contact_length: float | None = None,
 ) -> Corner:  # fmt: skip
-    """Return the worst corner that several searches from corner to corner find.
+    """Return the worst corner found by searches from several starting corners.
 
     Args:
-        prepared: a posture prepared for margins, or for energies and all other
-            quantities.
+        prepared: a posture prepared for margins, or one prepared for energies, which
+            is used for all other quantities.
         sources: m sources of errors; their distributions are not used.
         tolerances: (m,) [rad or m] half widths of the tolerances.
         corners: (k, m) signs at the start of each search.
@@ -66,7 +67,7 @@ def worst_corner(
     """
     signs = corners.copy()
     if isinstance(prepared, LinearResponse):
-        # where clearances take up an error completely, the energy has zero slope
+        # where clearances close an error completely, the energy has zero derivative
         signs = np.vstack([
             signs,
             _worst_without_clearance(prepared, sources, tolerances, signs),
@@ -91,7 +92,7 @@ def _worst_without_clearance(
     prepared: LinearResponse, sources: ErrorSources, tolerances: NDArray,
     corners: NDArray,
 ) -> NDArray:  # fmt: skip
-    """Return (k, m) worst corners without clearances; the energy is (h s)^2 / 2."""
+    """Return the worst corners (k, m) of the energy (h s)^2 / 2 without clearances."""
     h = prepared.misfit[:, 6 * sources.frame + sources.component] * tolerances
     signs = corners
     for _ in range(_ITERATIONS):
@@ -101,7 +102,7 @@ def _worst_without_clearance(
 
 
 def random_corners(count: int, sources: int, seed: int = 1) -> NDArray:
-    """Return (count, sources) signs of random corners."""
+    """Return the signs (count, sources) of random corners."""
     return np.random.default_rng(seed).choice([-1.0, 1.0], size=(count, sources))
 
 
@@ -111,12 +112,12 @@ def bound_margin(
     """Return an upper bound of the largest margin over all errors within tolerances.
 
     Args:
-        zone: a posture prepared for margins; the margin scales every clearance.
+        zone: a posture prepared for margins; the margin is a factor on all clearances.
         sources: m sources of errors.
         tolerances: (m,) [rad or m] half widths of the tolerances.
 
     Returns:
-        The bound; inf if no clearance can take up an error.
+        The bound; inf if no clearance can close some error.
     """
     columns = 6 * sources.frame + sources.component
     if np.abs(zone.infeasible[:, columns] * tolerances).max(initial=0.0) > 1e-12:
@@ -140,9 +141,9 @@ def bound_energy(
         tolerances: (m,) [rad or m] half widths of the tolerances.
 
     Returns:
-        [J] the bound for clearances and springs that are affine in the errors.  It adds
-        up the norms of their deflections, so it may be several times the worst case;
-        inf if no spring can take up an error.
+        [J] bound for clearances and springs that are affine in the errors.  The bound
+        adds up the norms of their deflections, so it may be several times the worst
+        case. It is inf if no spring can close some error.
     """
     columns = 6 * sources.frame + sources.component
     if np.abs(prepared.infeasible[:, columns] * tolerances).max(initial=0.0) > 1e-12:
@@ -157,14 +158,14 @@ def bound_energy(
 
 
 def _reach(V: NDArray, starts: NDArray) -> NDArray:
-    """Return the (cones,) largest norms of affine clearances in each cone."""
+    """Return the largest norms (cones,) of affine clearances in each cone."""
     return np.sqrt(np.add.reduceat(V**2, starts[:-1], axis=0)).sum(axis=1)
 
 
 def _affine_clearances(
     B: NDArray, asked: NDArray, starts: NDArray, G: NDArray | None, h: NDArray | None
 ) -> NDArray:
-    """Return (nu, m) V with B V = asked, smallest in the cones or of least energy."""
+    """Return V (nu, m) with B V = asked, smallest in the cones or of least energy."""
     import cvxpy as cp
 
     nu, m = starts[-1], asked.shape[1]

@@ -1,11 +1,12 @@
-"""Widths of callouts of least cost such that no machine within them exceeds a limit.
+"""Callout widths of least cost such that every machine within them meets the limits.
 
-The worst pose error is the largest sum of support functions over directions n,
-``sum_g t_g s_g(n) + c(n)``, where it is a convex maximisation without conditions: where
-nothing is over-constrained, or parts are elastic and without clearance.  It is convex
-in the tolerances t.  For each direction ``sum_g t_g s_g(n) <= limit - c(n)`` holds for
-all tolerances that meet the limit, so the programme of such planes proves the least
-cost, see :mod:`forcefit.assembly.statistics.cutting_planes`.
+The worst pose error is the maximum over directions n of a sum of support functions,
+``sum_g t_g s_g(n) + c(n)``. This requires a convex maximisation without constraints:
+either nothing is over-constrained, or parts are elastic and have no clearance.  The
+worst pose error is convex in the tolerances t.  For each direction, ``sum_g t_g s_g(n)
+<= limit - c(n)`` holds for all tolerances that meet the limit. A programme of such
+planes therefore proves the least cost, see
+:mod:`forcefit.assembly.statistics.cutting_planes`.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,7 +33,7 @@ from forcefit.assembly.statistics.verification import verify
 from forcefit.assembly.statistics.worst_pose import farthest_screw
 from forcefit.inputs.table import BadInput
 
-_TOLERANCE = 1e-3  # relative to a limit: largest violation before the last scaling
+_TOLERANCE = 1e-3  # largest violation before the last scaling, relative to a limit
 _MOST_STEPS = 200
 
 Progress = Callable[[str, int, int], None]
@@ -40,22 +41,22 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, eq=False)
 class _Case:
-    """A limit at a posture: the zones at their largest widths, and their classes."""
+    """A limit at a posture, with zones of largest width and their classes."""
 
     key: str
     sets: ErrorSets
-    classes: tuple[int, ...]  # of each zone; -1 of a clearance
+    classes: tuple[int, ...]  # class of each zone; -1 for a clearance
     where: str
 
     def scaled(self, shares: NDArray) -> ErrorSets:
-        """The sets for shares (G,) of the largest widths."""
+        """Return the error sets for shares (G,) of the largest widths."""
         factors = np.ones(self.sets.screws.shape[1])
         for columns, g in zip(self.sets.columns, self.classes, strict=True):
             factors[columns] = shares[g] if g >= 0 else 1.0
         return replace(self.sets, screws=self.sets.screws * factors)
 
     def worst(self, shares: NDArray) -> tuple[float, float, NDArray]:
-        """Value attained, certified bound, and direction (3,) of the worst error."""
+        """Return the value attained, its certified bound, and its direction (3,)."""
         half = 3 * POSE_ERRORS.index(self.key)
         (low, high), screw = farthest_screw(self.scaled(shares), half)
         direction = screw[half : half + 3]
@@ -63,7 +64,7 @@ class _Case:
         return low, high, direction / size if size else np.eye(3)[0]
 
     def supports(self, direction: NDArray, count: int) -> tuple[NDArray, float]:
-        """Support of each class (G,) at its largest width, and of the clearances."""
+        """Return the support of classes (G,) at largest width, and of clearances."""
         half = 3 * POSE_ERRORS.index(self.key)
         weights = direction @ self.sets.screws[half : half + 3]
         found = np.zeros(count + 1)
@@ -81,8 +82,8 @@ def allot_worst_case(
     """Return the tolerances of least cost within which every machine meets the limits.
 
     Args:
-        postures: of one robot.
-        plan: of callouts, with limits on rotation and translation and a yield of 1;
+        postures: postures of one robot.
+        plan: plan with callouts, limits on rotation and translation, and a yield of 1;
             fits have their largest clearance.
         fresh: number of new draws that verify the tolerances; 0 for none.
         progress: called with the name of a step, its progress and its total.
@@ -92,8 +93,8 @@ def allot_worst_case(
         The tolerances, their worst case and a lower bound of the cost.
 
     Raises:
-        BadInput: the worst case is no convex maximisation, clearances alone exceed a
-            limit, or even the tightest tolerances do.
+        BadInput: the worst case is not a convex maximisation, or a limit is exceeded by
+            clearances without errors or with the tightest tolerances.
     """
     if plan.clearance != "worst":
         fault = f"found {plan.clearance} with callouts and a yield of 1"
@@ -130,7 +131,7 @@ def allot_worst_case(
 
 
 def _case(posture: Posture, plan: Plan, key: str) -> _Case:
-    """A limit at a posture, refused where its worst case is not convex."""
+    """Return a limit at a posture; raise an error if its worst case is not convex."""
     sources = plan.sources
     assert isinstance(sources, CalloutSources)
     sets = error_sets(linear_response(posture), sources)
@@ -152,7 +153,7 @@ def _case(posture: Posture, plan: Plan, key: str) -> _Case:
 
 
 def _plane(case: _Case, plan: Plan, shares: NDArray) -> list[NDArray]:
-    """The plane ``a.t <= 1`` that cuts off tolerances beyond a limit, if they are."""
+    """Return the plane ``a.t <= 1`` that excludes tolerances beyond a limit, if any."""
     limit = plan.limits[case.key]
     low, _, direction = case.worst(shares)
     if low <= limit * (1 + _TOLERANCE):
@@ -168,8 +169,8 @@ def _plane(case: _Case, plan: Plan, shares: NDArray) -> list[NDArray]:
 
 
 def _factor(case: _Case, plan: Plan, shares: NDArray) -> float:
-    """The factor on tolerances at which the certified bound meets the limit."""
-    # the worst case is convex in the factor, so the chord from zero is above it
+    """Return the factor on tolerances for which the certified bound meets the limit."""
+    # the worst case is convex in the factor, so the chord from zero lies above it
     limit, high = plan.limits[case.key], case.worst(shares)[1]
     if high <= limit:
         return 1.0
@@ -178,7 +179,7 @@ def _factor(case: _Case, plan: Plan, shares: NDArray) -> float:
 
 
 def _worst(cases: Sequence[_Case], shares: NDArray) -> dict[str, tuple[float, float]]:
-    """The largest value attained and its bound, by quantity over all postures."""
+    """Return the largest value and bound over all postures, by quantity."""
     found: dict[str, tuple[float, float]] = {}
     for case in cases:
         low, high, _ = case.worst(shares)

@@ -1,15 +1,16 @@
 """Largest pose errors over all clearance positions: problem (27) for many draws.
 
-The assumption is ``frozen``: springs have the deformations of the solution of (22), and
-unloaded clearances may be anywhere within their bounds.  By strict convexity every
-solution of (22) has the same springs, and by complementary slackness the same loaded
-clearances.  So this is the set of *all* solutions of (22), inside and outside a zone.
-It contains the positions of the uniform and the contact model, and the solver's
-solution. The other assumptions change the robot: with ``free``, compliant joints rotate
-without energy; with ``budget``, more energy than the least is allowed.
+The assumption ``frozen`` is used: springs keep their deformations from the solution of
+(22), and unloaded clearances may be anywhere within their bounds.  By strict convexity,
+every solution of (22) has the same springs; by complementary slackness, it has the same
+loaded clearances.  The set is therefore the set of *all* solutions of (22), inside and
+outside an assembly zone.  The set contains the positions of the uniform and the contact
+model, and the solution that the solver returns. The other assumptions change the robot:
+``free`` lets compliant joints rotate without energy; ``budget`` allows more energy than
+the least.
 
-Under a load the same holds for energy minus work; only clearances without force are
-free.
+Under a load, the same applies to energy minus work: only clearances that transmit no
+force are free.
 """
 
 import numpy as np
@@ -30,7 +31,7 @@ from forcefit.assembly.statistics.quantities import POSE_ERRORS
 
 ASSUMPTION = "frozen"
 PRECISION = (1e-6, 1e-6)  # [rad, m] required difference of upper and lower bounds
-# [rad or m] precision of a support function whose multipliers are used as slopes
+# [rad or m] precision of a support function whose multipliers are derivatives
 _SUPPORT_PRECISION = 1e-12
 
 
@@ -42,13 +43,13 @@ def bound_worst_errors(
     Args:
         draws: solutions of k draws at one posture.
         precision: [rad, m] required difference of upper and lower bounds; inf for a
-            part that is not needed.
+            bound that is not needed.
 
     Returns:
         (k, 2, 2) lower and upper bounds of the rotation [rad] and the translation [m],
-        at least as large as for the screw of ``draws``.  NaN for a draw without a
-        solution; upper bounds are inf if not proved.  And (k, 2, 6) [rad, m] screws
-        that attain the lower bounds, at least nearly.
+        at least as large as the errors of the screw in ``draws``.  NaN for a draw
+        without a solution; an upper bound is inf if not proved.  And (k, 2, 6) [rad, m]
+        screws that attain the lower bounds, at least nearly.
     """
     bounds = np.full((len(draws), 2, 2), np.nan)
     screws = np.tile(draws.platform_screw[:, None], (1, 2, 1))
@@ -58,7 +59,7 @@ def bound_worst_errors(
     else:
         for i in solved.tolist():
             bounds[i], screws[i] = _under_load(draws, i, precision)
-    # solutions of (22) may differ by the square root of their duality gaps
+    # solutions of (22) may differ by the square root of their duality gap
     least = np.stack([
         np.linalg.norm(draws.platform_screw[:, part], axis=1)
         for part in (slice(0, 3), slice(3, 6))
@@ -75,7 +76,7 @@ def bound_worst_errors(
 def _without_load(
     draws: Assembly, precision: tuple[float, float]
 ) -> tuple[NDArray, NDArray]:
-    """Return the bounds and screws of unloaded draws, compiled."""
+    """Return bounds and screws of unloaded draws, computed by the C++ kernel."""
     found = bound_pose_error(
         draws, ASSUMPTION,
         tolerance_rotation=precision[0], tolerance_translation=precision[1],
@@ -89,7 +90,7 @@ def _without_load(
 def _under_load(
     draws: Assembly, i: int, precision: tuple[float, float]
 ) -> tuple[NDArray, NDArray]:
-    """Return the bounds and screws of one loaded draw; NaN if the solver failed."""
+    """Return bounds and screws of one loaded draw; NaN if the solver failed."""
     try:
         error_bound = bound_pose_error(
             draws[i], ASSUMPTION,
@@ -104,10 +105,10 @@ def _under_load(
 def worst_error_slopes(
     prepared: LinearResponse, draws: Assembly, key: str, screws: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return the slopes of the largest pose error by platform screw and clearances.
+    """Return the derivatives of the largest pose error by screw and clearances.
 
-    The farthest point attains the support function in its own direction, so by the
-    envelope theorem the slopes are those of this support function.
+    The farthest point attains the support function in its own direction. By the
+    envelope theorem, the derivatives equal those of this support function.
 
     Args:
         prepared: the prepared posture.
@@ -117,7 +118,7 @@ def worst_error_slopes(
             :func:`bound_worst_errors`.
 
     Returns:
-        (k, 6) slopes of the largest error by the platform's screw, and (k, nu)
+        (k, 6) derivatives of the largest error by the platform's screw, and (k, nu)
         multipliers of the bounds of the clearances that carry no load.
     """
     part = 3 * POSE_ERRORS.index(key)
@@ -125,7 +126,7 @@ def worst_error_slopes(
     by_screw, by_clearance = np.zeros_like(screws), np.zeros_like(draws.clearances)
     by_screw[:, part : part + 3] = screws[:, part : part + 3] / np.maximum(size, 1e-300)
     loaded = loaded_clearances(prepared, draws)
-    # [rad or m] by clearances; those in contact with their bounds remain
+    # [rad or m] derivative by the clearances; clearances at their bounds do not move
     along = by_screw @ prepared.screws[:, : draws.clearances.shape[1]]
     patterns, pattern_of = np.unique(loaded, axis=0, return_inverse=True)
     for k, pattern in enumerate(patterns):

@@ -1,6 +1,6 @@
 """Worst pose error over all errors within tolerance and all clearances.
 
-Four readings are different numbers where a machine is over-constrained:
+Four definitions of the worst pose error differ if a machine is over-constrained:
 
 =========== ====================================================================
 rigid       errors and clearances that close without any force: a convex set
@@ -9,10 +9,10 @@ equilibrium least energy (22) at given errors, worst position in the clearances
 bound       clearances are added as if they were errors: not below equilibrium
 =========== ====================================================================
 
-The first two, and all where nothing is over-constrained, are convex maximisations: the
-largest size over the sphere of directions of a sum of support functions.  Equilibrium
-with clearances is none: it is bracketed by climbing from corner to corner and by the
-bound.
+The rigid and the elastic worst case are convex maximisations: the maximum over all
+directions of a sum of support functions. If nothing is over-constrained, this applies
+to all four.  The equilibrium with clearances is not a convex maximisation: it is
+bracketed by a search from corner to corner (lower bound) and by ``bound``.
 
 Sources:
     Hoffman (1981), see :mod:`forcefit.assembly.solvers.outer_cuts`.
@@ -43,9 +43,9 @@ from forcefit.inputs.table import BadInput
 from forcefit.results.display import Figures, html_table, short_repr
 from forcefit.results.text import in_unit
 
-_TOLERANCE = 3e-4  # relative to the sum of the supports along x, y and z
-_STARTS = 24  # random corners from which the equilibrium climbs
-_CLIMBS = 12  # most steps from corner to corner
+_TOLERANCE = 3e-4  # relative to the sum of the support functions along x, y and z
+_STARTS = 24  # number of random corners from which the search starts
+_CLIMBS = 12  # largest number of steps from corner to corner
 
 MEANINGS = {
     "linear": "nothing is over-constrained: every reading is the same",
@@ -67,9 +67,9 @@ class WorstPose:
         bound: [rad or m] a certified upper bound.
         direction: (3,) unit vector of the value attained, base axes.
         shares: [rad or m] by callout, independent error or clearance, along that
-            direction, the largest first; their sum is the bound's support there.
-        rigid: [rad or m] attained by the rigid reading, as a part of equilibrium; NaN
-            for the other readings.
+            direction, largest first; their sum is the support function of the bound.
+        rigid: [rad or m] value attained by the rigid definition, which is part of the
+            equilibrium; NaN for the other definitions.
     """
 
     quantity: str
@@ -104,10 +104,10 @@ def worst_pose(
         sources: callouts, independent errors that are bounded and symmetric, and
             fits, each at its largest clearance.
         quantity: ``"rotation"`` or ``"translation"``.
-        seed: of the corners from which the equilibrium climbs.
+        seed: seed of the random corners from which the search starts.
 
     Returns:
-        The worst case, with the reading that it answers.
+        The worst case, with the definition that applies.
 
     Raises:
         BadInput: a joint is bolted at a pose, the posture is loaded, or an independent
@@ -142,16 +142,16 @@ def worst_pose(
 def bound_worst_pose(
     prepared: LinearResponse, sources: Sources, tolerance: float = _TOLERANCE
 ) -> tuple[str, dict[str, float]]:
-    """Return certified upper bounds of the worst pose error, without attaining it.
+    """Return certified upper bounds of the worst pose error, without attained values.
 
     Args:
         prepared: as for :func:`worst_pose`.
-        sources: likewise.
-        tolerance: [-] the bounds are within this share of the supports along x, y and
-            z above the largest value of the convex problem.
+        sources: as for :func:`worst_pose`.
+        tolerance: [-] largest difference between the bounds and the maximum of the
+            convex problem, relative to the support functions along x, y and z.
 
     Returns:
-        The reading, a key of :data:`MEANINGS`, and the bounds of the ``rotation`` [rad]
+        The definition, a key of :data:`MEANINGS`, and bounds of the ``rotation`` [rad]
         and the ``translation`` [m].
 
     Raises:
@@ -168,7 +168,7 @@ def bound_worst_pose(
 def _at_largest_clearances(
     prepared: LinearResponse, sources: Sources
 ) -> tuple[LinearResponse, Sources]:
-    """The posture with the largest clearances of the fits, and the other sources."""
+    """Return the posture with largest fit clearances, and the sources except fits."""
     refuse_bolted(prepared.posture.robot, "worst case")
     if prepared.loads is not None:
         raise BadInput("worst case: found a load, expected none: it is not linear then")
@@ -180,8 +180,8 @@ def _at_largest_clearances(
 
 
 def _reading(sets: ErrorSets) -> str:
-    """The reading of the worst case, a key of :data:`MEANINGS`."""
-    # contacts of a joint hold each other, but no part
+    """Return the definition that applies to the worst case, a key of MEANINGS."""
+    # parallel contacts within a joint constrain each other, but no other part
     held = len(sets.rigid_rows) > len(sets.contact_rows)
     sprung = len(sets.spring_rows) > 0
     if sprung and sets.clearances:
@@ -190,14 +190,14 @@ def _reading(sets: ErrorSets) -> str:
 
 
 def farthest_screw(sets: ErrorSets, half: int) -> tuple[tuple[float, float], NDArray]:
-    """Bracket the largest half screw over the zones, without a condition of the loops.
+    """Bracket the largest rotation or translation over the zones, without closures.
 
     Args:
         sets: zones of errors and clearances.
         half: 0 for the rotation, 3 for the translation.
 
     Returns:
-        [rad or m] value attained and certified bound, and (6,) the screw attained.
+        [rad or m] value attained and certified bound, and (6,) screw that attains it.
     """
     return _farthest(sets, sets.contact_rows, half)
 
@@ -205,14 +205,14 @@ def farthest_screw(sets: ErrorSets, half: int) -> tuple[tuple[float, float], NDA
 def _farthest(
     sets: ErrorSets, rows: NDArray, half: int, tolerance: float = _TOLERANCE
 ) -> tuple[tuple[float, float], NDArray]:
-    """Bracket the largest half screw over the zones where rows @ z = 0."""
+    """Bracket the largest rotation or translation over the zones with rows @ z = 0."""
     support = _support(sets, rows, half)
     sizes = [support(direction)[0] for direction in np.eye(3)]
     if not max(sizes) > 0:
         return (0.0, 0.0), np.zeros(6)
     bounds, screw, _ = farthest(np.zeros(6), half, tolerance * max(sizes), support)
     low = bounds[0]
-    # the farthest screw in its own direction is not shorter
+    # the farthest screw in the direction of a screw is at least as long as that screw
     for _ in range(50):
         further = support(screw[half : half + 3] / low)[1]
         size = float(np.linalg.norm(further[half : half + 3]))
@@ -223,8 +223,8 @@ def _farthest(
 
 
 def _sum_of_sizes(sets: ErrorSets, half: int) -> float:
-    """[rad or m] the largest sizes of the parts of all balls, added: an upper bound."""
-    # cuts need many planes where the screws are a ball; there this bound is exact
+    """Return an upper bound [rad or m]: the sum of the largest sizes of all balls."""
+    # cutting planes converge slowly if the screws form a ball; there this sum is exact
     total = 0.0
     for zone, columns in zip(sets.zones, sets.columns, strict=True):
         ends = np.cumsum(zone.dimensions)[:-1]
@@ -236,7 +236,7 @@ def _sum_of_sizes(sets: ErrorSets, half: int) -> float:
 def _support(
     sets: ErrorSets, rows: NDArray, half: int
 ) -> Callable[[NDArray], tuple[float, NDArray, NDArray]]:
-    """The support function of the platform's screws, with the screw that attains it."""
+    """Return the support function of the platform's screws and the farthest screw."""
     P = sets.screws[half : half + 3]
     if not len(rows):
 
@@ -260,7 +260,7 @@ def _support(
 def _climb(
     prepared: LinearResponse, sources: Sources, quantity: str, seed: int, start: NDArray
 ) -> tuple[float, NDArray]:
-    """The largest equilibrium found by climbing, and its direction (3,)."""
+    """Return the largest equilibrium found by the search, and its direction (3,)."""
     half = 3 * POSE_ERRORS.index(quantity)
     own = zones_of_errors(sources)
     sizes = [sum(zone.dimensions) for _, zone, _ in own]
@@ -268,7 +268,7 @@ def _climb(
     scale = np.concatenate([unit for _, _, unit in own])
 
     def corners(slopes: NDArray) -> NDArray:
-        """Farthest errors for slopes (k, m), in the numbers of the sources."""
+        """Return the farthest errors for slopes (k, m), as numbers of the sources."""
         u = np.zeros_like(slopes)
         for row, w in zip(u, slopes * scale, strict=True):
             for (_, zone, _), columns in zip(own, parts, strict=True):

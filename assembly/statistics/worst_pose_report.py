@@ -10,8 +10,8 @@ from forcefit.assembly.statistics.worst_pose import MEANINGS, worst_pose
 from forcefit.page.page import paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
 
-_LISTED = 8  # of the shares, in text
-_LEAST = 1e-6  # share of all that is listed; less is rounding
+_LISTED = 8  # largest number of shares in the text
+_LEAST = 1e-6  # smallest part of the sum that is listed; less is rounding
 
 
 def worst_results(
@@ -22,11 +22,11 @@ def worst_results(
     Args:
         prepared: a posture without loads.
         sources: see :func:`forcefit.assembly.statistics.worst_pose.worst_pose`.
-        seed: of the corners from which an equilibrium climbs.
+        seed: seed of the random corners from which the search starts.
 
     Returns:
-        By quantity: reading and its meaning, value attained and certified bound, unit,
-        direction, shares by name; of an equilibrium also the rigid reading.
+        By quantity: definition and its meaning, value attained and certified bound,
+        unit, direction, shares by name; for an equilibrium also the rigid value.
     """
     results = {}
     for key in POSE_ERRORS:

@@ -1,15 +1,15 @@
-"""Adjustments: a change of geometric errors that makes a reading least.
+"""Adjustments: the change of a geometric error that minimises a reading.
 
-Three cases differ:
+Three cases are solved differently:
 
 ====================== =============================================================
 no loose clearance     the reading is linear in the change: least squares
 closure, no loads      convex in the change and the clearances together: one equilibrium
-frame, or loads        piecewise linear in the change, because the equilibrium decides
-                       which clearances are in contact: Gauss and Newton's method to
-                       local leasts, of which the least is taken.  It starts from the
-                       present error, and from the change that is best if the
-                       clearances stay where they are pressed
+frame, or loads        piecewise linear in the change, because the equilibrium
+                       determines which clearances are in contact: the Gauss-Newton
+                       method finds local minima, and the smaller one is taken.  It
+                       starts from the present error, and from the change that is best
+                       if all clearances remain where they are pressed
 ====================== =============================================================
 """
 
@@ -30,10 +30,10 @@ from forcefit.assembly.steps.state import (
 )
 from forcefit.inputs.table import BadInput, quoted
 
-_MOST_STEPS, _HALVINGS = 30, 12  # of Gauss and Newton's method, of each of its steps
-_STEP = 1e-7  # [rad, reference lengths] step of the differences
+_MOST_STEPS, _HALVINGS = 30, 12  # Gauss-Newton steps, and halvings of each step
+_STEP = 1e-7  # [rad, reference lengths] step of the finite differences
 _FLAT = (
-    1e-6  # share of the steepest slope below which a slope is the differences' error
+    1e-6  # slopes below this share of the steepest one are errors of the differences
 )
 _SETTLED = 1e-7  # relative reduction of the reading below which the search ends
 
@@ -41,7 +41,7 @@ _SETTLED = 1e-7  # relative reduction of the reading below which the search ends
 def with_adjustment(
     machine: Machine, state: State, step: Adjust, amount: NDArray
 ) -> State:
-    """Return the state with a changed geometric error, before it settles."""
+    """Return the state with a changed geometric error, before its equilibrium."""
     first = 6 * machine.posture.robot.index(step.frame)
     errors = state.errors.copy()
     errors[:, first + rows_of(step.components)] += amount
@@ -49,18 +49,18 @@ def with_adjustment(
 
 
 def adjustment_of(machine: Machine, state: State, step: Adjust) -> NDArray:
-    """Return the (k, a) [rad or m] change that makes the reading least.
+    """Return the (k, a) [rad or m] change that minimises the reading of a step.
 
     Args:
         machine: columns and rows of the robot.
-        state: before the step.
+        state: state before the step.
         step: the adjustment.
 
     Returns:
-        The changes of the components of the frame's geometric error.
+        Changes of the a adjusted components of the frame's geometric error.
 
     Raises:
-        BadInput: clearances are loose, and the frame's joint is bolted.
+        BadInput: some clearances are loose, and the joint of the frame is bolted.
     """
     if step.amount is not None:
         return np.broadcast_to(step.amount, (len(state.errors), len(step.components)))
@@ -77,7 +77,7 @@ def adjustment_of(machine: Machine, state: State, step: Adjust) -> NDArray:
 
 
 def _linear_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
-    """Return the change of a machine without loose clearances."""
+    """Return the best change if no clearance is loose."""
     count = len(step.components)
     value = _to_vanish(machine, state, step)
     slopes = np.empty((value.shape[1], count))
@@ -86,13 +86,13 @@ def _linear_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
         unit[:, i] = 1.0
         moved = settle(machine, with_adjustment(machine, state, step, unit))
         slopes[:, i] = (_to_vanish(machine, moved, step) - value)[0]
-    # where many changes do alike, the least one, lengths in reference lengths
+    # of equally good changes take the least, with lengths in reference lengths
     unit = 1 / machine.scale[rows_of(step.components)]
     return -value @ np.linalg.pinv(slopes * unit).T * unit
 
 
 def _best_local_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
-    """Return the better one of the changes at two local leasts of the reading."""
+    """Return the better change of two local minima of the reading."""
     none = np.zeros((len(state.errors), len(step.components)))
     amount, size = _local_adjustment(machine, state, step, none)
     pressed = _linear_adjustment(*_with_pressed_clearances(machine, state), step)
@@ -102,7 +102,7 @@ def _best_local_adjustment(machine: Machine, state: State, step: Adjust) -> NDAr
 
 
 def _with_pressed_clearances(machine: Machine, state: State) -> tuple[Machine, State]:
-    """Return the machine with all clearances as errors, where they are now."""
+    """Return the machine with each clearance as an error of its present value."""
     moved, joints = state.found.clearances @ machine.cones.T, machine.joints
     fixed = replace(joints, cones=joints.cones[:, :0], group=joints.group[:0])
     found = replace(state.found, clearances=state.found.clearances[:, :0])
@@ -113,7 +113,7 @@ def _with_pressed_clearances(machine: Machine, state: State) -> tuple[Machine, S
 def _local_adjustment(
     machine: Machine, state: State, step: Adjust, start: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return the change at a local least of the reading, and the (k,) least."""
+    """Return the change at a local minimum of the reading, and the (k,) minimum."""
     unit = 1 / machine.scale[rows_of(step.components)]
     amount = start
     value, slopes = _value_and_slopes(machine, state, step, amount)
@@ -121,7 +121,7 @@ def _local_adjustment(
         inverse = np.linalg.pinv(slopes * unit, rcond=_FLAT)
         change = -np.einsum("kcp,kp->kc", inverse, value) * unit
         size, going = np.linalg.norm(value, axis=1), np.ones(len(value), dtype=bool)
-        for _ in range(_HALVINGS):  # a step may end in another set of contacts
+        for _ in range(_HALVINGS):  # a full step may end at another set of contacts
             trial = amount + change * going[:, None]
             found = _value_at(machine, state, step, trial)
             less = np.linalg.norm(found, axis=1) < size * (1 - _SETTLED)
@@ -139,7 +139,7 @@ def _local_adjustment(
 def _value_and_slopes(
     machine: Machine, state: State, step: Adjust, amount: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return (k, p) what becomes least after a change, and its (k, p, a) slopes."""
+    """Return the minimised quantities (k, p) after a change, and slopes (k, p, a)."""
     value = _value_at(machine, state, step, amount)
     slopes = np.empty((*value.shape, len(step.components)))
     for i, scale in enumerate(machine.scale[rows_of(step.components)]):
@@ -151,13 +151,13 @@ def _value_and_slopes(
 
 
 def _value_at(machine: Machine, state: State, step: Adjust, amount: NDArray) -> NDArray:
-    """Return what an adjustment makes least, after a change."""
+    """Return the quantities that an adjustment minimises, after a change."""
     moved = settle(machine, with_adjustment(machine, state, step, amount))
     return _to_vanish(machine, moved, step)
 
 
 def _check_not_bolted(machine: Machine, state: State, step: Adjust) -> None:
-    """Refuse an adjustment in a joint that is bolted among loose clearances."""
+    """Reject an adjustment in a bolted joint while other clearances are loose."""
     if machine.posture.robot.index(step.frame) in state.bolted.values():
         raise BadInput(
             f"step {quoted(step.name)}: found clearances that are not bolted, and "
@@ -167,11 +167,12 @@ def _check_not_bolted(machine: Machine, state: State, step: Adjust) -> None:
 
 
 def _closing_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
-    """Return the change with which closing a closure needs the least energy.
+    """Return the change for which closing a closure needs the least energy.
 
-    The changes are free motions of the closed machine, whose energy is convex in them
-    and in the clearances together.  Where many changes do alike, the clearances stay as
-    close as possible to where they are; then the change is the least one.
+    The changes are treated as free motions of the closed machine, whose energy is
+    convex in the changes and the clearances together.  If several changes are equally
+    good, the clearances remain as close as possible to their positions; among these
+    changes the smallest is taken.
     """
     rows = rows_of(step.components)
     units = np.zeros((len(machine.free), len(rows)))
@@ -188,7 +189,7 @@ def _closing_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray
 
 
 def _least_change(machine: Machine, state: State, count: int) -> NDArray:
-    """Return the (k, a) last motions, without what other free motions can do."""
+    """Return the last a motions (k, a), less what other free motions can replace."""
     motions = machine.movable((), tuple(state.bolted.values()), 1)[2][:-count]
     rows = np.vstack([hold.rows for hold in state.holds.values()])
     changing, free = rows @ machine.free[:, -count:], rows @ machine.free[:, :-count]
@@ -201,7 +202,7 @@ def _least_change(machine: Machine, state: State, count: int) -> NDArray:
 
 
 def _to_vanish(machine: Machine, state: State, step: Adjust) -> NDArray:
-    """Return what an adjustment makes least: a reading, or strains of a closure."""
+    """Return what an adjustment minimises: a reading, or the strains of a closure."""
     part = step.reading.part
     if isinstance(part, str):
         return reading_of(machine, state, step.reading)

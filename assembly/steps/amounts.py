@@ -1,10 +1,10 @@
-"""The changes of all adjustments of a plan together, for the least objective.
+"""Simultaneous optimisation of all adjustments of a plan for one objective.
 
-Each adjustment alone makes its own reading least.  Here Gauss and Newton's method
-continues from these changes, with differences of the whole plan; all changes that it
-tries are carried out together, as machines that differ in their adjustments.  A change
-is kept only if the objective falls, so that the result is at least as good as that of
-the readings; it is a local least.
+Each adjustment by itself minimises its own reading.  From these changes, the
+Gauss-Newton method continues with finite differences of the whole plan. All trial
+changes are carried out together, as machines that differ in their adjustments.  A
+change is accepted only if the objective decreases, so the result is at least as good as
+the changes that minimise the readings. The result is a local minimum.
 """
 
 from collections.abc import Callable
@@ -19,35 +19,35 @@ from forcefit.assembly.steps.plan import Adjust, Join, Plan, rows_of
 from forcefit.assembly.steps.run import StepResult, carry_out
 from forcefit.assembly.steps.state import State
 
-_STEP = 1e-7  # [rad, reference lengths] step of the differences
+_STEP = 1e-7  # [rad, reference lengths] step of the finite differences
 _FLAT = (
-    1e-6  # share of the steepest slope below which a slope is the differences' error
+    1e-6  # slopes below this share of the steepest one are errors of the differences
 )
 _MOST_STEPS, _SHARES = (
     20,
     0.5 ** np.arange(8),
-)  # of the method, and of each of its steps
-_SETTLED = 1e-7  # relative reduction below which the search ends
+)  # Gauss-Newton steps, and halvings of each step
+_SETTLED = 1e-7  # relative reduction below which the iteration ends
 
-# function of a number of machines that returns their state before the first step
+# function from a number of machines to their state before the first step
 Start = Callable[[int], State]
 
 
 def with_best_amounts(
     plan: Plan, machine: Machine, start: Start, objective: str, given: float
 ) -> tuple[Plan, float]:
-    """Return a plan whose adjustments together reduce an objective.
+    """Return a plan whose adjustments together reduce an objective, and its value.
 
     Args:
-        plan: the steps, which can be carried out.
+        plan: a plan that can be carried out.
         machine: columns and rows of the robot.
-        start: function of a number of equal machines: their state before the plan.
+        start: function from a number of equal machines to their state before the plan.
         objective: ``"force"``, ``"energy"`` or ``"error"``.
-        given: value with the changes that make the readings least.
+        given: value of the objective if each adjustment minimises its reading.
 
     Returns:
-        The plan with the changes as ``amount`` of its adjustments, and the value.  The
-        same plan and value if nothing better is found.
+        The plan with the changes as ``amount`` of its adjustments, and the objective.
+        If nothing better is found, the plan and the value that were passed.
     """
     steps = [step for step in plan.steps if isinstance(step, Adjust)]
     if not steps:
@@ -84,14 +84,14 @@ def with_best_amounts(
 
 
 def _rounded(steps: list[Adjust], amounts: NDArray) -> NDArray:
-    """Return changes rounded to the increments of their steps."""
+    """Return changes rounded to multiples of the increments of their steps."""
     sizes = np.concatenate([np.full(len(s.components), s.increment) for s in steps])
     whole = np.where(sizes > 0, sizes, 1.0)
     return np.where(sizes > 0, whole * np.round(amounts / whole), amounts)
 
 
 def _with_amounts(plan: Plan, amounts: NDArray) -> Plan:
-    """Return a plan with given changes (.., total) of its adjustments."""
+    """Return a plan with the given changes (.., total) of its adjustments."""
     steps, first = [], 0
     for step in plan.steps:
         if isinstance(step, Adjust):
@@ -114,7 +114,7 @@ def _carried_out(plan: Plan, machine: Machine, state: State) -> list[StepResult]
 def _outcome(
     plan: Plan, machine: Machine, state: State, objective: str
 ) -> tuple[NDArray, NDArray]:
-    """Return (k, p) residuals whose squares become least, and the (k,) objective."""
+    """Return residuals (k, p) for least squares, and the objective (k,)."""
     forces = [np.zeros((len(state.errors), 3))]
     screw = machine.platform_screw(state.errors, state.found)
     for step in plan.steps:

@@ -1,10 +1,10 @@
 """Joints that are bolted at one pose and rigid afterwards (``locked_at``).
 
-At the pose where a joint is bolted its clearance gives way, so that the closures need
-the least energy, without loads; among such clearances those of the least sum of
-squares, in units of their bounds.  The clearance stays there at all other poses, as if
-it were a geometric error.  Joints are bolted in the order of the frames; those at the
-same pose together.
+Without loads, the clearance of a joint that is about to be bolted moves such that the
+closures need the least energy. Among the clearances of least energy, the least sum of
+squares, in units of their bounds, is taken.  Bolting locks this clearance in: at all
+other poses it acts like a geometric error.  Joints are bolted in the order of the
+frames; joints with the same pose are bolted together.
 """
 
 from collections.abc import Sequence
@@ -29,9 +29,9 @@ from forcefit.assembly.steps.state import State, first_state
 from forcefit.inputs.table import BadInput, quoted
 from forcefit.results.display import numbers
 
-BOLT_STREAM = 4  # stream of random numbers of bolted joints, see draw_generator
-_ROUNDED = 1e-12  # share of its bound below which a clearance is rounding
-_BOLTED = "is bolted at"  # words of a remark
+BOLT_STREAM = 4  # stream number of the bolted positions, see draw_generator
+_ROUNDED = 1e-12  # clearances below this share of their bound are rounding errors
+_BOLTED = "is bolted at"  # words in the remark on a bolted joint
 _RULES = {
     "least": "",
     "uniform": ", drawn machines anywhere at least energy",
@@ -44,19 +44,19 @@ class CannotBolt(BadInput):
 
 
 def bolt_joints(robot: Robot, rng: np.random.Generator | None = None) -> Robot:
-    """Return a robot with the clearances of its bolted joints locked in.
+    """Return a robot in which the clearances of bolted joints are locked in.
 
     Args:
-        robot: robot whose links are solved.
-        rng: of a drawn machine, see :func:`bolted_errors`.
+        robot: robot with solved link stiffnesses.
+        rng: generator for the position of a drawn machine, see :func:`bolted_errors`.
 
     Returns:
-        The robot; the screws locked in are part of its geometric errors.  The same
-        object if no joint is bolted.
+        The robot; the locked-in screws are part of its geometric errors.  If no joint
+        is bolted, the robot object that was passed.
 
     Raises:
-        BadInput: the pose of a bolt is out of reach, or the robot cannot be assembled
-            there; the message names the frame.
+        BadInput: the pose at which a joint is bolted is out of reach, or the robot
+            cannot be assembled there; the message names the frame.
     """
     if not any(frame.locked_at for frame in robot.frames):
         return robot
@@ -75,7 +75,7 @@ def bolt_joints(robot: Robot, rng: np.random.Generator | None = None) -> Robot:
 
 
 def _remark(frame: Frame) -> str:
-    """Return the position in which a joint is bolted."""
+    """Return a sentence on the position in which a joint is bolted."""
     assert frame.locked_at is not None
     screw = numbers(frame.locked_at.screw)
     rule = _RULES[frame.locked_at.left]
@@ -85,7 +85,7 @@ def _remark(frame: Frame) -> str:
 def bolt_generators(
     robot: Robot, seed: int, draws: Sequence[int] | NDArray
 ) -> list[np.random.Generator] | None:
-    """Return the generators of the positions in which drawn machines are bolted.
+    """Return generators for the positions in which drawn machines are bolted.
 
     Args:
         robot: any robot.
@@ -93,7 +93,7 @@ def bolt_generators(
         draws: numbers of the draws.
 
     Returns:
-        One for each draw; None if no position is random.
+        One generator per draw; None if no position is random.
     """
     bolts = [frame.locked_at for frame in robot.frames]
     if all(bolt is None or bolt.left != "uniform" for bolt in bolts):
@@ -105,21 +105,22 @@ def bolt_generators(
 def bolted_errors(
     robot: Robot, errors: NDArray, rngs: Sequence[np.random.Generator] | None = None
 ) -> NDArray:
-    """Return the errors of machines with the clearances of bolted joints locked in.
+    """Return errors of k machines with the clearances of bolted joints locked in.
 
     Args:
-        robot: robot of n frames whose links are solved; its own errors do not matter.
-        errors: (k, n, 6) [rad, m] of k machines, nothing locked in.
-        rngs: k generators of drawn machines, for joints left ``"uniform"``; where
-            absent, they are left at the least sum of squares.
+        robot: robot of n frames with solved link stiffnesses; the errors of its file
+            are not used.
+        errors: (k, n, 6) [rad, m] errors of the machines, without locked-in screws.
+        rngs: k generators for joints with ``left = "uniform"``; if None, these joints
+            are bolted at the least sum of squares.
 
     Returns:
-        (k, n, 6) [rad, m] with the screws locked in; the same object if no joint is
-        bolted.
+        (k, n, 6) [rad, m] errors with the locked-in screws. If no joint is bolted, the
+        array that was passed.
 
     Raises:
-        CannotBolt: one of the machines cannot be assembled where it is bolted.
-        BadInput: the pose of a bolt is out of reach.
+        CannotBolt: a machine cannot be assembled at the pose where it is bolted.
+        BadInput: the pose at which a joint is bolted is out of reach.
     """
     total = errors
     for frames, machine in _bolts(robot):
@@ -135,7 +136,7 @@ def bolted_errors(
 def _loose_state(
     robot: Robot, frames: list[int], machine: Machine, errors: NDArray
 ) -> State:
-    """Return machines at the pose of a bolt, before it is bolted."""
+    """Return machines at the pose of a bolt, before the joint is bolted."""
     try:
         return first_state(machine, Plan(()), errors, None)
     except (CannotAssemble, SolverFailed) as error:
@@ -146,7 +147,7 @@ def _loose_state(
 def _with_locked(
     machine: Machine, frames: list[int], errors: NDArray, u: NDArray
 ) -> NDArray:
-    """Return errors with the clearances of bolted frames locked in."""
+    """Return errors in which the clearances of bolted frames are locked in."""
     moved = np.where(np.abs(u) > _ROUNDED, u, 0.0) @ machine.cones.T
     total = errors.copy()
     total[:, frames] += moved.reshape(total.shape)[:, frames]
@@ -154,17 +155,18 @@ def _with_locked(
 
 
 def last_bolt(robot: Robot) -> tuple[list[int], Machine, State]:
-    """Return the joints that are bolted last, and the robot before.
+    """Return the joints that are bolted last, and the machine before they are bolted.
 
     Args:
-        robot: robot with a joint that is left ``"worst"``.
+        robot: robot with a joint that has ``left = "worst"``.
 
     Returns:
-        Frames, machine and its state at the pose of the bolt, joints of it loose.
+        Indices of the frames; the machine and its state at the pose of the bolt, in
+        which these joints are loose.
 
     Raises:
-        BadInput: joints that are bolted earlier are left ``"worst"``, or the robot
-            cannot be assembled there.
+        BadInput: a joint with ``left = "worst"`` is not bolted last, or the robot
+            cannot be assembled at that pose.
     """
     total = robot.declared_errors[None]
     *before, (frames, machine) = _bolts(robot)
@@ -183,7 +185,7 @@ def last_bolt(robot: Robot) -> tuple[list[int], Machine, State]:
 
 @lru_cache(maxsize=16)
 def _bolts(robot: Robot) -> list[tuple[list[int], Machine]]:
-    """Return the frames bolted at each pose, and the machine there."""
+    """Return the frames bolted at each pose, and the machine at that pose."""
     rows = [i for i, frame in enumerate(robot.frames) if frame.locked_at is not None]
     bolts, open_ = [], set(rows)
     for _, group in groupby(rows, lambda i: _pose(robot.frames[i])):
@@ -194,14 +196,14 @@ def _bolts(robot: Robot) -> list[tuple[list[int], Machine]]:
 
 
 def _pose(frame: Frame) -> tuple:
-    """Return what two frames that are bolted together have in common."""
+    """Return the pose of a bolt, which is equal for frames that are bolted together."""
     bolt = frame.locked_at
     assert bolt is not None
     return sorted(bolt.pose.items()), sorted(bolt.joints.items()), bolt.left
 
 
 def _posture(robot: Robot, row: int, open_: set[int]) -> Posture:
-    """Return the posture of a bolt, joints not yet bolted loose."""
+    """Return the posture of a bolt, in which joints not yet bolted are loose."""
     frames = tuple(
         _loose(frame) if i in open_ else frame for i, frame in enumerate(robot.frames)
     )
@@ -216,18 +218,18 @@ def _posture(robot: Robot, row: int, open_: set[int]) -> Posture:
 
 
 def _loose(frame: Frame) -> Frame:
-    """Return a frame before it is bolted."""
+    """Return a frame as it is before its joint is bolted."""
     bolt = frame.locked_at
     assert bolt is not None
     return replace(frame, clearance=bolt.clearance, locked_at=None)
 
 
 def refuse_bolted(robot: Robot, what: str) -> None:
-    """Refuse a robot with bolted joints, where errors must act linearly.
+    """Reject a robot with bolted joints where errors must act linearly.
 
     Args:
         robot: any robot.
-        what: what is computed, in words.
+        what: name of the computation, for the message.
 
     Raises:
         BadInput: a joint is bolted at a pose.
@@ -242,13 +244,13 @@ def refuse_bolted(robot: Robot, what: str) -> None:
 
 
 def loose_over_poses(robot: Robot) -> list[str]:
-    """Return a remark on fixed joints whose clearance is loose at every pose.
+    """Return a remark on fixed joints that have loose clearance at every pose.
 
     Args:
-        robot: robot that is computed at several poses.
+        robot: robot that is solved at several poses.
 
     Returns:
-        A list of one sentence, or empty.
+        A list with one sentence, or an empty list.
     """
     contacts = contact_frames(robot)
     owners = dict.fromkeys(

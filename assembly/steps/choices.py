@@ -1,7 +1,7 @@
-"""Which steps of a plan may change places.
+"""Which steps of a plan may be exchanged.
 
-Joins and adjustments that follow each other may; an adjustment to a closure stays on
-its side of the step that joins this closure.
+Consecutive joins and adjustments may be exchanged. However, an adjustment of a closure
+must stay before, or after, the step that joins this closure, as in the plan.
 """
 
 from collections.abc import Iterator
@@ -12,13 +12,13 @@ from forcefit.assembly.steps.plan import Adjust, Join, Step
 
 
 def choices(left: tuple[Step, ...]) -> Iterator[tuple[Step, tuple[Step, ...]]]:
-    """Yield the steps that may come next, with those that are left then.
+    """Yield each step that may come next, with the steps that remain after it.
 
     Args:
         left: steps that are not yet carried out, in the order of the plan.
 
     Yields:
-        A step, and the steps left after it.
+        A step, and the remaining steps.
     """
     for i, step in enumerate(left):
         movable = isinstance(step, (Join, Adjust))
@@ -40,26 +40,26 @@ def _keep_order(one: Step, other: Step) -> bool:
 
 
 def movable_runs(steps: tuple[Step, ...]) -> list[list[Step]]:
-    """Return the runs of steps that may change places among themselves.
+    """Return the sequences of steps that may be exchanged among themselves.
 
     Args:
-        steps: of a plan.
+        steps: steps of a plan.
 
     Returns:
-        The runs of consecutive joins and adjustments.
+        The sequences of consecutive joins and adjustments.
     """
     runs = groupby(steps, lambda step: isinstance(step, (Join, Adjust)))
     return [list(run) for movable, run in runs if movable]
 
 
 def order_matters(run: list[Step]) -> bool:
-    """Return whether the state after a run depends on its order.
+    """Return whether the state after a sequence of steps depends on their order.
 
     Args:
-        run: see :func:`movable_runs`.
+        run: sequence of steps, see :func:`movable_runs`.
 
     Returns:
-        True if a step holds what it finds, and a part is joined.
+        True if a part is joined, and a step locks in the position that it finds.
     """
     joins = [step for step in run if isinstance(step, Join)]
     return any(map(depends_on_state, run if joins else joins))

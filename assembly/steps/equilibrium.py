@@ -1,19 +1,19 @@
-"""The least energy of a partly assembled robot, for many sets of errors at once.
+"""Least energy of a partly assembled robot, for many sets of errors at once.
 
-The small screws of all frames are s = e + E y + U u + F q: errors, springs, clearances
-and free motions (:mod:`forcefit.assembly.linear.closure`).  A step of assembly holds
-rows
+The small screws of all frames are s = e + E y + U u + F q, with errors e, springs y,
+clearances u and free motions q (:mod:`forcefit.assembly.linear.closure`).  At each step
+of assembly the rows
 
     R s + L y_f = b
 
-of the closures joined so far and of the fixtures, where y_f are the springs of the
-fixtures.  The equilibrium minimises y.y / 2 less the work of the loads.  Its
-multipliers are the wrenches of the rows.  The elimination is that of
+of the closures joined so far and of the fixtures hold, where y_f are the springs of the
+fixtures.  The equilibrium minimises y.y / 2 minus the work of the loads.  Its
+multipliers are the wrenches of the rows.  The unknowns are eliminated as in
 :mod:`forcefit.assembly.linear.reference.reduction`.
 
-Where the energy leaves clearances and free motions undetermined, they stay as close as
-possible to where the last step left them (least sum of squares, clearances in units of
-their bounds, lengths in reference lengths).
+If the energy does not determine all clearances and free motions, they remain as close
+as possible to their values after the preceding step (least sum of squares, clearances
+in units of their bounds, lengths in reference lengths).
 """
 
 from dataclasses import dataclass
@@ -33,18 +33,18 @@ from forcefit.assembly.solvers.many_programmes import (
 )
 
 _OPEN = 1e-12  # [rad, reference lengths] closure error that counts as rounding
-_ROUNDING = 1e-14  # share of the largest right side that counts as rounding
-_SOLVED = 1e-11  # share of its terms below which a strain counts as the solver's error
+_ROUNDING = 1e-14  # rounding error relative to the largest right side
+_SOLVED = 1e-11  # strains below this share of their terms are the solver's error
 _DRIVEN = 1e-8  # share of a load along a free motion that counts as rounding
 
 
 class Held(NamedTuple):
-    """Rows that hold a partly assembled robot; m rows, k machines.
+    """Rows that hold a partly assembled robot: m rows for k machines.
 
     Attributes:
-        rows: (m, 6n) on the screws of all frames, lengths in reference lengths.
+        rows: (m, 6n) rows on the screws of all frames, lengths in reference lengths.
         right: (k, m) right sides.
-        roots: (m, nf) columns of the fixtures' springs, energy y.y / 2.
+        roots: (m, nf) columns of the fixtures' springs, whose energy is y.y / 2.
     """
 
     rows: NDArray
@@ -53,15 +53,15 @@ class Held(NamedTuple):
 
 
 class Movable(NamedTuple):
-    """Columns of the screws that may move.
+    """Columns of the screws that may move, and the loads on them.
 
     Attributes:
-        springs: (6n, ny) of links and joint springs, energy y.y / 2.
-        cones: (6n, nu) of clearances, in units of their bounds.
-        group: (nu,) cone of each clearance, counted from 0.
-        free: (6n, nq) of free motions, lengths in reference lengths.
-        on_springs: (k, ny) [sqrt(2 J)] loads on the springs; here and below the same
-            for all machines.
+        springs: (6n, ny) columns of links and joint springs, whose energy is y.y / 2.
+        cones: (6n, nu) columns of clearances, in units of their bounds.
+        group: (nu,) cone number of each clearance, from 0.
+        free: (6n, nq) columns of free motions, lengths in reference lengths.
+        on_springs: (k, ny) [sqrt(2 J)] loads on the springs. All loads are equal for
+            all machines.
         on_cones: (k, nu) [J] loads on the clearances.
         on_free: (k, nq) [J] loads on the free motions.
     """
@@ -77,15 +77,15 @@ class Movable(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """The unknowns at least energy, of k machines.
+    """The unknowns of k machines at least energy.
 
     Attributes:
         springs: (k, ny) [sqrt(2 J)] scaled deformations of links and joints.
         fixtures: (k, nf) [sqrt(2 J)] scaled deformations of the fixtures.
-        clearances: (k, nu) in units of their bounds.
+        clearances: (k, nu) clearances in units of their bounds.
         motions: (k, nq) free motions.
-        multipliers: (k, m) [J] of the rows held: derivative of the energy with respect
-            to their right sides.
+        multipliers: (k, m) [J] multipliers of the rows: derivatives of the energy by
+            their right sides.
     """
 
     springs: NDArray
@@ -96,7 +96,7 @@ class Equilibrium:
 
     @property
     def energy(self) -> NDArray:
-        """(k,) [J] of all springs, those of the fixtures among them."""
+        """(k,) [J] energy of all springs, including those of the fixtures."""
         links = np.vecdot(self.springs, self.springs)
         return (links + np.vecdot(self.fixtures, self.fixtures)) / 2
 
@@ -117,9 +117,9 @@ def equilibrium(
     """Return the equilibrium of least energy closest to the last state.
 
     Args:
-        held: rows held, their right sides less the part of all fixed screws.
+        held: rows that hold, with right sides from which fixed screws are subtracted.
         movable: columns that may move, and the loads on them.
-        last: clearances (k, nu) and free motions (k, nq) before.
+        last: preceding clearances (k, nu) and free motions (k, nq).
         tolerance: relative size below which a singular value counts as zero.
 
     Returns:
@@ -127,8 +127,8 @@ def equilibrium(
 
     Raises:
         CannotAssemble: rows without springs contradict each other.
-        FreeMotion: a load drives a motion that nothing resists.
-        SolverFailed: the solver of the clearances gave up.
+        FreeMotion: a load acts along a motion that nothing resists.
+        SolverFailed: the solver for the clearances did not converge.
     """
     R = held.rows
     B_q, B_u = R @ movable.free, R @ movable.cones
@@ -152,15 +152,15 @@ def equilibrium(
 
 
 def without_idle_weight(movable: Movable, weight: NDArray, rows: NDArray) -> Movable:
-    """Return the loads without weight along motions that nothing holds.
+    """Return the loads without the weight along motions that nothing resists.
 
     Args:
         movable: columns that may move, and the loads on them.
-        weight: (nq,) [J] part of the loads on the free motions that is weight.
-        rows: (m, 6n) rows held.
+        weight: (nq,) [J] part of the loads on the free motions due to weight.
+        rows: (m, 6n) rows that hold.
 
     Returns:
-        The same; the fitter carries parts that are still free.
+        The columns with reduced loads: the fitter carries parts that are still free.
     """
     if not len(weight):
         return movable
@@ -174,7 +174,7 @@ def without_idle_weight(movable: Movable, weight: NDArray, rows: NDArray) -> Mov
 
 
 def _balancing(B_q: NDArray, drive: NDArray) -> NDArray:
-    """Return (k, m) multipliers that balance the loads on the free motions."""
+    """Return multipliers (k, m) that balance the loads on the free motions."""
     if not drive.any():
         return np.zeros((len(drive), len(B_q)))
     start = np.linalg.lstsq(B_q.T, -drive.T, rcond=RANK)[0].T
@@ -185,7 +185,7 @@ def _balancing(B_q: NDArray, drive: NDArray) -> NDArray:
 
 
 def _split(A: NDArray, tolerance: float, noise: float) -> _Split:
-    """Return the rows with springs and those without, by singular values."""
+    """Split rows by singular values into those with and those without springs."""
     if not A.size:
         count = A.shape[0]
         none = np.zeros((count, 0)), np.eye(count), np.zeros((A.shape[1], 0))
@@ -199,7 +199,7 @@ def _least(
     split: _Split, A_u: NDArray, right: NDArray, movable: Movable, by_motions: NDArray,
     last: NDArray, noise: float,
 ) -> tuple[NDArray, NDArray, NDArray]:  # fmt: skip
-    """Return clearances, strains and inner multipliers of every machine."""
+    """Return clearances, strains and multipliers of the rows with springs."""
     S = split.values
     h, rigid = right @ split.elastic / S, right @ split.rigid
     if not A_u.shape[1]:
@@ -225,7 +225,7 @@ def _least(
 
 
 def _check_closed(rigid: NDArray, right: NDArray) -> None:
-    """Refuse rows without springs and clearances that stay open."""
+    """Reject rows that neither springs nor clearances can close."""
     left = np.abs(rigid).max(initial=0.0)
     if left > _OPEN + 1e-9 * np.abs(right).max(initial=0.0):
         raise CannotAssemble(
@@ -238,8 +238,8 @@ def _closest(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, least: Minima, last: NDArray,
     group: NDArray,
 ) -> NDArray:  # fmt: skip
-    """Return the clearances closest to the last ones, of the same energy."""
-    rows = np.vstack([G, H, d[:1]])  # all machines are loaded alike
+    """Return the clearances of least energy that are closest to the preceding ones."""
+    rows = np.vstack([G, H, d[:1]])  # one row of d: all machines have equal loads
     size = np.linalg.norm(rows, axis=1)
     rows = rows[size > 0] / size[size > 0, None]
     u = least.clearances
@@ -251,7 +251,7 @@ def _closest(
 
 
 def _moved(B_q: NDArray, right: NDArray, last: NDArray) -> NDArray:
-    """Return the free motions that fit the rows, closest to the last ones."""
+    """Return the free motions that satisfy the rows, closest to the preceding ones."""
     if not B_q.shape[1]:
         return last
     return last + (right - last @ B_q.T) @ np.linalg.pinv(B_q, rcond=RANK).T

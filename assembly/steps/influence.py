@@ -1,21 +1,21 @@
 """Whether the order of the joins changes the assembled machine.
 
-A join that is locked as it lies holds the opening G_k x that it finds.  The joins S
-before it have moved this opening by A_kS lambda_S + B_k q, where
+A join that is bolted "as it lies" locks in the opening G_k x that it finds.  The set S
+of earlier joins has changed this opening by A_kS lambda_S + B_k q, where
 
 ======  ======================  =====================================================
 symbol  code                    meaning
 ======  ======================  =====================================================
 A_kj    ``coefficients``        G_k K^-1 G_j^T, the influence coefficient of j at k
 B_k     ``free``                opening at k by motions that nothing resists
-lambda                          wrenches of the joins before
+lambda                          wrenches of the earlier joins
 ======  ======================  =====================================================
 
 K is the stiffness of the machine before the first of these joins.  If A_kj = 0 for all
-other joins j, and no free motion moves k together with one of them, then k finds the
-same opening after every set of other joins: its place in the order does not matter.
-Free motions that move only the opening at j, such as that of its own pin, are left out
-together with the wrenches that they do not carry.
+other joins j, and no free motion changes the openings at k and j together, then k finds
+the same opening after every set of other joins. The place of k in the order then does
+not matter.  Free motions that change only the opening at j, such as the rotation of its
+own pin, are omitted, together with the wrenches that they do not transmit.
 """
 
 from collections.abc import Sequence
@@ -29,21 +29,21 @@ from forcefit.assembly.steps.machine import Machine
 from forcefit.assembly.steps.plan import Adjust, Fix, Join, Plan, Step, rows_of
 from forcefit.assembly.steps.state import State
 
-_ZERO = 1e-9  # share of the own coefficients below which an influence is rounding
-_FREE = 1e-11  # share of the largest stiffness below which a motion is free
+_ZERO = 1e-9  # influences below this share of the own coefficients are rounding errors
+_FREE = 1e-11  # stiffnesses below this share of the largest one count as zero
 
 
 @dataclass(frozen=True, eq=False)
 class Influence:
-    """What closing one part does to the opening at another one.
+    """The effect of closing one part on the opening at another part.
 
     Attributes:
-        locked: step that holds the opening that it finds.
-        joined: another step.
+        locked: step that locks in the opening that it finds.
+        joined: another step, which closes a part.
         coefficients: (p, r) [rad, m per N m, N] motion of the p components that are
-            locked, by the r components of the closing wrench.
-        free: whether a free motion moves both openings.
-        zero: whether closing the part does not move the opening, for any errors.
+            locked, per unit of the r components of the closing wrench.
+        free: whether a free motion changes both openings.
+        zero: whether closing the part leaves the opening unchanged, for any errors.
     """
 
     locked: str
@@ -54,20 +54,20 @@ class Influence:
 
 
 def why_order_matters(plan: Plan) -> str:
-    """Return why the final state depends on the order; empty if it cannot.
+    """Return why the final state depends on the order; empty if it does not.
 
     Args:
         plan: any plan.
 
     Returns:
-        The steps that depend on the state that they find, in words.
+        Text that lists the steps that depend on the state that they find.
     """
     steps = [step.name for step in plan.steps if depends_on_state(step)]
     return ", ".join(steps)
 
 
 def depends_on_state(step: Step) -> bool:
-    """Return whether a step holds something at a position that it finds.
+    """Return whether a step locks in a position that it finds.
 
     Args:
         step: any step.
@@ -82,15 +82,15 @@ def depends_on_state(step: Step) -> bool:
 
 
 def influences(machine: Machine, state: State, run: Sequence[Join]) -> list[Influence]:
-    """Return the influence of joins on those that hold what they find.
+    """Return the influence of joins on those joins that lock in an opening.
 
     Args:
         machine: columns and rows of the robot.
-        state: before the first of the joins; its clearances are bolted.
-        run: joins that may change places.
+        state: state before the first of the joins; all its clearances are bolted.
+        run: joins that may be exchanged.
 
     Returns:
-        One for each pair of a join that depends on the state and another join.
+        One result for each pair of a join that depends on the state and another join.
     """
     rows = [_rows(machine, join) for join in run]
     bodies, free = _motions(machine, state)
@@ -118,28 +118,28 @@ def influences(machine: Machine, state: State, run: Sequence[Join]) -> list[Infl
 
 
 def _moving_alone(moved: list[NDArray], j: int) -> NDArray:
-    """Return the free motions, in columns, that move only one part's opening."""
+    """Return the free motions, as columns, that change only one part's opening."""
     others = np.vstack([np.zeros((1, moved[j].shape[1])), *moved[:j], *moved[j + 1 :]])
     return null_space(others, rcond=_ZERO) if others.size else np.zeros((0, 0))
 
 
 def _carried(motions: NDArray) -> NDArray:
-    """Return the projection on wrenches that do no work on a part's own motions."""
+    """Return the projector on wrenches that do no work on a part's own motions."""
     return np.eye(len(motions)) - motions @ np.linalg.pinv(motions, rcond=_ZERO)
 
 
 def _norm(A: NDArray) -> float:
-    """Return the largest norm of a row."""
+    """Return the largest row norm of a matrix."""
     return float(np.linalg.norm(A, axis=1).max(initial=0.0))
 
 
 def _size(A: NDArray) -> float:
-    """Return the largest entry."""
+    """Return the largest absolute entry of a matrix."""
     return float(np.abs(A).max(initial=0.0))
 
 
 def _unit(machine: Machine, join: Join) -> NDArray:
-    """Return the units of a join's rows: reference lengths become m."""
+    """Return the units of a join's rows, which convert reference lengths to m."""
     if isinstance(join.part, str):
         frames = np.abs(machine.free).reshape(-1, 6, machine.free.shape[1]).any(axis=1)
         return machine.free_size[frames[machine.posture.robot.index(join.part)]]
@@ -147,7 +147,7 @@ def _unit(machine: Machine, join: Join) -> NDArray:
 
 
 def _rows(machine: Machine, join: Join) -> NDArray:
-    """Return the rows that a join holds, on springs and free motions."""
+    """Return the rows of a join with respect to springs and free motions."""
     ny = machine.springs.shape[1]
     if isinstance(join.part, str):
         row = machine.posture.robot.index(join.part)
@@ -159,15 +159,15 @@ def _rows(machine: Machine, join: Join) -> NDArray:
 
 
 def _motions(machine: Machine, state: State) -> tuple[NDArray, NDArray]:
-    """Return elastic motions, scaled so that A = W W^T, and free motions.
+    """Return elastic motions, scaled such that A = W W^T, and free motions.
 
     Returns:
-        Columns on springs and free motions that keep what is held.
+        Columns on springs and free motions that satisfy all rows that hold.
     """
     movable, _, motions = machine.movable((), tuple(state.bolted.values()), 1)
     holds = list(state.holds.values())
     ny, nq = machine.springs.shape[1], machine.free.shape[1]
-    size = 1 / max(_size(machine.springs), 1e-300)  # springs as large as free motions
+    size = 1 / max(_size(machine.springs), 1e-300)  # scales springs like free motions
     roots = [hold.roots for hold in holds]
     columns = np.hstack([machine.springs * size, machine.free[:, motions]])
     held = [hold.rows @ columns for hold in holds]

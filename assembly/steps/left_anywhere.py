@@ -1,8 +1,8 @@
 """Random positions of clearances that no force determines.
 
-At least energy, clearances that carry load are at their bounds.  The others may move
-without strain; their positions are a convex set, in which all are equally likely
-(:mod:`forcefit.assembly.solvers.uniform_clearance`).
+At least energy, clearances that transmit force are at their bounds.  The others may
+move without deforming springs. Their possible positions form a convex set, over which
+the distribution is uniform (:mod:`forcefit.assembly.solvers.uniform_clearance`).
 """
 
 from collections.abc import Sequence
@@ -16,30 +16,30 @@ from forcefit.assembly.steps.machine import Machine
 from forcefit.assembly.steps.state import State
 
 _SAME = 1e-10  # relative size below which a singular value counts as zero
-_LOADED = 1e-9  # share of the energy above which the force of a clearance loads it
+_LOADED = 1e-9  # a clearance is loaded if its force exceeds this share of the energy
 
 
 def positions_left_anywhere(
     machine: Machine, state: State, rngs: Sequence[np.random.Generator]
 ) -> NDArray:
-    """Return clearances that are uniform over all positions of least energy.
+    """Return clearances distributed uniformly over all positions of least energy.
 
     Args:
         machine: columns and rows of the robot.
-        state: of k machines at least energy, without loads.
-        rngs: k generators.
+        state: state of k machines at least energy, without loads.
+        rngs: k generators of random numbers.
 
     Returns:
         (k, nu) clearances in units of their bounds.
     """
     u = state.found.clearances.copy()
-    # the mixture of a walk is judged by random combinations of all clearances
+    # random combinations of all clearances show whether the random walk mixed
     judged = np.random.default_rng(0).normal(size=(6, u.shape[1]))
     of_cones, of_motions = _of_rows(machine, state)
     loaded = _loaded(machine, state, of_cones[1:])
     for i, rng in enumerate(rngs):
-        # near the least load that presses a clearance, forces are the solver's error:
-        # if the set has an interior with all clearances, none is loaded
+        # if forces are as small as the solver's error, test the set instead: if it has
+        # an interior with all clearances, none is loaded
         for free in (np.ones_like(loaded[i]), ~loaded[i]):
             Z = _directions(of_cones[:, free], of_motions)
             own, starts = u[i, free].copy(), _starts(machine.joints.group[free])
@@ -60,12 +60,13 @@ def free_positions(
 
     Args:
         machine: columns and rows of the robot.
-        state: of k machines at least energy, without loads.
-        row: the machine.
+        state: state of k machines at least energy, without loads.
+        row: index of the machine.
 
     Returns:
-        (nu,) clearances in units of their bounds; (nu,) bool, those that carry no load;
-        and orthonormal columns, directions in which these move without strain.
+        (nu,) clearances in units of their bounds; (nu,) bool, True for clearances that
+        transmit no force; and orthonormal columns, the directions in which these
+        clearances move without deforming springs.
     """
     of_cones, of_motions = _of_rows(machine, state)
     free = ~_loaded(machine, state, of_cones[1:])[row]
@@ -74,7 +75,7 @@ def free_positions(
 
 
 def _of_rows(machine: Machine, state: State) -> tuple[NDArray, NDArray]:
-    """Return all rows held, on clearances and free motions; the first row is zero."""
+    """Return all rows that hold, by clearances and free motions; row 0 is zero."""
     rows = np.vstack([
         np.zeros((1, len(machine.cones))),
         *(h.rows for h in state.holds.values()),
@@ -83,25 +84,25 @@ def _of_rows(machine: Machine, state: State) -> tuple[NDArray, NDArray]:
 
 
 def _directions(of_cones: NDArray, of_motions: NDArray) -> NDArray:
-    """Return the orthonormal directions in which clearances move without strain."""
+    """Return orthonormal directions of the clearances that deform no spring."""
     together = null_space(np.hstack([of_cones, of_motions]), rcond=_SAME)
     U, S, _ = np.linalg.svd(together[: of_cones.shape[1]], full_matrices=False)
     return np.ascontiguousarray(U[:, S > _SAME])
 
 
 def _loaded(machine: Machine, state: State, of_cones: NDArray) -> NDArray:
-    """Return (k, nu) bool: clearances with a force at their bound (complementarity)."""
+    """Return (k, nu) bool: whether a clearance transmits force at its bound."""
     group, energy = machine.joints.group, state.found.energy
     cones = (group[:, None] == np.unique(group)).astype(float)
     forces = np.sqrt((state.found.multipliers @ of_cones) ** 2 @ cones)
     slack = np.maximum(0.0, 1.0 - np.sqrt(state.found.clearances**2 @ cones))
-    # force times slack is about the solver's gap, so one of them is nearly zero
+    # force times slack is about the solver's gap, so one of the two is nearly zero
     scale = np.maximum(energy, 1e-18)[:, None]
     loaded = (forces > scale * slack) & (forces > _LOADED * scale)
     return loaded @ cones.T > 0
 
 
 def _starts(group: NDArray) -> NDArray:
-    """Return the (cones + 1,) first columns of the cones, and their number."""
+    """Return the first column of each cone, and finally the number of columns."""
     first = np.unique(group, return_index=True)[1]
     return np.append(first, len(group)).astype(np.int64)

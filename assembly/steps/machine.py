@@ -28,7 +28,7 @@ class Machine:
     """A robot of n frames at a posture.
 
     Attributes:
-        posture: pose at which it is assembled.
+        posture: pose at which the robot is assembled.
         joints: columns of its springs, clearances and free motions.
         size: [m] reference length.
     """
@@ -49,7 +49,7 @@ class Machine:
 
     @cached_property
     def free_size(self) -> NDArray:
-        """(nq,) size of each free motion: 1 rad, or the reference length [m]."""
+        """(nq,) unit of each free motion: 1 rad, or the reference length [m]."""
         angles = np.tile(np.repeat([True, False], 3), len(self.joints.free) // 6)
         turns = self.joints.free[angles].any(axis=0)
         return np.where(turns, 1.0, self.size)
@@ -61,7 +61,7 @@ class Machine:
 
     @property
     def scale(self) -> NDArray:
-        """(6,) factors that make lengths comparable with angles."""
+        """(6,) factors that make translations comparable with rotations."""
         return in_reference_lengths(self.size)
 
     @property
@@ -76,8 +76,8 @@ class Machine:
             part: a frame, or the two frames of a closure.
 
         Returns:
-            (6, 6n) in the axes of the frame, or of the closure's first one, at its
-            origin; lengths in reference lengths.
+            (6, 6n) rows in the axes of the frame or of the closure's first frame, at
+            its origin; lengths in reference lengths.
         """
         robot, paths = self.posture.robot, self.posture.paths
         if isinstance(part, str):
@@ -95,12 +95,12 @@ class Machine:
         """Return the columns that may move, and the loads on them.
 
         Args:
-            loads: loads that act.
+            loads: loads that act on frames.
             bolted: frames whose joints are bolted as they lie.
             count: number of machines.
 
         Returns:
-            The columns; (nu,) and (nq,) bool of the clearances and motions in them.
+            The columns; and the clearances (nu,) and motions (nq,) among them, bool.
         """
         frames = np.repeat(~np.isin(np.arange(len(self.springs) // 6), bolted), 6)
         cones = np.abs(self.cones)[frames].any(axis=0)
@@ -119,22 +119,22 @@ class Machine:
         return movable, cones, motions
 
     def values(self, rows: NDArray, errors: NDArray, found: Equilibrium) -> NDArray:
-        """Return the values of rows on the screws of all frames.
+        """Return the values of rows for the screws of all frames.
 
         Args:
-            rows: (m, 6n) see :meth:`rows`.
+            rows: (m, 6n) rows from :meth:`rows`.
             errors: (k, 6n) [rad, m] geometric errors.
             found: springs, clearances and free motions.
 
         Returns:
-            (k, m) lengths in reference lengths.
+            (k, m) values, lengths in reference lengths.
         """
         value = errors @ rows.T + found.springs @ (rows @ self.springs).T
         value += found.clearances @ (rows @ self.cones).T
         return value + found.motions @ (rows @ self.free).T
 
     def platform_screw(self, errors: NDArray, found: Equilibrium) -> NDArray:
-        """Return the (k, 6) [rad, m] platform's screw at its origin, base axes."""
+        """Return the platform's screw (k, 6) [rad, m] at its origin, base axes."""
         robot = self.posture.robot
         row = robot.index(robot.platform)
         own = self.values(self.rows(robot.platform), errors, found) / self.scale
@@ -148,11 +148,12 @@ class Machine:
         Args:
             errors: (k, 6n) geometric errors.
             found: springs, clearances and free motions.
-            holds: rows that hold already.
-            hold: the rows that are to be closed.
+            holds: rows that already hold.
+            hold: the rows to be closed.
 
         Returns:
-            (k, m) right side less the rows' value, lengths in reference lengths.
+            (k, m) right sides minus the values of the rows, lengths in reference
+            lengths.
         """
         open_ = hold.right - self.values(hold.rows, errors, found)
         rows = [other.rows @ self.free for other in holds.values()]
@@ -163,7 +164,7 @@ class Machine:
         return open_ - open_ @ np.linalg.pinv(columns, rcond=RANK).T @ columns.T
 
     def work(self, loads: Sequence[FrameLoads], state: Any) -> NDArray:
-        """Return the (k,) [J] work of loads on all screws of a state."""
+        """Return the work (k,) [J] of loads on all screws of a state."""
         if not loads:
             return np.zeros(len(state.errors))
         found, links = state.found, self.joints.links
@@ -180,13 +181,13 @@ def machine_at(posture: Posture) -> Machine:
     """Return the arrays of a robot at a posture.
 
     Args:
-        posture: pose at which it is assembled.
+        posture: pose at which the robot is assembled.
 
     Returns:
         The machine.
 
     Raises:
-        BadInput: a geometric error is beyond 1e6 rad or m.
+        BadInput: a geometric error exceeds 1e6 rad or m.
     """
     robot = posture.robot
     return Machine(posture, virtual_joints(robot), checked_size(robot))

@@ -1,8 +1,8 @@
 """A plan of assembly: its steps as data.
 
-Screws of a frame are read at its origin in its axes, after its joint; the opening of a
-closure at the origin of its first frame, in the axes of that frame.  Components are
-those of a screw, ``RX RY RZ TX TY TZ``.
+A frame's screw is expressed at the frame's origin in its axes, after its joint.  The
+opening of a closure is expressed at the origin of the closure's first frame, in the
+axes of that frame.  Components are named ``RX RY RZ TX TY TZ`` as for a screw.
 """
 
 from collections.abc import Mapping
@@ -17,20 +17,21 @@ from forcefit.inputs.table import BadInput, quoted
 from forcefit.stiffness.screws import SCREW
 
 Closure = tuple[str, str]
-GRAVITY = "gravity"  # name of the weights among the loads of steps
+GRAVITY = "gravity"  # name of the weights among the loads that act
 
 
 @dataclass(frozen=True)
 class Fix:
-    """A fixture holds a frame at a position.
+    """A step in which a fixture holds a frame at a position.
 
     Attributes:
-        name: of the step.
+        name: name of the step.
         frame: frame that is held.
-        position: [rad, m] by component, the errors of the fixture; the other components
-            are free.  None holds all six where the frame lies.
-        stiffness: [N m/rad, N/m] of the fixture by component; rigid where absent.
-        kind: ``"fix"`` or ``"clamp"``, its name in results.
+        position: [rad, m] by component, the error of the fixture; components that are
+            not listed are free.  None to hold all six components where the frame lies.
+        stiffness: [N m/rad, N/m] stiffness of the fixture by component; components that
+            are not listed are rigid.
+        kind: ``"fix"`` or ``"clamp"``, the name of the step's kind in results.
     """
 
     name: str
@@ -42,17 +43,17 @@ class Fix:
 
 @dataclass(frozen=True)
 class Join:
-    """A closure is closed, or a joint with clearance is bolted.
+    """A step that closes a closure or bolts a joint with clearance.
 
     Attributes:
-        name: of the step.
+        name: name of the step.
         part: the two frames of a closure, or the frame whose joint is bolted as it
             lies.
         locked: components of the closure's opening that are bolted as they lie; the
-            others are closed.
+            other components are closed.
         force_limit: [N] largest closing force.
-        leave_open: whether the opening that the limit leaves is locked in; otherwise
-            the closure is closed and the excess is reported.
+        leave_open: whether the opening that remains at the force limit is locked in;
+            otherwise the closure is closed and the excess force is reported.
     """
 
     name: str
@@ -64,12 +65,12 @@ class Join:
 
 @dataclass(frozen=True, eq=False)
 class Preload:
-    """A wrench on a frame's body, until it is released.
+    """A step that applies a wrench to a frame's body, until the step is released.
 
     Attributes:
-        name: of the step.
+        name: name of the step.
         frame: frame whose body is loaded.
-        wrench: (6,) [N m, N] at the frame's origin, base axes.
+        wrench: (6,) [N m, N] wrench at the frame's origin, base axes.
     """
 
     name: str
@@ -79,11 +80,11 @@ class Preload:
 
 @dataclass(frozen=True)
 class Release:
-    """Fixtures, clamps, preloads or joints of earlier steps are removed together.
+    """A step that removes fixtures, clamps, preloads or joints of earlier steps.
 
     Attributes:
-        name: of the step.
-        steps: names of these steps.
+        name: name of the step.
+        steps: names of the earlier steps, which are released together.
     """
 
     name: str
@@ -92,10 +93,10 @@ class Release:
 
 @dataclass(frozen=True)
 class Measure:
-    """A reading.
+    """A step that reads a screw or an opening.
 
     Attributes:
-        name: of the step.
+        name: name of the step.
         part: frame whose screw is read, or closure whose opening is read.
         components: components that are read.
     """
@@ -107,18 +108,18 @@ class Measure:
 
 @dataclass(frozen=True)
 class Adjust:
-    """A shim or an adjustable joint takes up a reading.
+    """A step in which a shim or an adjustable joint compensates a reading.
 
     Attributes:
-        name: of the step.
+        name: name of the step.
         frame: frame whose geometric error is changed.
-        components: components of it that are changed.
-        reading: what becomes least: components of a frame's screw, or the energy that
+        components: components of the error that are changed.
+        reading: quantity to minimise: components of a frame's screw, or the energy that
             closing a closure would need.
-        increment: [rad or m] to a multiple of which changes are rounded; 0 if
-            continuous.
-        amount: (a,) or (k, a) [rad or m] change that is made whatever the reading says;
-            of :func:`forcefit.assembly.steps.amounts.with_best_amounts`.
+        increment: [rad or m] changes are rounded to multiples of this value; 0 for
+            continuous changes.
+        amount: (a,) or (k, a) [rad or m] change that is made regardless of the reading,
+            from :func:`forcefit.assembly.steps.amounts.with_best_amounts`.
     """
 
     name: str
@@ -134,10 +135,10 @@ Step = Fix | Join | Preload | Release | Measure | Adjust
 
 @dataclass(frozen=True)
 class Plan:
-    """Steps of assembly, in order.
+    """The steps of assembly, in order.
 
-    Closures that no step joins are closed before the first step; joints that no step
-    bolts keep their clearance.
+    Closures that no step joins are closed before the first step. Joints that no step
+    bolts retain their clearance.
 
     Attributes:
         steps: the steps.
@@ -146,22 +147,22 @@ class Plan:
     steps: tuple[Step, ...]
 
     def joined(self) -> set[Closure]:
-        """Return the closures that a step joins."""
+        """Return the closures that the steps join."""
         parts = {s.part for s in self.steps if isinstance(s, Join)}
         return {part for part in parts if not isinstance(part, str)}
 
 
 def check_plan(plan: Plan, robot: Robot) -> None:
-    """Refuse steps that do not fit a robot or each other.
+    """Reject steps that do not fit the robot or each other.
 
     Args:
         plan: any plan.
         robot: the robot to be assembled.
 
     Raises:
-        BadInput: a name is used twice or unknown, a part is joined twice, or what is
-            released is not held; the message begins with the step.  Or a drive of the
-            robot applies a force.
+        BadInput: a name is used twice or unknown, a part is joined twice, a step
+            releases something that is not held, or a drive of the robot applies a
+            force.  The message begins with the step.
     """
     driven = [frame.name for frame in robot.frames if frame.drive_force]
     if driven:
@@ -176,9 +177,11 @@ def check_plan(plan: Plan, robot: Robot) -> None:
     for number, step in enumerate(plan.steps, 1):
         where = f"step[{number}] {quoted(step.name)}"
         if step.name in names:
-            raise BadInput(f"{where}: the name of an earlier step, expected another")
+            found = "found the name of an earlier step"
+            raise BadInput(f"{where}: {found}, expected a new one")
         if step.name in taken:
-            raise BadInput(f"{where}: the name of {taken[step.name]}, expected another")
+            found = f"found the name of {taken[step.name]}"
+            raise BadInput(f"{where}: {found}, expected a new one")
         names.add(step.name)
         for part in _parts_of(step):
             _check_part(where, part, robot)
@@ -195,7 +198,7 @@ def check_plan(plan: Plan, robot: Robot) -> None:
 
 
 def _parts_of(step: Step) -> list[Closure | str]:
-    """Return the frames and closures that a step names."""
+    """Return the frames and closures that a step refers to."""
     if isinstance(step, Release):
         return []
     if isinstance(step, (Join, Measure)):
@@ -204,7 +207,7 @@ def _parts_of(step: Step) -> list[Closure | str]:
 
 
 def _check_part(where: str, part: Closure | str, robot: Robot) -> None:
-    """Refuse a frame or a closure that the robot does not have."""
+    """Reject a frame or a closure that the robot does not have."""
     if isinstance(part, str):
         try:
             robot.index(part)
@@ -217,7 +220,7 @@ def _check_part(where: str, part: Closure | str, robot: Robot) -> None:
 
 
 def _check_join(where: str, step: Join, robot: Robot, held: Mapping) -> None:
-    """Refuse what is joined already, and a joint that has nothing to bolt."""
+    """Reject a part that is already joined, and a joint without clearance to bolt."""
     if step.part in held.values():
         raise BadInput(f"{where}.join: found a part that is joined already")
     if isinstance(step.part, str):
@@ -228,13 +231,13 @@ def _check_join(where: str, step: Join, robot: Robot, held: Mapping) -> None:
 
 
 def _held(held: Mapping) -> str:
-    """Return the names that may be released, in words."""
+    """Return the names that may be released as text."""
     names = ", ".join(map(quoted, held))
     return f"one of {names}" if names else "an earlier step that holds something"
 
 
 def closure_name(closure: Closure) -> str:
-    """Return the name under which a closure holds that no step joins."""
+    """Return the name of a closure that is closed before the first step."""
     return f"{closure[0]} - {closure[1]}"
 
 

@@ -1,14 +1,14 @@
 """A plan carried out on one machine, or on many that differ in their errors.
 
-The machine is linear in small screws, at one posture.  Each step changes what is held;
-then the springs find the equilibrium from the last state (``equilibrium.py``).
+The machine is linear in small screws at one posture.  Each step changes which rows
+hold; then the equilibrium is computed from the preceding state (``equilibrium.py``).
 
 ======  ==================  ==========  ==============================================
 symbol  code                shape       meaning
 ======  ==================  ==========  ==============================================
-E       ``energy``          (k,)        [J] of all springs, those of fixtures included
-lambda  ``closing_wrench``  (k, 6)      [N m, N] that closes a closure, at its peak
-gamma   ``opening``         (k, 6)      [rad, m] before it is closed
+E       ``energy``          (k,)        [J] of all springs, including the fixtures
+lambda  ``closing_wrench``  (k, 6)      [N m, N] largest wrench that closes a closure
+gamma   ``opening``         (k, 6)      [rad, m] before the closure is closed
 ======  ==================  ==========  ==============================================
 """
 
@@ -46,35 +46,37 @@ from forcefit.assembly.steps.state import (
     without,
 )
 
-_ROUNDED = 1e-13  # share of the energies below which their difference is rounding
-_HALVINGS = 50  # of the share of an opening that a limited force closes
+_ROUNDED = 1e-13  # energy differences below this share of the energies are rounding
+_HALVINGS = 50  # bisections of the share of an opening that a limited force closes
 
 
 @dataclass(frozen=True, eq=False)
 class StepResult:
-    """One step of k machines.
+    """The result of one step for k machines.
 
     Attributes:
         step: the step.
-        energy: (k,) [J] afterwards.
-        work: (k,) [J] of the step: of the closing wrench, of a clamp, or of a preload
-            that grows slowly.
-        load_work: (k,) [J] of the loads that acted before and after.
-        lost: (k,) [J] energy that a release loses.
-        closing_wrench: (k, 6) [N m, N] peak, in the axes of the closure or fixture; 0
-            for other steps.
-        opening: (k, 6) [rad, m] of the closure before, as far as free motions cannot
-            close it; what a force limit leaves open is in ``left_open``.
-        left_open: (k, 6) [rad, m] opening that the step leaves.
+        energy: (k,) [J] energy after the step.
+        work: (k,) [J] work of the step: by the closing wrench, by a clamp, or by a
+            preload that increases slowly.
+        load_work: (k,) [J] work of the loads that act both before and after the step.
+        lost: (k,) [J] energy that a release dissipates.
+        closing_wrench: (k, 6) [N m, N] largest closing wrench, in the axes of the
+            closure or fixture; 0 for other steps.
+        opening: (k, 6) [rad, m] opening of the closure before the step, without the
+            part that free motions can close.
+        left_open: (k, 6) [rad, m] opening after the step, if a force limit leaves one.
         exceeded: (k,) bool, whether closing needs more than the allowed force.
-        spring_back: (k, 6) [rad, m] motion of what is released, the last one named, in
-            its axes.
-        reading: (k, p) [rad or m] of a measurement.
+        spring_back: (k, 6) [rad, m] motion of the part that is released, the last one
+            if several are, in its axes.
+        reading: (k, p) [rad or m] reading of a measurement.
         adjustment: (k, a) [rad or m] change that an adjustment makes.
-        platform_screw: (k, 6) [rad, m] afterwards, at its origin, base axes.
-        wrenches: (k, 6) [N m, N] locked in afterwards, by step that holds, in its axes.
-        balance: (k,) [J] difference of the work, or of the energy lost, from half the
-            multipliers times the opening; NaN with clearances or gravity.
+        platform_screw: (k, 6) [rad, m] screw after the step, at the platform's origin,
+            base axes.
+        wrenches: (k, 6) [N m, N] locked-in wrenches after the step, by the name of the
+            step that holds, in its axes.
+        balance: (k,) [J] work, or dissipated energy, minus half the multipliers times
+            the opening; NaN with clearances or gravity.
     """
 
     step: Step
@@ -95,7 +97,7 @@ class StepResult:
 
     @property
     def closing_force(self) -> NDArray:
-        """(k,) [N] force part of the closing wrench."""
+        """(k,) [N] norm of the force part of the closing wrench."""
         return np.linalg.norm(self.closing_wrench[:, 3:], axis=1)
 
 
@@ -105,24 +107,24 @@ def assemble_in_steps(
     errors: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
 ) -> list[StepResult]:
-    """Carry out a plan.
+    """Carry out a plan and return the result of each step.
 
     Args:
         plan: the steps.
         posture: pose at which the robot of n frames is assembled.
-        errors: (k, n, 6) [rad, m] geometric errors of k machines; the robot's if
-            absent.
-        gravity: (3,) [m/s^2] base axes; acts from the beginning.  It does not move
-            parts that nothing holds yet.
+        errors: (k, n, 6) [rad, m] geometric errors of k machines; None for the errors
+            of the robot file.
+        gravity: (3,) [m/s^2] gravity in base axes, which acts from the beginning.  It
+            does not move parts that nothing holds yet.
 
     Returns:
-        The results, step by step.
+        The results, one per step.
 
     Raises:
         BadInput: the plan does not fit the robot.
-        CannotAssemble: rigid parts contradict each other.
-        FreeMotion: a load drives a motion that nothing resists.
-        SolverFailed: the solver of the clearances gave up.
+        CannotAssemble: the conditions of rigid parts contradict each other.
+        FreeMotion: a load acts along a motion that nothing resists.
+        SolverFailed: the solver for the clearances did not converge.
     """
     check_plan(plan, posture.robot)
     machine = machine_at(posture)
@@ -135,15 +137,15 @@ def assemble_in_steps(
 
 
 def carry_out(machine: Machine, state: State, step: Step) -> tuple[State, StepResult]:
-    """Carry out one step.
+    """Carry out one step of a plan.
 
     Args:
         machine: columns and rows of the robot.
-        state: before the step.
-        step: of a plan that was checked.
+        state: state before the step.
+        step: step of a plan that has been checked.
 
     Returns:
-        The state after it, and the result.
+        The state after the step, and the result.
     """
     blank = _blank(machine, state, step)
     if isinstance(step, Join) and isinstance(step.part, str):
@@ -173,14 +175,14 @@ def carry_out(machine: Machine, state: State, step: Step) -> tuple[State, StepRe
 
 
 def _row(machine: Machine, step: Join) -> int:
-    """Return the frame whose joint a step bolts."""
+    """Return the index of the frame whose joint a step bolts."""
     return machine.posture.robot.index(str(step.part))
 
 
 def _join(
     machine: Machine, state: State, step: Join, blank: StepResult
 ) -> tuple[State, StepResult]:
-    """Close a closure, with its locked components as they lie."""
+    """Close a closure, except for its locked components, which stay as they lie."""
     assert not isinstance(step.part, str)
     hold = closed_rows(machine, state, step.part)
     opening = machine.opening(state.errors, state.found, state.holds, hold)
@@ -212,7 +214,7 @@ def _join(
 
 
 def _share(linear: bool, limit: float, needed: NDArray, force: Callable) -> NDArray:
-    """Return the (k,) shares of the openings that a limited force closes."""
+    """Return the shares (k,) of the openings that a limited force can close."""
     share = np.minimum(1.0, limit / np.maximum(needed, 1e-300))
     if linear:
         return share  # the force is proportional to the share
@@ -238,7 +240,7 @@ def _blank(machine: Machine, state: State, step: Step) -> StepResult:
 
 
 def _wrenches(machine: Machine, state: State) -> dict[str, NDArray]:
-    """Return the (k, 6) [N m, N] wrenches of all holds, each in its own axes."""
+    """Return the wrenches (k, 6) [N m, N] of all holds, each in its own axes."""
     found = state.multipliers()
     wrenches = np.zeros((len(state.errors), len(found), 6))
     for i, (name, multipliers) in enumerate(found.items()):
@@ -252,7 +254,7 @@ def _wrenches(machine: Machine, state: State) -> dict[str, NDArray]:
 def _told(
     machine: Machine, before: State, after: State, result: StepResult
 ) -> tuple[State, StepResult]:
-    """Return the state after a step, and its result with energies and wrenches."""
+    """Return the state after a step, and its result completed by energies."""
     step = result.step
     kept = [after.loads[name] for name in after.loads if name in before.loads]
     load_work = machine.work(kept, after) - machine.work(kept, before)
@@ -275,10 +277,10 @@ def _told(
 
 
 def _half_work(machine: Machine, before: State, after: State, step: Step) -> NDArray:
-    """Return the (k,) [J] work of a linear step, by its wrenches and openings.
+    """Return the work (k,) [J] of a linear step from its wrenches and openings.
 
-    It is half of the wrench that a step adds, or that a release removes, times the
-    motion against it; NaN for steps that do neither.
+    The work is half the wrench that a step adds, or that a release removes, times the
+    motion against this wrench. It is NaN for steps of other kinds.
     """
     if step.name in after.holds:
         hold, multipliers = after.holds[step.name], after.multipliers()[step.name]
@@ -299,7 +301,7 @@ def _half_work(machine: Machine, before: State, after: State, step: Step) -> NDA
 
 
 def _spring_back(machine: Machine, before: State, after: State, step: Step) -> NDArray:
-    """Return the (k, 6) [rad, m] motion of the last hold that a step releases."""
+    """Return the motion (k, 6) [rad, m] of the last part that a step releases."""
     motion = np.zeros((len(after.errors), 6))
     released = step.steps if isinstance(step, Release) else ()
     for name in released:

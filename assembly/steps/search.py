@@ -1,14 +1,15 @@
-"""The order in which parts are joined: which one needs the least force or error.
+"""Search for the best order of joining: least force, least energy or least error.
 
-Only steps that join or adjust are permuted, among themselves and between the other
-steps.  An adjustment to a closure stays on its side of the step that joins it.  If no
-step holds what it finds, the state after each depends only on the set
-joined so far; the least peak force is a shortest path over the 2^n sets, with the
-largest force in place of the sum.  The path is searched from its end, because the state
-of a set has the closing forces of all its parts.  If joints are bolted as they lie, the
-orders are searched by branch and bound: the peak force never falls, and the energy is
-at least that of the state with all pinned parts joined and the locked ones left open.
-The least error has no bound.
+Only steps that join or adjust are permuted, within each sequence between other steps.
+An adjustment of a closure stays before, or after, the step that joins this closure.  If
+no step locks in a position that it finds, the state depends only on the set of parts
+joined so far. The least peak force is then a shortest path over the 2^n sets, in which
+the maximum replaces the sum.  The path is searched from its end, because the state of
+a set contains the closing forces of all its parts.  If joints are bolted as they lie,
+the orders are searched by branch and bound. The bounds are that the peak force never
+decreases, and that the energy is at least the energy of the state in which all pinned
+parts are joined and the locked ones are left open.  For the least error, no bound
+exists.
 """
 
 from collections.abc import Callable
@@ -34,26 +35,26 @@ from forcefit.inputs.table import BadInput, quoted
 
 Objective = Literal["force", "energy", "error"]
 OBJECTIVES: tuple[Objective, ...] = ("force", "energy", "error")
-_EQUAL = 1e-9  # share by which an order must be better than the given one
-MOST_STATES = 200_000  # states that are computed: some minutes
+_EQUAL = 1e-9  # relative improvement from which another order replaces the given one
+MOST_STATES = 200_000  # largest number of states computed, which takes some minutes
 
 
-# a partial order: its state, its peak force, steps done and left
+# a partial order: state, peak force, steps done and steps left
 _Partial = tuple[State, float, tuple[Step, ...], tuple[Step, ...]]
 
 
 @dataclass(frozen=True)
 class BestOrder:
-    """The best order of a plan.
+    """The best order of the steps of a plan.
 
     Attributes:
-        plan: the plan in that order, with the changes of its adjustments.
-        value: of the objective [N, J or m].
-        bound: lower bound over all orders; equal to ``value`` where all were searched,
-            0 where other changes of the adjustments than those of their readings were
-            found to be better.
-        given: value of the plan as given; inf if it cannot be assembled.
-        searched: number of sets or of partial orders that were computed.
+        plan: the plan in the best order, with the changes of its adjustments.
+        value: value of the objective [N, J or m].
+        bound: lower bound over all orders. It equals ``value`` if all orders were
+            searched. It is 0 if changes of the adjustments other than those that
+            minimise the readings were found to be better.
+        given: value for the order of the given plan; inf if it cannot be assembled.
+        searched: number of sets, or of partial orders, that were computed.
         method: ``"sets"`` or ``"orders"``.
     """
 
@@ -73,20 +74,20 @@ def best_order(
     progress: Callable[[int], None] = lambda done: None,
     most: int = MOST_STATES,
 ) -> BestOrder:
-    """Return the order of the joining steps with the least value of an objective.
+    """Return the order of the joining steps that minimises an objective.
 
     Args:
-        plan: the steps; runs of consecutive joins and adjustments are permuted.
+        plan: the steps; consecutive joins and adjustments are permuted.
         posture: pose at which the robot is assembled.
-        objective: ``"force"`` [N], the largest closing force of a step; ``"energy"``
-            [J], stored at the end; ``"error"`` [m], the translation of the platform at
-            the end.
-        gravity: (3,) [m/s^2] base axes.
-        progress: called with the number of states computed.
-        most: number of states after which a search ends with a bound.
+        objective: ``"force"`` [N], the largest closing force of any step; ``"energy"``
+            [J], the energy stored at the end; ``"error"`` [m], the translation of the
+            platform at the end.
+        gravity: (3,) [m/s^2] gravity in base axes.
+        progress: called with the number of computed states.
+        most: number of states after which the search ends with a bound.
 
     Returns:
-        The order, with a bound.
+        The best order found, with a bound.
 
     Raises:
         BadInput: the plan does not fit the robot, or no order can be assembled.
@@ -117,7 +118,7 @@ def best_order(
 
 @dataclass(eq=False)
 class _Search:
-    """A search: the machine, its objective and the number of states computed."""
+    """A search: machine, objective and number of computed states."""
 
     machine: Machine
     objective: Objective
@@ -126,7 +127,7 @@ class _Search:
     done: int = 0
 
     def carry_out(self, state: State, step: Step) -> tuple[State, StepResult] | None:
-        """Return a step carried out; None if it cannot be."""
+        """Carry out a step and return the result; None if it cannot be assembled."""
         self.done += 1
         self.progress(self.done)
         try:
@@ -137,7 +138,7 @@ class _Search:
     def closing_forces(
         self, start: State, run: list[Step], chosen: int
     ) -> list[tuple[int, float]]:
-        """Return the [N] closing force of each part of a set, were it joined last."""
+        """Return the closing force [N] of each part of a set if it is joined last."""
         self.done += 1
         self.progress(self.done)
         joined = [k for k in range(len(run)) if chosen >> k & 1]
@@ -158,7 +159,7 @@ class _Search:
         return list(zip(joined, forces, strict=True))
 
     def value(self, peak: float, state: State) -> float:
-        """Return the objective of a state that was reached with a peak force."""
+        """Return the objective of a state reached with a given peak force."""
         if self.objective == "force":
             return peak
         if self.objective == "energy":
@@ -167,7 +168,7 @@ class _Search:
         return float(np.linalg.norm(screw[3:]))
 
     def bound(self, peak: float, state: State, left: tuple[Step, ...]) -> float:
-        """Return a lower bound of the objective after the steps that are left."""
+        """Return a lower bound of the objective after the remaining steps."""
         if self.objective == "force":
             return peak
         joins = [step for step in left if isinstance(step, Join)]
@@ -184,7 +185,7 @@ class _Search:
         return float(closed.found.energy[0])
 
     def value_of(self, state: State, steps: tuple[Step, ...]) -> float:
-        """Return the objective of steps in their order; inf if they cannot be."""
+        """Return the objective of steps in the given order; inf if not possible."""
         peak = 0.0
         for step in steps:
             found = self.carry_out(state, step)
@@ -195,14 +196,14 @@ class _Search:
 
 
 def _force(result: StepResult) -> float:
-    """Return the [N] closing force of a step; 0 if it does not join."""
+    """Return the closing force [N] of a step; 0 if the step joins nothing."""
     return float(result.closing_force[0]) if isinstance(result.step, Join) else 0.0
 
 
 def _over_sets(
     search: _Search, state: State, runs: list[list[Step]], given: float
 ) -> BestOrder:
-    """Return the best order where the state depends only on the set joined."""
+    """Return the best order if the state depends only on the set of joined parts."""
     steps: list[Step] = []
     peak = bound = 0.0
     for run in runs:
@@ -223,12 +224,12 @@ def _over_sets(
 def _bottleneck(
     search: _Search, start: State, run: list[Step]
 ) -> tuple[list[Step], float, float]:
-    """Return the order of one run with the least peak force, that force and its bound.
+    """Return the order of one sequence with the least peak force, force and bound.
 
-    The search goes backwards, from the set of all parts, by increasing peak force: one
-    equilibrium has the closing forces of all parts that may have been joined last.
-    After the largest number of states, or Ctrl-C, the part that needs the least force
-    comes last each time.
+    The search goes backwards from the set of all parts, by increasing peak force: one
+    equilibrium contains the closing forces of all parts that may have been joined last.
+    After the largest number of states, or after Ctrl-C, the part that needs the least
+    force is always placed last.
     """
     chosen = (1 << len(run)) - 1
     best, later = {chosen: 0.0}, {chosen: -1}
@@ -256,7 +257,7 @@ def _bottleneck(
 
 
 def _joined_after(chosen: int, later: dict[int, int]) -> list[int]:
-    """Return the parts joined after a set, in order."""
+    """Return the parts joined after a set, in the order of joining."""
     order = []
     while (k := later[chosen]) >= 0:
         order.append(k)
@@ -265,14 +266,14 @@ def _joined_after(chosen: int, later: dict[int, int]) -> list[int]:
 
 
 def _over_orders(search: _Search, start: State, plan: Plan, given: float) -> BestOrder:
-    """Return the best order by depth first search with bounds.
+    """Return the best order by depth-first branch and bound.
 
-    After the largest number of states, or Ctrl-C, the orders not yet searched count
-    with their bounds.
+    After the largest number of states, or after Ctrl-C, the bounds of the orders that
+    were not searched enter the bound of the result.
 
     Raises:
         BadInput: no order can be assembled.
-        KeyboardInterrupt: Ctrl-C before an order was found.
+        KeyboardInterrupt: Ctrl-C was pressed before an order was found.
     """
     best, value = plan.steps, given
     stack: list[_Partial] = [(start, 0.0, (), plan.steps)]
@@ -284,7 +285,7 @@ def _over_orders(search: _Search, start: State, plan: Plan, given: float) -> Bes
             children = []
             if left and search.bound(peak, state, left) < value:
                 children = _children(search, *stack[-1])
-            # the most promising one is searched first
+            # the most promising partial order is searched first
             stack[-1:] = sorted(children, key=lambda c: -search.value(c[1], c[0]))
     except KeyboardInterrupt:
         if value == inf:
@@ -302,7 +303,7 @@ def _children(
     search: _Search, state: State, peak: float, done: tuple[Step, ...],
     left: tuple[Step, ...],
 ) -> list[_Partial]:  # fmt: skip
-    """Return a partial order continued by each step that may come next."""
+    """Return a partial order, extended by each step that may come next."""
     children = []
     for step, others in choices(left):
         found = search.carry_out(state, step)

@@ -1,4 +1,4 @@
-"""The state of a partly assembled machine: what holds it, and its equilibrium."""
+"""The state of a partly assembled machine: rows that hold, and the equilibrium."""
 
 from dataclasses import dataclass, field, replace
 
@@ -25,13 +25,13 @@ from forcefit.assembly.steps.plan import (
 
 @dataclass(frozen=True, eq=False)
 class Hold:
-    """Rows of one joined closure or of one fixture.
+    """The rows of one joined closure or of one fixture.
 
     Attributes:
-        rows: (m, 6n) on the frames' screws, lengths in reference lengths.
+        rows: (m, 6n) rows on the frames' screws, lengths in reference lengths.
         right: (k, m) right sides.
-        roots: (m, nf) of the fixture's springs.
-        part: frame or closure in whose axes the rows are.
+        roots: (m, nf) columns of the fixture's springs.
+        part: frame or closure whose axes the rows refer to.
         components: (m,) components of the screw.
     """
 
@@ -44,14 +44,14 @@ class Hold:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A partly assembled machine; k of them.
+    """The state of k partly assembled machines.
 
     Attributes:
-        errors: (k, 6n) [rad, m] geometric errors, adjustments included.
+        errors: (k, 6n) [rad, m] geometric errors, including adjustments.
         found: springs, clearances, free motions and multipliers.
-        holds: closures and fixtures that hold, by step.
-        loads: loads that act, by step.
-        bolted: by step, the frame whose joint is bolted as it lies.
+        holds: rows of closures and fixtures, by the name of the step.
+        loads: loads that act, by the name of the step.
+        bolted: frame whose joint is bolted as it lies, by the name of the step.
     """
 
     errors: NDArray
@@ -65,7 +65,7 @@ class State:
         return not machine.movable((), tuple(self.bolted.values()), 1)[1].any()
 
     def multipliers(self) -> dict[str, NDArray]:
-        """Return the (k, m) multipliers of each hold."""
+        """Return the multipliers (k, m) of each hold."""
         ends = np.cumsum([len(hold.rows) for hold in self.holds.values()])[:-1]
         parts = np.split(self.found.multipliers, ends, axis=1) if self.holds else []
         return dict(zip(self.holds, parts, strict=True))
@@ -78,7 +78,7 @@ def first_state(
 
     Args:
         machine: columns and rows of the robot.
-        plan: the steps; closures that they do not join are closed.
+        plan: the steps; closures that no step joins are closed.
         errors: see :func:`assemble_in_steps`.
         gravity: see :func:`assemble_in_steps`.
 
@@ -110,14 +110,14 @@ def first_state(
 
 
 def settle(machine: Machine, state: State) -> State:
-    """Return the equilibrium of what is held, from the last state.
+    """Return the equilibrium of a state, closest to the preceding equilibrium.
 
     Args:
         machine: columns and rows of the robot.
-        state: holds, loads and errors; its unknowns are those of the last state.
+        state: new holds, loads and errors, with the unknowns of the preceding state.
 
     Returns:
-        The same with its unknowns at equilibrium.
+        The state with its unknowns at equilibrium.
     """
     k, held = len(state.errors), list(state.holds.values())
     rows = np.vstack([np.zeros((0, state.errors.shape[1])), *(h.rows for h in held)])
@@ -141,7 +141,7 @@ def settle(machine: Machine, state: State) -> State:
 
 
 def _blocks(blocks: list[NDArray], count: int) -> NDArray:
-    """Return the springs of all fixtures as columns of all rows."""
+    """Return the springs of all fixtures as a block matrix on the rows of all holds."""
     columns = np.zeros((count, sum(block.shape[1] for block in blocks)))
     row = column = 0
     for block in blocks:
@@ -177,12 +177,12 @@ def fixture_rows(machine: Machine, state: State, step: Fix) -> Hold:
 
 
 def with_hold(state: State, name: str, hold: Hold) -> State:
-    """Return the state with one more hold, before it settles."""
+    """Return the state with an additional hold, before its equilibrium."""
     return replace(state, holds=state.holds | {name: hold})
 
 
 def without(state: State, names: tuple[str, ...]) -> State:
-    """Return the state without what earlier steps hold, before it settles."""
+    """Return the state without the holds of some steps, before its equilibrium."""
 
     def kept(given: dict) -> dict:
         return {name: value for name, value in given.items() if name not in names}
@@ -194,7 +194,7 @@ def without(state: State, names: tuple[str, ...]) -> State:
 
 
 def reading_of(machine: Machine, state: State, step: Measure) -> NDArray:
-    """Return the (k, p) [rad or m] readings of a measurement."""
+    """Return the readings (k, p) [rad or m] of a measurement."""
     chosen = rows_of(step.components)
     if isinstance(step.part, str):
         rows = machine.rows(step.part)

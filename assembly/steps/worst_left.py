@@ -1,20 +1,22 @@
-"""The worst position in which a fitter can leave a bolted joint (``left = "worst"``).
+"""Worst position in which a fitter can leave a bolted joint (``left = "worst"``).
 
-All positions of least energy where the joint is bolted are a convex set of clearances
-u.  At another pose the clearance stays locked in as an error, and the platform's screw
-is
+At the pose where the joint is bolted, all positions of least energy form a convex set
+of clearances u.  At another pose, the locked-in clearance acts like an error, and the
+platform's screw is
 
     x = x0 + X (u - u0) + V (v - v0),
 
-linear in u and in the clearances v that are loose there.  Its largest rotation and
+which is linear in u and in the clearances v that are loose at that pose.  The largest
+rotation and translation over the set are found by convex maximisation, as intervals
+between a value attained and a certified bound:
 translation over the set are convex maximisations: certified brackets.
 
 ======================  ================================================================
 loose clearances        largest error
 ======================  ================================================================
-none, or no springs     attained within the bracket's width: all u and v that close
-with springs            v follows from the least energy, so that the bracket over all v
-                        is an upper bound; equilibria at its corners are attained
+none, or no springs     attained within the interval: all u and v that close the loops
+with springs            v follows from the least energy, so the maximum over all v is an
+                        upper bound; equilibria at its corners are attained
 ======================  ================================================================
 """
 
@@ -41,8 +43,8 @@ from forcefit.assembly.steps.left_anywhere import free_positions
 from forcefit.assembly.steps.machine import Machine
 from forcefit.stiffness.screws import skew
 
-_TOLERANCE = 5e-4  # width of a bracket relative to the largest support along an axis
-_ROUNDING = 1e-10  # size of a row relative to the largest, below which it is rounding
+_TOLERANCE = 5e-4  # width of an interval relative to the largest support along an axis
+_ROUNDING = 1e-10  # rows below this share of the largest row are rounding errors
 
 CONVEX = "the largest of all positions of least energy; a convex set, certified"
 BRACKET = (
@@ -57,7 +59,7 @@ class WorstLeft:
 
     Attributes:
         rotation: (2,) [rad] value attained and certified upper bound.
-        translation: (2,) [m] the same of the translation.
+        translation: (2,) [m] value attained and certified upper bound.
         assumption: :data:`CONVEX` or :data:`BRACKET`.
     """
 
@@ -71,9 +73,9 @@ class _Response(NamedTuple):
 
     Attributes:
         joints: columns of the clearances.
-        screws: (6, 6n) [rad, m] platform's screw, of errors.
-        rigid: (p, 6n) rows that must be zero: no spring closes them.
-        elastic: whether clearances load springs.
+        screws: (6, 6n) [rad, m] map from the errors to the platform's screw.
+        rigid: (p, 6n) rows that must be zero, because no spring closes them.
+        elastic: whether clearances deform springs.
     """
 
     joints: VirtualJoints
@@ -84,15 +86,15 @@ class _Response(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Positions:
-    """Positions w = (u, v) of clearances in unit cones with rows (w - start) = 0.
+    """Positions w = (u, v) of clearances in unit cones, with rows (w - start) = 0.
 
     Attributes:
-        start: (nw,) one of them.
-        rows: (p, nw) orthonormal.
-        group: (nw,) cone of each clearance.
+        start: (nw,) one of these positions.
+        rows: (p, nw) orthonormal rows.
+        group: (nw,) cone number of each clearance.
         screws: (6, nw) [rad, m] map to the platform's screw.
         errors: (6n, nw) [rad, m] map to the errors locked in.
-        centre: (6,) [rad, m] platform's screw at the start.
+        centre: (6,) [rad, m] platform's screw at ``start``.
     """
 
     start: NDArray
@@ -104,24 +106,25 @@ class _Positions:
 
 
 def is_left_worst(robot: Robot) -> bool:
-    """Return whether a joint of a robot is bolted in the worst position."""
+    """Return whether a robot contains a joint with ``left = "worst"``."""
     bolts = [frame.locked_at for frame in robot.frames]
     return any(bolt is not None and bolt.left == "worst" for bolt in bolts)
 
 
 def worst_left(posture: Posture, offset: ArrayLike = (0.0, 0.0, 0.0)) -> WorstLeft:
-    """Return the largest pose error over where a fitter may leave bolted joints.
+    """Return the largest pose error over all positions of joints with worst bolting.
 
     Args:
-        posture: pose of a robot with a joint that is left ``"worst"``; no loads.
-        offset: (3,) [m] from the platform's origin to the point whose translation is
-            bounded, base axes.
+        posture: posture of a robot with a joint that has ``left = "worst"``, without
+            loads.
+        offset: (3,) [m] vector from the platform's origin to the point whose
+            translation is bounded, base axes.
 
     Returns:
-        The brackets of rotation and translation.
+        Value attained and certified bound of the rotation and of the translation.
 
     Raises:
-        BadInput: another joint is bolted after those that are left worst.
+        BadInput: another joint is bolted after those with ``left = "worst"``.
         CannotAssemble: the robot cannot be assembled at the posture.
     """
     response = _response(posture)
@@ -137,7 +140,7 @@ def worst_left(posture: Posture, offset: ArrayLike = (0.0, 0.0, 0.0)) -> WorstLe
 
 
 def _response(posture: Posture) -> _Response:
-    """Return the response of a posture without loads to errors."""
+    """Return the linear response of an unloaded posture to errors."""
     robot = posture.robot
     lin, joints = linearise(posture), virtual_joints(robot)
     reduced = reduce_problem(lin, joints, no_loads(robot.errors.size))
@@ -154,7 +157,7 @@ def _response(posture: Posture) -> _Response:
 
 
 def _positions(posture: Posture, response: _Response, offset: NDArray) -> _Positions:
-    """Return the positions of bolted and loose clearances, and their screws."""
+    """Return the set of positions of bolted and loose clearances, with their screws."""
     robot, cones = posture.robot, response.joints.cones
     frames, machine, state = last_bolt(robot)
     u, free, Z = free_positions(machine, state, 0)
@@ -182,13 +185,13 @@ def _positions(posture: Posture, response: _Response, offset: NDArray) -> _Posit
 
 
 def _locked_in(machine: Machine, frames: list[int]) -> NDArray:
-    """Return the (6n, nu) map from clearances to the errors of the bolted frames."""
+    """Return the map (6n, nu) from clearances to the errors of the bolted frames."""
     bolted = np.isin(np.arange(len(machine.cones)) // 6, frames)
     return machine.cones * bolted[:, None]
 
 
 def _largest(at: _Positions, half: int) -> tuple[tuple[float, float], list[NDArray]]:
-    """Bracket the largest half screw; return the corners that were met, too."""
+    """Bracket the largest rotation or translation; also return the corners visited."""
     corners: list[NDArray] = [at.start]
     starts, right = cone_starts(at.group), (at.rows @ at.start)[None]
 
@@ -219,7 +222,7 @@ def _attained(
     posture: Posture, at: _Positions, corners: list[NDArray], half: int,
     offset: ArrayLike,
 ) -> float:  # fmt: skip
-    """Return the largest error of equilibria with the joints bolted in the corners."""
+    """Return the largest error of equilibria with the joints bolted at the corners."""
     moved = (np.array(corners) - at.start) @ at.errors.T
     errors = posture.robot.errors + moved.reshape(len(moved), -1, 6)
     bounds = bound_pose_error(solve_assembly(posture, errors=errors), offset=offset)

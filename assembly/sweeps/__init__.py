@@ -1,4 +1,4 @@
-"""Sweeps: the same quantities at many postures, designs and draws, in one file.
+"""Sweeps: quantities of a robot at many postures, designs and draws, in one file.
 
-Begin at ``request.py`` for the options, and at ``sweep.py`` for the solution.
+Start with ``request.py`` for the options, ``sweep.py`` for the solution.
 """

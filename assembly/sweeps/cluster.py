@@ -1,11 +1,11 @@
 """Parallel solution of a sweep with Dask, on this machine or on a cluster.
 
-The client keeps a few tasks in flight for each worker and writes their results to the
-journal.  So neither the client nor a worker ever holds more than a few blocks.  A task
-has as many blocks as take about half a second, fewer towards the end, so that workers
-finish together.  Dask reassigns the tasks of a lost worker.  The distribution of blocks
-changes no result: each process computes on one thread, and points do not depend on
-their neighbours.
+The client submits a few tasks per worker at a time and writes their results to the
+journal, so the client and every worker hold only a few blocks in memory.  A task
+contains as many blocks as can be solved in about half a second. The last tasks are
+smaller, so that workers finish at nearly the same time.  Dask reassigns the tasks of a
+lost worker.  The distribution of blocks does not change any result, because each
+process computes on one thread and points do not depend on neighbouring points.
 """
 
 import logging
@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     import distributed
 
 _TASK = 0.5  # [s] target duration of a task; Dask recommends at least 0.1
-_IN_FLIGHT = 3  # number of tasks for each thread of the cluster
-_LARGEST = 256  # largest number of blocks in a task
-_LAST = 2  # number of tasks for each thread into which the last blocks are divided
+_IN_FLIGHT = 3  # number of submitted tasks per thread of the cluster
+_LARGEST = 256  # largest number of blocks per task
+_LAST = 2  # number of tasks per thread into which the last blocks are divided
 # Dask's profiler samples every 10 ms, which makes workers a thirtieth slower
 _QUIET = {"distributed.worker.profile.enabled": False}
 _PATIENCE = 60.0  # [s] longest wait for the first worker
@@ -51,12 +51,14 @@ def cluster_solver(
     """Return a solver for :func:`.sweep.run_sweep` on a cluster.
 
     Args:
-        workers: number of processes of a cluster that is started here, or
+        workers: number of processes of a local cluster to start; None if
+            ``scheduler`` is given.
         scheduler: address of a running cluster, such as ``tcp://10.0.0.1:8786``.
-        report: function called at the end with a line: number of tasks, median time.
+        report: function called at the end with a line on the number and median duration
+            of the tasks.
 
     Returns:
-        The solver; the cluster is connected or started when the solver begins.
+        The solver, which connects to the cluster or starts it when it is first used.
     """
 
     def solve(
@@ -65,7 +67,7 @@ def cluster_solver(
         import dask
         from distributed import Client, LocalCluster
 
-        # failures are reported by the sweep, in one message
+        # the sweep reports failures in one message
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
         if scheduler is not None:
             with _connected(scheduler) as client:
@@ -84,7 +86,7 @@ def cluster_solver(
 
 @contextmanager
 def _without_interrupts() -> Generator[None, None, None]:
-    """Make processes started in the block ignore Ctrl-C; the sweep ends them."""
+    """Let processes started in the block ignore Ctrl-C; the sweep terminates them."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -114,7 +116,7 @@ def _distribute_connected(
     blocks: list[int],
     report: Callable[[str], None],
 ) -> Iterator[tuple[int, SolvedPoints]]:
-    """Distribute blocks; report a loss of the scheduler in one message."""
+    """Distribute blocks; if the scheduler is lost, raise one error that says so."""
     from distributed.comm import CommClosedError
 
     try:
@@ -132,7 +134,7 @@ def _distribute(
     blocks: list[int],
     report: Callable[[str], None],
 ) -> Iterator[tuple[int, SolvedPoints]]:
-    """Distribute blocks as workers become free, and yield results in any order."""
+    """Submit blocks as workers become free, and yield results in any order."""
     from distributed import KilledWorker, as_completed
 
     _check_workers(client)
@@ -174,17 +176,17 @@ def _distribute(
 
 
 def _threads(client: "distributed.Client") -> int:
-    """Return the present number of threads of all workers, because clusters change."""
+    """Return the current number of threads of all workers; clusters may change."""
     from distributed.comm import CommClosedError
 
     try:
         return max(1, sum(client.nthreads().values()))
-    except OSError as error:  # a lost scheduler refuses this query too
+    except OSError as error:  # a lost scheduler also fails to answer this query
         raise CommClosedError(str(error)) from error
 
 
 def _check_workers(client: "distributed.Client") -> None:
-    """Reject a cluster without workers, or with workers of another program version."""
+    """Reject a cluster without workers or with workers of another program version."""
     try:
         client.wait_for_workers(1, timeout=_PATIENCE)
     except TimeoutError:
@@ -202,7 +204,7 @@ def _check_workers(client: "distributed.Client") -> None:
 
 
 def _program() -> dict[str, str]:
-    """Return version of this program, and the digest of its sources and libraries."""
+    """Return the program's version, and the digest of its sources and libraries."""
     return {
         "program": f"forcefit {version('forcefit')}",
         "program_sha256": program_hash(),
@@ -212,15 +214,15 @@ def _program() -> dict[str, str]:
 def solve_task(
     question: bytes, digest: str, tasks: list[Task]
 ) -> tuple[float, list[tuple[int, SolvedPoints]]]:
-    """Solve some blocks on one thread of a worker.
+    """Solve the blocks of a task on one thread of a worker.
 
     Args:
-        question: pickled question of the sweep.
-        digest: digest of the question on the client.
+        question: pickled quantities of the sweep.
+        digest: digest of these quantities on the client.
         tasks: number and points of each block.
 
     Returns:
-        Time of computation [s], and the number of each block with its results.
+        Computation time [s], and the number of each block with its results.
 
     Raises:
         BadInput: the digest on this worker differs, because a mesh or a library
@@ -237,7 +239,7 @@ def solve_task(
 
 @lru_cache(maxsize=4)
 def _question(content: bytes, digest: str) -> Question:
-    """Return question, unpickled once on each worker; robots are cached by identity."""
+    """Return the unpickled quantities, cached because robots are cached by identity."""
     asked: Question = pickle.loads(content)
     question = replace(asked, robot=solve_links(asked.robot))
     if question_hash(question) != digest:

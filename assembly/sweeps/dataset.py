@@ -1,7 +1,7 @@
 """Results of a sweep as an xarray data set, in memory or in a NetCDF file.
 
-A file is written from the journal block by block, so the memory is bounded.  The bytes
-of the file depend on the sweep only.
+A file is written from the journal block by block, which limits the memory used.  The
+bytes of the file depend only on the sweep.
 """
 
 import os
@@ -29,21 +29,21 @@ if TYPE_CHECKING:
     from forcefit.assembly.sweeps.plan import Sweep
 
 Texts = dict[str, dict[int, str]]
-# kinds of files that commands write, and the attribute that identifies each kind
+# kinds of files that commands write, and the attribute that marks each kind
 KINDS = {
     "a sweep": "near", "draws": "sources_and_posture_sha256", "tolerances": "cost_law",
     "a path": "path_law",
 }  # fmt: skip
 _TEXT = {name: QUANTITIES[name].meaning for name in ("status", *TEXTS)}
 _TEXT["status"] += ": " + ", ".join(OF_POINTS[1:])
-# names in files of older releases, with the present names
+# names in files of older releases, with their present names
 _OLD_NAMES = {
     "rotation_error_play": "rotation_error_clearance",
     "translation_error_play": "translation_error_clearance",
     "play_mixed": "clearance_mixed",
 }
 _OLD_ATTRIBUTES = {"play": "clearance", "reading": "assumption"}
-# number of blocks written together; a write takes as long as solving a hundred points
+# number of blocks per write; a write takes as long as solving a hundred points
 _TOGETHER = 256
 
 
@@ -53,7 +53,7 @@ def sweep_dataset(sweep: "Sweep", records: NDArray, texts: Texts) -> "xarray.Dat
     Args:
         sweep: sweep to which the results belong.
         records: (points,) records of all points.
-        texts: texts by name: for each, the text of the points that have one.
+        texts: for each name, the texts of those points that have one.
 
     Returns:
         The data set; units are in the attribute ``units``.
@@ -77,12 +77,12 @@ def sweep_dataset(sweep: "Sweep", records: NDArray, texts: Texts) -> "xarray.Dat
 def write_sweep(
     sweep: "Sweep", read: Callable[[int], tuple[NDArray, Texts]], path: Path
 ) -> None:
-    """Write the data set of a whole sweep as a NetCDF file, completely or not at all.
+    """Write the data set of a sweep as a NetCDF file, either completely or not at all.
 
     Args:
         sweep: sweep to which the results belong.
         read: function that returns the records and texts of a block.
-        path: path of the file; an old file is replaced only by a complete one.
+        path: path of the file; an existing file is replaced only by a complete one.
 
     Raises:
         BadInput: the file cannot be written.
@@ -94,7 +94,7 @@ def write_sweep(
 def _write(
     sweep: "Sweep", read: Callable[[int], tuple[NDArray, Texts]], file: Any
 ) -> None:
-    """Write the file, from its coordinates to its last block."""
+    """Write the file, first the coordinates, then block after block."""
     import h5py
 
     text = h5py.string_dtype()
@@ -141,7 +141,7 @@ def _put(variable: Any, shape: tuple[int, ...], first: int, values: NDArray) -> 
 
 
 def slabs(shape: tuple[int, ...], first: int, last: int) -> Iterator[tuple[slice, ...]]:
-    """Yield boxes that together hold the points ``first`` .. ``last - 1`` of an array.
+    """Yield boxes of an array that together contain points ``first`` to ``last - 1``.
 
     Args:
         shape: shape of the array.
@@ -149,7 +149,7 @@ def slabs(shape: tuple[int, ...], first: int, last: int) -> Iterator[tuple[slice
         last: number after the last point.
 
     Yields:
-        A slice for each axis; the boxes follow each other in the order of the points.
+        A slice for each axis; the boxes are in the order of the points.
     """
     if len(shape) == 1:
         yield (slice(first, last),)
@@ -170,7 +170,7 @@ def slabs(shape: tuple[int, ...], first: int, last: int) -> Iterator[tuple[slice
 
 
 def _joined(blocks: list[tuple[NDArray, Texts]]) -> tuple[NDArray, Texts]:
-    """Return the blocks joined one after the other."""
+    """Concatenate blocks and return them as one block."""
     texts: Texts = {name: {} for name in TEXTS}
     start = 0
     for records, texts_of_block in blocks:
@@ -183,7 +183,7 @@ def _joined(blocks: list[tuple[NDArray, Texts]]) -> tuple[NDArray, Texts]:
 
 
 def _text_column(name: str, records: NDArray, texts: Texts) -> NDArray:
-    """Return the (k,) texts of a variable as objects."""
+    """Return the texts (k,) of a variable as an object array."""
     if name == "status":
         return np.array(OF_POINTS, dtype=object)[records["status"]]
     column = np.full(len(records), "", dtype=object)
@@ -214,11 +214,11 @@ def _coordinates(sweep: "Sweep") -> dict[str, tuple[tuple[str, ...], NDArray, di
 
 
 def save_dataset(data: "xarray.Dataset", path: Path | str) -> None:
-    """Write a data set as NetCDF, completely or not at all.
+    """Write a data set as NetCDF, either completely or not at all.
 
     Args:
         data: data set to write.
-        path: path of the file; an old file is replaced only by a complete one.
+        path: path of the file; an existing file is replaced only by a complete one.
 
     Raises:
         BadInput: the file cannot be written.
@@ -230,7 +230,7 @@ def save_dataset(data: "xarray.Dataset", path: Path | str) -> None:
 
 
 def check_dataset(path: Path | str, what: str) -> None:
-    """Raise an error before the computation if a NetCDF file could not be written.
+    """Raise an error before the computation if a NetCDF file cannot be written.
 
     Args:
         path: path of the file that will be written.
@@ -251,7 +251,7 @@ def check_dataset(path: Path | str, what: str) -> None:
 
 
 def _is(path: Path, what: str) -> bool:
-    """Return whether a file's attributes identify it as one of forcefit's kinds."""
+    """Return whether the attributes of a file mark it as the given kind."""
     import h5py
 
     try:
@@ -264,13 +264,13 @@ def _is(path: Path, what: str) -> bool:
 
 
 def open_dataset(path: Path | str) -> "xarray.Dataset":
-    """Return a data set from its file.
+    """Return the data set that a NetCDF file contains.
 
     Args:
         path: path of a NetCDF file.
 
     Returns:
-        The data set, all in memory.
+        The data set, loaded into memory.
 
     Raises:
         BadInput: the file is absent, or is not a NetCDF file.
@@ -284,14 +284,14 @@ def open_dataset(path: Path | str) -> "xarray.Dataset":
     check_heaps(path)
     try:
         data = xarray.load_dataset(path, engine="h5netcdf")
-    except Exception as error:  # for a damaged file HDF5 raises various exceptions
+    except Exception as error:  # HDF5 raises various exceptions for damaged files
         reason = str(error).partition("\n")[0][:200]
         raise BadInput(f"{path}: cannot be read as NetCDF: {reason}") from None
     return _with_new_names(data)
 
 
 def _with_new_names(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Return a data set of an older release with the present names."""
+    """Return a data set of an older release with present variable names."""
     old = {name: new for name, new in _OLD_NAMES.items() if name in data.data_vars}
     data.attrs = {_OLD_ATTRIBUTES.get(str(k), k): v for k, v in data.attrs.items()}
     return data.rename_vars(old)

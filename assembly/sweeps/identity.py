@@ -1,6 +1,6 @@
-"""Digests that identify results: of the program, the robot and the question.
+"""Digests that identify results, of the program, the robot and the computed quantities.
 
-Each digest is a SHA-256, which journals and the workers of a cluster compare.
+Each digest is a SHA-256. Journals and the workers of a cluster compare the digests.
 """
 
 import hashlib
@@ -25,22 +25,23 @@ from forcefit.assembly.model.robot import LibraryLink, MeshLink, Robot
 from forcefit.assembly.sweeps.parameters import Design
 from forcefit.inputs.program import sources_hash
 
-# libraries on which the results depend; another version may round differently
+# libraries that affect the results; another version may round differently
 _LIBRARIES = ("numpy", "scipy", "clarabel")
 
 
 @cache
 def program_hash() -> str:
-    """Return SHA-256 of the program's sources and of the versions of its libraries."""
+    """Return the SHA-256 of the program's sources and its libraries' versions."""
     packages = forcefit.inputs, forcefit.stiffness, forcefit.assembly
     own = sources_hash(packages, _LIBRARIES)
     return hashlib.sha256((own + kernels.sources).encode()).hexdigest()
 
 
 def robot_hash(robot: Robot) -> str:
-    """Return the SHA-256 of a robot's file content, and of what the file names.
+    """Return the SHA-256 of a robot file and of all that the file refers to.
 
-    These are meshes, libraries, and versions of effects of other distributions.
+    A robot file may refer to meshes, stiffness libraries, and effects of other
+    packages, which enter with their version.
 
     Args:
         robot: the robot.
@@ -60,12 +61,12 @@ def robot_hash(robot: Robot) -> str:
         if isinstance(frame.link, LibraryLink):
             digest.update(link_compliance(frame).tobytes())
     for name in (*robot.effects, *chain(*robot.session_effects.values())):
-        digest.update(LIBRARY.version(name).encode())  # empty for effects of forcefit
+        digest.update(LIBRARY.version(name).encode())  # empty for forcefit's effects
     return digest.hexdigest()
 
 
 def question_hash(question: Any) -> str:
-    """Return the SHA-256 of a question: of every attribute with its name.
+    """Return the SHA-256 of an object from the names and values of its attributes.
 
     Args:
         question: plain values, arrays, robots, designs and dataclasses of these.
@@ -77,10 +78,10 @@ def question_hash(question: Any) -> str:
 
 
 def _as_json(value: Any) -> Any:
-    """Return a value in terms of JSON, so that different values differ."""
+    """Return a value as JSON-serializable data, different for different values."""
     if isinstance(value, Robot):
         return ["robot", robot_hash(value)]
-    if isinstance(value, Design):  # independent of the path of the design's file
+    if isinstance(value, Design):  # the path of the design's file does not matter
         return ["design", _as_json(value.content)]
     if isinstance(value, np.ndarray):
         content = np.ascontiguousarray(value)

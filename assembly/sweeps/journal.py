@@ -1,11 +1,12 @@
-"""Journal of a sweep: finished blocks on disk, protected against an interruption.
+"""Journal of a sweep: a file of finished blocks that survives an interruption.
 
-The file begins with one line of JSON that identifies the sweep, with a check sum.
-Records follow, each appended by one write: number of a block, its length and a check
-sum, then its rows and texts.  Each check sum continues that of the first line, so that
-every record identifies its sweep.  Records with a wrong check sum are ignored, such as
-a last record that was cut by an interruption, or a damaged one.  Records may be in any
-order and may occur twice.  Only one program at a time can lock the file.
+The file begins with one line of JSON that identifies the sweep, and its check sum.
+Records follow. Each record is appended by one write and contains the number of a block,
+the length and a check sum, then the block's rows and texts.  Each check sum continues
+the check sum of the first line, so every record identifies its sweep.  A record with a
+wrong check sum is ignored, for example a damaged one or a last record that an
+interruption cut.  Records may be in any order and may occur twice.  Only one program at
+a time can lock the file.
 """
 
 import json
@@ -33,12 +34,12 @@ _KIND = "forcefit sweep journal 2"
 
 @dataclass(frozen=True, eq=False)
 class Journal:
-    """An open journal.
+    """An open journal of finished blocks.
 
     Attributes:
         path: path of the file.
         record_type: type of the rows.
-        owner: check sum of the first line, which is continued in the records.
+        owner: check sum of the first line, from which the records' check sums continue.
         places: offset and length of the content of each finished block.
     """
 
@@ -50,12 +51,12 @@ class Journal:
     def add(
         self, block: int, records: NDArray, texts: dict[str, dict[int, str]]
     ) -> None:
-        """Append a finished block, which is in the file when this function returns.
+        """Append a finished block; when this function returns, the file contains it.
 
         Args:
             block: number of the block.
             records: records of its points.
-            texts: texts by name: for each, the text of the rows that have one.
+            texts: for each name, the texts of those rows that have one.
 
         Raises:
             BadInput: the file cannot be written, for example because the disk is full.
@@ -90,10 +91,10 @@ class Journal:
             block: number of the block.
 
         Returns:
-            The records and texts as they were added.
+            The records and texts as they were passed to :meth:`add`.
 
         Raises:
-            BadInput: the file was changed in the meantime, or cannot be read.
+            BadInput: the file has been changed since it was opened, or cannot be read.
         """
         start, length = self.places[block]
         try:
@@ -122,20 +123,20 @@ class Journal:
 def open_journal(
     path: Path, whose: dict[str, Any], record_type: np.dtype
 ) -> Generator[Journal, None, None]:
-    """Open a new journal, or that of an interrupted sweep, for the time of a block.
+    """Open a new journal, or the journal of an interrupted sweep, as a context.
 
     Args:
         path: path of the file.
-        whose: plain values that identify the sweep; all must be equal, except
-            ``program``, because the version differs between commits with equal sources.
+        whose: plain values that identify the sweep. All must be equal to resume it,
+            except ``program``: its version differs between commits of equal sources.
         record_type: type of the records.
 
     Yields:
         The journal with the finished blocks.
 
     Raises:
-        BadInput: another program has locked the file; it belongs to another sweep, is
-            not a journal, or cannot be written.
+        BadInput: another program has locked the file; or the file belongs to another
+            sweep, is not a journal, or cannot be written.
     """
     check_writable(path)
     equal = {name: value for name, value in whose.items() if name != "program"}
@@ -156,7 +157,7 @@ def open_journal(
 
 
 def _recover(path: Path, header: bytes, owner: int) -> dict[int, tuple[int, int]]:
-    """Return the places of finished blocks; repair the first line and the end."""
+    """Return the places of finished blocks; repair the first line and a cut end."""
     try:
         with path.open("r+b") as file:
             size = os.fstat(file.fileno()).st_size
@@ -202,13 +203,13 @@ def _scan(
 
 
 def _check(owner: int, block: int, content: bytes) -> int:
-    """Return the check sum of a record: sweep, number, length and content."""
+    """Return the check sum of a record from sweep, block number, length and content."""
     head = struct.pack("<QQ", block, len(content))
     return zlib.crc32(content, zlib.crc32(head, owner))
 
 
 def _difference(first_line: bytes, header: bytes) -> str:
-    """Return the difference between a journal and the expected one, as text."""
+    """Return the difference between a journal and the expected journal as text."""
     expected = json.loads(header.rpartition(b" ")[0])
     line, _, check = first_line.rstrip(b"\n").rpartition(b" ")
     if not first_line.startswith(b'{"kind": "forcefit sweep journal'):
@@ -224,7 +225,7 @@ def _difference(first_line: bytes, header: bytes) -> str:
         )
     other = json.loads(line)
     keys = [k for k in expected if other.get(k) != expected[k]]
-    # the hash of the whole question is omitted if a part of it is named
+    # omit the hash of the complete input if another line names the part that differs
     keys = [k for k in keys if k != "question_sha256"] or keys
     theirs = ", ".join(f"{k} {str(other.get(k))[:60]!r}" for k in keys)
     wanted = ", ".join(f"{k} {str(expected[k])[:60]!r}" for k in keys)

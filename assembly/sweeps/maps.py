@@ -1,4 +1,4 @@
-"""Figures of a sweep from its data set: maps over two axes, lines along one axis.
+"""Figures of a sweep from its data set: maps over two axes, or lines along one axis.
 
 Each function takes a data set and returns a figure.
 """
@@ -26,19 +26,19 @@ def figure_of(
     at: Mapping[str, float | str] | None = None,
     quantities: Sequence[str] = (),
 ) -> "Figure":
-    """Return the maps of a sweep over two axes, or lines along one axis.
+    """Return the figure of a sweep: maps over two axes, or lines along one axis.
 
     Args:
-        data: data of a sweep, as saved.
-        at: values on other axes by name; the nearest points are shown.  If no draw is
-            selected, the median of the draws is shown.
+        data: data set of a sweep.
+        at: values on further axes by name; the nearest points are shown.  If no draw is
+            selected, the median over the draws is shown.
         quantities: quantities to show, by the names in
             :mod:`forcefit.assembly.sweeps.panels`; by default those of the paper's
             figure 5.
 
     Returns:
-        A figure with a panel for each quantity, with six panels by default.  It is
-        not shown, except by a notebook as the result of a cell.
+        A figure with one panel per quantity, by default six.  Only a notebook shows it,
+        if it is the result of a cell.
 
     Raises:
         BadInput: an axis or a quantity is unknown, or more than two axes remain.
@@ -59,13 +59,13 @@ def figure_of(
 
 
 def check_axes(sizes: Mapping[str, int]) -> None:
-    """Reject axes that allow neither a map nor a line.
+    """Reject a sweep whose axes allow neither a map nor a line.
 
     Args:
         sizes: number of values on each axis.
 
     Raises:
-        BadInput: not one or two axes have more than one value, apart from draws.
+        BadInput: the number of axes with several values, without draws, is not 1 or 2.
     """
     long = {name: n for name, n in sizes.items() if n > 1 and name != "draw"}
     if len(long) > 2:
@@ -83,14 +83,14 @@ def check_axes(sizes: Mapping[str, int]) -> None:
 def part_of_sweep(
     data: "xarray.Dataset", at: Mapping[str, float | str]
 ) -> tuple["xarray.Dataset", str]:
-    """Return a part of a sweep: some axes at fixed values, draws as their median.
+    """Select a part of a sweep: some axes at fixed values, and the median over draws.
 
     Args:
-        data: data of a sweep.
-        at: value for each of these axes.
+        data: data set of a sweep.
+        at: value for each axis to be fixed.
 
     Returns:
-        The part without axes of one value, and a note that describes the selection.
+        The part without axes of length one, and a note that describes the selection.
 
     Raises:
         BadInput: an axis or a value is unknown.
@@ -119,7 +119,7 @@ def part_of_sweep(
 
 
 def _number(name: str, value: float | str) -> float:
-    """Return a number that was requested on an axis."""
+    """Return the number that was given for an axis."""
     try:
         return float(value)
     except ValueError:
@@ -129,7 +129,7 @@ def _number(name: str, value: float | str) -> float:
 
 
 def _median(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Return the median over the draws; for the status the first that is not ok."""
+    """Return the median over the draws, and the first status that is not ok."""
     numbers = [k for k, v in data.data_vars.items() if v.dtype.kind == "f"]
     middle = data[numbers].median("draw", skipna=True)
     first = data.isel(draw=0, drop=True)
@@ -146,7 +146,7 @@ def _median(data: "xarray.Dataset") -> "xarray.Dataset":
 
 
 def _squeezed(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Return the data set without the axes of points that have one value."""
+    """Return the data set without those axes of the points that have one value."""
     single = [d for d in data["status"].dims if data.sizes[d] == 1]
     return data.squeeze(single, drop=True)
 
@@ -157,12 +157,12 @@ def map_figure(
     """Return maps over a two-dimensional grid: margins, energy and platform error.
 
     Args:
-        data: data of a sweep over two axes with more than one value each.
+        data: data set of a sweep over two axes with more than one value each.
         panels: panels to show; by default the usual ones and the status.
 
     Returns:
-        A figure with a panel for each quantity.  The contour of margin 1 bounds the
-        assembly zone; crosses mark nearby singularities.
+        A figure with one panel per quantity.  The contour of margin 1 is the boundary
+        of the assembly zone; crosses mark points near a singularity.
 
     Raises:
         ValueError: the grid does not have two axes with several values.
@@ -181,7 +181,7 @@ def map_figure(
         low, high = float(finite.min()), float(finite.max())
         if low < high:
             figure.colorbar(image, ax=panel)
-        elif low == high:  # a scale about one value would show rounding as differences
+        elif low == high:  # any colour scale would show rounding errors as differences
             title = f"{title}: {low:.4g} everywhere"
         inside = bool((finite < 1).any()) and bool((finite > 1).any())
         if key.startswith("margin") and inside and min(finite.shape) > 1:
@@ -195,7 +195,7 @@ def map_figure(
 
 
 def _figure_for(count: int, height: float) -> tuple["Figure", "list[Axes]"]:
-    """Return a figure with a given number of panels, or one more, in a grid."""
+    """Return a figure with a grid of at least the given number of panels."""
     from matplotlib.figure import Figure
 
     rows, columns = -(-count // 2), min(count, 2)
@@ -210,11 +210,11 @@ def path_figure(
     """Return a figure of the quantities along one axis, or over a list of postures.
 
     Args:
-        data: data of a sweep over one axis.
-        panels: panels to show; by default the usual ones and the condition.
+        data: data set of a sweep over one axis.
+        panels: panels to show; by default the usual ones and the condition number.
 
     Returns:
-        A figure with a panel for each quantity; crosses mark nearby singularities.
+        A figure with one panel per quantity; crosses mark points near a singularity.
     """
     data = _along_numbers(_squeezed(data))
     (x,) = (str(d) for d in data["status"].dims)
@@ -244,7 +244,7 @@ def path_figure(
 
 
 def _along_numbers(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Return the data set with increasing numbers on each axis, 1, 2, .. for labels."""
+    """Return the data set with increasing axis values; labels become 1, 2, .."""
     for name in map(str, data["status"].dims):
         if data[name].dtype.kind not in "fiu":
             data = data.assign_coords({name: np.arange(data.sizes[name]) + 1})
@@ -253,7 +253,7 @@ def _along_numbers(data: "xarray.Dataset") -> "xarray.Dataset":
 
 
 def _near(data: "xarray.Dataset") -> NDArray:
-    """Return a bool array: True where a singularity is near."""
+    """Return a bool array that is True at points near a singularity."""
     if "near_singularity" not in data:
         return np.zeros(data["status"].shape, dtype=bool)
     texts = data["near_singularity"].transpose(*data["status"].dims)
@@ -261,7 +261,7 @@ def _near(data: "xarray.Dataset") -> NDArray:
 
 
 def _mark(panel: "Axes", data: "xarray.Dataset", x: str, y: str) -> None:
-    """Draw crosses where a singularity is near."""
+    """Draw crosses at points near a singularity."""
     i, j = np.nonzero(_near(data))
     if len(i):
         x_first = data["status"].dims[0] == x
@@ -280,7 +280,7 @@ def _states(panel: "Axes", data: "xarray.Dataset", x: str, y: str) -> None:
 
 
 def _label(panel: "Axes", data: "xarray.Dataset", x: str, y: str, title: str) -> None:
-    """Set title and axes; two axes of lengths get the same scale."""
+    """Set the title and axis labels; two axes of lengths get equal scales."""
     same = data[x].attrs.get("units") == data[y].attrs.get("units")
     spans = [float(np.ptp(data[k].values)) for k in (x, y)]
     fits = same and 0.2 < spans[0] / spans[1] < 5
@@ -295,13 +295,13 @@ def _axis_name(data: "xarray.Dataset", name: str) -> str:
 
 
 def _counts(data: "xarray.Dataset") -> str:
-    """Return the number of points of each status."""
+    """Return the number of points of each status as text."""
     names, counts = np.unique(data["status"].values.astype(str), return_counts=True)
     return ", ".join(f"{n}: {c}" for n, c in zip(names, counts, strict=True))
 
 
 def _caption(data: "xarray.Dataset") -> str:
-    """Return a caption: the robot, the statuses, and the marked singularities."""
+    """Return a caption with the robot, the statuses and the nearby singularities."""
     caption = f"{data.attrs.get('robot', '')}; {_counts(data)}"
     if _near(data).any():
         texts = np.unique(data["near_singularity"].values.astype(str))

@@ -1,4 +1,4 @@
-"""NetCDF files that are written completely or not at all, even if the disk is full."""
+"""NetCDF files, written either completely or not at all, even if the disk is full."""
 
 import struct
 from collections.abc import Generator
@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import unwritable, whole_file
 
-_HEAP = b"GCOL\x01\x00\x00\x00"  # mark of a global heap in HDF5, with its version
+_HEAP = b"GCOL\x01\x00\x00\x00"  # signature and version of a global heap in HDF5
 
 
 @contextmanager
 def netcdf_file(path: Path | str) -> Generator[Any, None, None]:
-    """Write a NetCDF file.
+    """Open a new NetCDF file for writing, as a context.
 
     Args:
-        path: path of the file; it exists only after the block ended without an error.
+        path: path of the file, which is created only if the block ends without error.
 
     Yields:
         The open ``h5netcdf.File``.
@@ -43,7 +43,7 @@ def netcdf_file(path: Path | str) -> Generator[Any, None, None]:
 
 
 class Stored(NamedTuple):
-    """A variable of a file, with the attribute names that xarray uses.
+    """A variable of a file; the attributes have the names that xarray uses.
 
     Attributes:
         dims: names of the axes.
@@ -57,7 +57,7 @@ class Stored(NamedTuple):
 
 
 class StoredDataset(NamedTuple):
-    """A data set for a summary, read without xarray, whose import takes a second.
+    """A data set that is read without xarray, because importing xarray takes a second.
 
     Attributes:
         data_vars: variables by name, without coordinates.
@@ -69,7 +69,7 @@ class StoredDataset(NamedTuple):
 
 
 def stored_dataset(path: Path | str) -> StoredDataset:
-    """Return a newly written data set for its summary.
+    """Return a newly written data set, from which its summary is computed.
 
     Args:
         path: path of a NetCDF file written by forcefit.
@@ -93,7 +93,7 @@ def stored_dataset(path: Path | str) -> StoredDataset:
 
 
 def _decoded(values: NDArray) -> NDArray:
-    """Return texts of a variable, which HDF5 returns as bytes; numbers unchanged."""
+    """Return values with bytes decoded, because HDF5 returns texts as bytes."""
     if values.dtype != object:
         return values
     texts = [text.decode() for text in values.ravel()]
@@ -104,11 +104,11 @@ def forgive_damaged_files() -> None:
     """Prevent h5netcdf from writing to stderr when it closes a damaged file."""
     import h5netcdf
 
-    h5netcdf.File._writable = False  # until a file sets this attribute
+    h5netcdf.File._writable = False  # default until an opened file sets it
 
 
 def check_heaps(path: Path) -> None:
-    """Reject a file with damaged heaps of texts, which HDF5 would read endlessly.
+    """Reject a file with damaged heaps of texts, on which HDF5 would loop endlessly.
 
     Args:
         path: path of an HDF5 file; other files are accepted.
@@ -126,7 +126,7 @@ def check_heaps(path: Path) -> None:
             end, place = start + min(length, size - start), start + 16
             while place + 16 <= end:
                 number, _, own = struct.unpack_from("<HH4xQ", data, place)
-                # an entry, or the free space, whose size includes its own header
+                # a text, or the free space, whose size includes its own header
                 step = 16 + -(-own // 8) * 8 if number else own
                 if step < 16:
                     raise BadInput(f"{path}: cannot be read as NetCDF: damaged heap")
@@ -135,10 +135,10 @@ def check_heaps(path: Path) -> None:
 
 
 class _Target:
-    """The file to which HDF5 writes; after a failure a copy in memory replaces it.
+    """The file to which HDF5 writes; after a failure it becomes a copy in memory.
 
     HDF5 crashes the whole process if a file cannot be closed, or if data that it reads
-    again differ from the data written.
+    back differ from the data it wrote.
     """
 
     def __init__(self, file: FileIO) -> None:
@@ -183,10 +183,10 @@ class _Target:
             return self.truncate(size)
 
     def flush(self) -> None:
-        """Do nothing, because no data are buffered."""
+        """Do nothing: no data are buffered."""
 
     def _go_on_in_memory(self, failure: OSError) -> None:
-        """Record the failure, and copy the data written so far to memory."""
+        """Record the failure, and copy the data written so far into memory."""
         self.failure = failure
         position = self.file.tell()
         self.file.seek(0)

@@ -1,9 +1,10 @@
-"""Panels of figures of a sweep or of draws: quantities, units, titles.
+"""Panels of the figures of a sweep or of draws: quantities, units and titles.
 
-A quantity is a variable of the data set, with its component if it has several:
-``energy``, ``stiffness.FX``, ``wrench.leg1.link_a.FZ``.  These are the column names of
-:func:`forcefit.assembly.sweeps.point_table.point_table`.  ``rotation`` and
-``translation`` are the magnitudes of the platform's pose error.
+A quantity is a variable of the data set, followed by a component if the variable has
+several: ``energy``, ``stiffness.FX``, ``wrench.leg1.link_a.FZ``.  The names equal the
+column names of :func:`forcefit.assembly.sweeps.point_table.point_table`.  The
+quantities ``rotation`` and ``translation`` are the magnitudes of the platform's pose
+error.
 """
 
 from collections.abc import Sequence
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 _MOST = 12  # largest number of panels in a readable figure
 _HALVES = {"rotation": slice(0, 3), "translation": slice(3, 6)}
-# for each unit in the file: factor and unit in the figure
+# for each unit in the file: the factor to the unit of the figure, and that unit
 _SHOWN = {
     "rad": (1e3, "mrad"), "m": (1e3, "mm"), "N/m": (1e-6, "N/um"), "Pa": (1e-6, "MPa"),
     "1": (1.0, "-"),
@@ -44,7 +45,7 @@ class Panel(NamedTuple):
     colours: str
 
 
-# the six panels of the paper's figure 5; further ones replace the last two if these
+# the six panels of the paper's figure 5; the panels below replace the last two if these
 # were not computed
 _PAPER = (
     Panel("margin_free", 1.0, "zone margin, compliant joints free [-]", "magma_r"),
@@ -66,10 +67,10 @@ _FREQUENCY = Panel("frequency.1", 1.0, "lowest natural frequency [Hz]", "viridis
 
 
 def usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
-    """Return the panels of a sweep's figure if no quantity is named.
+    """Return the panels of a sweep's figure if the user names no quantity.
 
     Args:
-        data: data of a sweep.
+        data: data set of a sweep.
 
     Returns:
         The usual panels whose quantities are stored.
@@ -97,7 +98,7 @@ def _is_stored(data: "xarray.Dataset", key: str) -> bool:
 
 
 def _usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
-    """Return the panels of the paper's figure if their quantities are stored."""
+    """Return the panels of the paper's figure whose quantities are stored."""
     if "rotation_error_clearance" in data:
         return _PAPER
     middle = _STIFFNESS if "eigen_stiffness" in data else _PAPER[2:4]
@@ -107,14 +108,14 @@ def _usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
 
 
 def named_panels(data: "xarray.Dataset", names: Sequence[str]) -> tuple[Panel, ...]:
-    """Return panels of named quantities; a variable's name selects all components.
+    """Return panels of named quantities; a variable's name selects all its components.
 
     Args:
-        data: data of a sweep or of draws.
+        data: data set of a sweep or of draws.
         names: names of the quantities.
 
     Returns:
-        A panel for each component.
+        One panel per component.
 
     Raises:
         BadInput: there is no such quantity, or the figure would have too many panels.
@@ -143,18 +144,18 @@ def named_panels(data: "xarray.Dataset", names: Sequence[str]) -> tuple[Panel, .
 
 
 def quantity(data: "xarray.Dataset", key: str) -> Any:
-    """Return a quantity over the points.
+    """Return the values of a quantity at all points.
 
     Args:
-        data: data of a sweep or of draws.
-        key: name of the quantity; the magnitude of a pose error is the certified upper
-            bound or, without bounds, a half of the platform screw.
+        data: data set of a sweep or of draws.
+        key: name of the quantity. The magnitude of a pose error is the certified upper
+            bound or, if bounds are not stored, the norm of half the platform screw.
 
     Returns:
         Data array over the axes of the points.
 
     Raises:
-        KeyError: there is no quantity with that name.
+        KeyError: no quantity has that name.
     """
     if key in _HALVES and key not in data:
         if f"{key}_error" in data:
@@ -172,7 +173,7 @@ def quantity(data: "xarray.Dataset", key: str) -> Any:
 
 
 def _quantities(data: "xarray.Dataset") -> dict[str, str]:
-    """Return the unit of every numeric quantity over the points, by name."""
+    """Return the name and unit of every numeric quantity at the points."""
     units: dict[str, str] = {}
     points = set(data["status"].dims)
     for name in map(str, data.data_vars):
@@ -189,5 +190,5 @@ def _quantities(data: "xarray.Dataset") -> dict[str, str]:
 
 
 def _further(data: "xarray.Dataset", name: str) -> list[str]:
-    """Return the axes of a variable in addition to those of the points."""
+    """Return the axes of a variable other than the axes of the points."""
     return [str(d) for d in data[name].dims if d not in data["status"].dims]

@@ -1,12 +1,12 @@
 """Design parameters: any number in a robot file, addressed by its path.
 
-A path consists of the frame's name and the keys of the number, such as
+A path consists of a frame's name and the keys of the number, such as
 ``leg1.link_a.link.beam.radius`` or ``leg1.elbow.clearance.radial``.  A frame's name
-without its leg means that frame in every leg.  A joint of several frames may be named
-too, such as ``ball.clearance.ball``.  Three numbers in brackets are x, y, z;
-six are rx .. tz, and so are the rows and columns of six by six (``stiffness.rx.ty``
-sets both entries of a symmetric matrix); six moments of inertia are xx, yy, zz, xy,
-xz, yz.
+without the leg's name addresses that frame in every leg.  A path may also begin with a
+joint of several frames, such as ``ball.clearance.ball``.  In arrays, three numbers are
+called x, y, z; six numbers are called rx .. tz. Rows and columns of a 6 x 6 matrix are
+also called rx .. tz (``stiffness.rx.ty`` sets both entries of a symmetric matrix). Six
+moments of inertia are called xx, yy, zz, xy, xz, yz.
 """
 
 import copy
@@ -46,14 +46,14 @@ Setter = Callable[[float], None]
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """A robot as the content of its file, in which numbers can be changed.
+    """The content of a robot file, in which numbers can be changed.
 
     Attributes:
-        content: the root table as plain values.
-        file: name of the file, for messages; paths in the table are relative to its
+        content: root table of the file as plain values.
+        file: name of the file for messages; paths in the table are relative to its
             folder.
-        name: name of the robot if the table has none.
-        joints: joints of several frames by name; a path may begin with one.
+        name: name of the robot if the table contains none.
+        joints: joints that consist of several frames, by name.
     """
 
     content: dict[str, Any]
@@ -63,27 +63,27 @@ class Design:
 
     @cached_property
     def paths(self) -> list[str]:
-        """Full paths of all numbers."""
+        """Full paths of all numbers of the design."""
         return list(self.values)
 
     @cached_property
     def values(self) -> dict[str, float]:
-        """All numbers by their full path."""
+        """Values of all numbers by full path."""
         numbers = _numbers(copy.deepcopy(self.content))
         return {path: float(value) for path, value, _ in numbers}
 
     def find(self, path: str) -> list[str]:
-        """Return the full paths that a path selects.
+        """Return the full paths of the numbers that a path addresses.
 
         Args:
-            path: full path, or path with the frame's name without its leg.
+            path: full path, or a path without the leg's name.
 
         Returns:
-            One path, or one path for each leg, and for each bearing of a universal
+            One full path; or one for each leg, and for each bearing of a universal
             joint.
 
         Raises:
-            BadInput: the robot has no such number; the message names a similar one.
+            BadInput: no number has this path; the message suggests a similar one.
         """
         known = self.paths
         matches = [p for p in known if p == path] or [
@@ -98,10 +98,10 @@ class Design:
         return matches
 
     def changed(self, values: Mapping[str, float]) -> dict[str, Any]:
-        """Return the root table with changed numbers.
+        """Return a root table in which some numbers are replaced.
 
         Args:
-            values: new values by path.
+            values: mapping from path to new value.
 
         Returns:
             A new table.
@@ -117,18 +117,18 @@ class Design:
         return content
 
     def robot(self, values: Mapping[str, float]) -> Robot:
-        """Return the robot with changed numbers.
+        """Return the robot with some numbers replaced.
 
         Args:
-            values: new values by path.
+            values: mapping from path to new value.
 
         Returns:
-            The robot, after the checks of a robot file with these numbers.
+            The robot, checked like a robot that is read from a file.
 
         Raises:
             BadInput: a path does not lead to a number, a value violates a rule of the
-                format, the closures no longer hold, or a link's mesh or library is not
-                usable.
+                format, the closures no longer close, or a link's mesh or stiffness
+                library is not usable.
         """
         robot = robot_of(Table(self.changed(values), self.file, ""), self.name)
         try:
@@ -140,17 +140,16 @@ class Design:
         """Reject numbers that violate a rule of the format.
 
         Args:
-            values: new values by path.
+            values: mapping from path to new value.
 
         Raises:
-            BadInput: a number violates a rule; whether the closures still hold is not
-                checked.
+            BadInput: a number violates a rule. The closures are not checked.
         """
         declared_robot(Table(self.changed(values), self.file, ""), self.name)
 
 
 def design_of(robot: Robot) -> Design:
-    """Return a robot in memory in the form of a robot file."""
+    """Return a robot in memory as the content of a robot file."""
     return Design(robot_table(robot), robot.name, robot.name, robot.joints)
 
 
@@ -169,14 +168,14 @@ def load_design(name: str | Path) -> Design:
     from forcefit.assembly.exchange.robot_files import is_robot_file, load_robot
     from forcefit.assembly.robots import BUILT_IN
 
-    # an invalid file is refused before numbers are changed
+    # raise an error for an invalid file before any number is changed
     robot = load_robot(name, links=False)
     if str(name) in BUILT_IN or not is_robot_file(Path(name)):
         return design_of(robot)
     table = read_toml(Path(name))
     if is_drawing(
         table
-    ):  # its bodies may be copied, so numbers are addressed in frames
+    ):  # bodies may be copied from other bodies, so frames contain the numbers
         return Design(robot_table(robot), str(name), robot.name, robot.joints)
     return Design(table.content, str(name), robot.name, robot.joints)
 
@@ -192,7 +191,7 @@ def unit_of(path: str) -> str:
 
 
 def _numbers(content: dict[str, Any]) -> Iterator[tuple[str, float, Setter]]:
-    """Yield path, value and setter of every number; omitted zeros are included."""
+    """Yield path, value and setter of every number, including omitted zeros."""
     for frame in content.get("frame", ()):
         given = dict(_ABSENT) if "dh" in frame else _ABSENT | _PLACED
         if frame.get("joint", "fixed") != "fixed":
@@ -203,7 +202,7 @@ def _numbers(content: dict[str, Any]) -> Iterator[tuple[str, float, Setter]]:
 
 
 def _inside(path: str, table: dict[str, Any]) -> Iterator[tuple[str, float, Setter]]:
-    """Yield the numbers of a table."""
+    """Yield path, value and setter of the numbers of a table."""
     for key, value in table.items():
         path_of_key = f"{path}.{key}"
         if _is_number(value):
@@ -222,17 +221,17 @@ def _inside(path: str, table: dict[str, Any]) -> Iterator[tuple[str, float, Sett
 
 
 def _is_number(value: object) -> bool:
-    """Return whether a plain value is a number; booleans are not."""
+    """Return whether a plain value is a number and not a boolean."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _setter(place: Any, key: Any) -> Setter:
-    """Return the function that writes a number to its place."""
+    """Return a function that assigns a number to an entry of a container."""
     return lambda number: place.__setitem__(key, number)
 
 
 def _setter_of_two(rows: list[list[float]], i: int, j: int) -> Setter:
-    """Return the function that writes both entries of a symmetric matrix."""
+    """Return a function that assigns a number to both entries of a symmetric matrix."""
 
     def write(number: float) -> None:
         rows[i][j] = rows[j][i] = number

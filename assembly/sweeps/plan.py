@@ -1,4 +1,4 @@
-"""A sweep: the requested quantities, and the points at which they are computed."""
+"""A sweep: the requested quantities, and the points at which to compute them."""
 
 import hashlib
 import json
@@ -20,14 +20,14 @@ from forcefit.results.display import html_table, short_repr
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """The requested quantities, and the points at which they are computed.
+    """The requested quantities, and the points at which to compute them.
 
     Attributes:
         question: the quantities.
         targets: the postures.
         values: values of each varied parameter, in the order of ``question.varied``.
-        draws: number of draws of errors; 0 if the robot's own errors are used.
-        command: command line, for the provenance; empty without one.
+        draws: number of draws of errors; 0 to use the errors of the robot file.
+        command: command line for the provenance; empty if there is none.
         block_size: number of points that are solved and stored together.
     """
 
@@ -127,6 +127,6 @@ class Sweep:
             "strength": str(question.strength),
             "conditions": str((question.load, question.gravity, dict(question.under))),
             "block": str(self.block_size),
-            # all values that are not named above
+            # all values except those named above
             "question_sha256": question_hash(question),
         }

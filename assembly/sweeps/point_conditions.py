@@ -1,8 +1,8 @@
-"""Conditions at the points of a sweep: load, gravity and effects of the robot.
+"""Conditions at the points of a sweep: load, gravity and effects of the robot file.
 
-Compiled functions solve points together, under loads and with effects that change
-errors, springs or clearances.  Points with nonlinear compliances are solved one by one,
-in some milliseconds each.
+Compiled functions solve many points together, also under loads and with effects that
+change errors, springs or clearances.  Points with nonlinear compliances are solved one
+by one, which takes a few milliseconds each.
 """
 
 from dataclasses import replace
@@ -30,15 +30,16 @@ from forcefit.assembly.sweeps.quantities import Question
 def point_conditions(
     question: Question, robot: Robot, postures: list[Posture], errors: NDArray | None
 ) -> Conditions:
-    """Return the conditions at points of one design, with effects applied.
+    """Return the conditions at the points of one design, after applying the effects.
 
     Args:
-        question: question of the sweep, with load, gravity and covariates.
+        question: quantities of the sweep, with load, gravity and covariates.
         robot: robot of the design.
         postures: k postures.
-        errors: (k, n, 6) [rad, m] drawn errors; None for the robot's own errors.
+        errors: (k, n, 6) [rad, m] drawn errors; None for the errors of the robot file.
 
     Returns:
+        Conditions with k rows.
         k rows of conditions.
     """
     many = Posture(
@@ -61,22 +62,22 @@ def point_conditions(
 
 
 def is_loaded(conditions: Conditions) -> bool:
-    """Return whether there are loads, weights, or compliant effects or contacts."""
+    """Return whether there are loads, weights, or elastic effects or contacts."""
     loaded = conditions.load.any() or conditions.gravity.any()
     compliant = conditions.laws or conditions.yields
     return bool(loaded or driven(conditions.robot) or compliant)
 
 
 def assemble_rows(conditions: Conditions) -> tuple[Assembly, NDArray, NDArray]:
-    """Return the solutions of least energy of all rows under loads.
+    """Return the solutions of least energy (22) of all rows under their loads.
 
     Args:
-        conditions: k rows of a robot of n frames.
+        conditions: conditions with k rows, for a robot of n frames.
 
     Returns:
-        Assemblies, with screws and certificates in the given order; the (k, n, 6) [N m,
-        N] wrenches of the links' springs; and the (k, n, 6) part of these wrenches due
-        to the links' own weight.
+        Assemblies, with screws and certificates in the order of the rows; the (k, n, 6)
+        [N m, N] wrenches of the links' springs; and the (k, n, 6) part of these
+        wrenches due to the links' own weight.
     """
     c = conditions
     if not (c.laws or c.yields):
@@ -93,7 +94,7 @@ def assemble_rows(conditions: Conditions) -> tuple[Assembly, NDArray, NDArray]:
 
 
 def _assembled(conditions: Conditions, i: int) -> Assembly | Exception:
-    """Return the solution of one point, or the exception that was raised."""
+    """Return the solution of one point, or the exception that its solution raised."""
     try:
         assembly = assemble_row(conditions, i)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:

@@ -1,8 +1,8 @@
-"""Properties of a sweep's points that follow from the nominal geometry alone.
+"""Properties of a sweep's points that depend only on the nominal geometry.
 
-They are joint coordinates, distances to singularities, and whether the posture is
-usable, that is within the joints' limits, regular, and not separated from home by a
-singularity.
+These are the joint coordinates, the distances to singularities, and whether the posture
+is usable: within the joint limits, regular, and not separated from the home posture by
+a singularity.
 """
 
 from collections.abc import Sequence
@@ -29,13 +29,13 @@ def note_geometry(
     """Record the geometry of postures; return the postures that are not usable.
 
     Args:
-        question: question of the sweep.
+        question: quantities of the sweep.
         robot: robot of the design.
         goals: (k, 6) or (k, n) poses or coordinates of the k postures.
         postures: the postures that were reached.
         rows: indices of the records of each posture.
-        records: records of the points, to be filled in.
-        near_singularity: names of nearby singularities by row, to be filled in.
+        records: records of the points, which are filled in.
+        near_singularity: names of nearby singularities by row, which are filled in.
 
     Returns:
         Status and reason of each posture, as in

@@ -1,8 +1,9 @@
-"""K_C at the points of a sweep: nominal, or with errors, loads and clearances.
+"""Platform stiffness K_C at the points of a sweep.
 
-Errors, loads and clearances do not change the nominal K_C, so the draws of a posture
-share it.  A tangent is computed point by point: of problem (22), with clearances free
-or in contact, or of the exact equilibrium, with its internal forces.
+Errors, loads and clearances do not change the nominal K_C, so all draws at a posture
+share one matrix.  A tangent stiffness is computed point by point, either of problem
+(22), with clearances free or in contact, or of the exact equilibrium, with its internal
+forces.
 """
 
 from dataclasses import replace
@@ -43,10 +44,10 @@ def stiffness_parts(robot: Robot, state: str) -> tuple[str, ...]:
 
     Args:
         robot: robot of the sweep.
-        state: state of :data:`STATES`.
+        state: one of :data:`STATES`.
 
     Returns:
-        Links and joints; for a tangent also clearances in contact, or existing forces.
+        Links and joints; for a tangent also clearances in contact and internal forces.
     """
     return tuple(part.words for part in _parts(robot, state))
 
@@ -70,24 +71,24 @@ def nominal_stiffnesses(
         posture: k postures.
 
     Returns:
-        Quantities by name, with k rows each; and the free motions by row.
+        Quantities by name, each with k rows; and the free motions by row.
     """
-    many: Any = platform_stiffness(posture)  # of many postures: Stiffnesses
+    many: Any = platform_stiffness(posture)  # Stiffnesses, because k postures are given
     return many_quantities(many), {i: one.free_text for i, one in many.apart.items()}
 
 
 def tangent_stiffnesses(
     conditions: Conditions, state: str
 ) -> tuple[dict[str, NDArray], dict[int, str]]:
-    """Return the tangents of k points under their errors, loads and effects.
+    """Return the tangent stiffnesses of k points under errors, loads and effects.
 
     Args:
-        conditions: conditions of k rows.
+        conditions: conditions with k rows.
         state: ``"contact"`` or ``"exact"``.
 
     Returns:
-        The quantities of :func:`nominal_stiffnesses`, NaN without equilibrium and 0
-        along free motions; and the reasons by row.
+        The quantities of :func:`nominal_stiffnesses`, NaN without an equilibrium and 0
+        along free motions; and the reason for each row without a tangent.
     """
     parts = _parts(conditions.robot, state)
     rows, reasons = [], {}
@@ -108,7 +109,7 @@ def tangent_stiffnesses(
 
 
 def _tangent(conditions: Conditions, i: int, state: str) -> PlatformStiffness:
-    """Return the tangent at one point, on the compliant side of a contact change."""
+    """Return the tangent at one point; at a change of contact the compliant one."""
     if conditions.laws or any(not place.linear for place in conditions.yields):
         raise SolverFailed(
             "tangent",

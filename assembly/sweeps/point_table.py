@@ -1,7 +1,7 @@
-"""Data sets as tables with a row for each point or draw, a column for each component.
+"""Data sets as tables with one row per point or draw and one column per component.
 
-``xarray.Dataset.to_dataframe`` multiplies all axes of all variables, so a sweep of some
-megabytes becomes tens of millions of rows.
+``xarray.Dataset.to_dataframe`` forms the product of all axes of all variables, which
+turns a sweep of some megabytes into tens of millions of rows.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# variables whose axes are those of the points: in sweeps and draws, in tolerances
+# variables whose axes are the row axes: of sweeps and draws, of tolerances
 _OF_POINTS = ("status", "tolerance")
 
 
@@ -27,19 +27,19 @@ def point_table(
     """Return a data set as a table with one row for each point, draw or tolerance.
 
     Args:
-        data: data of a sweep, of draws or of tolerances; or the path of a file.
-        rows: axes whose points are the rows, such as ``["quantity", "group"]`` for the
+        data: data set of a sweep, of draws or of tolerances; or the path of a file.
+        rows: axes whose points become rows, such as ``["quantity", "group"]`` for the
             importance of errors; by default the axes of the sweep's points, the draws
             or the classes of tolerances.
 
     Returns:
         Table whose columns are pairs (variable, component); the component is empty for
         plain numbers.  For example, ``table["platform_screw", "TX"]`` is a column.  The
-        index has the axes.  ``attrs["units"]`` has the units by variable and axis.
+        index contains the axes.  ``attrs["units"]`` maps variables and axes to units.
 
     Raises:
-        BadInput: the file cannot be read, an axis is unknown, or ``rows`` is empty and
-            the data set is of another kind.
+        BadInput: the file cannot be read, an axis is unknown, or ``rows`` is empty for
+            another kind of data set.
     """
     whose = "table"
     if isinstance(data, str | Path):
@@ -62,10 +62,10 @@ def point_table(
 def write_point_table(
     data: "xarray.Dataset | Path | str", path: Path | str, rows: Sequence[str] = ()
 ) -> None:
-    """Write the table of :func:`point_table` as CSV, completely or not at all.
+    """Write the table of :func:`point_table` as CSV, either completely or not at all.
 
-    The first column is ``id``, the number of the row from 0.  The axes follow, and the
-    columns, ``variable.component [unit]``.  A missing number is an empty cell.
+    The first column is ``id``, the row number from 0.  The axes follow, then the
+    columns ``variable.component [unit]``.  A missing number becomes an empty cell.
 
     Args:
         data: see :func:`point_table`.
@@ -73,7 +73,8 @@ def write_point_table(
         rows: see :func:`point_table`.
 
     Raises:
-        BadInput: for the reasons of :func:`point_table`, or the file cannot be written.
+        BadInput: for the reasons of :func:`point_table`, or if the file cannot be
+            written.
     """
     check_writable(path, TABLE)
     table = point_table(data, rows)

@@ -1,8 +1,8 @@
 """Solution of the points of a sweep: margins, energy, wrenches, errors, singularities.
 
-Points are solved in blocks.  The reason why a point has no solution is in ``status``
-and ``reason``; other points are still solved.  The results of a point do not depend on
-the other points of its block.
+Points are solved in blocks.  If a point has no solution, ``status`` and ``reason``
+state why, and the other points are still solved.  The results of a point do not depend
+on the other points of its block.
 """
 
 from collections.abc import Iterator, Mapping
@@ -60,7 +60,7 @@ _PAGE = 256  # number of draws generated together
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Some points of a sweep.
+    """Some of the points of a sweep.
 
     Attributes:
         values: (k, p) values of the varied parameters.
@@ -82,9 +82,8 @@ class SolvedPoints:
     """Results at k points.
 
     Attributes:
-        records: (k,) records of :func:`record_type`; NaN where there is no solution.
-        texts: texts by name in :data:`TEXTS`: for each, the text of points that have
-            one.
+        records: (k,) records of :func:`record_type`; NaN for points without a solution.
+        texts: for each name in :data:`TEXTS`, the texts of those points that have one.
     """
 
     records: NDArray
@@ -92,11 +91,11 @@ class SolvedPoints:
 
 
 def solve_points(question: Question, points: Points) -> SolvedPoints:
-    """Solve some points of a sweep.
+    """Solve some of the points of a sweep.
 
     Args:
-        question: the quantities.
-        points: points in the order of the sweep, so that points of one posture are
+        question: quantities of the sweep.
+        points: points in the order of the sweep, in which points of one posture are
             adjacent.
 
     Returns:
@@ -129,7 +128,7 @@ def _runs(rows: NDArray) -> Iterator[slice]:
 
 @lru_cache(maxsize=4)
 def _robots(question: Question, values: tuple[float, ...]) -> tuple[Robot, Robot]:
-    """Return the robot of a design, and the same robot without errors."""
+    """Return the robot of a design, and the robot of the design without errors."""
     robot = question.robot
     if question.design is not None:
         robot = question.design.robot(dict(zip(question.varied, values, strict=True)))
@@ -139,7 +138,7 @@ def _robots(question: Question, values: tuple[float, ...]) -> tuple[Robot, Robot
 def _solve_variant(
     question: Question, points: Points, solved: SolvedPoints, first: int
 ) -> None:
-    """Solve points of one design; records begin at ``first``."""
+    """Solve points of one design and store them from record ``first`` on."""
     count = len(points.rows)
     runs = list(_runs(points.rows))
     starts = [run.start for run in runs]
@@ -166,7 +165,7 @@ def _solve_variant(
             _fail(solved, rows[i], status, reason)
             continue
         reachable += [(row, posture) for row in rows[i]]
-        # the results are right, but it is unknown whether the robot can reach the pose
+        # the results are valid, but the robot may not be able to reach the pose
         if status:
             far += [(row, reason) for row in rows[i]]
     if not reachable:
@@ -188,7 +187,7 @@ def _solve_or_split(
     question: Question, robot: Robot, perfect: Robot, postures: list[Posture],
     errors: NDArray | None, solved: SolvedPoints, rows: NDArray,
 ) -> None:  # fmt: skip
-    """Solve points whose posture exists; one by one if a solver fails for all."""
+    """Solve points whose posture exists together, or one by one if a solver fails."""
     try:
         _solve_reached(question, robot, perfect, postures, errors, solved, rows)
     except (np.linalg.LinAlgError, SolverFailed) as error:
@@ -205,13 +204,13 @@ def _solve_or_split(
 
 
 def _fail(solved: SolvedPoints, rows: range, status: str, reason: str) -> None:
-    """Record the status of points without a solution."""
+    """Record the status and the reason of points without a solution."""
     solved.records["status"][rows.start : rows.stop] = OF_POINTS.index(status)
     solved.texts["reason"].update(dict.fromkeys(rows, reason))
 
 
 def _errors(question: Question, robot: Robot, draws: NDArray) -> NDArray:
-    """Return the (k, n, 6) [rad, m] errors of given draws, bolted joints locked in."""
+    """Return the errors (k, n, 6) [rad, m] of draws, with bolted joints locked in."""
     pages = {page: _page(question, page) for page in np.unique(draws // _PAGE).tolist()}
     own, which = np.unique(draws, return_inverse=True)
     errors = np.array([pages[d // _PAGE][d % _PAGE] for d in own.tolist()])
@@ -222,7 +221,7 @@ def _errors(question: Question, robot: Robot, draws: NDArray) -> NDArray:
 
 @lru_cache(maxsize=8)
 def _page(question: Question, page: int) -> NDArray:
-    """Return the (256, n, 6) [rad, m] errors of the draws from 256 page on."""
+    """Return the errors (256, n, 6) [rad, m] of draws 256 page to 256 page + 255."""
     sources = question.sources
     assert sources is not None
     return sources.errors(sources.draw(page * _PAGE, _PAGE, question.seed))
@@ -232,7 +231,7 @@ def _solve_reached(
     question: Question, robot: Robot, perfect: Robot, postures: list[Posture],
     errors: NDArray | None, solved: SolvedPoints, rows: NDArray,
 ) -> None:  # fmt: skip
-    """Solve points whose posture exists; most failures become a status."""
+    """Solve points whose posture exists; most failures are recorded as a status."""
     out = solved.records
     conditions = point_conditions(question, robot, postures, errors)
     if robot.has_effects:
@@ -317,7 +316,7 @@ def _record_wrenches(
 def _record_stiffness(
     state: str, conditions: Conditions, solved: SolvedPoints, rows: NDArray
 ) -> None:
-    """Record K_C: the nominal stiffness for each posture, tangents for each point."""
+    """Record K_C: nominal stiffness once per posture, tangent stiffness per point."""
     T = conditions.transforms
     runs = list(_runs(T.reshape(len(T), -1)))
     if state == "nominal":
@@ -338,7 +337,7 @@ def _record_frequencies(
     count: int, robot: Robot, conditions: Conditions, solved: SolvedPoints,
     rows: NDArray,
 ) -> None:  # fmt: skip
-    """Record natural frequencies for each posture; NaN beyond the existing modes."""
+    """Record natural frequencies for each posture; NaN if there are fewer modes."""
     T = conditions.transforms
     for run in _runs(T.reshape(len(T), -1)):
         i = run.start
@@ -348,12 +347,12 @@ def _record_frequencies(
         try:
             frequencies = natural_modes(there, count).frequencies
         except BadInput:
-            continue  # no part with a mass moves in these modes
+            continue  # no part with a mass moves at this posture
         solved.records["frequency"][rows[run], : len(frequencies)] = frequencies
 
 
 def _record_bounds(bounds: PoseError, solved: SolvedPoints, rows: NDArray) -> None:
-    """Record bounds of (27) where (22) has a solution; failures mark the point."""
+    """Record bounds of (27) at points with a solution of (22), and failures."""
     out = solved.records
     for i in np.flatnonzero(out["status"][rows] == 0).tolist():
         row = int(rows[i])
@@ -367,7 +366,7 @@ def _record_bounds(bounds: PoseError, solved: SolvedPoints, rows: NDArray) -> No
 def _bound_clearance_only(
     perfect: Posture, solved: SolvedPoints, rows: NDArray
 ) -> None:
-    """Record bounds of (27) by clearances alone, once for each posture."""
+    """Record bounds of (27) without errors, once for each posture."""
     T = perfect.transforms
     runs = list(_runs(T.reshape(len(T), -1)))
     starts = [run.start for run in runs]

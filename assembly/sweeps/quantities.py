@@ -1,4 +1,4 @@
-"""The quantities that a sweep can compute, and their table."""
+"""The quantities that a sweep can compute, with units and meanings."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -28,30 +28,30 @@ _READING = ("registration", "drift")  # effects that change readings but not scr
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """The quantities requested at every point; sent once to each worker.
+    """The quantities requested at every point; every worker receives them once.
 
-    robot: robot with its errors, which are used if none are drawn.
-    design: design parameters of the robot, if some vary.
-        design: design parameters of the robot, if some vary; otherwise None.
+    Attributes:
+        robot: robot with the errors of its file, which are used if none are drawn.
+        design: content of the robot file if parameters vary; otherwise None.
         varied: paths of the varied parameters.
         components: components of the postures, see
             :mod:`forcefit.assembly.sweeps.targets`.
-        sources: sources of drawn errors; None if the robot's own errors are used.
+        sources: sources of drawn errors; None to use the errors of the robot file.
         seed: seed of the draws.
         assumption: assumption of problem (27); None if its bounds are not computed.
         clearance_only: whether (27) is also bounded for the robot without errors.
         wrenches: frames whose wrenches are recorded.
-        linearisation: whether each point is compared with finite motions.
+        linearisation: whether each point is also solved with finite motions.
         near: distance below which a singularity is reported.
         strength: [Pa] yield strength of the links; stress and safety are then computed.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes.
+        load: (6,) [N m, N] load on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] gravity in base axes.
         under: covariates on which the robot's effects depend.
-        stiffness: state of K_C, in
-            :data:`forcefit.assembly.sweeps.point_stiffness.STATES`, if K_C and the
-            shares of its parts are computed; otherwise empty.
-        frequencies: number of natural frequencies, from the same K_C and declared
-            masses.
+        stiffness: state in which K_C and the shares of its parts are computed, one of
+            :data:`forcefit.assembly.sweeps.point_stiffness.STATES`; empty if they are
+            not computed.
+        frequencies: number of natural frequencies, computed from the same K_C and the
+            masses in the robot file.
         kept: names of the variables that are stored; by default all computed ones.
     """
 
@@ -78,7 +78,7 @@ class Question:
 
     @property
     def reads_otherwise(self) -> bool:
-        """Whether readings of a measuring device differ from the screw."""
+        """Whether a measuring device reads something other than the screw."""
         robot = self.robot
         effects = [robot.effects, *robot.session_effects.values()]
         return any(name in every for every in effects for name in _READING) or any(
@@ -88,12 +88,12 @@ class Question:
 
 @dataclass(frozen=True)
 class Variable:
-    """One quantity of a data set.
+    """A variable of a sweep's data set.
 
     Attributes:
-        dims: axes in addition to those of the points, with their labels.
+        dims: axes other than those of the points, with their labels.
         quantity: entry in the table of quantities.
-        condition: condition of the computation, which follows the meaning.
+        condition: condition of the computation, appended to the meaning.
     """
 
     dims: Mapping[str, tuple[str, ...]]
@@ -102,13 +102,13 @@ class Variable:
 
     @property
     def attributes(self) -> dict[str, str]:
-        """Unit and meaning, as attributes of a NetCDF variable."""
+        """Unit and meaning as attributes of a NetCDF variable."""
         known = self.quantity.attributes
         return known | {"long_name": known["long_name"] + self.condition}
 
 
 def _variable(name: str, condition: str = "", **labels: tuple[str, ...]) -> Variable:
-    """Return a quantity of the table, with labels for its dimensions."""
+    """Return a variable from the table of quantities, with labels for its axes."""
     known = QUANTITIES[name]
     every = {**LABELS, **labels}
     dims = {dim: every[dim] for dim in (*labels, *known.dims)}
@@ -116,26 +116,26 @@ def _variable(name: str, condition: str = "", **labels: tuple[str, ...]) -> Vari
 
 
 def variables(question: Question) -> dict[str, Variable]:
-    """Return the numeric quantities that a sweep stores, by name.
+    """Return the numeric variables that a sweep stores, by name.
 
     Args:
-        question: question of a sweep.
+        question: quantities of a sweep.
 
     Returns:
-        All quantities except ``status`` and the texts.
+        All variables except ``status`` and the texts.
     """
     table = computed(question)
     return {k: v for k, v in table.items() if not question.kept or k in question.kept}
 
 
 def computed(question: Question) -> dict[str, Variable]:
-    """Return the numeric quantities that are computed; some may not be stored.
+    """Return the numeric variables that are computed, including those not stored.
 
     Args:
-        question: question of a sweep.
+        question: quantities of a sweep.
 
     Returns:
-        All quantities except ``status`` and the texts.
+        All variables except ``status`` and the texts.
     """
     names = [
         "margin", "margin_free", "energy", "platform_screw", "closure_residual",
@@ -187,12 +187,12 @@ def _stiffness_variables(robot: Robot, state: str) -> dict[str, Variable]:
 
 
 def record_type(question: Question) -> np.dtype:
-    """Return type of a point's record: stored quantities, and ``status`` as a code."""
+    """Return the type of a point's record: stored variables, ``status`` as a code."""
     return record_of(variables(question))
 
 
 def record_of(table: Mapping[str, Variable]) -> np.dtype:
-    """Return the type of a record of given quantities, and ``status`` as a code."""
+    """Return the type of a record of given variables, with ``status`` as a code."""
     fields = [
         (name, "<f8", tuple(len(labels) for labels in v.dims.values()))
         for name, v in table.items()

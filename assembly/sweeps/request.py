@@ -1,4 +1,4 @@
-"""A sweep from the options of its command, with checks; summary of its results."""
+"""Creation of a sweep from checked options, and the summary of its results."""
 
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
@@ -77,10 +77,10 @@ def ask_sweep(robot: Robot | str | Path, options: SweepOptions) -> Sweep:
         options: options of the command.
 
     Returns:
-        The sweep; all its options have been checked.
+        The sweep, after all options were checked.
 
     Raises:
-        BadInput: an option, a file that it names or the robot violates a rule.
+        BadInput: an option, a file named by an option, or the robot violates a rule.
     """
     close = closing_of(options.rest, options.mismatch, own_errors=not options.errors)
     if close is not None and options.vary:
@@ -193,12 +193,12 @@ def _sources(
 
 
 def _short(value: float | str) -> str:
-    """Return a covariate in the form of the command line."""
+    """Return a covariate as it is written on the command line."""
     return value if isinstance(value, str) else f"{value:g}"
 
 
 def _check_assumption(question: Question) -> None:
-    """Reject bounds of the pose error of a loaded robot: (27) has no load."""
+    """Reject pose error bounds for a loaded robot, because (27) contains no load."""
     home = point_conditions(
         question, question.robot, [home_posture(question.robot)], None
     )
@@ -211,14 +211,14 @@ def _check_assumption(question: Question) -> None:
 
 
 def _targets(robot: Robot, grid: str | None, poses: Path | str | None) -> Targets:
-    """Return the postures."""
+    """Return the postures of a grid or of a table."""
     if poses is not None:
         return read_targets(poses, robot)
     return grid_targets(parse_grid(grid or "", robot))
 
 
 def _vary(design: Design, texts: Sequence[str]) -> dict[str, NDArray]:
-    """Return values by path; least and largest must be valid in a robot file."""
+    """Return values by path; check the smallest and largest as in a robot file."""
     values_by_path: dict[str, NDArray] = {}
     owner: dict[str, str] = {}
     for text in texts:
@@ -230,7 +230,7 @@ def _vary(design: Design, texts: Sequence[str]) -> dict[str, NDArray]:
             )
         for full in design.find(path):
             if full in owner:
-                raise BadInput(f"--vary {path}: {full} varies already")
+                raise BadInput(f"--vary {path}: {full} is varied twice")
             owner[full] = path
         parts = [parse_values(f"--vary {path}", spec) for spec in specs.split(",")]
         values = np.concatenate(parts)
@@ -245,7 +245,7 @@ def _vary(design: Design, texts: Sequence[str]) -> dict[str, NDArray]:
 
 
 def _command(robot: str | Path, options: SweepOptions) -> str:
-    """Return the command of the same sweep, without options that have their default."""
+    """Return the command of this sweep, without options at their defaults."""
     default = {option.name: option.default for option in fields(options)}
     given = {name: getattr(options, name) for name in default} | {
         "load": _assigned((name.lower() for name in WRENCH), options.load),
@@ -261,25 +261,25 @@ def _command(robot: str | Path, options: SweepOptions) -> str:
             words += [word for one in value for word in (name, str(one))]
         elif value not in (None, False) and value != default[key]:
             words += [name, str(value)]
-    # names of files may contain bytes that are not UTF-8
+    # file names may contain bytes that are not UTF-8
     return shlex.join(words).encode(errors="backslashreplace").decode()
 
 
 def _assigned(names: Iterable[str], values: Iterable[float]) -> str | None:
-    """Return values in the form of the command line, without zeros."""
+    """Return nonzero values as they are written on the command line."""
     given = zip(names, values, strict=True)
     return ",".join(f"{name}={value:g}" for name, value in given if value) or None
 
 
 def summary_of(data: "xarray.Dataset | StoredDataset") -> dict[str, Any]:
-    """Return the summary of a sweep as plain values.
+    """Return the summary of a sweep as a dictionary of plain values.
 
     Args:
-        data: data of a sweep.
+        data: data set of a sweep.
 
     Returns:
-        Axes; the number of points with each status; for each quantity the smallest,
-        median and largest finite value with its unit, None if no value is finite.
+        The axes; the number of points with each status; and for each quantity the
+        smallest, median and largest finite value with its unit, or None.
     """
     status = data.data_vars["status"]
     names, counts = np.unique(status.values.astype(str), return_counts=True)
@@ -310,7 +310,7 @@ def _spread(variable: "xarray.DataArray | Stored") -> dict[str, Any] | None:
 
 
 def summary_text(summary: Mapping[str, Any], data: "StoredDataset") -> str:
-    """Return a text with the statuses, and the first reason for each that is not ok."""
+    """Return a text with all statuses, and the first reason for each except ok."""
     lines = [", ".join(f"{name}: {n}" for name, n in summary["status"].items())]
     status = data.data_vars["status"].values.astype(str).ravel()
     for name in summary["status"]:

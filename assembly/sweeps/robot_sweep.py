@@ -1,6 +1,6 @@
-"""A whole sweep in one call: from a robot and varied quantities to a data set.
+"""A sweep in one call: from a robot and varied quantities to a data set.
 
-Begin at :func:`sweep`; the command ``forcefit assembly sweep`` takes the same options.
+Start with :func:`sweep`; the command ``forcefit assembly sweep`` has the same options.
 """
 
 from collections.abc import Mapping, Sequence
@@ -53,8 +53,8 @@ def sweep(
 
     Args:
         robot: a robot, a robot file, or a built-in name.
-        grid: grid such as ``tx=-0.2:0.2:0.025,tz=-0.5``, or
-        poses: a table of postures.
+        grid: grid such as ``tx=-0.2:0.2:0.025,tz=-0.5``; None if ``poses`` is given.
+        poses: table of postures; None if ``grid`` is given.
         vary: design parameters, such as ``link_a.link.beam.radius=0.03,0.04``, of a
             robot file or a built-in robot.
         errors: file with the distributions of the errors, see docs/statistics.md.
@@ -63,35 +63,35 @@ def sweep(
         assumption: assumption of problem (27): ``"frozen"``, ``"free"``, ``"budget"``,
             or ``"none"`` if its bounds are not computed.
         quantities: names of the data variables to compute and store; ``"default"``
-            stands for those that are stored if none are named.  The bounds by
-            clearances alone (``"rotation_error_clearance"``,
-            ``"translation_error_clearance"``) and the changes by finite motions
-            (``"linearisation_rotation"``, ..) are only computed if they are named.
+            stands for those that are stored if none are named.  Some variables are
+            computed only if they are named: the bounds by clearances without errors
+            (``"rotation_error_clearance"``, ``"translation_error_clearance"``) and the
+            differences to finite motions (``"linearisation_rotation"``, ..).
         wrench_of: frames whose wrenches are recorded.
         near: distance below which a singularity is reported.
         yield_strength: [Pa] yield strength of the links, for their stress and safety.
-        load: (6,) [N m, N] on the platform at its origin, base axes, or by component,
-            ``{"fz": -50}``.
-        gravity: (3,) [m/s^2] base axes.
+        load: load on the platform at its origin in base axes, (6,) [N m, N] or by
+            component, ``{"fz": -50}``.
+        gravity: (3,) [m/s^2] gravity in base axes.
         under: covariates on which effects of the robot's file depend.
-        state: ``"nominal"``, ``"contact"`` or ``"exact"``: state in which K_C, and the
-            shares of links and joints in it, are computed too.
+        state: ``"nominal"``, ``"contact"`` or ``"exact"``: state in which K_C and the
+            shares of links and joints in it are computed; None to omit them.
         frequencies: number of natural frequencies.
         rest: frame to which the closures' mismatch at home is added as geometric error.
-        mismatch: ``"spring"``: redundant drives that do not fit at home are preloaded.
-        output: NetCDF file to write.  Finished points are kept in ``<output>.journal``.
-            After an interruption the same call resumes from it and writes the same
-            file, byte for byte.
+        mismatch: ``"spring"`` to preload redundant drives that do not fit at home.
+        output: NetCDF file to write.  Finished points are stored in
+            ``<output>.journal``. After an interruption, the same call resumes from the
+            journal and writes the same file, byte for byte.
         progress: function called with the number of finished points and of all points.
-        solve: function that solves blocks of points; with a file, other processes may
-            solve them, see :mod:`forcefit.assembly.sweeps.cluster`.
+        solve: function that solves blocks of points, here or in other processes, see
+            :mod:`forcefit.assembly.sweeps.cluster`.
 
     Returns:
-        The data set over the axes, with units; it is in memory, even with a file.
+        The data set over the axes, with units, in memory even if a file is written.
 
     Raises:
-        BadInput: an option, a file that it names or the robot violates a rule; the
-            journal belongs to another sweep or run; or a file cannot be written.
+        BadInput: an option, a file named by an option, or the robot violates a rule;
+            the journal belongs to another sweep or run; or a file cannot be written.
     """
     if isinstance(quantities, str):
         quantities = (quantities,)
@@ -112,7 +112,7 @@ def sweep(
 
 
 def options_by_old_names(**options: Any) -> SweepOptions:
-    """Return the options of a sweep by the keywords of the last release.
+    """Return the options of a sweep from the keywords of the last release.
 
     Args:
         options: ``reading``, ``play_alone``, ``wrench``, ``linearisation``,

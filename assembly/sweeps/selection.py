@@ -15,7 +15,7 @@ from forcefit.assembly.sweeps.quantities import (
 from forcefit.inputs.errors import BadInput, nearest, quoted
 
 DEFAULT = "default"  # stands for the variables that are stored if none are named
-MODES = 6  # number of natural frequencies if it is not given
+MODES = 6  # default number of natural frequencies
 _STIFFNESS = (
     "compliance", "stiffness", "eigen_stiffness", "stiffness_condition", "share",
 )  # fmt: skip
@@ -27,18 +27,18 @@ _NEEDED = (
 
 
 def select(question: Question, texts: Sequence[str]) -> Question:
-    """Restrict a question to named quantities.
+    """Restrict the quantities of a sweep to the named ones.
 
     Args:
-        question: question from the other options.
+        question: quantities that the other options request.
         texts: names of data variables, separated by commas; ``"default"`` stands for
             those that are stored if none are named.
 
     Returns:
-        The question; variables that are not named are not computed.
+        The requested quantities; variables that are not named are not computed.
 
     Raises:
-        BadInput: there is no such variable, or it needs an option that is missing.
+        BadInput: a variable is unknown, or an option that it requires is missing.
     """
     every = computed(_with_optional(question))
     kept: list[str] = []
@@ -56,7 +56,7 @@ def select(question: Question, texts: Sequence[str]) -> Question:
 
 
 def _with_optional(question: Question) -> Question:
-    """Return a question for all quantities whose options are given or have defaults."""
+    """Request all quantities whose options are given or have defaults."""
     return replace(
         question, clearance_only=True, linearisation=True,
         stiffness=question.stiffness or "nominal",
@@ -65,7 +65,7 @@ def _with_optional(question: Question) -> Question:
 
 
 def _for(question: Question, kept: dict[str, Variable]) -> Question:
-    """Return the question for exactly these variables."""
+    """Request exactly the given variables."""
     every = _with_optional(question)
     return replace(
         question,
@@ -81,7 +81,7 @@ def _for(question: Question, kept: dict[str, Variable]) -> Question:
 
 
 def quantities_text() -> str:
-    """Return every data variable of sweeps: name, unit, meaning and needed option."""
+    """Return all variables of sweeps as text: name, unit, meaning, required option."""
     from forcefit.assembly.robots import BUILT_IN
 
     robot = BUILT_IN["four_bar"]()

@@ -1,4 +1,4 @@
-"""Derivatives of K_C by any number of a robot file, with the effects of the file."""
+"""Derivatives of K_C by any number of a robot file, including the file's effects."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -14,14 +14,14 @@ from forcefit.assembly.platform_stiffness.tangent_slopes import (
 from forcefit.assembly.sweeps.parameters import Design
 from forcefit.inputs.table import BadInput
 
-# step relative to the number, or to 1 if it is zero; the derivative's error is 1e-8
+# step relative to the number, or 1 if it is zero; the derivative's error is 1e-8
 _STEP = 1e-4
 _SMALL_STEP = 1e-8  # [rad, m] step for errors, because contacts change within some um
 _AS_ERROR = {"translation": "t", "rotation": "r"}
 
 
 class CannotChange(BadInput):
-    """Error: a number cannot change alone, because no robot exists for other values."""
+    """A number cannot change by itself, because no robot exists for other values."""
 
 
 def stiffness_slopes(
@@ -35,12 +35,12 @@ def stiffness_slopes(
     """Return the derivatives of the platform's compliance by design numbers.
 
     Args:
-        design: the robot of the file, with its effects.
-        paths: paths of numbers; a frame's name without its leg changes the number in
-            all legs together.
-        pose: nominal platform pose, which stays the same.
-        joints: actuated coordinates, which stay the same instead of the pose.
-        asked: state of the tangent, and its point; the nominal state if absent.
+        design: robot file, including its effects.
+        paths: paths of numbers; a path without the leg's name changes the number in all
+            legs together.
+        pose: nominal platform pose, which is kept constant.
+        joints: actuated coordinates, which are kept constant instead of the pose.
+        asked: state of the tangent, and its point; None for the nominal state.
         under: covariates on which effects depend.
 
     Returns:
@@ -48,10 +48,10 @@ def stiffness_slopes(
         axes; NaN where a motion of the platform is free, or at a change of contact.
 
     Raises:
-        BadInput: there is no such number.
+        BadInput: a path does not lead to a number.
         CannotChange: the robot or its posture does not exist for a changed number, for
-            example a length in an overconstrained loop.
-        CannotAssemble: the closures cannot be closed with these errors.
+            example for a changed length in an overconstrained loop.
+        CannotAssemble: the closures cannot be closed with the present errors.
         FreeMotion: a load acts along a motion without stiffness.
         SolverFailed: no equilibrium was found.
     """
@@ -88,7 +88,7 @@ def stiffness_slopes(
 
 
 def _cannot_change(path: str, reason: str) -> str:
-    """Return a message with the number, the reason, and an alternative number."""
+    """Return an error message with the number, the reason, and an alternative."""
     frame, *keys = path.rsplit(".", 2)
     instead = ""
     if len(keys) == 2 and keys[0] in _AS_ERROR and keys[1] in {"x", "y", "z"}:

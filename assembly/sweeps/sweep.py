@@ -1,8 +1,8 @@
-"""Solution of a sweep over postures, draws of errors and designs, to one data set.
+"""Solution of a sweep over designs, postures and draws of errors, as one data set.
 
-The points of a sweep are its designs x postures x draws; draws vary fastest.  They are
-divided into blocks that are solved and stored in any order, by any process.  No result
-depends on the process or on earlier blocks.
+The points of a sweep are all combinations designs x postures x draws; the draw changes
+fastest.  Points are divided into blocks, which any process may solve and store in any
+order.  No result depends on the process or on other blocks.
 """
 
 import signal
@@ -29,15 +29,15 @@ if TYPE_CHECKING:
     import xarray
 
 Progress = Callable[[int, int], None]
-# function that yields each block's number with its results, in any order
+# function that yields the number and results of each block, in any order
 Solver = Callable[["Sweep", Iterable[int]], Iterator[tuple[int, SolvedPoints]]]
 
 
 def solve_here(
     sweep: Sweep, blocks: Iterable[int]
 ) -> Iterator[tuple[int, SolvedPoints]]:
-    """Solve blocks one after the other, on one thread."""
-    # more threads take longer for small matrices, and add up in another order
+    """Solve blocks one after the other on one thread."""
+    # more threads are slower for small matrices and change the order of summation
     with threadpool_limits(1), _interrupts_noted() as noted:
         for block in blocks:
             yield block, solve_points(sweep.question, sweep.points(block))
@@ -47,7 +47,7 @@ def solve_here(
 
 @contextmanager
 def _interrupts_noted() -> Generator[list[int], None, None]:
-    """Record a first Ctrl-C so that the block is finished; stop at once at a second."""
+    """Let a first Ctrl-C finish the current block; a second one stops at once."""
     noted: list[int] = []
     if threading.current_thread() is not threading.main_thread():
         yield noted
@@ -72,20 +72,21 @@ def run_sweep(
     solve: Solver = solve_here,
     held: ExitStack | None = None,
 ) -> None:
-    """Solve a sweep into a NetCDF file; resume from its journal if there is one.
+    """Solve a sweep and write a NetCDF file, resuming from the journal if it exists.
 
-    The journal, ``<path>.journal``, holds every finished block.  After an interruption
-    the same sweep resumes from it and writes the same file, byte for byte.
+    The journal, ``<path>.journal``, stores every finished block.  After an
+    interruption, the same call resumes from it and writes the same file, byte for byte.
 
     Args:
         sweep: sweep to solve.
-        path: path of the file; when it is complete, the journal is removed.
+        path: path of the file; the journal is removed when the file is complete.
         progress: called at the start and after each block with the number of points in
-            the journal and of all points.
+            the journal and the number of all points.
         solve: function that solves blocks: :func:`solve_here`, or
             :mod:`forcefit.assembly.sweeps.cluster`.
-        held: context that keeps the journal until it is closed, while further results
-            are computed from the file; after an interruption no block is solved again.
+        held: exit stack that keeps the journal until it is closed, while further
+            results are computed from the file. After an interruption, no block is then
+            solved again.
 
     Raises:
         BadInput: the journal belongs to another sweep or run, or a file cannot be
@@ -127,7 +128,7 @@ def sweep_in_memory(
 
     Args:
         sweep: sweep to solve.
-        progress: called after each block with the number of finished and of all points.
+        progress: called after each block with the numbers of finished and all points.
 
     Returns:
         The data set that :func:`run_sweep` would write.
@@ -149,22 +150,22 @@ def sweep_poses(
     progress: Progress = lambda done, total: None,
     assumption: str | None = None,
 ) -> "xarray.Dataset":
-    """Solve (21) and (22), and (27) if requested, at every pose of a grid.
+    """Solve (21), (22) and, if requested, (27) at every pose of a grid.
 
     Args:
         robot: robot with its errors, clearances and stiffnesses.
         axes: values [m or rad] by pose component or ``q.<frame>``; omitted components
             are free.
-        progress: called after each block with the number of finished and of all points.
+        progress: called after each block with the numbers of finished and all points.
         assumption: assumption of problem (27): ``"frozen"``, ``"free"`` or
             ``"budget"``; None if the bounds of the pose error are not computed.
 
     Returns:
         Data set over the axes: ``margin``, ``margin_free``, ``energy``,
-        ``platform_screw``; with an assumption ``rotation_error`` and
-        ``translation_error`` (lower and upper); certificates, distances to
-        singularities and ``status``.  NaN where there is no solution; the status is
-        then the reason.
+        ``platform_screw``; certificates, distances to singularities and ``status``;
+        with an assumption also ``rotation_error`` and ``translation_error`` (lower and
+        upper).  At points without a solution, values are NaN and the status is the
+        reason.
     """
     targets = grid_targets(axes)
     question = Question(robot, components=targets.names, assumption=assumption)

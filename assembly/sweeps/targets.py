@@ -1,7 +1,7 @@
 """The postures of a sweep: a grid of poses or joint coordinates, or a list of them.
 
-A grid has an axis for each named component; a list has one axis, ``posture``.  Names
-are either ``tx ty tz rx ry rz`` for the platform's pose, or ``q.<frame>`` for the
+A grid has one axis for each named component; a list has one axis, ``posture``.  The
+names are either ``tx ty tz rx ry rz`` for the platform's pose, or ``q.<frame>`` for the
 coordinate of an actuated joint.  A list may also use ``pose.tx``, as campaigns do.
 """
 
@@ -16,14 +16,14 @@ from forcefit.assembly.kinematics.posture import POSE
 from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, nearest, quoted, read_rows
 
-# largest number of points; a larger grid is probably due to a wrong step
+# largest number of points; more points are probably due to a wrong step
 LARGEST_GRID = 10_000_000
 _JOINT = "q."
 
 
 @dataclass(frozen=True, eq=False)
 class Targets:
-    """Poses or joint coordinates, on the axes of a grid or in a list.
+    """Poses or joint coordinates, either on a grid or in a list.
 
     Attributes:
         names: names of the components, ``tx`` .. or ``q.<frame>``.
@@ -49,7 +49,7 @@ class Targets:
         return self.names if self.labels is None else ("posture",)
 
     def at(self, numbers: NDArray) -> NDArray:
-        """Return the (k, components) values of postures, given by numbers."""
+        """Return the components (k, components) of the postures with given numbers."""
         if self.labels is not None:
             return np.stack([v[numbers] for v in self.values], axis=1)
         places = np.unravel_index(numbers, self.shape)
@@ -58,15 +58,16 @@ class Targets:
 
 
 def goals_of(names: Sequence[str], robot: Robot, rows: NDArray) -> NDArray:
-    """Return poses or coordinates in the form of ``assembly.kinematics.posture``.
+    """Return postures in the form that ``assembly.kinematics.posture`` expects.
 
     Args:
-        names: names of the components, all of one kind.
+        names: names of the components, either of a pose or of joints.
         robot: robot of n frames.
         rows: (k, components) values from :meth:`Targets.at`.
 
     Returns:
-        (k, 6) poses, NaN where free; or (k, n) coordinates, NaN where passive.
+        (k, 6) poses with NaN for free components; or (k, n) joint coordinates with NaN
+        for passive joints.
     """
     if not of_joints(names):
         goals = np.full((len(rows), len(POSE)), np.nan)
@@ -84,7 +85,7 @@ def of_joints(names: Sequence[str]) -> bool:
 
 
 def grid_targets(axes: Mapping[str, NDArray]) -> Targets:
-    """Return all combinations of the values on each axis."""
+    """Return the grid of all combinations of the values on each axis."""
     return Targets(tuple(axes), tuple(np.asarray(v, float) for v in axes.values()))
 
 
@@ -100,16 +101,16 @@ def parse_grid(text: str, robot: Robot | None = None) -> dict[str, NDArray]:
     """Return the axes of a grid given as ``"tx=-0.2:0.2:0.025,tz=-0.6:-0.3:0.025"``.
 
     Args:
-        text: for each component ``start:stop:step`` [m or rad], or one number.  Both
-            ends are included if (stop - start)/step is an integer within 1e-9.
-        robot: robot with actuated joints ``q.<frame>`` that may be named; None if only
+        text: for each component ``start:stop:step`` [m or rad], or one number.  The
+            value ``stop`` is included if (stop - start)/step is an integer within 1e-9.
+        robot: robot whose actuated joints ``q.<frame>`` may be named; None if only
             poses are allowed.
 
     Returns:
         Values by component, in the given order.
 
     Raises:
-        BadInput: the text has a different form, or gives too many points.
+        BadInput: the text has a different form, or describes too many points.
     """
     axes: dict[str, NDArray] = {}
     for part in text.split(","):
@@ -125,7 +126,7 @@ def parse_grid(text: str, robot: Robot | None = None) -> dict[str, NDArray]:
 
 
 def _check_name(whose: str, what: str, name: str, robot: Robot | None) -> None:
-    """Reject a component that no posture has."""
+    """Reject a name that is not a component of a posture."""
     frames = robot.frames if robot is not None else ()
     valid = [*POSE, *(_JOINT + f.name for f in frames if f.actuated)]
     if name not in valid:
@@ -146,7 +147,7 @@ def _check_columns(
 
 
 def _check_kind(whose: str, names: Mapping | Sequence[str]) -> None:
-    """Reject components of a pose together with joint coordinates."""
+    """Reject a mixture of pose components and joint coordinates."""
     joints = [name for name in names if name.startswith(_JOINT)]
     if joints and len(joints) < len(names):
         other = next(name for name in names if not name.startswith(_JOINT))
@@ -163,10 +164,10 @@ def parse_values(whose: str, spec: str) -> NDArray:
         spec: the text.
 
     Returns:
-        The values, with both ends if the step fits within 1e-9.
+        The values, including ``stop`` if the step fits within 1e-9.
 
     Raises:
-        BadInput: the text has a different form, or gives too many points.
+        BadInput: the text has a different form, or describes too many points.
     """
     expected = "expected START:STOP:STEP or one number"
     try:
@@ -190,19 +191,19 @@ def parse_values(whose: str, spec: str) -> NDArray:
 
 
 def read_targets(path: Path | str, robot: Robot, extra: Sequence[str] = ()) -> Targets:
-    """Return the postures of a table: columns ``pose.tx`` or ``q.<frame>``, ``id``.
+    """Return the postures of a CSV table with columns ``pose.tx`` or ``q.<frame>``.
 
     Args:
         path: CSV file with a header and one row for each posture.
         robot: robot whose actuated joints may be columns; joints without a column keep
             their ``position``.
-        extra: names of further columns of numbers, returned among the components.
+        extra: names of further columns of numbers, which become components.
 
     Returns:
         The postures in the order of the file.
 
     Raises:
-        BadInput: the table is invalid; the message names line and column.
+        BadInput: the table is invalid; the message contains line and column.
     """
     path = Path(path)
     rows = [row for row in enumerate(read_rows(path), 1) if any(map(str.strip, row[1]))]
@@ -237,7 +238,7 @@ def read_targets(path: Path | str, robot: Robot, extra: Sequence[str] = ()) -> T
 
 
 def _cell(whose: str, text: str) -> float:
-    """Return the number in a cell."""
+    """Return the number in a cell of the table."""
     try:
         value = float(text)
     except ValueError:
@@ -248,7 +249,7 @@ def _cell(whose: str, text: str) -> float:
 
 
 def _check_labels(path: Path, labels: Sequence[str]) -> None:
-    """Reject equal ids in two rows."""
+    """Reject a table with two rows of equal id."""
     if len(set(labels)) < len(labels):
         twice = next(label for label in labels if labels.count(label) > 1)
         raise BadInput(f"{path}: id: found {quoted(twice)} twice; expected unique ids")

@@ -34,12 +34,12 @@ from forcefit.assembly.callouts.zones_of_features import (
     shift_along,
 )
 
-LENGTH = 0.020  # [m] of the bore
-SIZES = 0.040, 0.030  # [m] of the rectangular face; the round one has the first
+LENGTH = 0.020  # [m] length of the bore
+SIZES = 0.040, 0.030  # [m] sides of the rectangular face; first is the diameter
 ALONG = np.array([1.0, 0.0])
 GREY, BLUE, RED = "0.85", "tab:blue", "tab:red"
 _CORNERS = ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (-1.0, 1.0))
-# a unit of these components of a screw in the pictures, and their names
+# factor to the unit in the pictures, and label, for each component of a screw
 UNITS = {0: (1e3, "tilt RX [mrad]"), 1: (1e3, "tilt RY [mrad]"),
          3: (1e6, "shift TX [µm]"), 4: (1e6, "shift TY [µm]"),
          5: (1e6, "shift TZ [µm]")}  # fmt: skip

@@ -1,15 +1,16 @@
-"""A simulated machine corrected: its error at the machine before and after.
+"""Position error of simulated robots before and after compensation.
 
     python benchmarks/evidence/compensation.py OUT.json --count 20 [--first 0]
         [--robots arm6]
 
-Case k, drawn from seed k: a robot of six drives, or a Delta (positions alone), with one
-or two hidden effects of the library or outside it, each 5 times the noise.  It is
-measured, diagnosed, and the robot found is used to correct commands at configurations
-never measured.  The machine is then commanded again, and the distance from where it
-should stand is taken at the machine, without noise and without the measuring device.
-Beside it the floor: errors of the size of the noise that the diagnosis had to work
-with, alone.
+Case k is drawn from seed k: a robot with six drives, or a Delta robot (positions only),
+with one or two hidden effects from the library or outside it, each five times as large
+as the noise.  Readings of the robot are simulated and diagnosed, and the identified
+robot is used to correct commands at configurations that were not measured.  The robot
+is then simulated with the corrected commands.  The error is the distance from the
+required position, without noise and without the measuring device.  The error is also
+given as the reading of a device with this noise over the noise; it is 1 for a perfect
+robot.
 """
 
 import argparse
@@ -52,7 +53,7 @@ ROBOTS = ("arm6", "hexapod", "delta")
 STRENGTH = 5.0
 TARGETS = 12
 TRIES = 20
-NEAR = 1.2  # of the noise: what the machine's error is to come to
+NEAR = 1.2  # multiple of the noise that the error should reach
 # weight and stiffening set the noise; clearance is left where the load pushes it
 NAMES = [
     name for name in (*LIBRARY, *OUTSIDE)
@@ -63,7 +64,7 @@ NAMES = [
 
 
 def draw_case(seed: int, robots: tuple[str, ...]) -> Synthetic:
-    """A measured machine; draws again what a robot cannot have."""
+    """Return a measured robot; draw again if the robot cannot have the effects."""
     for attempt in range(TRIES):
         rng = np.random.default_rng([seed, attempt])
         robot = without_clearance(load_robot(str(rng.choice(robots))))
@@ -81,13 +82,13 @@ def draw_case(seed: int, robots: tuple[str, ...]) -> Synthetic:
 
 
 def _design(robot: Robot) -> CampaignDesign:
-    """What is measured."""
+    """Return the design of the measurements."""
     reach = 0.2 if robot.closures else 0.6
     return CampaignDesign(30, 120, reach, load=60.0, humidity=True)
 
 
 def plan_table(plan: CampaignPlan) -> str:
-    """The commands of a plan, its loads and covariates."""
+    """Return the commands of a plan with loads and covariates as a table."""
     covariates = list(plan.rows[0].covariates)
     loads = [f"load.{axis}" for axis in ("mx", "my", "mz", "fx", "fy", "fz")]
     lines = [",".join(["id", *plan.columns, *loads, *(f"cov.{c}" for c in covariates)])]
@@ -98,7 +99,7 @@ def plan_table(plan: CampaignPlan) -> str:
 
 
 def run_case(seed: int, robots: tuple[str, ...]) -> dict[str, Any]:
-    """Errors at the machine before and after, in units of the noise."""
+    """Return the errors before and after compensation, in units of the noise."""
     begin = time.process_time()
     case = draw_case(seed, robots)
     design = replace(_design(case.robot), configurations=TARGETS, rows=TARGETS)
@@ -140,7 +141,7 @@ def run_case(seed: int, robots: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _against(error: NDArray, sigma: NDArray, six: bool) -> float:
-    """What a device of the same noise would read, over that noise."""
+    """Return the rms error that a device of this noise would read, over the noise."""
     parts = [error[:, 0] / sigma[3]] + ([error[:, 1] / sigma[0]] if six else [])
     return float(np.sqrt(1.0 + np.mean(np.square(parts)) / 3))
 
@@ -150,7 +151,7 @@ def _rms(values: NDArray) -> float:
 
 
 def main() -> None:
-    """Run cases, write every answer, print medians."""
+    """Run the cases, write each result, and print the medians."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
     parser.add_argument("--count", type=int, default=20)

@@ -1,4 +1,4 @@
-"""With clearances: how often the simulation converges, how long, and how near it is.
+"""Cross-checks with clearances: rate of convergence, time and agreement.
 
 Run ``python benchmarks/evidence/crosscheck_play.py [draws [robot ...]]``; 120 draws of
 each robot take several minutes and print a table of ``docs/crosscheck.md``.

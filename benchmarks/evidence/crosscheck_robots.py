@@ -1,7 +1,7 @@
-"""Robots on which the cross-check is measured, beside the paper's.
+"""Additional robots on which the cross-check is evaluated.
 
-``hexapod`` is a Gough-Stewart platform on six legs of steel tubes, ``three_rrr`` a
-planar 3-RRR, which in space is overconstrained six-fold.
+``hexapod`` is a Gough-Stewart platform with six legs of steel tubes.  ``three_rrr`` is
+a planar 3-RRR robot, which has an overconstraint of six in space.
 """
 
 import numpy as np
@@ -14,12 +14,12 @@ PLAY = Clearance(radial=2e-5, axial=2e-5, tilt=5e-4)
 
 
 def _vector(R: np.ndarray) -> np.ndarray:
-    """Rotation vector of a matrix."""
+    """Return the rotation vector of a rotation matrix."""
     return Rotation.from_matrix(R).as_rotvec()
 
 
 def _axes_along(x: np.ndarray) -> np.ndarray:
-    """Axes whose x is along a direction."""
+    """Return axes whose x axis is along a direction."""
     x = x / np.linalg.norm(x)
     y = np.cross([0.3, 1.0, 0.2], x)
     y /= np.linalg.norm(y)
@@ -27,7 +27,7 @@ def _axes_along(x: np.ndarray) -> np.ndarray:
 
 
 def hexapod(play: bool = False) -> Robot:
-    """Universal joint, locked slide, tube, three pins (the last with a stiff bush).
+    """Return a hexapod; each leg has a universal joint, locked slide, tube and pins.
 
     Args:
         play: whether the last pin has clearances.
@@ -45,7 +45,7 @@ def hexapod(play: bool = False) -> Robot:
         b = np.array([0.3 * np.cos(head), 0.3 * np.sin(head), 0.6])
         R = _axes_along(b - a)
         length = float(np.linalg.norm(b - a))
-        turn = np.array([0.0, np.pi / 2, 0.0])  # z along the old x, the leg
+        turn = np.array([0.0, np.pi / 2, 0.0])  # rotate z onto the leg
         back = np.array([0.0, -np.pi / 2, 0.0])
         name = f"leg{k}"
         frames += [
@@ -81,7 +81,7 @@ def hexapod(play: bool = False) -> Robot:
 
 
 def three_rrr(play: bool = False) -> Robot:
-    """Three legs of two aluminium bars in one plane; pins stiff but for their own z.
+    """Return a robot with three legs of two aluminium bars, joined by stiff pins.
 
     Args:
         play: whether the last pins have clearances.
@@ -121,11 +121,11 @@ def three_rrr(play: bool = False) -> Robot:
 
 
 def papers_robot(seed: int, signed: bool) -> Robot:
-    """The built-in IRSbot-2 with errors of the paper's size at the paper's frames.
+    """Return the IRSbot-2 with errors of the paper's size at the frames of the paper.
 
     Args:
-        seed: of the draw.
-        signed: errors of random sign instead of all positive.
+        seed: seed of the draw.
+        signed: whether errors have random signs; otherwise all are positive.
 
     Returns:
         The robot: up to 2e-2 rad and 2e-4 m about and along each axis.
@@ -142,13 +142,13 @@ def papers_robot(seed: int, signed: bool) -> Robot:
 
 
 def drawn(robot: Robot, seed: int, turn: float, shift: float) -> Robot:
-    """The robot with errors drawn on every elastic link and every closing frame.
+    """Return the robot with drawn errors of every elastic link and closing frame.
 
     Args:
-        robot: nominal.
-        seed: of the draw.
+        robot: nominal robot.
+        seed: seed of the draw.
         turn: [rad] largest rotation about an axis.
-        shift: [m] largest translation along one.
+        shift: [m] largest translation along an axis.
 
     Returns:
         A robot with errors of random signs.

@@ -1,4 +1,4 @@
-"""Slopes, limits and what finite rotations leave, over poses and draws.
+"""Slopes, limits and residuals of the cross-check over poses and draws.
 
 Run ``python benchmarks/evidence/crosscheck_slopes.py [robot ...]``; it takes a minute
 or two and prints the tables of ``docs/crosscheck.md``.
@@ -21,7 +21,7 @@ POSES = [
 
 
 def postures(name: str) -> list[Posture]:
-    """Thirty cases of a robot."""
+    """Return thirty postures of a robot with drawn errors."""
     if name == "irsbot2":
         return [
             place_robot(papers_robot(seed, signed=seed % 2 == 1), {"tx": x, "tz": z})
@@ -32,7 +32,7 @@ def postures(name: str) -> list[Posture]:
 
 
 def main() -> None:
-    """Print one row for each robot and kind of link."""
+    """Print a row for each robot and each model of the links."""
     print("robot      links   passed  slope            limit    left rotation    "
           "left translation  energy, linear and exact   seconds")  # fmt: skip
     names = sys.argv[1:] or ("irsbot2", "hexapod", "three_rrr")

@@ -1,7 +1,7 @@
-"""The paper's robot with its distal links as solids of finite elements.
+"""Cross-check of the paper's robot with its distal links as finite-element solids.
 
-Run ``python benchmarks/evidence/crosscheck_solids.py``; a minute or two, most of it
-condensing the mesh.  It prints a table of ``docs/crosscheck.md``.
+Run ``python benchmarks/evidence/crosscheck_solids.py``.  It takes one or two minutes,
+mainly to condense the mesh, and prints a table of ``docs/crosscheck.md``.
 """
 
 import time
@@ -18,7 +18,7 @@ SURFACE = Path(__file__).parents[2] / "meshes" / "distal_plain.stl"
 
 
 def main() -> None:
-    """Print one row for each draw and kind of link."""
+    """Print a row for each draw and each model of the links."""
     link = MeshLink(SURFACE, "z=0", "z=0.452", 60e9, 0.3)
     names = [f"leg{leg}.link_{side}" for leg in (1, 2) for side in "ab"]
     print("draw  links   passed  slope   limit    left rotation  left translation  "

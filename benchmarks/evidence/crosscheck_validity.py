@@ -1,11 +1,12 @@
-"""Where the virtual-joint model's assumptions cost more than one per cent or 20 um.
+"""Errors due to the assumptions of the virtual-joint model, above 1 % or 20 um.
 
-Run ``python benchmarks/evidence/crosscheck_validity.py``: five minutes.  It prints the
-tables of ``docs/validity.md`` and writes its figures and ``validity.json`` to
-``docs/``, or to a folder that is given.
+Run ``python benchmarks/evidence/crosscheck_validity.py``; it takes five minutes.  It
+prints the tables of ``docs/validity.md``, and writes the figures and ``validity.json``
+to ``docs/`` or to a given folder.
 
-Errors are drawn up to a size in rad about, and a hundredth of it in m along, each axis,
-over 5 poses x 4 draws a robot.  Joints are tight but for disc and cone.
+Errors are drawn at 5 poses with 4 draws each.  Their largest size is given in rad about
+each axis, and a hundredth of it in m along each axis.  Joints have no clearance, except
+for the comparison of disc and cone.
 """
 
 import itertools
@@ -60,14 +61,14 @@ POSES = {
 
 
 def erring(name: str, seed: int) -> Robot:
-    """A robot with errors of the paper's size, random signs in every other draw."""
+    """Return a robot with errors of the paper's size; odd draws have random signs."""
     if name == "irsbot2":
         return papers_robot(seed, signed=seed % 2 == 1)
     return drawn(hexapod(play=True), seed, PAPER, PAPER / 100)
 
 
 def postures(name: str, slenderness: float | None = None, play: bool = False) -> list:
-    """Twenty cases of a robot at the paper's errors."""
+    """Return twenty postures of a robot with the paper's errors."""
     cases = []
     for pose, seed in itertools.product(POSES[name], range(4)):
         robot = erring(name, seed) if play else without_clearance(erring(name, seed))
@@ -78,7 +79,7 @@ def postures(name: str, slenderness: float | None = None, play: bool = False) ->
 
 
 def free_of_errors(cases: Iterable[Posture]) -> list[Posture]:
-    """One case at each pose, without errors; play stays."""
+    """Return one posture at each pose without errors; clearances are unchanged."""
     none = [
         replace(c, robot=c.robot.with_errors(np.zeros_like(c.robot.errors)))
         for c in cases
@@ -87,7 +88,7 @@ def free_of_errors(cases: Iterable[Posture]) -> list[Posture]:
 
 
 def resized(cases: Iterable[Posture], factor: float) -> list[Posture]:
-    """The same with errors times a factor; play stays as it is."""
+    """Return the postures with errors times a factor; clearances are unchanged."""
     return [
         replace(c, robot=c.robot.with_errors(factor * c.robot.errors)) for c in cases
     ]
@@ -97,7 +98,7 @@ def row(
     head: tuple[str, str, str, float], cases: Iterable[Posture],
     cost: Callable[..., Cost], *arguments: object,
 ) -> dict:  # fmt: skip
-    """Median and largest cost over cases, at a robot, assumption, case and x."""
+    """Return the median and largest error over the postures as a row of a table."""
     costs = []
     for posture in cases:
         try:
@@ -113,7 +114,7 @@ def row(
 
 
 def closures(name: str) -> Iterable[dict]:
-    """(a) over the size of the errors, the load and the links' slenderness."""
+    """Yield (a) for several sizes of the errors, loads and slendernesses of links."""
     kinds = (("as built", None, None), ("1 kN", None, DOWN), ("L / r = 40", 40.0, None))
     for case, slenderness, load in kinds:
         cases = postures(name, slenderness)
@@ -123,7 +124,7 @@ def closures(name: str) -> Iterable[dict]:
 
 
 def beams(name: str) -> Iterable[dict]:
-    """(b) over slenderness, for the paper's errors and for 1 kN without any."""
+    """Yield (b) over slenderness: the paper's errors, and 1 kN without errors."""
     for slenderness in BARS:
         cases = postures(name, slenderness)
         none = free_of_errors(cases)
@@ -135,7 +136,7 @@ def beams(name: str) -> Iterable[dict]:
 
 
 def weights(name: str) -> Iterable[dict]:
-    """(c) over slenderness: a link's weight at its ends, with moments and without."""
+    """Yield (c) over slenderness: weight at links' ends, with and without moments."""
     for slenderness in WEIGHT_BARS:
         cases = postures(name, slenderness)
         none = free_of_errors(cases)
@@ -150,7 +151,7 @@ def weights(name: str) -> Iterable[dict]:
 
 
 def discs(name: str) -> Iterable[dict]:
-    """(d) over the size of the errors and the load."""
+    """Yield (d) over the size of the errors and the load."""
     cases = postures(name, play=True)
     for case, load in (("no load", None), ("1 kN", DOWN)):
         for size in SIZES:
@@ -159,7 +160,7 @@ def discs(name: str) -> Iterable[dict]:
 
 
 def print_margins(name: str) -> None:
-    """By how much two bushes raise the zone's margin: least, median, largest factor."""
+    """Print the factor by which two bushes raise the margin: least, median, largest."""
     for compliant in ("rigid", "free"):
         factors = []
         for at in postures(name, play=True):
@@ -173,7 +174,7 @@ def print_margins(name: str) -> None:
 
 
 def forks() -> Iterable[dict]:
-    """(b) for links as they could be built: tubes with forks and bearing bores."""
+    """Yield (b) for realistic links: tubes with forks and bearing bores."""
     mesh = MeshLink(FORKS, *BORES, 60e9, 0.3)
     cases = postures("irsbot2")
     names = [f.name for f in cases[0].robot.frames if f.link is not None]
@@ -194,7 +195,7 @@ def forks() -> Iterable[dict]:
 
 
 def rods() -> Iterable[dict]:
-    """(b) for the hexapod: 400 mm of each leg a steel tube with solid heads.
+    """Yield (b) for the hexapod: 400 mm of each leg are a steel tube with solid heads.
 
     ``meshes/delta_forearm.stl``; K_E of its exact geometry by
     ``stiffness_references.py``, there of 60 GPa and along z.
@@ -221,7 +222,7 @@ def rods() -> Iterable[dict]:
 
 
 def over_poses(name: str) -> dict:
-    """Costs over the workspace at the paper's errors, as built: medians of 3 draws."""
+    """Return median errors over the workspace, from 3 draws of the paper's errors."""
     if name == "irsbot2":
         xs, zs = np.arange(-0.4, 0.41, 0.1), np.arange(-0.6, -0.19, 0.1)
     else:
@@ -245,7 +246,7 @@ def over_poses(name: str) -> dict:
 
 
 def print_table(rows: list[dict]) -> None:
-    """As Markdown: median (largest) over the cases."""
+    """Print the median (largest) errors over the cases as Markdown."""
     print(
         "| robot | case | x | position [um] | rotation [urad] | energy [%] | beyond |"
     )
@@ -261,7 +262,7 @@ def print_table(rows: list[dict]) -> None:
 
 
 def main() -> None:
-    """Everything, to the screen and to a folder."""
+    """Compute everything, print it, and write it to a folder."""
     folder = Path(
         sys.argv[1] if len(sys.argv) > 1 else Path(__file__).parents[2] / "docs"
     )

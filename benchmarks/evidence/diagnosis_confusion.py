@@ -3,14 +3,15 @@
     python benchmarks/evidence/diagnosis_confusion.py FOLDER --count 200  # make
     python benchmarks/evidence/diagnosis_confusion.py FOLDER --score      # count
 
-Case k is drawn from seed k: a robot (``random_robots``), a design, and what is hidden:
-one public effect at 2, 5 or 9 times the noise, two, none, one that no library has, or
-one that the design cannot tell from another.  The data come from the simulation's side
-(``forcefit.validation.synthetic.generator``); what else would explain them as well is
-worked out there too (``forcefit.validation.synthetic.equivalents``).  FOLDER keeps
-campaigns, truths and answers, so that a run can be stopped and taken up again.
+Case k is drawn from seed k: a robot (``random_robots``), a design, and hidden effects.
+The hidden effects are one public effect at 2, 5 or 9 times the noise, two effects, no
+effect, an effect outside the library, or an effect that the design cannot distinguish
+from another.  Readings are simulated by ``forcefit.validation.synthetic.generator``,
+and ``forcefit.validation.synthetic.equivalents`` finds other effects that explain them
+equally well.  FOLDER stores campaigns, hidden effects and results, so that a run can be
+interrupted and continued.
 
-What counts as right is in ``diagnosis_score.py``.
+``diagnosis_score.py`` defines which results are correct.
 """
 
 import argparse
@@ -54,14 +55,14 @@ from forcefit.validation.synthetic.truth import truth_of
 
 MIX = {"single": 0.52, "none": 0.12, "pair": 0.16, "outside": 0.12, "confounded": 0.08}
 STRENGTHS = (2.0, 5.0, 9.0)
-TRIES = 12  # draws of a case until its robot can have the effects
-FINE = 2e-7  # [m] noise that no device has; weight or stiffening would be too weak
-VISIBLE = 200.0  # chi square that no public set explains, of an effect outside
+TRIES = 12  # largest number of draws per case
+FINE = 2e-7  # [m] noise below that of any device, as a lower limit
+VISIBLE = 200.0  # least chi square not explained by public effects
 SMALL = 1e-2  # scale of errors and load at which the machine is linear
 
 
 def finite_part(campaign: Synthetic) -> NDArray:
-    """(rows, 6) [rad, m] finite minus linear readings of the declared machine."""
+    """Return (rows, 6) [rad, m] finite minus linear readings of the declared robot."""
     robot, rows = campaign.robot, campaign.plan.rows
 
     def readings(scale: float) -> NDArray:
@@ -74,7 +75,7 @@ def finite_part(campaign: Synthetic) -> NDArray:
 
 
 def draw_case(seed: int, only: str | None = None) -> tuple[str, Synthetic]:
-    """Kind and campaign of a case; draws again what a robot cannot have."""
+    """Return the kind and campaign of a case; draw again if effects are impossible."""
     for attempt in range(TRIES):
         rng = np.random.default_rng([seed, attempt])
         kind = str(rng.choice(list(MIX), p=list(MIX.values())))
@@ -89,7 +90,7 @@ def draw_case(seed: int, only: str | None = None) -> tuple[str, Synthetic]:
 
 
 def _measure(kind: str, rng: np.random.Generator) -> Synthetic:
-    """A campaign of a kind."""
+    """Return a campaign of the given kind."""
     names = _effects(kind, rng)
     kinds = dict.fromkeys(SLIDING, "gantry")
     kinds |= dict.fromkeys(("joint_clearance", "_torque_backlash"), "arm")
@@ -123,7 +124,7 @@ def _measure(kind: str, rng: np.random.Generator) -> Synthetic:
 
 
 def _effects(kind: str, rng: np.random.Generator) -> list[str]:
-    """Names of what is hidden."""
+    """Return the names of the hidden effects."""
     library = list(LIBRARY)
     if kind == "none":
         return []
@@ -138,14 +139,14 @@ def _effects(kind: str, rng: np.random.Generator) -> list[str]:
 
 
 def _one_beam(name: str, robot: Any, rng: np.random.Generator) -> Parameters:
-    """Parameters at a single beam."""
+    """Return parameters of an effect at a single beam."""
     given = dict(draw_effect(name, robot, 1.0, rng).parameters)
     first = str(rng.choice(list(given)))
     return {first: given[first]}
 
 
 def truth_with_rivals(kind: str, campaign: Synthetic) -> dict[str, Any]:
-    """The truth, with every set that explains the data as well."""
+    """Return the hidden effects, and other sets that explain the data equally well."""
     names = sorted(effect.name for effect in campaign.effects)
     # two public effects may do what one that is not public does
     most = 2 if len(names) == 2 or kind == "outside" else 1
@@ -185,14 +186,14 @@ def truth_with_rivals(kind: str, campaign: Synthetic) -> dict[str, Any]:
 
 
 def _plain(one: Alternative) -> list[str]:
-    """Names without the time constants of drifts."""
+    """Return the names of effects without the time constants of drifts."""
     return [name.partition("(")[0] for name in one.names]
 
 
 def make(
     folder: Path, seed: int, only: str | None = None, understated: float = 1.0
 ) -> None:
-    """Write a case's campaign and truth, unless it is there.
+    """Write the campaign and the hidden effects of a case unless they exist.
 
     The campaign states a sigma that is too small by the factor ``understated``.
     """
@@ -208,7 +209,7 @@ def make(
 
 
 def answer(folder: Path, seed: int) -> None:
-    """Diagnose a case and write the answer, unless it is there."""
+    """Diagnose a case and write the result unless it exists."""
     from forcefit.validation.campaign.campaign_file import read_campaign
     from forcefit.validation.diagnosis.diagnose import diagnose
 
@@ -228,7 +229,7 @@ def answer(folder: Path, seed: int) -> None:
 
 
 def _saved(found: Diagnosis, campaign: Campaign) -> dict[str, Any]:
-    """The saved file's error on all rows over that printed, and against declared."""
+    """Return the error of the saved file on all rows, over the printed and declared."""
     if not found.better:
         return {}
     with tempfile.TemporaryDirectory() as folder:
@@ -245,7 +246,7 @@ def _saved(found: Diagnosis, campaign: Campaign) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Make, diagnose, score."""
+    """Make campaigns, diagnose them, and score the results."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--count", type=int, default=200)

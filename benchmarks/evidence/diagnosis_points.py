@@ -1,15 +1,15 @@
-"""Diagnosis of random robots of which three points are measured at once.
+"""Diagnosis of random robots with three points measured at the same time.
 
     python -m benchmarks.evidence.diagnosis_points [--first 710000] [--count 10]
         [--hidden library|outside] [--common 1.0] [--device 5e-6]
 
-Case k is drawn from seed k: a robot (``random_robots``), 128 rows of 64 configurations,
-noise of 5 um of the device in every reading and, common to the points of a row, a
-motion of 20 um and 200 urad times ``--common``; hidden is nothing, or one effect at
-five times the noise in common.  The device's noise is stated as 5 um whatever it is.
-Printed: verdict, claims, functions, errors in stated sigma, noise found; in how many
-cases a function was added, how many named what is hidden, and how many 90 % intervals
-of its parameters cover.
+Case k is drawn from seed k: a robot (``random_robots``) and 128 rows of 64
+configurations.  The device noise is 5 um in each reading.  All points of a row share a
+noise motion of 20 um and 200 urad times ``--common``.  Either no effect is hidden, or
+one effect at five times the common noise.  The declared device noise is always 5 um.
+The program prints verdict, reported effects, functions, errors in declared sigma and
+estimated noise.  It also prints in how many cases a function was added, in how many the
+hidden effect was named, and how many 90 % intervals contain the true parameter.
 """
 
 import argparse
@@ -39,7 +39,7 @@ TRIES = 12
 
 
 def machine(seed: int, hidden: str | None, common: float) -> Synthetic:
-    """A simulated machine; draws again what a robot cannot have."""
+    """Return a simulated robot; draw again if it cannot have the effect."""
     for attempt in range(TRIES):
         rng = np.random.default_rng([seed, attempt])
         listed = list(OUTSIDE) if hidden == "outside" else list(LIBRARY)
@@ -59,7 +59,7 @@ def machine(seed: int, hidden: str | None, common: float) -> Synthetic:
 
 
 def covered(found: Diagnosis, made: Synthetic) -> tuple[int, int]:
-    """How many 90 % intervals of hidden parameters cover, and how many there are."""
+    """Return how many of the 90 % intervals cover, and how many there are."""
     true = {e.name: e.parameters for e in made.effects}
     inside = [
         abs(p["value"] - true[e["name"]][p["name"]]) < 1.645 * p["std"]
@@ -70,7 +70,7 @@ def covered(found: Diagnosis, made: Synthetic) -> tuple[int, int]:
 
 
 def main() -> None:
-    """Draw, diagnose, count."""
+    """Draw the cases, diagnose them, and count the results."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--first", type=int, default=710000)
     parser.add_argument("--count", type=int, default=10)

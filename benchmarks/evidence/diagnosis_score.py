@@ -1,7 +1,8 @@
-"""What the answers of ``diagnosis_confusion.py`` are worth, counted.
+"""Score of the results of ``diagnosis_confusion.py``.
 
-Counted as right: a definite verdict with the hidden effects or a set that explains the
-data as well.  A false claim is a definite verdict with any other set.
+A result is correct if its verdict is definite and names the hidden effects, or a set
+that explains the data equally well.  A definite verdict with any other set is a false
+claim.
 """
 
 import json
@@ -13,7 +14,7 @@ import numpy as np
 
 from forcefit.validation.synthetic.outside import OUTSIDE_COVARIATES
 
-WITHIN_90 = 1.645  # [-] standard deviations
+WITHIN_90 = 1.645  # [-] standard deviations of a 90 % interval
 VERDICTS = (
     "explained", "learned", "none_needed", "ambiguous", "outside_library",
     "not_enough_rows",
@@ -22,13 +23,13 @@ UNNAMED = ("geometric_errors", "springs")  # listed where no effect is named
 
 
 def score(folder: Path) -> dict[str, Any]:
-    """Everything that is asked of the answers in a folder.
+    """Compute all scores of the results in a folder.
 
     Args:
-        folder: with truths and answers.
+        folder: folder with hidden effects and results.
 
     Returns:
-        Plain values; see the head of this file.
+        Scores as plain values; see the head of this file.
     """
     confusion: dict[str, Counter] = defaultdict(Counter)
     outcome: dict[str, Counter] = defaultdict(Counter)
@@ -93,7 +94,7 @@ def score(folder: Path) -> dict[str, Any]:
 
 
 def _judge(truth: dict, diagnosis: dict) -> str:
-    """right, abstained, false claim, false outside, missed or crashed."""
+    """Return right, abstained, false claim, false outside, missed or crashed."""
     verdict = diagnosis["verdict"]
     if verdict == "crashed":
         return "crashed"
@@ -116,13 +117,13 @@ def _judge(truth: dict, diagnosis: dict) -> str:
 
 
 def _claimed(diagnosis: dict) -> list[str]:
-    """Effects of the library that an answer names."""
+    """Return the library effects that a result names."""
     names = (effect["name"] for effect in diagnosis.get("effects", []))
     return sorted(name for name in names if name not in UNNAMED)
 
 
 def _place_and_variable(truth: dict, diagnosis: dict) -> tuple[bool, bool]:
-    """Whether some function learned is where, and of what, the hidden effect is."""
+    """Return whether a function has the place and the variable of the effect."""
     (effect,) = truth["effects"]
     name, frames = effect["name"], set(effect["where"])
     at_reading = name in ("_stand", "_sag")
@@ -145,14 +146,14 @@ def _place_and_variable(truth: dict, diagnosis: dict) -> tuple[bool, bool]:
 
 
 def _told(diagnosis: dict) -> str:
-    """What was claimed, in a word."""
+    """Return what was reported, in a few words."""
     if diagnosis["verdict"] == "explained":
         return "+".join(_claimed(diagnosis)) or "geometry or springs"
     return str(diagnosis["verdict"])
 
 
 def _band(strength: float) -> str:
-    """Of a strength in sigmas, the weakest of what is hidden."""
+    """Return the range of the strength, in sigma, of the weakest hidden effect."""
     return (
         "none"
         if not strength
@@ -164,7 +165,7 @@ def _band(strength: float) -> str:
 
 
 def _inside(truth: dict, diagnosis: dict) -> list[bool]:
-    """For every parameter found: is the truth within the 90 % interval?"""
+    """Return for each parameter found whether its 90 % interval covers the truth."""
     known = {
         (effect["name"], parameter["name"]): parameter["value"]
         for effect in truth["effects"]
@@ -181,12 +182,12 @@ def _inside(truth: dict, diagnosis: dict) -> list[bool]:
 
 
 def _share(right: list[bool]) -> list[float | int | None]:
-    """Share of what is right, and of how many."""
+    """Return the share of correct results, and their number."""
     return [float(np.mean(right)) if right else None, len(right)]
 
 
 def _spread(values: list[float]) -> dict[str, float | int]:
-    """Median, 90 % and number."""
+    """Return the median, the 90 % quantile and the number of values."""
     if not values:
         return {"count": 0}
     return {

@@ -1,9 +1,9 @@
-"""The exact equilibrium of the paper's robot at its full errors, over the workspace.
+"""Exact equilibrium of the paper's robot at its full errors, over the workspace.
 
-Run as ``python -m benchmarks.evidence.exact_irsbot2 [STEP_MM]``; prints the tables of
-``docs/exact.md``: convergence, what the answers leave open, what the linear model gets
-wrong, and times.  The draws are those of the reference reconstruction (``literal``: all
-components positive, ``signed``: random signs).
+Run ``python -m benchmarks.evidence.exact_irsbot2 [STEP_MM]``.  It prints the tables of
+``docs/exact.md``: convergence, residuals of the solutions, errors of the linear model,
+and times.  The draws are those of the reference reconstruction: all components positive
+(``literal``) or with random signs (``signed``).
 """
 
 import sys
@@ -32,7 +32,7 @@ COLUMNS = {
 
 
 def workspace(step: float) -> np.ndarray:
-    """(k, 6) poses of a grid over the half workspace z <= 0, reachable or not."""
+    """Return (k, 6) poses of a grid over z <= 0, whether reachable or not."""
     x = step * np.arange(-round(0.7 / step), round(0.7 / step) + 1)
     z = step * np.arange(-round(0.8 / step), 1)
     X, Z = np.meshgrid(x, z)
@@ -42,7 +42,7 @@ def workspace(step: float) -> np.ndarray:
 
 
 def measure(case: dict, poses: np.ndarray) -> tuple[dict[str, np.ndarray], list[str]]:
-    """The figures of every reachable point, and what failed."""
+    """Return the results at every reachable point, and a message for each failure."""
     rows, failed = [], []
     for posture in place_many(irsbot2_with(case), poses)[0]:
         if posture is None:

@@ -1,12 +1,12 @@
-"""Rows that a planned campaign saves against rows drawn at random.
+"""Number of rows that a planned campaign saves compared with random rows.
 
     python benchmarks/evidence/plan_rows.py OUT.json --count 50 [--first 0]
 
-Case k, drawn from seed k: a robot, one effect of the library, so large that it shows by
-STRENGTH sigma (rms of the readings of random rows).  Campaigns of more and more rows
-are read from the model with that effect and noise, once of planned rows, once of random
-ones within the same ranges, and diagnosed.  The rows needed are the fewest from which
-on every answer names that effect and no other.
+Case k is drawn from seed k: a robot and one effect of the library.  The effect is
+scaled so that its rms in the readings of random rows is STRENGTH sigma.  Campaigns of
+increasing size are simulated from the model with this effect and noise.  The rows are
+either planned, or random within the same ranges.  Each campaign is diagnosed.  The
+required number of rows is the smallest from which on all results name only this effect.
 """
 
 import argparse
@@ -35,18 +35,18 @@ ROBOTS = ("arm6", "five_bar")
 ROWS = (8, 12, 16, 24, 32, 48)
 STRENGTH = 1.0  # [sigma]
 SIGMA = (1e-5, 5e-6)
-# the base stands where it is declared to; finite motions have no unknown
+# the pose of the base is as declared; finite motions have no parameter
 NOT_DRAWN = {"joint_clearance", "registration", "self_weight", "geometric_stiffening"}
 NAMES = [name for name in LIBRARY if name not in NOT_DRAWN]
 
 
 def design_of(robot: Robot) -> CampaignDesign:
-    """What may be varied."""
+    """Return the design, which states what may be varied."""
     return CampaignDesign(120, 120, 0.2 if robot.closures else 0.6, load=60.0)
 
 
 def random_rows(robot: Robot, rows: int, rng: np.random.Generator) -> Campaign:
-    """Rows as they are drawn."""
+    """Return a campaign of random rows."""
     design = replace(design_of(robot), configurations=rows, rows=rows)
     plan = plan_campaign(robot, design, rng)
     return rows_as_campaign(robot, plan, design, SIGMA)
@@ -55,7 +55,7 @@ def random_rows(robot: Robot, rows: int, rng: np.random.Generator) -> Campaign:
 def draw_effect(
     campaign: Campaign, rng: np.random.Generator
 ) -> tuple[str, dict[str, float]]:
-    """One effect with numbers at which it shows by STRENGTH sigma."""
+    """Return an effect with parameters for which its rms is STRENGTH sigma."""
     conditions = conditions_of(campaign)
     every = hypotheses(conditions, loaded_components(campaign))
     name = str(rng.choice([n for n in NAMES if any(h.effect == n for h in every)]))
@@ -87,7 +87,7 @@ def draw_effect(
 
 def is_right(campaign: Campaign, name: str, values: dict[str, float],
              rng: np.random.Generator) -> bool:  # fmt: skip
-    """Whether a campaign with an effect is answered with that effect alone."""
+    """Return whether the diagnosis of a campaign names only the given effect."""
     conditions = apply_effects(conditions_of(campaign), {name: values})
     noise = campaign.sigma * rng.normal(size=campaign.measured.shape)
     found = diagnose(replace(campaign, measured=predict(conditions).deviation + noise))
@@ -95,14 +95,14 @@ def is_right(campaign: Campaign, name: str, values: dict[str, float],
 
 
 def needed(right: list[bool]) -> int:
-    """Fewest rows from which on every answer is right; twice the most if none."""
+    """Return the fewest rows from which on all are right, else twice the most."""
     wrong = [k for k, good in enumerate(right) if not good]
     first = wrong[-1] + 1 if wrong else 0
     return ROWS[first] if first < len(ROWS) else 2 * ROWS[-1]
 
 
 def run_case(seed: int) -> dict[str, Any]:
-    """Rows needed, planned and random."""
+    """Return the required numbers of planned and of random rows."""
     begin = time.process_time()
     rng = np.random.default_rng([seed, 14])
     robot: Robot = without_clearance(load_robot(str(rng.choice(ROBOTS))))
@@ -124,7 +124,7 @@ def run_case(seed: int) -> dict[str, Any]:
 
 
 def summary(answers: list[dict[str, Any]]) -> str:
-    """Medians, and the share of right answers at every number of rows."""
+    """Return the medians, and the share of right results at every number of rows."""
     rows = {h: np.array([a[h] for a in answers]) for h in ("planned", "random")}
     lines = [
         f"{how}: median {np.median(count):g} rows, mean {count.mean():.1f}"
@@ -143,7 +143,7 @@ def summary(answers: list[dict[str, Any]]) -> str:
 
 
 def main() -> None:
-    """Run cases, write every answer, print what was saved."""
+    """Run the cases, write each result, and print the saved rows."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
     parser.add_argument("--count", type=int, default=50)

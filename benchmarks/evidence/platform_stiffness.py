@@ -1,7 +1,7 @@
-"""K_C of the paper's robot over its half workspace: time beside that of (22).
+"""Time of K_C of the paper's robot over its half workspace, compared with (22).
 
-``python -m benchmarks.evidence.platform_stiffness`` prints microseconds a posture, the
-least of several runs in turn, and how far K_C is from that of one posture at a time.
+``python -m benchmarks.evidence.platform_stiffness`` prints the time [us] per posture,
+the least of several alternating runs, and the difference of K_C from single postures.
 """
 
 import time
@@ -23,7 +23,7 @@ _DRAWN = ("elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip")
 
 
 def least(function: Callable[[], object], count: int) -> float:
-    """[us] a point of the quickest run."""
+    """Return the time [us] per point of the fastest run."""
     times = []
     for _ in range(_RUNS):
         start = time.perf_counter()
@@ -71,7 +71,7 @@ def main() -> None:
 
 
 def everything(postures: Posture) -> None:
-    """All that a sweep keeps of a stiffness."""
+    """Compute everything that a sweep stores for a stiffness."""
     found: Any = platform_stiffness(postures)
     _ = found.eigen_stiffnesses, found.eigen_screws
     for axis in np.eye(6):

@@ -1,14 +1,15 @@
-"""The published solids of the Princeton beam done again: 500 x 12 x 4 bricks.
+"""Reproduction of the published solids of the Princeton beam: 500 x 12 x 4 bricks.
 
-``python -m benchmarks.evidence.princeton_bricks`` (two minutes); ``.. 90 75`` also
-bends the bricks themselves under these angles, with large rotations, ten minutes each.
+``python -m benchmarks.evidence.princeton_bricks`` takes two minutes.  With angles such
+as ``90 75``, the bricks are also bent with large rotations under these angles, which
+takes ten minutes for each.
 
-The published rows were computed with that many bricks in Ansys; of eight nodes and
-B-bar (mean dilatation) they are too stiff across the thickness, where four of them
-stand for a bending that is linear in each.  Printed are how much too stiff against
-bricks that bend exactly (incompatible modes), refined and extrapolated; then per cent
-by which the published solids are off 8 pieces of a beam that is as much too stiff; and
-off these bricks.
+The published results were computed with 500 x 12 x 4 bricks in Ansys.  Bricks of eight
+nodes with B-bar (mean dilatation) are too stiff across the thickness, where only four
+of them represent the bending.  The program prints their excess stiffness relative to
+bricks with exact bending (incompatible modes), refined and extrapolated.  It then
+prints by how many per cent the published solids differ from a beam of 8 pieces with the
+same excess stiffness, and from these bricks.
 
 Sources:
     Hughes (1980), Generalization of selective integration procedures (B-bar); Wilson,
@@ -41,8 +42,8 @@ from forcefit.assembly.model.links import link_compliance
 from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink
 from forcefit.stiffness.beam.sections import declared_section
 
-COUNTS = (500, 12, 4)  # of the published solids
-_COARSE = ((120, 2, 1), (250, 6, 2))  # a bent shape is refined from these on
+COUNTS = (500, 12, 4)  # numbers of bricks of the published solids
+_COARSE = ((120, 2, 1), (250, 6, 2))  # coarse boxes, from which a bent shape is refined
 _CORNERS = np.array(list(product((-1, 1), repeat=3)))
 _POINTS = _CORNERS / np.sqrt(3)
 _PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
@@ -52,16 +53,16 @@ _STEPS, _ITERATIONS = 6, 60
 
 @dataclass(frozen=True, eq=False)
 class Bricks:
-    """A box of equal bricks of eight nodes, clamped at x = 0.
+    """A box of equal bricks with eight nodes, clamped at x = 0.
 
     Attributes:
-        counts: of them along length, height and width.
-        elements: (e, 8) nodes.
-        gradients: (8, 8, 3) [1/m] of the nodes' shapes at each Gauss point.
-        modes: (8, 3, 3) [1/m] of the incompatible shapes, one along each axis.
-        weight: [m^3] of a Gauss point.
-        places: (nodes, 3) [m].
-        share: (nodes,) of a force spread over the last face.
+        counts: numbers of bricks along length, height and width.
+        elements: (e, 8) nodes of the bricks.
+        gradients: (8, 8, 3) [1/m] gradients of the shape functions at each Gauss point.
+        modes: (8, 3, 3) [1/m] gradients of the incompatible modes, one along each axis.
+        weight: [m^3] weight of a Gauss point.
+        places: (nodes, 3) [m] positions of the nodes.
+        share: (nodes,) share of each node in a force spread over the last face.
     """
 
     counts: tuple[int, int, int]
@@ -74,7 +75,7 @@ class Bricks:
 
 
 def bricks(counts: tuple[int, int, int]) -> Bricks:
-    """The box cut into so many bricks."""
+    """Return the box divided into the given numbers of bricks."""
     sides = np.array([LENGTH, HEIGHT, WIDTH]) / counts
     nodes = [n + 1 for n in counts]
     number = np.arange(np.prod(nodes)).reshape(nodes)
@@ -104,7 +105,7 @@ def bricks(counts: tuple[int, int, int]) -> Bricks:
 
 
 def strains(F: NDArray, gradients: NDArray) -> NDArray:
-    """(e, 6, 3 m) Green's strains, shears doubled, per displacement of m shapes."""
+    """Return (e, 6, 3 m) Green's strains, shears doubled, for displacements."""
     rows = [
         np.einsum("n,ek->enk", gradients[:, j], F[:, :, i])
         + (0 if i == j else np.einsum("n,ek->enk", gradients[:, i], F[:, :, j]))
@@ -114,12 +115,12 @@ def strains(F: NDArray, gradients: NDArray) -> NDArray:
 
 
 def equations(box: Bricks, u: NDArray, exact: bool = False) -> tuple[NDArray, NDArray]:
-    """(e, 24) forces of each brick and (e, 24, 24) their derivatives.
+    """Return (e, 24) forces of each brick, and (e, 24, 24) their derivatives.
 
     Args:
         box: the bricks.
-        u: (nodes, 3) [m].
-        exact: with incompatible modes in place of B-bar; of an unbent box.
+        u: (nodes, 3) [m] displacements.
+        exact: use incompatible modes instead of B-bar; only for an undeformed box.
 
     Returns:
         Both, in the order of a brick's nodes.
@@ -160,7 +161,7 @@ def equations(box: Bricks, u: NDArray, exact: bool = False) -> tuple[NDArray, ND
 
 
 def deviatoric(B: NDArray) -> NDArray:
-    """(e, 6, k) [N/m^2] stresses of strains, without those of the dilatation."""
+    """Return (e, 6, k) [N/m^2] stresses of strains without the volumetric part."""
     out = _SHEAR * B
     out[:, :3] *= 2
     out[:, :3] -= 2 * _SHEAR / 3 * B[:, :3].sum(axis=1, keepdims=True)
@@ -168,13 +169,13 @@ def deviatoric(B: NDArray) -> NDArray:
 
 
 def solved(box: Bricks, K: NDArray, right: NDArray) -> NDArray:
-    """(nodes, 3, k) displacements under (nodes, 3, k) forces, the first face held."""
+    """Return (nodes, 3, k) displacements under forces, with the first face held."""
     dofs = (3 * box.elements[:, :, None] + np.arange(3)).reshape(len(K), 24)
     rows, columns = np.repeat(dofs, 24, axis=1).ravel(), np.tile(dofs, 24).ravel()
     size = 3 * len(box.places)
     free = np.arange(3 * (box.counts[1] + 1) * (box.counts[2] + 1), size)
     matrix = csc_matrix((K.ravel(), (rows, columns)), shape=(size, size))[free][:, free]
-    # nodes run along the bar: natural order keeps the band
+    # nodes are numbered along the bar, so that the natural order has a small bandwidth
     factors = splu(
         matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0,
         options={"SymmetricMode": True},
@@ -185,7 +186,7 @@ def solved(box: Bricks, K: NDArray, right: NDArray) -> NDArray:
 
 
 def compliances(counts: tuple[int, int, int], exact: bool) -> NDArray:
-    """(3,) of the unbent bar: along the height, across [m/N], twist [rad/(N m)]."""
+    """Return the compliances along the height, across [m/N], in twist [rad/(N m)]."""
     box = bricks(counts)
     y, z = box.places[:, 1], box.places[:, 2]
     loads = np.zeros((len(y), 3, 3))
@@ -197,7 +198,7 @@ def compliances(counts: tuple[int, int, int], exact: bool) -> NDArray:
 
 
 def bent(box: Bricks, force: NDArray, u: NDArray, tolerance: float) -> NDArray:
-    """(nodes, 3) [m] displacements under a dead force spread over the last face."""
+    """Return (nodes, 3) [m] displacements under a dead force on the last face."""
     for _ in range(_ITERATIONS):
         forces, K = equations(box, u)
         inner = np.zeros((len(box.places), 3))
@@ -211,7 +212,7 @@ def bent(box: Bricks, force: NDArray, u: NDArray, tolerance: float) -> NDArray:
 
 
 def refined(box: Bricks, u: NDArray, finer: Bricks) -> NDArray:
-    """Displacements of a box's nodes read at those of a finer one."""
+    """Interpolate the displacements of a box at the nodes of a finer box."""
     axes = [np.unique(box.places[:, k].round(12)) for k in range(3)]
     grid = u.reshape(*(n + 1 for n in box.counts), 3)
     places = finer.places.round(12)
@@ -219,7 +220,7 @@ def refined(box: Bricks, u: NDArray, finer: Bricks) -> NDArray:
 
 
 def bent_rows(angle: float) -> dict[float, NDArray]:
-    """(2,) [m] along the height and across, of the last face, by force."""
+    """Return (2,) [m] displacements of the last face (height, across), by force."""
     coarse, middle, fine = (bricks(counts) for counts in (*_COARSE, COUNTS))
     u, before, rows = np.zeros((len(coarse.places), 3)), 0.0, {}
     axis = np.array([0.0, np.cos(angle), np.sin(angle)])
@@ -234,7 +235,7 @@ def bent_rows(angle: float) -> dict[float, NDArray]:
 
 
 def stiffer_beam(factors: NDArray) -> tuple[BeamLink, MatrixLink]:
-    """The bar and its root, stiffer along the height, across, in twist."""
+    """Return the bar and its root with increased stiffness (height, across, twist)."""
     section = declared_section({"width": WIDTH, "height": HEIGHT}, NU)
     along, across, twist = factors
     strong, weak = max(section.I_y, section.I_z), min(section.I_y, section.I_z)
@@ -253,7 +254,7 @@ def stiffer_beam(factors: NDArray) -> tuple[BeamLink, MatrixLink]:
 
 
 def main() -> None:
-    """Print how much too stiff, and the two tables."""
+    """Print the excess stiffness and the two tables."""
     coarse, fine = (compliances(c, exact=True) for c in (COUNTS, (250, 24, 8)))
     right = fine + (fine - coarse) / 3
     factors = right / compliances(COUNTS, exact=False)

@@ -2,11 +2,12 @@
 
 ``python -m benchmarks.evidence.princeton_solids`` (half an hour)
 
-An arbiter between the published beams and the published solids, which differ by up to
-3.5 %: a box of bricks of high order, Saint Venant's and Kirchhoff's material, total
-Lagrangian, clamped over one end face and pulled evenly over the other.  It shares no
-code with forcefit.  Printed are per cent by which others are off the arbiter: links of
-8 pieces, published beams and published solids, along the height and across.
+Published beams and published solids differ by up to 3.5 %.  This program computes a
+third solution: a box of high-order bricks of Saint Venant-Kirchhoff material in the
+total Lagrangian formulation.  One end face is clamped, and the other is loaded
+uniformly.  The program shares no code with forcefit.  It prints by how many per cent
+other results differ from this solution, along the height and across: links of 8 pieces,
+published beams and published solids.
 
 Sources:
     Dowell, Traybar (1975), the experiment; Obrezkov et al., Nonlinear Dynamics (2022),
@@ -33,7 +34,7 @@ from forcefit.validation.assumptions.solid_links import solid_link
 LENGTH, HEIGHT, WIDTH = 0.508, 12.3777e-3, 3.2024e-3  # [m]
 E, NU = 71.7e9, 0.31
 BAR = BeamLink({"width": WIDTH, "height": HEIGHT}, E, NU, up=(0, 1, 0))
-ANGLES = (0, 15, 30, 45, 60, 75, 90)  # [deg] of the force from the height
+ANGLES = (0, 15, 30, 45, 60, 75, 90)  # [deg] angles of the force from the height
 # [m] along the height and across: (beams, solids)
 PUBLISHED = {
     8.896: (
@@ -57,19 +58,19 @@ PUBLISHED = {
           0.192972233, 0.197669499)),
     ),
 }  # fmt: skip
-_STEPS = 4  # of a load
+_STEPS = 4  # number of load steps
 _ITERATIONS = 30
 
 
 def line(order: int) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Lagrange's polynomials through Lobatto's points of the line from -1 to 1.
+    """Return Lagrange polynomials through the Lobatto points of the line from -1 to 1.
 
     Args:
-        order: of the polynomials, at least 2.
+        order: order of the polynomials, at least 2.
 
     Returns:
-        Their values and slopes (order + 1 Gauss points, nodes), the points' weights,
-        and the integrals of the polynomials.
+        Values and slopes (order + 1 Gauss points, nodes) of the polynomials, the
+        weights of the Gauss points, and the integrals of the polynomials.
     """
     inner = Legendre.basis(order).deriv().roots()
     nodes = np.concatenate([[-1.0], inner, [1.0]])
@@ -86,11 +87,11 @@ class Box:
     """A box of equal bricks.
 
     Attributes:
-        elements: (e, m) nodes.
-        gradients: (q, m, 3) [1/m] of shape functions at Gauss points.
-        weights: (q,) [m^3] of Gauss points.
+        elements: (e, m) nodes of the bricks.
+        gradients: (q, m, 3) [1/m] gradients of shape functions at Gauss points.
+        weights: (q,) [m^3] weights of Gauss points.
         clamped: nodes of the first face.
-        pulled: (nodes,) share of the last face's force on each node.
+        pulled: (nodes,) share of each node in the force on the last face.
     """
 
     elements: NDArray
@@ -101,7 +102,7 @@ class Box:
 
 
 def box(counts: tuple[int, int, int], orders: tuple[int, int, int]) -> Box:
-    """A box clamped at x = 0, cut into bricks along its length, height and width."""
+    """Return a box clamped at x = 0, divided along its length, height and width."""
     sides = np.array([LENGTH, HEIGHT, WIDTH]) / counts
     nodes = [order * n + 1 for order, n in zip(orders, counts, strict=True)]
     number = np.arange(np.prod(nodes)).reshape(nodes)
@@ -132,7 +133,7 @@ def box(counts: tuple[int, int, int], orders: tuple[int, int, int]) -> Box:
 
 
 def equations(solid: Box, u: NDArray) -> tuple[NDArray, csc_matrix]:
-    """Internal forces (nodes, 3) and their derivative by the displacements."""
+    """Return internal forces (nodes, 3) and their derivative by the displacements."""
     lame, shear = E * NU / (1 + NU) / (1 - 2 * NU), E / 2 / (1 + NU)
     eye, G = np.eye(3), solid.gradients
     F = eye + np.einsum("eni,qnj->eqij", u[solid.elements], G, optimize=True)
@@ -163,16 +164,16 @@ def equations(solid: Box, u: NDArray) -> tuple[NDArray, csc_matrix]:
 
 
 def bent(solid: Box, force: NDArray, u: NDArray, start: NDArray) -> NDArray:
-    """(nodes, 3) [m] displacements under an even dead load on the last face.
+    """Return (nodes, 3) [m] displacements under a uniform dead load on the last face.
 
     Args:
         solid: the box.
-        force: (3,) [N].
+        force: (3,) [N] load.
         u: (nodes, 3) [m] equilibrium under the load ``start``.
-        start: (3,) [N].
+        start: (3,) [N] load with a known equilibrium.
 
     Returns:
-        The equilibrium, followed in steps of the load.
+        The displacements at equilibrium, followed in steps of the load.
     """
     free = np.ones(u.shape, dtype=bool)
     free[solid.clamped] = False
@@ -194,7 +195,7 @@ def bent(solid: Box, force: NDArray, u: NDArray, start: NDArray) -> NDArray:
 def solid_rows(
     counts: tuple[int, int, int], orders: tuple[int, int, int], angle: float
 ) -> dict[float, NDArray]:
-    """(2,) [m] along the height and across, of the last face, by force."""
+    """Return (2,) [m] displacements of the last face (height, across), by force."""
     solid = box(counts, orders)
     u, start, rows = np.zeros((len(solid.pulled), 3)), np.zeros(3), {}
     for size in PUBLISHED:
@@ -205,10 +206,11 @@ def solid_rows(
 
 
 def root_link() -> MatrixLink:
-    """The first of 8 pieces with its clamped end, that neither warps nor contracts.
+    """Return the first of 8 pieces with a clamped end that neither warps nor contracts.
 
-    A solid whose ends are both held so is stiffer than the beam, by half of it at each
-    end: to moments and tension, what does not depend on where the end is.
+    A solid with both ends held in this way is stiffer than the beam.  Half of the
+    difference belongs to each end: for moments and tension, the part that does not
+    depend on the position of the other end.
     """
     piece = LENGTH / 8
     frame = Frame("tip", translation=[piece, 0, 0], link=BAR)
@@ -223,7 +225,7 @@ def root_link() -> MatrixLink:
 def in_pieces(
     size: float, angle: float, root: MatrixLink | None = None, link: BeamLink = BAR
 ) -> NDArray:
-    """(2,) [m] the same of a beam link in 8 pieces, the first perhaps another link."""
+    """Return (2,) [m] displacements of 8 beam pieces; the first can be replaced."""
     piece = LENGTH / 8
     if root is None:
         whole = replace(link, pieces=8)
@@ -240,7 +242,7 @@ def in_pieces(
 
 
 def main() -> None:
-    """Print the table; with six numbers, for that count of bricks and orders."""
+    """Print the table; six numbers select the counts and orders of the bricks."""
     numbers = tuple(int(n) for n in sys.argv[1:7]) or (40, 2, 1, 4, 4, 3)
     counts, orders = numbers[:3], numbers[3:]
     print(f"{counts} bricks of orders {orders}; per cent off, along the height, across")
@@ -260,7 +262,7 @@ def main() -> None:
 
 
 def off(values: NDArray, arbiter: NDArray) -> str:
-    """Per cent off, where there is a displacement."""
+    """Return the difference in per cent, where a displacement exists."""
     return "".join(
         f"{100 * (v / a - 1):8.2f}" if abs(a) > 1e-6 else f"{'-':>8s}"
         for v, a in zip(values, arbiter, strict=True)

@@ -1,7 +1,8 @@
-"""Robots of random dimensions, with declared geometric errors, to be measured.
+"""Robots of random dimensions with declared geometric errors, for simulated campaigns.
 
-Serial arms of 3 to 6 joints, planar 3-RRR and five-bar robots, hexapods and delta
-robots: tight joints, some drives elastic, some rigid, bodies with a mass.
+There are serial arms of 3 to 6 joints, planar 3-RRR and five-bar robots, hexapods and
+delta robots.  Joints have no clearance, some drives are elastic, and bodies have
+masses.
 """
 
 from dataclasses import dataclass, replace
@@ -25,20 +26,21 @@ from forcefit.validation.synthetic.machine import simulate_readings
 from forcefit.validation.synthetic.springs import rest_on_springs
 
 KINDS = ("arm",) * 5 + ("3rrr",) * 2 + ("five_bar",) * 2 + ("hexapod", "delta")
-_MOST = 1.5e-3  # [rad, m] anywhere within reach
-_ALLOWED = np.array([6e-4, 3e-4])  # [rad, m] by declared errors, by the largest load
+_MOST = 1.5e-3  # [rad, m] largest deviation anywhere within reach
+_ALLOWED = np.array([6e-4, 3e-4])  # [rad, m] by errors, by load
 
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """A robot and how far it may be moved and loaded.
+    """A robot, and the limits of its motions and loads.
 
     Attributes:
-        kind: which kind of robot.
-        robot: with its declared errors.
-        reach: [rad] largest change of a drive from home; 0.1 m for 1 rad if it slides.
+        kind: kind of the robot.
+        robot: robot with its declared errors.
+        reach: [rad] largest change of a revolute drive from home; for a prismatic drive
+            0.1 m for each rad.
         load: [N] largest force.
-        point: (3,) [m] measured, platform axes.
+        point: (3,) [m] measured point, platform axes.
     """
 
     kind: str
@@ -49,10 +51,10 @@ class Drawn:
 
 
 def draw_robot(rng: np.random.Generator, kind: str | None = None) -> Drawn:
-    """A random robot.
+    """Return a random robot.
 
     Args:
-        rng: of the draws.
+        rng: generator of the random numbers.
         kind: one of :data:`KINDS`, or ``"gantry"``; drawn if absent.
 
     Returns:
@@ -75,7 +77,7 @@ def draw_robot(rng: np.random.Generator, kind: str | None = None) -> Drawn:
 def _of_first_order(
     robot: Robot, point: NDArray, reach: float, load: float
 ) -> tuple[float, float]:
-    """Reach [rad] and load [N] with which no deviation grows far: no singularities."""
+    """Return the reach [rad] and load [N] for which deviations stay small."""
     for _ in range(8):
         design = CampaignDesign(configurations=30, rows=60, reach=reach, load=load)
         rows = plan_campaign(robot, design, np.random.default_rng(0)).rows
@@ -90,7 +92,7 @@ def _of_first_order(
 
 
 def _arm(rng: np.random.Generator) -> tuple[Robot, float]:
-    """Joints that turn about their neighbours' axis, or across it."""
+    """Return an arm whose axes are parallel or perpendicular to their neighbours."""
     count = int(rng.integers(3, 7))
     elastic = rng.random() < 0.6
     frames: list[Frame] = []
@@ -101,7 +103,7 @@ def _arm(rng: np.random.Generator) -> tuple[Robot, float]:
             link = _tube(radius)
             place = rng.uniform(0.15, 0.4) * _direction(rng)
             turn = rng.choice([-1, 0, 1]) * np.pi / 2 * np.eye(3)[rng.integers(2)]
-            if k == 1:  # otherwise all axes may be parallel
+            if k == 1:  # otherwise all axes could be parallel
                 turn = np.array([np.pi / 2, 0, 0])
         K = drive_stiffness(2e5 * 0.65**k) if elastic else None
         frames.append(
@@ -117,7 +119,7 @@ def _arm(rng: np.random.Generator) -> tuple[Robot, float]:
 
 
 def _gantry(rng: np.random.Generator) -> tuple[Robot, float]:
-    """Three slides across one another, and a turning head."""
+    """Return a gantry with three perpendicular slides and a rotating head."""
     elastic = rng.random() < 0.6
     frames: list[Frame] = []
     parent, radius = "base", rng.uniform(0.035, 0.055)
@@ -144,7 +146,7 @@ def _gantry(rng: np.random.Generator) -> tuple[Robot, float]:
 
 
 def _direction(rng: np.random.Generator) -> NDArray:
-    """(3,) unit vector, rather across the joint's axis than along it."""
+    """Return a (3,) unit vector, more likely across the joint axis than along it."""
     vector = rng.normal(size=3) * [1, 1, 0.5]
     return vector / np.linalg.norm(vector)
 
@@ -155,7 +157,7 @@ def _tube(radius: float) -> BeamLink:
 
 
 def _about(rng: np.random.Generator, value: float) -> float:
-    """A number within 20 %."""
+    """Return a random number within 20 % of a value."""
     return float(value * rng.uniform(0.8, 1.2))
 
 
@@ -175,7 +177,7 @@ def _five_bar(rng: np.random.Generator) -> tuple[Robot, float]:
 
 
 def _driven(leg, rng: np.random.Generator):
-    """A planar leg with a drive of another stiffness."""
+    """Return a planar leg whose drive has a random stiffness."""
     return replace(leg, drive=_about(rng, 3 * leg.drive))
 
 
@@ -203,7 +205,7 @@ _BUILDERS = {
 
 
 def _with_masses(robot: Robot, rng: np.random.Generator) -> Robot:
-    """Bodies of some mass at beams' ends and at the platform."""
+    """Return the robot with random masses at the ends of beams and at the platform."""
     heavy = []
     for frame in robot.frames:
         if frame.name == robot.platform or isinstance(frame.link, BeamLink):
@@ -213,14 +215,14 @@ def _with_masses(robot: Robot, rng: np.random.Generator) -> Robot:
 
 
 def _largest_load(tight: Robot) -> float:
-    """[N] under which the platform gives way by about what is allowed at home."""
+    """Return the load [N] that deflects the platform by about the allowed error."""
     forces = [np.eye(6)[k] for k in (3, 4, 5)]
     softest = (_moved(tight, forces, tight) / _ALLOWED).max()
     return float(f"{np.clip(1 / softest, 0.5, 400):.2g}")
 
 
 def _moved(robot: Robot, forces: list[NDArray], tight: Robot) -> NDArray:
-    """(k, 2) [rad, m] how far forces move the home platform."""
+    """Return (k, 2) [rad, m] displacements of the platform at home under forces."""
     home = home_posture(tight)
     names = [frame.name for frame in robot.frames]
     q = dict(zip(names, home.coordinates.tolist(), strict=True))

@@ -1,12 +1,13 @@
-"""How large a report is, and how long a browser takes to open it.
+"""Size of a report, and the time that a browser needs to open it.
 
     python benchmarks/evidence/report_opening.py my_study/report.html
 
-Headless Chromium by selenium, which draws without a graphics card: a desktop is faster.
-Times are from the start of loading: the headline readable, the first screen drawn, all
-figures drawn; and the processor time of the page's thread.  Each page is opened in a
-browser that has shown an empty page, and in one just started, which still makes ready
-what it draws with.
+The browser is headless Chromium, driven by selenium, which draws without a graphics
+card; a desktop browser is faster.  Times count from the start of loading until the
+headline is readable, the first screen is drawn, and all figures are drawn.  The
+processor time of the page's thread is printed too.  Each page is opened in a browser
+that has shown an empty page before, and in a newly started browser, which still has to
+initialise its graphics.
 """
 
 import shutil
@@ -26,7 +27,7 @@ return ['first-contentful-paint', 'first screen', 'drawn'].map(at);
 
 
 def opened(path: Path, first: str) -> list[float]:
-    """[s] Headline, first screen, all, processor, once a first address was shown."""
+    """Return the times [s] of headline, first screen, all figures and processor."""
     options = webdriver.ChromeOptions()
     for word in ("headless=new", "no-sandbox", "use-angle=swiftshader",
                  "enable-unsafe-swiftshader", "window-size=1200,1000"):  # fmt: skip
@@ -36,7 +37,7 @@ def opened(path: Path, first: str) -> list[float]:
     try:
         if first:
             browser.get(first)
-            time.sleep(1.0)  # processes started for the next page
+            time.sleep(1.0)  # wait for processes that are started for the next page
         browser.execute_cdp_cmd("Performance.enable", {"timeDomain": "threadTicks"})
         browser.get(path.resolve().as_uri())
         WebDriverWait(browser, 60, 0.05).until(
@@ -51,7 +52,7 @@ def opened(path: Path, first: str) -> list[float]:
 
 
 def main() -> None:
-    """Print size and times of each page that is named."""
+    """Print the size and the times of each given page."""
     head = "page, browser, MB, headline, first screen, all, processor [s]"
     print(f"{head}; least and median of {TIMES}")
     for path in map(Path, sys.argv[1:]):

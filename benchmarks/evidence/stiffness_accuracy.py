@@ -2,13 +2,14 @@
 
 ``python benchmarks/evidence/stiffness_accuracy.py [link ...] [--kind rigid]``
 
-Of the meshes' own K, the upper end of the interval whose middle is returned.  Each
-link of ``meshes/`` is refined until 430 k unknowns or seven meshes; below them
-stands, for each entry that matters of the last mesh's K, true error / estimate [%].
-The truth of rigid interfaces is NGSolve's, in ``stiffness_references.json``, as long as
-it is good to a third of the error judged; that of the others is the finest K less 0.85
-of its own estimated error (before the safety factor), and the last mesh is not judged.
-Allow about two minutes a link.
+The errors are those of the K of each mesh, which is the upper end of the interval whose
+middle is returned.  Each link of ``meshes/`` is refined up to 430 k unknowns or seven
+meshes.  Below, the ratio of true error to estimate [%] is printed for each significant
+entry of the last K.  For rigid interfaces, the true K is that of NGSolve in
+``stiffness_references.json``, if it is accurate to a third of the judged error.  For
+other interfaces, it is the finest K minus 0.85 of its estimated error (before the
+safety factor), and the last mesh is not judged.  The program takes about two minutes
+per link.
 """
 
 import argparse
@@ -46,7 +47,7 @@ LINKS = {
 
 
 def levels(name, kind, most):
-    """Stiffness, both indicated errors, unknowns and seconds of each mesh."""
+    """Return stiffness, both indicated errors, unknowns and seconds of each mesh."""
     surface = read_surface(MESHES / f"{name}.stl")
     faces = [parse_interface(text) for text in LINKS[name]]
     centers = np.array([interface_center(surface, f, "face") for f in faces])
@@ -65,7 +66,7 @@ def levels(name, kind, most):
 
 
 def report(name, kind, most):
-    """One row a mesh: unknowns, true error, estimate, their ratio, seconds."""
+    """Print a row for each mesh: unknowns, true error, estimate, ratio, seconds."""
     meshes = levels(name, kind, most)
     history = [totals for *totals, _, _ in meshes]
     if kind == "rigid":

@@ -3,14 +3,15 @@
 ``python benchmarks/evidence/stiffness_fresh_references.py FOLDER [--parts 0:40]``
 (``pip install ngsolve``; nothing else of this package is needed)
 
-Each part is written to FOLDER as a STEP file in millimetres.  K is that of a half or a
-quarter of the same shape, by its symmetry, in curved tetrahedra with layers of prisms
-along the edges of both interfaces and of the layers.  The higher of two orders (5, or 4
-of layers and thin walls) is extrapolated by a part of its difference from the lower.
-The uncertainty is the larger of that part and the difference from the higher order on a
-coarser mesh with fewer layers of prisms.  Walls with sharp edges and round tubes have
-the references of ``stiffness_random_references.py``, bricks and Fourier modes.
-What the JSON file already holds is not computed again.
+Each part is written to FOLDER as a STEP file in millimetres.  K is computed on a half
+or a quarter of the part, by its symmetry.  The mesh consists of curved tetrahedra, with
+layers of prisms along the edges of interfaces and material layers.  The result of the
+higher one of two orders (5; 4 for layers and thin walls) is extrapolated by a fraction
+of its difference from the lower order.  The uncertainty is the larger one of this
+extrapolation and of the difference from a coarser mesh with fewer layers of prisms.
+Walls with sharp edges and round tubes use the references of
+``stiffness_random_references.py``: bricks and Fourier modes.  Results that the JSON
+file already contains are not computed again.
 """
 
 import argparse
@@ -28,12 +29,12 @@ from stiffness_random_references import by_symmetry, independent_stiffness
 from stiffness_references import scaled
 
 REFERENCES = Path(__file__).with_name("stiffness_fresh_parts.json")
-FAR = 1e3  # [mm] beyond every part
-MORE = 0.3  # of the difference of both orders that is added to the higher one
+FAR = 1e3  # [mm] farther than any part
+MORE = 0.3  # fraction of the difference that is added
 
 
 def cut_shape(part):
-    """A half or a quarter of a part, in its layers, faces named."""
+    """Return a half or a quarter of a part, divided into layers, with named faces."""
     low = [0 if axis in part.mirrors else -FAR for axis in "xyz"]
     shape = part.solid * block(low, (FAR, FAR, FAR))
     pieces = []
@@ -49,7 +50,7 @@ def cut_shape(part):
 
 
 def solid_names(shape, part):
-    """Of which layer each solid is, by its centre."""
+    """Return the layer to which each solid belongs, by its centre."""
     found = []
     for solid in shape.solids:
         center, name = np.array([*solid.center]), "m0"
@@ -61,7 +62,7 @@ def solid_names(shape, part):
 
 
 def mesh_of(part, factor, rows):
-    """Curved tetrahedra, prisms along the singular edges."""
+    """Return a mesh of curved tetrahedra with prisms along the singular edges."""
     shape = cut_shape(part)
     shape.faces.name = "side"
     for face in shape.faces:
@@ -91,7 +92,7 @@ def mesh_of(part, factor, rows):
 
 
 def lame(mesh, part):
-    """Both constants, by material [N/mm^2]."""
+    """Return Lame's constants of each material [N/mm^2]."""
     lam = {f"m{n}": E * nu / ((1 + nu) * (1 - 2 * nu))
            for n, (*_, E, nu) in enumerate(part.layers)}  # fmt: skip
     mu = {f"m{n}": E / (2 * (1 + nu)) for n, (*_, E, nu) in enumerate(part.layers)}
@@ -99,7 +100,7 @@ def lame(mesh, part):
 
 
 def stiffness(part, mesh, order):
-    """K of the tip's centre in N m / rad, N, N / m."""
+    """Return K at the centre of the tip in N m / rad, N and N / m."""
     mesh.Curve(order)
     tips = [f for f in part.solid.faces if corners_of(f)[0][2] > part.L - EPS]
     center = np.average(
@@ -111,7 +112,7 @@ def stiffness(part, mesh, order):
 
 
 def reference(part):
-    """K and how unsure it is."""
+    """Return K and its uncertainty."""
     if part.simple:
         empty = {"kind": part.note.split(",")[0], "profile": (), "eye": ()}
         known = SimpleNamespace(**empty | part.simple, nu=part.layers[0][4])
@@ -128,7 +129,7 @@ def reference(part):
 
 
 def part_texts(part):
-    """Layers after the first as ``--part`` takes them."""
+    """Return the layers after the first in the form of the option ``--part``."""
     return [f"{'xyz'[axis]}={a / 1e3!r}..{b / 1e3!r}/young={1e6 * E!r},poisson={nu!r}"
             for axis, a, b, E, nu in part.layers[1:]]  # fmt: skip
 

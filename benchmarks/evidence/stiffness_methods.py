@@ -1,10 +1,11 @@
 """K_C of three robots by every method, side by side.
 
-``python -m benchmarks.evidence.stiffness_methods`` prints 1 / C_ii at the platform's
-origin along each axis, and how far each method's compliance is from the first, entries
-over sqrt(C_ii C_jj): virtual joints, the same compiled, the displacement method over
-all bodies, the tangent of the exact equilibrium, differences of the least energy (22),
-load steps in Exudyn with links as springs and as beams, and Exudyn's linearised system.
+``python -m benchmarks.evidence.stiffness_methods`` prints 1 / C_ii along each axis at
+the platform's origin, and the difference of each method from the first (entries over
+sqrt(C_ii C_jj)).  The methods are: virtual joints; the same compiled; the displacement
+method over all bodies; the tangent of the exact equilibrium; differences of the least
+energy (22); load steps in Exudyn with links as springs and as beams; and Exudyn's
+linearised system.
 """
 
 from collections.abc import Iterator
@@ -26,7 +27,7 @@ POSES = {"irsbot2": {"tx": 0.1, "tz": -0.5}, "hexapod": None, "orthoglide": None
 
 
 def methods(posture: Posture) -> dict[str, NDArray]:
-    """(6, 6) [rad/(N m) .. m/N] compliance by method."""
+    """Return the (6, 6) [rad/(N m) .. m/N] compliance by each method."""
     robot = posture.robot
     frames = tuple(replace(f, clearance=None) for f in robot.frames)
     tight = replace(robot, frames=frames).with_errors(0 * robot.errors)
@@ -43,7 +44,7 @@ def methods(posture: Posture) -> dict[str, NDArray]:
 
 
 def by_simulation(posture: Posture) -> Iterator[tuple[str, NDArray]]:
-    """Both roads of the simulation, links as springs and as beams."""
+    """Yield the results of both simulation methods, with links as springs and beams."""
     for links in ("spring", "beam"):
         answer = simulated_tangent(posture, link_models(posture.robot, links))
         yield f"load steps, {links}s", answer.stepped

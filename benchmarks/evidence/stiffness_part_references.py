@@ -1,14 +1,16 @@
-"""K_E of the L-bracket and the link with forks from a half and an eighth of them.
+"""K_E of the L-bracket and of the link with forks, from a half and an eighth of them.
 
 ``python benchmarks/evidence/stiffness_part_references.py [link ...]`` (``pip install
 ngsolve``)
 
-Mirror symmetry splits the six motions of the tip into groups that are symmetric or
-antisymmetric in each plane, so that a part of the solid is enough: a half of the
-bracket in bricks that shrink geometrically toward the clamped and the re-entrant edges,
-an eighth of the link with forks in curved tetrahedra with layers of prisms along them.
-Polynomials of rising order; K of the last one goes to ``stiffness_references.json``
-with what the last two differ by.  Nothing is shared with our elements or estimates.
+Mirror symmetry divides the six motions of the tip into groups that are symmetric or
+antisymmetric about each plane, so that a part of the solid is sufficient.  A half of
+the bracket is meshed by bricks that become geometrically smaller toward clamped and
+re-entrant edges.  An eighth of the link with forks is meshed by curved tetrahedra with
+layers of prisms along these edges.  The order of the polynomials is increased.  K of
+the highest order, and its difference from the previous order, are written to
+``stiffness_references.json``.  The program shares no code with forcefit's elements or
+estimates.
 """
 
 import argparse
@@ -26,18 +28,18 @@ SHRINK, EPS = 0.15, 1e-9
 
 
 def mode_stiffness(mesh, order, even, motions, held="", lame=(LAM, MU)):
-    """Energies of motions of the tip that are even or odd in each cut.
+    """Return the energies of tip motions that are even or odd about each cut.
 
     Args:
-        mesh: of the part; its faces are called tip, x0, y0, z0, and one may be held.
-        order: of the polynomials.
-        even: (x, y, z) whether the motions are their own mirror image.
-        motions: of the tip.
-        held: name of a face that stands still.
-        lame: both constants [Pa].
+        mesh: mesh of the part, with faces named tip, x0, y0, z0; one may be held.
+        order: order of the polynomials.
+        even: (x, y, z) whether the motions are symmetric about the plane.
+        motions: motions of the tip.
+        held: name of a face that is fixed.
+        lame: Lame's constants [Pa].
 
     Returns:
-        Work of each field's forces on each other's, of the part, and unknowns.
+        Work of the forces of each field on every other field, and number of unknowns.
     """
     (lam, mu), fixed = lame, {c: ["tip", held] if held else ["tip"] for c in "xyz"}
     for cut, same in zip("xyz", even, strict=True):
@@ -75,7 +77,7 @@ def mode_stiffness(mesh, order, even, motions, held="", lame=(LAM, MU)):
 
 
 def unit_screws(center):
-    """The six rigid motions about a point."""
+    """Return the six rigid motions about a point."""
     x, y, z = (c - p for c, p in zip((ng.x, ng.y, ng.z), center, strict=True))
     return [(0, -z, y), (z, 0, -x), (-y, x, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
 
@@ -84,12 +86,12 @@ def unit_screws(center):
 
 
 def toward(a, b, layers):
-    """Places from a to b, geometrically closer toward a."""
+    """Return positions from a to b that become geometrically closer toward a."""
     return [a] + [a + (b - a) * SHRINK**k for k in range(layers, -1, -1)]
 
 
 def half_bracket(layers):
-    """Bricks of the L of ``meshes/make.py``."""
+    """Return the bricks of the L in ``meshes/make.py``."""
     across = [*toward(-0.02, 0, layers), *toward(0.02, 0, layers)[-2::-1]]
     arm = toward(0.02, 0.05, layers)[1:] + [0.085, *toward(0.15, 0.12, layers)[::-1]]
     leg = toward(0, 0.03, layers) + [0.075, 0.12, *toward(0.18, 0.15, layers)[::-1]]
@@ -99,7 +101,7 @@ def half_bracket(layers):
 
 
 def brick_mesh(x, y, z, empty):
-    """Hexahedra between places along the axes, but for empty ones (i, k)."""
+    """Return hexahedra between positions along the axes, except empty ones (i, k)."""
     mesh = netgen.Mesh()
     mesh.dim = 3
     for n, name in enumerate(("base", "tip", "y0", "side"), start=1):
@@ -140,7 +142,7 @@ def brick_mesh(x, y, z, empty):
 
 
 def bracket(order, layers):
-    """K_E of the L-bracket and the largest system's unknowns."""
+    """Return K_E of the L-bracket and the unknowns of the largest system."""
     mesh, motions = half_bracket(layers), unit_screws((0.15, 0, 0.2))
     K = np.zeros((6, 6))
     for even, group in ((True, [1, 3, 5]), (False, [0, 2, 4])):
@@ -156,7 +158,7 @@ def bracket(order, layers):
 
 
 def eighth_of_forks(layers, finer):
-    """The base's fork and half the tube, prisms along the singular edges."""
+    """Return the base fork and half of the tube, with prisms along singular edges."""
     tube = bar(0.040, 0.060, L / 2) - bar(0.034, 0, L)
     solid = (fork() + tube) * Box(Pnt(0, 0, -0.1), Pnt(0.1, 0.1, L / 2))
     solid.faces.name = "side"
@@ -186,7 +188,7 @@ def eighth_of_forks(layers, finer):
 
 
 def corners_of(shape):
-    """Lowest and highest corner of what a shape fills."""
+    """Return the lowest and highest corner of the bounding box of a shape."""
     low, high = shape.bounding_box
     return [np.array([p[0], p[1], p[2]]) for p in (low, high)]
 
@@ -223,7 +225,7 @@ LINKS = {"l_bracket": bracket, "distal_forks": forks}
 
 
 def reference(name, orders, layers):
-    """K of the highest order and how far the one before is from it."""
+    """Return K of the highest order, and its difference from the previous order."""
     last = None
     for order in orders:
         start = time.process_time()

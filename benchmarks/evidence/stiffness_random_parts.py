@@ -1,18 +1,19 @@
-"""Judge the error estimate of K_E on parts drawn at random, against other solvers.
+"""Evaluation of the error estimate of K_E on random parts, against other solvers.
 
 ``python benchmarks/evidence/stiffness_random_parts.py [--set test] [--parts 0:33]``
-(``pip install ngsolve`` for parts whose reference is not in the JSON file beside this)
+(``pip install ngsolve`` for parts whose reference is not in the JSON file of this name)
 
-Eleven kinds of parts in turn: plate, bar, box, channel, L-bracket, fork, rod, tube,
-cone, stepped rod and an eye with a bore, thin and thick, slender and stubby, nu from 0
-to 0.45, all by the set's seed and the part's number.  Each is solved as
-``forcefit stiffness fea`` does, at the default accuracy, and judged by K of
-``stiffness_random_references.py``.  Printed: unknowns, meshes, true error, told error,
-effectivity told / true, all largest entries scaled by sqrt(K_ii K_jj), and the true
-error of the mesh's own K; then their distribution and means.  The reference's own
-uncertainty is beside the true error; parts are counted as covered if told is not below
-true.  References and answers are kept in JSON files, so that a campaign resumes and
-nothing is computed twice; the answers' file is to be deleted when the code has changed.
+Eleven kinds of parts alternate: plate, bar, box, channel, L-bracket, fork, rod, tube,
+cone, stepped rod, and an eye with a bore.  They are thin and thick, slender and stubby,
+with nu from 0 to 0.45.  The seed of the set and the number of the part determine all
+dimensions.  Each part is solved at the default accuracy, as ``forcefit stiffness fea``
+does, and compared with K of ``stiffness_random_references.py``.  Printed are unknowns,
+meshes, true error with the uncertainty of the reference, estimated error, effectivity
+(estimated / true), and the true error of the mesh's K.  All are largest entries scaled
+by sqrt(K_ii K_jj).  Their distributions and means follow.  A part counts as covered if
+the estimated error is at least the true error.  References and results are stored in
+JSON files, so that an interrupted run continues.  Delete the file of results after a
+change of the code.
 """
 
 import argparse

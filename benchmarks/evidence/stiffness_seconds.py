@@ -1,13 +1,13 @@
-"""How long K_E of a part takes at most: random parts with surfaces of many triangles.
+"""Longest time of K_E for random parts whose surfaces consist of many triangles.
 
     python -m benchmarks.evidence.stiffness_seconds OUT.json [--count 50] [--seed 3]
         [--accuracy 0.005]
 
-Parts as in ``stiffness_random_parts.py``, of another seed, each triangle of their
-surfaces divided into four until there are 10 000 to 40 000, solved as ``forcefit
-stiffness fea`` does, without a cache of meshes.  Every answer is written as it comes,
-and a campaign resumes.  Printed: triangles, unknowns, told error, wall and processor
-seconds with the mesher's.
+The parts are those of ``stiffness_random_parts.py`` with another seed.  Each triangle
+of their surfaces is divided into four, until there are 10 000 to 40 000 triangles.  The
+parts are solved as ``forcefit stiffness fea`` does, without stored meshes.  Each result
+is written at once, so that an interrupted run continues.  Printed are triangles,
+unknowns, estimated error, and wall and processor time including the mesher.
 """
 
 import argparse

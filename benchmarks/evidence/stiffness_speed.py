@@ -1,18 +1,19 @@
-"""What K_E costs beside NGSolve and CalculiX, at errors against one reference.
+"""Cost of K_E compared with NGSolve and CalculiX, as a function of the true error.
 
 ``python benchmarks/evidence/stiffness_speed.py`` (``pip install ngsolve``; ``ccx`` on
 the path)
 
-Every case is a process of its own; its processor time (children and imports counted)
-and its largest memory are the machine's own account of it.  Wall times mean something
-on an idle machine only.  True errors are against ``stiffness_references.json``.
+Each case runs in a separate process.  The operating system reports its processor time
+(including child processes and imports) and its largest memory.  Wall times are
+meaningful only on an idle machine.  True errors refer to ``stiffness_references.json``.
 
-- ours: from the STL surface to K with its error estimate, mesher counted, no cache;
-  and, of that, assembly, factorisation and six load cases on the last mesh alone;
-- NGSolve: from the exact geometry, curved; order and mesh picked by hand, no estimate;
-- CalculiX: one load case of six on a mesh of ours that it is given, quadratic elements
-  (it has no cubic ones) with our layers, halved where ours point until the true error
-  is what was asked; what finding that mesh takes is not counted; its own solver.
+- ours: from the STL surface to K with its error estimate, including the mesher,
+  without stored meshes; and separately assembly, factorisation and six load cases on
+  the last mesh. - NGSolve: from the exact geometry with curved elements; order and mesh
+  are chosen by hand, and there is no error estimate. - CalculiX: one load case of six
+  on a given mesh of forcefit, by its own solver.  The elements are quadratic (it has no
+  cubic ones), with forcefit's layers, and are bisected as forcefit's indicator requests
+  until the true error is small enough.  The time to find this mesh is not included.
 """
 
 import argparse

@@ -1,12 +1,14 @@
-"""Judge the estimated error of peak stresses on shouldered, grooved and bored shafts.
+"""Evaluation of the estimated error of peak stresses on shafts with notches.
 
 ``python benchmarks/evidence/stress_of_notches.py [--accuracy 0.02] [--parts 0:20]``
 
-Twenty parts drawn at random, each in tension, torsion or bending, solved and read as
-``forcefit stiffness stress`` does, one radius away from the ends.  Their references
-are of quadratic axisymmetric elements (scikit-fem; the first harmonic in bending), held
-rigidly at both ends, on meshes of r / 20 and r / 40 in the notch that agree to 0.25 %.
-Printed: true error, told error, covered or not; then how many are.  20 to 100 s a part.
+Twenty random shafts with shoulders, grooves or bores are loaded in tension, torsion or
+bending.  They are solved as ``forcefit stiffness stress`` does, and stresses are read
+one radius away from the ends.  The references use quadratic axisymmetric elements
+(scikit-fem; the first harmonic in bending) with rigidly held ends.  Their meshes of r /
+20 and r / 40 in the notch agree to 0.25 %.  Printed are the true error, the estimated
+error, and whether it covers the true error; then the number of covered parts.  Each
+part takes 20 to 100 s.
 """
 
 import argparse

@@ -1,11 +1,12 @@
-"""Judge the estimated error of peak stresses by Peterson's charts.
+"""Evaluation of the estimated error of peak stresses against Peterson's charts.
 
 ``python -m benchmarks.evidence.stress_of_peterson [--parts 0:10] [--accuracy 0.02]``
 
-Ten parts drawn at random, of kinds whose factors are printed: shoulder fillets in
-tension, bending and torsion, circumferential grooves in torsion, plates with a hole in
-tension.  What is compared is the largest principal stress, which the charts give; in
-torsion it is the shear.  The fits of the charts are known to 1 to 3 %.
+Ten random parts are of kinds with published stress concentration factors: shoulder
+fillets in tension, bending and torsion; circumferential grooves in torsion; plates with
+a hole in tension.  The compared value is the largest principal stress, as in the
+charts; in torsion it equals the shear stress.  The fits of the charts are accurate to 1
+to 3 %.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""Figures of ``crosscheck_validity.py``: what assumptions cost, over what matters."""
+"""Figures of ``crosscheck_validity.py``: errors due to assumptions over parameters."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,13 +14,13 @@ STYLES = {"position": "o-", "energy": "s--"}
 
 
 def validity_figure(rows: list[dict]) -> Figure:
-    """Costs over their limits, 20 um or 1 %: medians, and the largest as thin lines.
+    """Plot errors over their limits (20 um or 1 %): medians, and largest as thin lines.
 
     Args:
-        rows: of the benchmark.
+        rows: rows of the results of the benchmark.
 
     Returns:
-        One row of panels a robot, one panel an assumption.
+        A figure with a row of panels for each robot and a panel for each assumption.
     """
     names = list(dict.fromkeys(r["robot"] for r in rows))
     figure = Figure(figsize=(15, 3.6 * len(names)), layout="constrained")
@@ -56,13 +56,13 @@ def validity_figure(rows: list[dict]) -> Figure:
 
 
 def pose_figure(maps: dict[str, dict]) -> Figure:
-    """Costs over the workspace at the paper's errors.
+    """Plot the errors over the workspace for the paper's geometric errors.
 
     Args:
         maps: by robot ``x``, ``z`` [m] and by assumption (z, x, 2) [m], [-].
 
     Returns:
-        Position and energy of two assumptions for each robot.
+        A figure with position and energy errors of two assumptions for each robot.
     """
     from matplotlib.colors import LogNorm
 

@@ -1,8 +1,8 @@
-"""The costs of ``crosscheck_validity.py`` again, by the multibody simulation.
+"""Errors of ``crosscheck_validity.py``, computed by the multibody simulation instead.
 
-Run ``python benchmarks/evidence/validity_simulated.py``: some two minutes; it prints
-the last table of ``docs/validity.md``.  Beams bend geometrically exactly, weight acts
-at nine nodes of each beam, a pin presses against two bushes as two contacts.
+Run ``python benchmarks/evidence/validity_simulated.py``; it takes two minutes and
+prints the last table of ``docs/validity.md``.  Beams are geometrically exact, weight
+acts at nine nodes of each beam, and a pin in two bushes is modelled by two contacts.
 """
 
 from collections.abc import Iterator
@@ -17,11 +17,11 @@ from forcefit.validation.assumptions.bushes import solve_bushes
 from forcefit.validation.crosscheck.spread_weight import energy_between_ends
 from forcefit.validation.multibody.simulation import SimulationModel, simulate_assembly
 
-ELEMENTS = 8  # of each beam under its weight
+ELEMENTS = 8  # number of elements of each beam under its weight
 
 
 def closures(at: Posture) -> tuple[float, ...]:
-    """[um] [%] simulation against the linear and the exact model."""
+    """Return the error [um] and [%] of the linear and of the exact model."""
     assembly, exact = simulate_assembly(at), solve_exact(at)
     costs = []
     for model in (exact.linear, exact):
@@ -32,7 +32,7 @@ def closures(at: Posture) -> tuple[float, ...]:
 
 
 def weights(at: Posture) -> tuple[float, ...]:
-    """[um] [%] against the ends' equivalents, [%] with what is between them."""
+    """Return the error [um] and [%] of end loads, and [%] with the inner load."""
     assembly = simulate_assembly(
         at, model=SimulationModel(elements=ELEMENTS), gravity=GRAVITY
     )
@@ -47,7 +47,7 @@ def weights(at: Posture) -> tuple[float, ...]:
 
 
 def discs(at: Posture) -> tuple[float, ...]:
-    """[%] what bushes cost more by cones, and by contacts at a sixteenth of all."""
+    """Return the additional energy [%] of bushes by cones and by contacts."""
     by_cones = solve_bushes(at).energy / solve_assembly(at).energy
     disc, bushes = (
         simulate_assembly(
@@ -59,7 +59,7 @@ def discs(at: Posture) -> tuple[float, ...]:
 
 
 def cases(name: str) -> Iterator[tuple[str, tuple[float, ...]]]:
-    """What is compared, and the numbers of four cases or so."""
+    """Yield each comparison with its numbers for about four cases."""
     for ratio in (None, 40.0):
         label = "as built" if ratio is None else "L / r = 40"
         for at in postures(name, ratio)[::5]:
@@ -72,7 +72,7 @@ def cases(name: str) -> Iterator[tuple[str, tuple[float, ...]]]:
 
 
 def main() -> None:
-    """One row for each comparison: medians and largest."""
+    """Print a row for each comparison, with medians and largest values."""
     for name in POSES:
         rows: dict[str, list[tuple[float, ...]]] = {}
         for what, numbers in cases(name):

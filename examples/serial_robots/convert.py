@@ -88,7 +88,7 @@ def find(file: Path, data: Path | None = None) -> Path:
         The path of the table.
 
     Raises:
-        BadInput: there is no such table.
+        BadInput: the table does not exist.
     """
     if file.is_file():
         return file
@@ -102,7 +102,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("file", type=Path, help="a table, or its name in the data set")
     parser.add_argument("-o", "--out", type=Path, required=True)
-    parser.add_argument("--data", type=Path, help="folder that holds the data sets")
+    parser.add_argument("--data", type=Path, help="folder that contains the data sets")
     given = parser.parse_args()
     try:
         print(convert(find(given.file, given.data), given.out))

@@ -1,4 +1,4 @@
 """The commands: each parses its options, calls one function, and prints or saves.
 
-Begin at ``app.py``; ``options.py`` has the options that several commands share.
+Start with ``app.py``.  ``options.py`` defines the options that several commands share.
 """

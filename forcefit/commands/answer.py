@@ -1,4 +1,4 @@
-"""Last step of a command: results are written and printed, the exit status is set."""
+"""Last step of every command: write and print results, and set the exit status."""
 
 from typing import Any
 
@@ -8,16 +8,16 @@ from forcefit.inputs.writing import write_json
 
 
 def answer(results: dict[str, Any], text: str, status: str, json: str | None) -> None:
-    """Write and print results; exit with status 1 if their status is not ok.
+    """Write and print results; exit with status 1 if their status is not ``ok``.
 
     Args:
-        results: plain values.
-        text: the results as text.
-        status: status of the results.
-        json: target of the JSON, as in ``write_json``.
+        results: results as plain values (dictionaries, lists, numbers and texts).
+        text: the same results as text for the terminal.
+        status: status of the results, such as ``"ok"``.
+        json: path for the JSON output, ``"-"`` for standard output, or None.
 
     Raises:
-        typer.Exit: the status is not ok.
+        typer.Exit: the status is not ``ok``.
     """
     from forcefit.assembly.model.statuses import OK
 

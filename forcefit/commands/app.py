@@ -1,4 +1,4 @@
-"""The command ``forcefit`` with the commands of the three packages, and ``study``."""
+"""The command ``forcefit``: the commands of the three packages, and ``study``."""
 
 import io
 import signal
@@ -89,8 +89,8 @@ def study(
 ) -> None:
     """Run every check of a study file and write one report.
 
-    Writes report.html (self-contained), results.json and results.nc to the folder that
-    the study file names.  Exit status 1 if a check fails.
+    Writes report.html (self-contained), results.json and results.nc.  Unless --output
+    is given, the study file names the folder.  The exit status is 1 if a check fails.
     """
     from forcefit.validation.study.headline import verdict
     from forcefit.validation.study.report import results_table, write_study
@@ -113,18 +113,18 @@ def study(
 
 
 def main() -> None:
-    """Run the command; bad input gives one line on stderr and exit status 2."""
+    """Run the command; bad input prints one line to stderr and gives exit status 2."""
     if not sys.warnoptions:
-        # warnings of libraries are for programmers; ``python -W default -m forcefit``
-        # shows them
+        # Warnings of libraries are meant for programmers, who can show them with
+        # ``python -W default -m forcefit``.
         warnings.simplefilter("ignore")
     _print_any_letter()
     report_loading()
     with _interrupts() as interrupts:
         try:
             with naming_packages():
-                # changed in place, so that the provenance in a report has the present
-                # option names
+                # sys.argv is changed in place, so that the command recorded in a report
+                # contains the present names of the options
                 sys.argv[1:] = with_new_names(sys.argv[1:])
                 status = app(prog_name="forcefit", standalone_mode=False)
         except BaseException as error:
@@ -133,10 +133,10 @@ def main() -> None:
 
 
 def _print_any_letter() -> None:
-    r"""Print characters that are not in the encoding of standard output as ``\u03a9``.
+    r"""Print characters outside the encoding of standard output as ``\u03a9``.
 
-    Standard error does this too.  On Windows the encoding of a file or a pipe has only
-    256 characters.
+    Python already treats standard error in this way.  On Windows, the encoding of a
+    file or a pipe contains only 256 characters.
     """
     out = sys.stdout
     if isinstance(out, io.TextIOWrapper) and out.errors == "strict":
@@ -155,10 +155,10 @@ def _status_after(error: BaseException, interrupted: bool) -> int:
         case BrokenPipeError():
             sys.stderr.close()
             return 1
-    # misspelt and missing options raise an error of the parser
+    # the parser raises this error for misspelt and missing options
     if not hasattr(error, "format_message"):
         raise error
-    # the message of this error is the help
+    # the message of this error is the help text itself
     if type(error).__name__ == "NoArgsIsHelpError":
         print(error.format_message(), file=sys.stderr)
         return 2
@@ -167,10 +167,10 @@ def _status_after(error: BaseException, interrupted: bool) -> int:
 
 @contextmanager
 def _interrupts() -> Generator[list[int], None, None]:
-    """Record Ctrl-C, and raise it as usual.
+    """Record whether Ctrl-C was pressed, and raise KeyboardInterrupt as usual.
 
-    Interrupted compiled code may raise a different error, such as matplotlib's
-    ``ValueError: Invalid bounding box``; the record shows the actual cause.
+    When Ctrl-C interrupts compiled code, the code may raise a different error, such as
+    ``ValueError: Invalid bounding box`` of matplotlib.  The record reveals the cause.
     """
     recorded: list[int] = []
     usual = signal.getsignal(signal.SIGINT) is signal.default_int_handler
@@ -190,14 +190,14 @@ def _interrupts() -> Generator[list[int], None, None]:
 
 
 def _with_found(message: str, error: BaseException) -> str:
-    """Return a parser's message with the refused value, which new parsers omit."""
+    """Add the refused value to a message of the parser, whose new versions omit it."""
     refused: list[dict] = getattr(error.__cause__, "errors", list)()
     values = [str(one.get("input")) for one in refused[:1] if one.get("input")]
     return "; ".join([message, *(f"found {quoted(v)}" for v in values)])
 
 
 def _complain(message: str, status: int) -> int:
-    """Print a message to stderr, if there is one, and return the exit status."""
+    """Print a message to stderr unless it is empty, and return the exit status."""
     if message:
         print(f"forcefit: {one_line(message, 800)}", file=sys.stderr)
     return status

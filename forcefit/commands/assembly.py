@@ -1,4 +1,4 @@
-"""The commands ``forcefit assembly ...``: parse, call one function, print or save."""
+"""The commands ``forcefit assembly ...``: parse options, call a function, print."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""The options that describe a beam."""
+"""Options that describe the section, the material and the theory of a beam."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ from forcefit.stiffness.link import LinkStiffness
 
 @dataclass(frozen=True)
 class BeamOptions:
-    """The options that describe a beam; absent values are None."""
+    """Values of the options that describe a beam; None if an option is not given."""
 
     young: float
     poisson: float
@@ -26,7 +26,7 @@ class BeamOptions:
     theory: str = "timoshenko"
 
     def has_section(self) -> bool:
-        """Return whether a section is given."""
+        """Return whether the options describe a section."""
         lengths = (self.radius, self.inner_radius, self.width, self.height)
         return {*lengths, self.section_text} != {None}
 
@@ -36,7 +36,7 @@ class BeamOptions:
         return E, checked("--poisson", self.poisson, "1", above=-1, below=0.5)
 
     def declared(self) -> dict[str, float]:
-        """Return the lengths [m] or constants of the section by name."""
+        """Return the given lengths [m] or constants of the section, by name."""
         plain = {
             "radius": self.radius,
             "inner_radius": self.inner_radius,
@@ -79,12 +79,12 @@ class BeamOptions:
         return given
 
     def section(self) -> Section:
-        """Return the section that the options describe."""
+        """Return the section that the options describe, after checks of its values."""
         _, nu = self.material()
         return declared_section(self.declared(), nu)
 
     def checked_theory(self) -> str:
-        """Return a valid name of a beam theory."""
+        """Return the name of the beam theory; raise an error if it is not valid."""
         if self.theory not in THEORIES:
             raise BadInput(
                 f"--theory: found {describe(self.theory)}"
@@ -95,7 +95,7 @@ class BeamOptions:
     def link(
         self, base: NDArray, tip: NDArray, up: NDArray | None = None
     ) -> LinkStiffness:
-        """Return the beam between two points, in the axes of these points."""
+        """Return the stiffness of the beam between two points, in their axes."""
         E, nu = self.material()
         theory = self.checked_theory()
         C = beam_compliance(
@@ -111,6 +111,6 @@ class BeamOptions:
 
 
 def beam_name(theory: str) -> str:
-    """Return the name of a beam theory in results."""
+    """Return the full name of a beam theory, as printed in results."""
     names = {"timoshenko": "Timoshenko beam", "euler": "Euler-Bernoulli beam"}
     return names[theory]

@@ -37,8 +37,8 @@ def check(
 ) -> None:
     """Print all mistakes in files, not only the first.
 
-    Nothing is computed.  The messages are those of the commands that read the files.
-    Exit status 2 if there are any.
+    No result is computed.  The messages are those of the commands that read the files.
+    The exit status is 2 if a mistake is found.
     """
     results = [_checked(file, robot) for file in files]
     passed = not any(one["messages"] for one in results)
@@ -51,7 +51,7 @@ def check(
 
 
 def _checked(file: Path, robot: str | None) -> dict[str, Any]:
-    """Return kind and messages of one file."""
+    """Return the kind of one file and all messages about it."""
     from forcefit.inputs.mending import all_messages
 
     try:
@@ -62,7 +62,7 @@ def _checked(file: Path, robot: str | None) -> dict[str, Any]:
 
 
 def _text(one: dict[str, Any]) -> str:
-    """Return the lines to print about one file."""
+    """Return the lines that the command prints about one file."""
     from forcefit.inputs.mending import MOST_MESSAGES
 
     messages = one["messages"]
@@ -74,10 +74,11 @@ def _text(one: dict[str, Any]) -> str:
 
 
 def _reader(file: Path, robot: str | None) -> tuple[str, Callable[[], object]]:
-    """Return kind and reader of a file.
+    """Return the kind of a file and the function that reads it.
 
     Raises:
-        BadInput: the file is of no known kind, or the robot that it needs is missing.
+        BadInput: the kind of the file is unknown, or ``--robot`` is missing although
+            the file needs a robot.
     """
     from forcefit.inputs.table import read_toml
 
@@ -110,14 +111,14 @@ def _reader(file: Path, robot: str | None) -> tuple[str, Callable[[], object]]:
 
 
 def _campaign(folder: Path) -> tuple[str, Callable[[], object]]:
-    """Return kind and reader of a campaign."""
+    """Return the word ``campaign`` and the function that reads the folder."""
     from forcefit.validation.campaign.campaign_file import read_campaign
 
     return "campaign", lambda: read_campaign(folder, links=False)
 
 
 def _robot(name: Path | str) -> "Robot":
-    """Return a robot, with links of libraries but without solutions of meshes."""
+    """Return a robot; link libraries are read, but meshes are not solved."""
     from forcefit.assembly.exchange.robot_files import load_robot
     from forcefit.assembly.model.robot import MeshLink
 
@@ -128,7 +129,7 @@ def _robot(name: Path | str) -> "Robot":
 
 
 def _robot_for(file: Path, robot: str | None) -> "Robot":
-    """Return the robot whose frames a file names."""
+    """Return the robot that contains the frames named in a file."""
     if robot is None:
         raise BadInput(
             f"{file}: found names of frames; expected --robot ROBOT with these frames"

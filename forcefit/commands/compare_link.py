@@ -81,9 +81,10 @@ def compare(
 ) -> None:
     """Compare K_E by finite elements with K_E of a beam.
 
-    The beam of a SURFACE is straight with the given section, or follows a curve.  With
-    --ratios the end effect is fitted to bars of several L / r, where r is twice the
-    section's larger radius of gyration (the radius of a round bar).
+    The beam that is compared with a SURFACE is straight with the given section, or
+    follows --curve.  With --ratios, bars of several slenderness ratios L / r are
+    compared and the end effect is fitted.  Here r is twice the larger radius of
+    gyration of the section, which for a round bar is its radius.
     """
     from forcefit.commands.beam_options import BeamOptions
 
@@ -115,7 +116,7 @@ def compare(
 
 
 def _check_no_surface(**values: object) -> None:
-    """Refuse options of a SURFACE if bars are compared."""
+    """Raise an error if options of a SURFACE are given together with --ratios."""
     for name, value in values.items():
         if value is not None:
             option = name if name == "SURFACE" else f"--{name}"
@@ -129,7 +130,7 @@ def _compare_surface(
     options: "BeamOptions", mesh: tuple[Path, str | None, str | None, str, float, str],
     curve: Path | None, up: str | None, figure: Path | None, json: str | None,
 ) -> None:  # fmt: skip
-    """Compare the finite elements of a surface with a beam."""
+    """Compare the stiffness of a meshed surface with that of a beam."""
     from forcefit.stiffness.fem.fea import FemOptions, mesh_link
     from forcefit.stiffness.fem.material import Material
     from forcefit.stiffness.report.compare import compare_link
@@ -168,7 +169,7 @@ def _compare_bars(
     options: "BeamOptions", ratios: str, accuracy: float, interface: str,
     figure: Path | None, json: str | None,
 ) -> None:  # fmt: skip
-    """Compare the finite elements of bars with beams of the same section over L / r."""
+    """Compare meshed bars of several lengths with beams of the same section."""
     from forcefit.commands.options import parse_sizes
     from forcefit.stiffness.report.results import sweep_results, sweep_text
     from forcefit.stiffness.report.slenderness import sweep_slenderness

@@ -1,4 +1,4 @@
-"""The command ``forcefit convert``: robots from and to other programs."""
+"""The command ``forcefit convert``: import and export robots of other programs."""
 
 from pathlib import Path
 from typing import Annotated
@@ -35,8 +35,8 @@ def convert(
     loops: Annotated[
         Path | None,
         typer.Option(
-            help="File with loops and drives of a URDF (YAML, closed_loop). Default: "
-            "a YAML file in the same folder, with the name of the URDF or robot.yaml."
+            help="File with loops and drives of a URDF (YAML, closed_loop). Default: a "
+            "YAML file in the same folder that has the name of the URDF, or robot.yaml."
         ),
     ] = None,
     overlay: Annotated[
@@ -46,9 +46,9 @@ def convert(
     points: Annotated[
         str | None,
         typer.Option(
-            help="Loops closed in a point only, without orientation: loop1 for the "
-            "first, or the name of an end, separated by commas; all; none: types as "
-            "declared."
+            help="Loops that are closed in a point only, without orientation: loop1 "
+            "(the first loop) or names of their ends, separated by commas; all; or "
+            "none, which uses the declared types."
         ),
     ] = None,
     rest: RestOption = None,
@@ -57,10 +57,11 @@ def convert(
 ) -> None:
     """Convert a robot from or to URDF, MJCF and SDF.
 
-    A home pose is computed where the file's own does not close the loops.  The written
-    file is read back and compared in 100 random postures; data that it cannot hold are
-    listed.  Where MuJoCo is installed, the robot that it reads from the same URDF or
-    MJCF is compared too: exit status 1 if they differ.
+    If the home pose in the file does not close the loops, a new home pose is computed.
+    The written file is read back and compared with the original in 100 random postures.
+    Data that the written format cannot contain are listed.  If MuJoCo is installed, it
+    reads the same URDF or MJCF, and its robot is compared too.  The exit status is 1 if
+    the robots differ.
     """
     from forcefit.assembly.exchange.convert import convert as convert_robot
     from forcefit.assembly.kinematics.closing import closing_of

@@ -42,10 +42,10 @@ def predict(
 ) -> None:
     """Predict the readings of a campaign or a table.
 
-    Geometric errors, effects and functions of the robot's file are applied.  Readings
-    have intervals if the file states uncertainties.  The error of the prediction is
-    printed for measured rows.  Exit status 1 if a row has no solution; its cells are
-    empty.
+    The geometric errors, effects and functions of the robot file are applied.  If the
+    file states uncertainties, each reading is written with an interval.  For measured
+    rows, the error of the prediction is printed.  If a row has no solution, its cells
+    are left empty and the exit status is 1.
     """
     from forcefit.assembly.exchange.robot_files import load_robot
     from forcefit.results.text import readings_text
@@ -71,7 +71,7 @@ def predict(
 
 
 def _about(table: dict[str, Any]) -> list[str]:
-    """Return lines on the assumptions and the uncertainty of a prediction."""
+    """Return lines that state the assumptions and the uncertainty of a prediction."""
     from forcefit.results.text import readings_text
 
     lines = []
@@ -124,16 +124,17 @@ def compensate(
     as_read: Annotated[
         bool,
         typer.Option(
-            "--as-read", help="Also correct effects that only change the readings."
+            "--as-read", help="Also correct effects that change only the readings."
         ),
     ] = False,
     json: JsonOption = None,
 ) -> None:
     """Find the commands that cancel the robot's errors.
 
-    ROBOT has the identified errors, as saved by diagnose --save.  TARGETS command the
-    required poses of the nominal robot.  Joint limits are respected and loops stay
-    closed. Exit status 1 if a row has no solution; its command is unchanged.
+    ROBOT contains the identified errors, as written by diagnose --save.  TARGETS
+    contain the commands by which the nominal robot would reach the required poses.
+    Joint limits are respected, and loops remain closed.  If a row has no solution, its
+    command is not changed and the exit status is 1.
     """
     from forcefit.assembly.exchange.robot_files import load_robot
     from forcefit.validation.campaign.campaign_file import read_commands
@@ -158,7 +159,7 @@ def compensate(
 
 
 def _warned(commands: "Campaign") -> dict[str, Any]:
-    """Warn about variables outside the range of the identification data."""
+    """Warn about variables that are outside the range of the identification data."""
     from forcefit.validation.diagnosis.learned_range import beyond
 
     left = beyond(commands.robot, commands)
@@ -168,7 +169,7 @@ def _warned(commands: "Campaign") -> dict[str, Any]:
 
 
 def _left(path: Path) -> dict[str, float]:
-    """Return the held-out residual [m, rad] from the JSON of a diagnosis."""
+    """Return the rms error on held-out rows [m, rad] from the JSON of a diagnosis."""
     from json import loads
 
     from forcefit.inputs.table import read_text
@@ -191,13 +192,14 @@ def carry(
     setup: Annotated[
         str,
         typer.Option(
-            help="Set-up rows: the first N of each session, or 1-20,31, or labels."
+            help="Set-up rows: the first N rows of each session; or rows such as "
+            "1-20,31; or labels of rows."
         ),
     ],
     fit: Annotated[
         str,
         typer.Option(
-            help="Quantities that are fitted in each session: registration,tool,zeros."
+            help="Quantities to fit in each session: registration,tool,zeros."
         ),
     ] = "registration",
     output: Annotated[
@@ -208,11 +210,12 @@ def carry(
 ) -> None:
     """Fit a saved robot to a new session.
 
-    The device's pose, effects of time and the quantities of --fit are fitted to the
-    set-up rows of each session.  The robot's parameters are fitted too, with their
-    covariance as prior.  Errors are those of the other rows, by the fitted and by the
-    declared robot. Exit status 1 if the set-up rows are not sufficient or the fitted
-    robot is worse than the declared one; no robot is written then.
+    The pose of the measuring device, the effects of time and the quantities named by
+    --fit are fitted to the set-up rows of each session.  The parameters of the robot
+    are fitted too, with their stored covariance as prior.  The errors of the fitted and
+    of the declared robot are computed on the other rows.  No robot is written and the
+    exit status is 1 if the set-up rows are not sufficient, or if the fitted robot
+    predicts worse than the declared one.
     """
     from forcefit.assembly.exchange.robot_files import load_robot
     from forcefit.validation.campaign.campaign_file import read_campaign, read_commands
@@ -253,10 +256,10 @@ def explain(
     figure: FigureOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Show the functions of a robot's file as curves.
+    """Show the functions of a robot file as curves.
 
-    The curves have confidence bands.  A function with memory is shown as its response
-    to a unit step.
+    The curves are plotted with confidence bands.  A function whose value depends on
+    earlier inputs is shown by its response to a unit step.
     """
     from forcefit.assembly.exchange.robot_files import load_robot
     from forcefit.validation.correction import curves
@@ -280,7 +283,7 @@ def explain(
 def _ranges(
     functions: tuple["Function", ...], texts: list[str]
 ) -> dict[str, tuple[float, float]]:
-    """Return the range of each variable from ``--over``."""
+    """Return the range of each variable that ``--over`` names."""
     valid = {name for function in functions for name in (*function.variables, "time")}
     ranges = {}
     for part in ",".join(texts).split(",") if texts else ():

@@ -24,7 +24,7 @@ from forcefit.commands.progress import one_thread, progress_lines
 from forcefit.inputs.errors import BadInput, describe, nearest
 from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
 
-_MOST = 10_000  # largest number of loads on a curve
+_MOST = 10_000  # largest number of load values on a curve
 
 
 def deflection(
@@ -52,23 +52,23 @@ def deflection(
         ),
     ] = "contact",
     back: Annotated[
-        bool, typer.Option("--back", help="Afterwards return to the first load.")
+        bool, typer.Option("--back", help="Return to the first load afterwards.")
     ] = False,
     follow: Annotated[
         bool,
         typer.Option(
             "--follow",
-            help="Follow the path by arc length past limit points, stable or not "
-            "(finite motions, clearances at zero).",
+            help="Follow the equilibrium path by arc length past limit points, also "
+            "where it is unstable (finite motions, clearances at zero).",
         ),
     ] = False,
     figure: FigureOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Compute load against deflection, up to critical loads.
+    """Compute load-deflection curves, up to critical loads.
 
-    The curve shows free motion within clearances, contacts, elastic deformation and
-    jumps.
+    The curve includes free motion within clearances, contacts, elastic deformation and
+    jumps to another equilibrium.
     """
     from forcefit.assembly.model.statuses import OK
     from forcefit.assembly.report.deflection import (
@@ -112,11 +112,13 @@ def parse_along(text: str) -> tuple[int, list[float]]:
         text: text such as ``"fz=0:-500:10"``; the sign of the step does not matter.
 
     Returns:
-        Row of the wrench, and its values [N m or N]; both ends are included if the step
-        fits.
+        Row of the component in the wrench ``[M F]``, and the values of the load [N
+        m or N].  The last value is included if the distance is a multiple of the
+        step.
 
     Raises:
-        BadInput: the text has a different form, no change, or more than 10000 values.
+        BadInput: the text has a different form, the load is constant, or the curve
+            would have more than 10000 values.
     """
     from forcefit.assembly.model.largest import LARGEST
     from forcefit.stiffness.screws import WRENCH

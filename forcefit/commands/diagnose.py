@@ -23,8 +23,8 @@ def diagnose(
     calibrate: Annotated[
         int,
         typer.Option(
-            help="Number of campaigns that are simulated on the same design, for the "
-            "error rates.",
+            help="Number of campaigns that are simulated on the same design to "
+            "estimate error rates.",
             min=0,
             max=1_000_000,
         ),
@@ -39,14 +39,14 @@ def diagnose(
     without: Annotated[
         list[str] | None,
         typer.Option(
-            help="Name of an effect to leave out; also function (all "
-            "functions), geometry, springs."
+            help="Name of an effect to leave out, or function (all functions), "
+            "geometry, springs."
         ),
     ] = None,
     only: Annotated[
         list[str] | None,
         typer.Option(
-            help="Name of an effect to consider, no others; names as for --without."
+            help="Consider only effects with this name; names as for --without."
         ),
     ] = None,
     prior: Annotated[
@@ -54,15 +54,16 @@ def diagnose(
         typer.Option(help="Factor on the prior odds of an effect: NAME=FACTOR."),
     ] = None,
     save: Annotated[
-        Path | None, typer.Option(help="Also write the robot with the effects found.")
+        Path | None,
+        typer.Option(help="Also write the robot with the identified effects."),
     ] = None,
 ) -> None:
-    """Find effects that a model lacks, from measured deviations.
+    """Identify effects that a model lacks from measured deviations.
 
     The verdict is explained, learned, none_needed, ambiguous, outside_library or
-    not_enough_rows.  The errors before and after are computed on held-out rows, which
-    are used neither to choose nor to fit a model.  --save writes the robot if it
-    predicts these rows better than the declared robot.
+    not_enough_rows.  The errors before and after identification are computed on
+    held-out rows, which are used neither to choose nor to fit a model.  --save writes
+    the identified robot if it predicts these rows better than the declared robot.
     """
     from forcefit.validation.campaign.campaign_file import read_campaign
     from forcefit.validation.diagnosis import results
@@ -101,7 +102,7 @@ def diagnose(
 
 
 def _odds(without: list[str], only: list[str], prior: list[str]) -> dict[str, float]:
-    """Return the factors on the prior odds of the effects, from the options."""
+    """Return the factor on the prior odds of each effect that an option names."""
     from forcefit.assembly.effects import LIBRARY
 
     names = [*LIBRARY, "function", "geometry", "springs"]
@@ -127,7 +128,7 @@ def _odds(without: list[str], only: list[str], prior: list[str]) -> dict[str, fl
 
 
 def _worse(diagnosis: "Diagnosis") -> str:
-    """Return the reason why the identified robot is not saved."""
+    """Return the reason why the identified robot is not saved, for a message."""
     if not len(diagnosis.fit.unknowns) and not diagnosis.effects:
         return "the diagnosis found no error or effect in addition to the declared ones"
     after, before = diagnosis.after.normalised, diagnosis.before.normalised

@@ -1,4 +1,4 @@
-"""The command ``forcefit example``: writes the files of the examples."""
+"""The command ``forcefit example``, which writes the files of the examples."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,12 +11,12 @@ from forcefit.inputs.writing import check_writable, write_bytes
 
 
 class _Example(NamedTuple):
-    """One example.
+    """An example that the command can write.
 
     Attributes:
         about: short description of the example.
-        files: its files and folders, relative to the folder that has ``examples``.
-        first: a command to begin with.
+        files: files and folders of the example, relative to the parent of ``examples``.
+        first: a command to run first.
     """
 
     about: str
@@ -129,8 +129,8 @@ def example(
 ) -> None:
     """Write the files of examples, as in the repository.
 
-    The commands of the README and of the documentation then work in that folder.  If a
-    file with different content exists, nothing is written.
+    The commands in the README and in the documentation can then be run in that folder.
+    Nothing is written if a file of the same name exists with different content.
     """
     if not names:
         for name, one in EXAMPLES.items():
@@ -158,7 +158,7 @@ def example(
 
 
 def _root() -> Path:
-    """Return the folder of the examples, of the installed package or of a checkout."""
+    """Return the folder of the examples, in the installed package or in a checkout."""
     package = Path(__file__).parents[1]
     for folder in (package, package.parent):
         if (folder / "examples" / "irsbot2.toml").is_file():
@@ -167,7 +167,7 @@ def _root() -> Path:
 
 
 def _files(root: Path, part: str) -> Iterator[Path]:
-    """Yield a file, or all files of a folder, relative to the root."""
+    """Yield the paths of a file, or of all files in a folder, relative to the root."""
     if (root / part).is_file():
         yield Path(part)
         return
@@ -177,7 +177,7 @@ def _files(root: Path, part: str) -> Iterator[Path]:
 
 
 def _is_absent(target: Path, source: Path) -> bool:
-    """Return whether an example's file is absent; refuse other content in it."""
+    """Return whether an example file is absent; refuse a file of other content."""
     if not target.exists():
         check_writable(next(p for p in target.parents if p.exists()) / target.name)
         return True

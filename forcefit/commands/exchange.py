@@ -1,4 +1,4 @@
-"""The command ``forcefit validation import``."""
+"""The command ``forcefit validation import``, which reads measuring devices."""
 
 from pathlib import Path
 from typing import Annotated
@@ -37,8 +37,9 @@ def import_(
 ) -> None:
     """Make a campaign from the files of a measuring device.
 
-    Readings are assigned to commands by name, by time or by order.  The device's pose
-    is fitted; exchanged targets and outliers are reported, and outliers are left out.
+    Readings are assigned to commands by name, by time or by order.  The pose of the
+    device is fitted.  Interchanged targets and outliers are reported; outliers are not
+    written to the campaign.
     """
     from forcefit.validation.exchange.tracker import import_readings
 

@@ -42,9 +42,9 @@ def frequencies(
     count: Annotated[int, typer.Option(help="Number of modes.", min=1, max=1000)] = 6,
     json: JsonOption = None,
 ) -> None:
-    """Compute natural frequencies and modes, the drives held.
+    """Compute natural frequencies and modes with the drives held.
 
-    Masses must be declared.
+    The robot file must declare the masses of the bodies.
     """
     from forcefit.assembly.report.vibration import vibration_of, vibration_text
 

@@ -1,4 +1,4 @@
-"""The command ``forcefit validation generate``: parse, call one function, save."""
+"""The command ``forcefit validation generate``, which simulates a campaign."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -34,7 +34,7 @@ def parse_effects(texts: list[str] | None) -> dict[str, float]:
         texts: texts such as ``["self_weight", "link_length=3"]``.
 
     Returns:
-        For each name its multiple of the noise.
+        Size of each effect as a multiple of the measurement noise, by name.
 
     Raises:
         BadInput: a multiple is not a number > 0, or an effect is given twice.
@@ -109,7 +109,9 @@ def generate(
     ] = 0.0,
     hidden_frame: Annotated[
         float,
-        typer.Option(help="[rad, m] Magnitude of the measuring frame's unknown pose."),
+        typer.Option(
+            help="[rad, m] Magnitude of the unknown pose of the device frame."
+        ),
     ] = 0.0,
     at: AtOption = None,
     program: Annotated[
@@ -121,7 +123,7 @@ def generate(
     """Simulate a campaign with effects that the file lacks.
 
     Writes campaign.toml, measurements.csv and robot.toml to FOLDER.  Joints have no
-    clearance unless a hidden effect is one.
+    clearance, unless a clearance is among the hidden effects.
     """
     import numpy as np
 

@@ -1,11 +1,11 @@
-"""Help texts of the commands: options in groups with titles."""
+"""Help texts of the commands, with the options in titled groups."""
 
 from typing import Any
 
 import typer
 from typer.core import TyperCommand
 
-_WHAT = "What"  # title of the group of all other options
+_WHAT = "What"  # title of the group of all options that are not listed below
 GROUPS = {
     "Where": (
         "pose joint grid poses path rest mismatch under at along over base tip nodes "
@@ -24,10 +24,10 @@ _GROUP_OF = {
 
 
 class GroupedCommand(TyperCommand):
-    """A command whose help lists its options by groups."""
+    """A command whose help text lists its options in groups."""
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
-        """Write the arguments and each group of options."""
+        """Write the arguments, and then each group of options."""
         rows: dict[str, list[tuple[str, str]]] = {
             title: [] for title in ("Arguments", _WHAT, *GROUPS)
         }
@@ -42,10 +42,10 @@ class GroupedCommand(TyperCommand):
 
 
 class Commands(typer.Typer):
-    """A group of commands whose help lists options by groups."""
+    """A group of commands whose help texts list their options in groups."""
 
     def command(self, name: str | None = None, **settings: Any) -> Any:
-        """Register a command, in the manner of :meth:`typer.Typer.command`."""
+        """Register a command; see :meth:`typer.Typer.command` for the arguments."""
         return super().command(name, cls=GroupedCommand, **settings)
 
 

@@ -28,10 +28,12 @@ def inspect(
 ) -> None:
     """Inspect measured data; characteristics of ISO 9283 and 230-2.
 
-    Reports rows, loads and covariates; noise from repeats against the stated sigma;
-    visible effects, and effects that this design cannot distinguish.  With --iso, from
-    repeats: pose accuracy and repeatability, distance accuracy, drift; reversal,
-    repeatability and accuracy of each reading approached from both sides.
+    The report states the numbers of rows, the ranges of loads and covariates, the noise
+    estimated from repeats against the declared sigma, the visible effects, and the
+    effects that this design cannot distinguish.  With --iso it states characteristics
+    from repeats instead: accuracy and repeatability of pose, accuracy of distance,
+    drift; and reversal, repeatability and accuracy of readings approached from both
+    sides.
     """
     from forcefit.validation.campaign.campaign_file import read_campaign
     from forcefit.validation.inspection.inspection import inspect_campaign

@@ -1,4 +1,4 @@
-"""The commands ``forcefit stiffness library ...``."""
+"""The commands ``forcefit stiffness library ...``, for stored link stiffnesses."""
 
 from functools import partial
 from pathlib import Path
@@ -97,7 +97,7 @@ def _list(folder: Path, json: str | None) -> None:
 
 
 def _look_up(folder: Path, at: list[str], family: str, json: str | None) -> None:
-    """Print K_E interpolated between the entries of a library, and its error."""
+    """Print K_E interpolated between entries of a library, and its estimated error."""
     from forcefit.commands.options import parse_assignments
     from forcefit.stiffness.link import scaled
     from forcefit.stiffness.report.library import look_up, read_library
@@ -114,7 +114,7 @@ def _look_up(folder: Path, at: list[str], family: str, json: str | None) -> None
 
 
 def _export(folder: Path, to: str, key: str | None, json: str | None) -> None:
-    """Print a library, or K_E of one entry for another program."""
+    """Print a library as CSV, or K_E of one entry in the format of another program."""
     from forcefit.stiffness.report.export import library_csv, stiffness_for
     from forcefit.stiffness.report.library import read_entry, read_library
 

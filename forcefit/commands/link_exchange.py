@@ -55,9 +55,9 @@ def import_(
     ] = "translations-first",
     json: JsonOption = None,
 ) -> None:
-    """Import K_E from another program's matrix.
+    """Import K_E from a stiffness matrix of another program.
 
-    The matrix is condensed onto two interfaces.
+    The matrix is condensed onto the base and tip interfaces.
     """
     from forcefit.stiffness.exchange.import_link import import_link
     from forcefit.stiffness.report.results import link_results, link_text
@@ -87,9 +87,9 @@ def export(
     output: Annotated[Path, typer.Option("-o", "--output", help="File to write.")],
     unit: Length = "m",
 ) -> None:
-    """Write a link's K_E as another program's matrix.
+    """Write K_E of a link as a stiffness matrix for another program.
 
-    The matrix is that of two nodes, base and tip.
+    The matrix contains the degrees of freedom of two nodes, at the base and at the tip.
     """
     from forcefit.stiffness.exchange.export_link import link_file, read_link_results
 
@@ -101,7 +101,7 @@ def export(
             f"--output: found {quoted(output.name)}, expected the ending {expected} "
             f"for --to {to}, so that forcefit can read the file again"
         )
-    # only a matrix of the same format may be replaced
+    # an existing file may be replaced only if it contains a matrix of the same format
     endings, begins = (output.suffix.lower(),), (content[:8].lower(),)
     check_writable(output, Kind(f"a matrix for {to}", endings, begins))
     write_bytes(content, output)

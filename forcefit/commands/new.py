@@ -1,4 +1,4 @@
-"""The command ``forcefit new``: writes a robot file to begin with."""
+"""The command ``forcefit new``, which writes a robot file to start from."""
 
 import sys
 from pathlib import Path
@@ -17,8 +17,8 @@ def new(
     kind: Annotated[
         str | None,
         typer.Option(
-            help="Joints of a leg from the base: UPS | RUS | UPU | PRS | RRR (in a "
-            "plane) | delta. Asked for on a terminal."
+            help="Joints of a leg from the base: UPS | RUS | UPU | PRS | RRR (planar) "
+            "| delta. If it is missing, a terminal asks for it."
         ),
     ] = None,
     legs: Annotated[
@@ -28,7 +28,8 @@ def new(
 ) -> None:
     """Write a robot file of bodies and joints, with comments.
 
-    It solves as it is, and its numbers are to be replaced. No file is overwritten.
+    The file can be solved without changes. Replace its numbers by those of your robot.
+    An existing file is not overwritten.
     """
     from forcefit.assembly.files.new_robot import KINDS, new_robot
 
@@ -53,7 +54,7 @@ def new(
 
 
 def _asked(legs: int | None) -> tuple[str, int | None]:
-    """Return the kind and the number of legs that the user types."""
+    """Ask the user for the kind and the number of legs, and return both."""
     from forcefit.assembly.files.new_robot import KINDS
 
     for word, each in KINDS.items():

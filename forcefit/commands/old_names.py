@@ -1,7 +1,7 @@
-"""Old names of commands and options, which work for one release with a message.
+"""Old names of commands and options, which print a message and work for one release.
 
-The commands have the new names only, and ``--help`` shows no others.  Old names in the
-public formats remain valid without a message.
+The commands themselves accept only the new names, and ``--help`` lists only these.  Old
+names that the public file formats contain remain valid without a message.
 """
 
 import sys
@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from forcefit.inputs.errors import BadInput
 
-# old words of each merged command, and its new words
+# replaced command: the words that now select the same function
 COMMANDS: dict[str, tuple[str, ...]] = {
     "assembly exact": ("assembly", "solve", "--state", "exact"),
     "assembly zone": ("assembly", "solve", "--quantities", "margin"),
@@ -23,7 +23,8 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "validation iso": ("validation", "inspect", "--iso"),
 }
 _PICTURE: dict[str, tuple[str, ...]] = {"-o": ("--figure",), "--output": ("--figure",)}
-# old options of each command, and new words; a value follows if the option has one
+# for each command, its old options and the words that replace them; the value of an
+# option remains after these words
 OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
     "assembly error": {
         "--reading": ("--assumption",),
@@ -69,13 +70,13 @@ OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
     "stiffness beam": {"--axis": ("--along",)},
 }
 
-# old values of each option, and the new values
+# for each option, its old values and the new values that replace them
 VALUES = {"--compliant": {"free": "margin_free", "rigid": "margin"}}
 STAY = {("assembly error", "--reading"), ("stiffness beam", "--axis")}
 
 
 def with_new_names(words: Sequence[str]) -> list[str]:
-    """Replace commands and options given by their old names.
+    """Replace old names of commands and options by the new names.
 
     Each replacement is reported once on stderr.
 
@@ -83,13 +84,13 @@ def with_new_names(words: Sequence[str]) -> list[str]:
         words: words of the command line, without the program's name.
 
     Returns:
-        The words that the commands understand.
+        The words of the command line with new names only.
     """
     renamed = _renamed_options(words)
     end = words.index("--") if "--" in words else len(words)
     reported: list[str] = []
     new_words: list[str] = []
-    values: dict[str, str] = {}  # new values of the word that follows
+    values: dict[str, str] = {}  # new values for the word after the option
     for word in words[:end]:
         word, values = values.get(word, word), {}
         option, equals, value = _parts(word)
@@ -107,7 +108,7 @@ def with_new_names(words: Sequence[str]) -> list[str]:
 
 
 def _with_new_command(words: list[str]) -> list[str]:
-    """Replace the words of a merged command."""
+    """Replace the words of a command that was merged with another command."""
     for old, new in COMMANDS.items():
         count = len(old.split())
         if words[:count] == old.split():
@@ -121,19 +122,19 @@ def _with_new_command(words: list[str]) -> list[str]:
 
 
 def _parts(word: str) -> tuple[str, str, str]:
-    """Return the option, "=" and the value of a word; also for words such as -ofile."""
+    """Split a word into option, "=" and value; also split words such as ``-ofile``."""
     if word.startswith("--") or not word.startswith("-"):
         return word.partition("=")
     return word[:2], "=" * bool(word[2:]), word[2:]
 
 
 def _staying(words: Sequence[str]) -> list[str]:
-    """Return the old options of the command that are in the public formats."""
+    """Return the old options of the command that public file formats still contain."""
     return [old for command, old in STAY if list(words[:2]) == command.split()]
 
 
 def _renamed_options(words: Sequence[str]) -> dict[str, tuple[str, ...]]:
-    """Return the old options of the command that the first words name."""
+    """Return the old options, and their replacements, of the command that is called."""
     renamed: dict[str, tuple[str, ...]] = {}
     for command, options in OPTIONS.items():
         path = command.split()

@@ -1,4 +1,4 @@
-"""Options that several commands share, and the parsing of their texts.
+"""Options that several commands share, and functions that parse their values.
 
 Every error message names the option.
 """
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def _built_in_names(incomplete: str) -> list[str]:
-    """Return the built-in robots whose names begin with a text."""
+    """Return the names of built-in robots that begin with the given text."""
     from forcefit.assembly.robots import BUILT_IN
 
     return [name for name in BUILT_IN if name.startswith(incomplete)]
@@ -62,7 +62,7 @@ DriveForceOption = Annotated[
     list[str] | None,
     typer.Option(
         "--drive-force",
-        help="Forces of drives that hold no coordinate [N m or N], such as elbow=200.",
+        help="Forces of force-controlled drives [N m or N], such as elbow=200.",
     ),
 ]
 
@@ -140,7 +140,7 @@ JsonOption = Annotated[
 
 
 def parse_load(texts: list[str] | None, option: str = "--load") -> list[float] | None:
-    """Return the wrench ``[mx my mz fx fy fz]`` of an option; None if it is absent.
+    """Return the wrench ``[mx my mz fx fy fz]`` of an option, or None if it is absent.
 
     Args:
         texts: texts such as ``["fx=10,mz=1"]``; omitted components are zero.
@@ -150,7 +150,7 @@ def parse_load(texts: list[str] | None, option: str = "--load") -> list[float] |
         Six numbers [N m, N].
 
     Raises:
-        BadInput: a component is unknown, or a value is not a number.
+        BadInput: the name of a component is unknown, or a value is not a number.
     """
     if not texts:
         return None
@@ -163,12 +163,12 @@ def parse_load(texts: list[str] | None, option: str = "--load") -> list[float] |
 
 
 def parse_gravity(texts: list[str] | None) -> list[float] | None:
-    """Return the gravity (3,) [m/s^2] from ``--gravity``; see :func:`parse_vector`."""
+    """Return the gravity (3,) [m/s^2] of ``--gravity``; see :func:`parse_vector`."""
     return parse_vector(texts, "--gravity")
 
 
 def parse_vector(texts: list[str] | None, option: str) -> list[float] | None:
-    """Return three numbers given by component; None if the option is absent.
+    """Return three numbers given by component, or None if the option is absent.
 
     Args:
         texts: texts such as ``["z=-9.81"]``.
@@ -212,7 +212,7 @@ def parse_state(
 
 
 def parse_point(texts: list[str] | None) -> tuple[float, float, float]:
-    """Return the point of ``--at``; the platform's origin if the option is absent.
+    """Return the point of ``--at``, or the platform's origin if the option is absent.
 
     Args:
         texts: texts such as ``["0,0,-0.1"]`` or ``["z=-0.1"]``.
@@ -389,7 +389,7 @@ def declared_under(
 
 
 def note_massless(robot: Any, gravity: list[float] | None) -> None:
-    """Print a note to stderr if there is gravity and no body has a mass."""
+    """Print a note to stderr if gravity is given but no body has a mass."""
     from forcefit.assembly.linear.load import massless
 
     for remark in massless(robot, gravity):
@@ -397,7 +397,7 @@ def note_massless(robot: Any, gravity: list[float] | None) -> None:
 
 
 def note_loose(robot: Any) -> None:
-    """Print a note to stderr if a fixed joint's clearance is loose at every pose."""
+    """Print a note to stderr if a fixed joint stays loose at every pose."""
     from forcefit.assembly.steps.bolted import loose_over_poses
 
     for remark in loose_over_poses(robot):
@@ -412,16 +412,16 @@ def note_closing(robot: Any, rest: str | None, mismatch: str | None) -> None:
 
 
 def parse_covariates(texts: list[str] | None) -> dict[str, float | str]:
-    """Return the covariates from ``--under``.
+    """Return the values of covariates that ``--under`` sets.
 
     Args:
         texts: texts such as ``["temperature=5,approach=1"]``.
 
     Returns:
-        Numbers by name; ``session`` has a text.
+        Numbers by name; the value of ``session`` is a text.
 
     Raises:
-        BadInput: a text has a different form.
+        BadInput: a text is not of the form ``NAME=VALUE``.
     """
     parts = [part.strip() for text in texts or () for part in text.split(",")]
     named = [part.partition("=")[2].strip() for part in parts if _names_session(part)]
@@ -465,7 +465,7 @@ def parse_axis(option: str, text: str) -> "NDArray":
             "such as 0,0,1, not all zero"
         )
     largest = np.abs(vector).max()
-    # the square of 1e300 exceeds the range of floats
+    # the square of a number such as 1e300 would exceed the range of floats
     return vector if 1e-150 < largest < 1e150 else vector / largest
 
 

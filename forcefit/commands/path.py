@@ -1,4 +1,4 @@
-"""The command ``forcefit assembly path``."""
+"""The command ``forcefit assembly path``: errors by inertia along a path."""
 
 import sys
 from collections.abc import Callable, Generator
@@ -74,11 +74,12 @@ def path(
     ends: Annotated[
         str,
         typer.Option(
-            help="Ends of a path with times: rest (no speed, no acceleration) | moving."
+            help="State at the ends of a path with times: rest (zero speed and "
+            "acceleration) | moving."
         ),
     ] = "rest",
     points: Annotated[
-        int, typer.Option(help="Number of instants computed, equally spaced.")
+        int, typer.Option(help="Number of computed instants, equally spaced.")
     ] = 201,
     load: LoadOption = None,
     gravity: GravityOption = None,
@@ -106,10 +107,10 @@ def path(
     report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Compute the errors by inertia along a path.
+    """Compute the errors that inertia causes along a path.
 
-    Masses must be declared.  Vibration is left out.  With -o an interrupted
-    computation resumes when the command is run again.
+    The robot file must declare the masses of the bodies.  Vibration is not included.
+    With -o, an interrupted computation resumes when the command is run again.
     """
     from forcefit.assembly.model.largest import LARGEST
     from forcefit.assembly.path.request import PathTimes, errors_along_path
@@ -152,7 +153,7 @@ def _closed(robot: str, rest: str | None, mismatch: str | None) -> Any:
 
 @contextmanager
 def _resumable(output: Path | None) -> Generator[Callable[[int], int], None, None]:
-    """Yield a function that notes finished points; on Ctrl-C print how to resume."""
+    """Yield a counter of finished points; after Ctrl-C, print how to resume."""
     done = [0]
 
     def note(finished: int) -> int:

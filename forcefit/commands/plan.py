@@ -1,4 +1,4 @@
-"""The command ``forcefit validation plan``: parse, call one function, save."""
+"""The command ``forcefit validation plan``, which designs a campaign."""
 
 from pathlib import Path
 from typing import Annotated
@@ -48,10 +48,10 @@ def plan(
     seed: Annotated[int, typer.Option(help="Seed of the candidate rows.", min=0)] = 0,
     json: JsonOption = None,
 ) -> None:
-    """Plan rows that distinguish effects.
+    """Plan measurements that distinguish effects.
 
-    Writes campaign.toml, measurements.csv without readings and robot.toml.  Times and
-    temperatures are targets; replace them by the measured ones.
+    Writes campaign.toml, measurements.csv without readings and robot.toml.  The times
+    and temperatures in the table are targets; replace them by the measured values.
     """
     from forcefit.assembly.exchange.robot_files import load_robot
     from forcefit.validation.inspection import planning

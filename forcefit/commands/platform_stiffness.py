@@ -62,14 +62,14 @@ def stiffness(
     by: Annotated[
         list[str] | None,
         typer.Option(
-            help="Path of a value in the robot file by which the compliance is also "
-            "differentiated."
+            help="Path of a value in the robot file; the derivative of the compliance "
+            "by this value is also computed."
         ),
     ] = None,
     figure: FigureOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Compute the platform's stiffness, and each part's compliance."""
+    """Compute the platform's stiffness and each part's compliance."""
     from forcefit.assembly.model.statuses import OK
     from forcefit.assembly.report.platform_stiffness import stiffness_of, stiffness_text
     from forcefit.assembly.report.share_pictures import plot_shares
@@ -122,7 +122,7 @@ def _slopes(
     asked: tuple[Any, ...],
     under: list[str] | None,
 ) -> "tuple[dict[str, NDArray], dict[str, str]]":
-    """Return derivatives of the compliance in one state, or reasons for none."""
+    """Return derivatives of the compliance in one state, or why one does not exist."""
     from forcefit.assembly.platform_stiffness.tangent_slopes import TangentState
     from forcefit.assembly.sweeps.parameters import load_design
     from forcefit.assembly.sweeps.stiffness_slopes import CannotChange, stiffness_slopes
@@ -142,7 +142,7 @@ def _slopes(
 
 
 def _print_slopes(results: dict[str, Any]) -> None:
-    """Print one line for each derivative, and for each missing one its reason."""
+    """Print a line for each derivative; the line of a missing one states the reason."""
     for key in ("slopes", "slopes_contact"):
         name = key.removeprefix("slopes").replace("_", " ")
         for path, slope in results.get(key, {}).items():

@@ -11,7 +11,7 @@ from forcefit.inputs.writing import PICTURE, TABLE, check_writable, save_figure
 
 
 def _table(path: Path | None) -> Path | None:
-    """Refuse a table that could not be written before the computation begins."""
+    """Raise an error before the computation if the table could not be written."""
     if path is not None:
         check_writable(path, TABLE)
     return path
@@ -44,8 +44,8 @@ def plot(
     kind: Annotated[
         str | None,
         typer.Option(
-            help="Kind of the figure: histogram | tornado | allocation. Default: by "
-            "the file."
+            help="Kind of the figure: histogram | tornado | allocation. Default: a "
+            "kind that suits the file."
         ),
     ] = None,
     quantities: Annotated[
@@ -67,9 +67,9 @@ def plot(
 ) -> None:
     """Plot a saved file, or write it as a CSV table.
 
-    A figure shows maps, lines, histograms or tolerances.  A table has a row for each
-    point and a column for each component of every variable.  Its first column, id,
-    counts the rows from 0; the column headings have the units in brackets.
+    A figure shows maps, lines, histograms or tolerances.  A table contains a row for
+    each point and a column for each component of every variable.  The first column, id,
+    numbers the rows from 0.  The column headings state the units in brackets.
     """
     from forcefit.assembly.sweeps.point_table import write_point_table
 
@@ -88,7 +88,7 @@ def plot(
 
 
 def _check_goes_with(option: str, path: Path | None, others: dict[str, Any]) -> None:
-    """Refuse options of an output that is not requested."""
+    """Raise an error for options of an output that was not requested."""
     for name, value in others.items():
         if value and path is None:
             raise BadInput(
@@ -99,7 +99,7 @@ def _check_goes_with(option: str, path: Path | None, others: dict[str, Any]) -> 
 def _plot_file(
     file: Path, picture: Path, at: list[str], kind: str | None, quantities: list[str]
 ) -> None:
-    """Plot a saved file."""
+    """Plot the data in a saved file."""
     from forcefit.assembly.statistics.plot import KINDS, figure_of_draws
     from forcefit.assembly.sweeps.dataset import open_dataset
     from forcefit.assembly.sweeps.maps import figure_of

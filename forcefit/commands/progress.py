@@ -1,4 +1,4 @@
-"""Progress bars, and the number of threads."""
+"""Progress bars, progress lines, and a limit on the number of threads."""
 
 import logging
 import sys
@@ -10,14 +10,14 @@ from typing import Any
 
 from forcefit.inputs.errors import BadInput
 
-_DELAY = 2.0  # [s] time before the first line of progress
+_DELAY = 2.0  # [s] shortest time between two lines of progress
 
 
 def one_thread() -> AbstractContextManager:
-    """Limit linear algebra to one thread, because a posture's matrices are small.
+    """Limit linear algebra to one thread, because the matrices of a posture are small.
 
-    Idle threads wait actively and would slow down the working thread.  Without the
-    package ``threadpoolctl`` there is no limit.
+    Idle threads would wait actively and slow down the working thread.  If the package
+    ``threadpoolctl`` is not installed, the number of threads is not limited.
     """
     try:
         from threadpoolctl import threadpool_limits
@@ -27,7 +27,7 @@ def one_thread() -> AbstractContextManager:
 
 
 class _Links(logging.Handler):
-    """Handler that prints a line for each link solved by finite elements, or a bar."""
+    """Log handler that prints a line or advances a bar for each link that is solved."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -35,7 +35,7 @@ class _Links(logging.Handler):
         self.bar: Any = None
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Advance the bar if the record counts links, otherwise print its message."""
+        """Advance the bar if the record counts links; otherwise print its message."""
         if not hasattr(record, "total"):
             self._begin()
             print(f"forcefit: {record.getMessage()}", file=sys.stderr)
@@ -48,7 +48,7 @@ class _Links(logging.Handler):
                 self.bar = None
 
     def _begin(self) -> None:
-        """Start a bar on stderr if stderr is a terminal and shows no other bar."""
+        """Start a bar on stderr if stderr is a terminal without another bar."""
         from rich.console import Console
         from rich.errors import LiveError
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
@@ -67,7 +67,7 @@ class _Links(logging.Handler):
 
 
 def report_loading() -> None:
-    """Show progress of the finite elements that loading a robot runs."""
+    """Show the progress of finite elements that are solved while a robot is loaded."""
     log = logging.getLogger("forcefit.links")
     log.setLevel(logging.DEBUG)
     log.handlers = [_Links()]
@@ -75,10 +75,10 @@ def report_loading() -> None:
 
 @contextmanager
 def progress_lines() -> Generator[Any, None, None]:
-    """Print progress of a usually short computation to stderr; yield ``update``.
+    """Print progress lines for a computation that is usually short; yield ``update``.
 
     ``update(what, done, most)`` prints a line if two seconds have passed since the last
-    one. The total number of steps is not known, so there is no bar.
+    one. A bar is not shown, because the total number of steps is not known in advance.
     """
     last = time.monotonic()
 
@@ -95,8 +95,8 @@ def progress_lines() -> Generator[Any, None, None]:
 def progress_bars() -> Generator[Any, None, None]:
     """Show progress bars on stderr; yield ``update(what, done, total)``.
 
-    If stderr is not a terminal, bars appear only at the end, and a line is printed for
-    a task that takes longer than two seconds.  After bad input no bar remains.
+    If stderr is not a terminal, bars are printed only at the end, and a line is printed
+    for each task that takes longer than two seconds.  Bars are removed after bad input.
     """
     from rich.console import Console
     from rich.progress import (
@@ -127,7 +127,7 @@ def progress_bars() -> Generator[Any, None, None]:
                     )
                     waiting[-1].daemon = True
                     waiting[-1].start()
-                # points of an earlier run do not count in the rate
+                # points of an earlier run must not count in the rate of this run
                 tasks[what] = bars.add_task(what, total=total, completed=done, rate="")
                 began[what] = time.monotonic(), done
             start, before = began[what]
@@ -140,7 +140,7 @@ def progress_bars() -> Generator[Any, None, None]:
         except BadInput:
             bars.live.transient = True
             bars.live.stop()
-            bars.disable = True  # otherwise it ends with an empty line
+            bars.disable = True  # otherwise closing the bar prints an empty line
             raise
         finally:
             for line in waiting:

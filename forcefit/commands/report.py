@@ -1,4 +1,4 @@
-"""The commands ``forcefit report``, and the option ``--report`` of other commands."""
+"""The command ``forcefit report``, and the option ``--report`` of other commands."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,7 +17,7 @@ app = Commands(no_args_is_help=True)
 
 
 def _checked(path: Path | None) -> Path | None:
-    """Refuse a page that could not be written before the computation begins."""
+    """Raise an error before the computation if the report could not be written."""
     if path is not None:
         check_writable(path, PAGE)
     return path
@@ -37,7 +37,7 @@ _File = Annotated[
 
 @app.callback()
 def report() -> None:
-    """Comparison of two runs."""
+    """Compare the results of two runs."""
 
 
 @app.command()
@@ -64,7 +64,7 @@ def compare(
 
 
 def _results(path: Path) -> dict:
-    """Return the results in a report or a JSON file."""
+    """Return the results that a report or a JSON file contains."""
     from forcefit.page.page import results_in
 
     try:
@@ -75,13 +75,14 @@ def _results(path: Path) -> dict:
 
 
 def provenance(*sources: Path | str | None) -> "Provenance":
-    """Return the running command and the files that it reads.
+    """Return the command that is running and the files that it reads.
 
     Args:
-        sources: files, folders whose files are read, names of built-in robots, or None.
+        sources: files, folders of which all files are read, names of built-in robots,
+            or None.
 
     Returns:
-        The command as typed, and the files that exist.
+        The command as typed, and the paths of the files that exist.
     """
     from forcefit.page.page import Provenance, command_line
 
@@ -96,5 +97,5 @@ def provenance(*sources: Path | str | None) -> "Provenance":
 
 
 def campaign_provenance(campaign: Path) -> "Provenance":
-    """Return the running command and the files of a campaign's folder."""
+    """Return the command that is running and the files in the folder of a campaign."""
     return provenance(campaign if campaign.is_dir() else campaign.parent)

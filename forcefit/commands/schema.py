@@ -17,10 +17,10 @@ def schema(
         ),
     ] = None,
 ) -> None:
-    """Print a JSON Schema: of robot files, campaigns or results.
+    """Print the JSON Schema of robot files, campaigns or results.
 
-    Editors use it to complete and check files: forcefit schema robot >
-    robot.schema.json
+    Editors use a schema to complete and check files, for example after forcefit schema
+    robot > robot.schema.json
     """
     from forcefit.assembly.files.robot_schema import ROBOT_FILE
     from forcefit.assembly.files.step_file import PLAN_FILE

@@ -38,8 +38,8 @@ def show(
         Path | None,
         typer.Option(
             "--figure",
-            help="Picture to write: PNG, JPEG, BMP or TIFF, with --closing GIF; or "
-            "HTML, a scene to turn in a browser. Without it and --json a window opens.",
+            help="Picture to write: PNG, JPEG, BMP, TIFF, GIF (with --closing) or HTML "
+            "(an interactive scene). A window opens if --figure and --json are absent.",
         ),
     ] = None,
     closing: Annotated[
@@ -69,15 +69,16 @@ def show(
     assumption: Annotated[
         str | None,
         typer.Option(
-            help="Assumption of that set: frozen | free | budget. Default: budget; "
-            "under a load frozen."
+            help="Assumption for the set of --error-body: frozen | free | budget. "
+            "Default: budget; under a load frozen."
         ),
     ] = None,
     json: JsonOption = None,
 ) -> None:
     """Plot the robot and its errors; print its mobility.
 
-    The nominal and the forced robot are drawn; with --json and without --figure, none.
+    The nominal and the forced robot are drawn.  With --json and without --figure,
+    nothing is drawn.
     """
     from forcefit.assembly.linear.energy import (
         CannotAssemble,
@@ -147,19 +148,19 @@ def show(
 
 
 def _is_page(path: Path) -> bool:
-    """Return whether a path ends as an HTML page."""
+    """Return whether the ending of a path is that of an HTML page."""
     return path.suffix.lower() in PAGE.endings
 
 
 def _write_scene(
     assembly: Any, figure: Path, error_body: str | None, assumption: str
 ) -> None:
-    """Write the scene that reports and notebooks show, as a page of its own."""
+    """Write the interactive scene of reports and notebooks as a separate HTML page."""
     from forcefit.assembly.report.show import show
     from forcefit.page.picture import Picture
 
     shown = show(assembly, errors=error_body, assumption=assumption, interactive=True)
-    assert isinstance(shown, Picture)  # because it is interactive
+    assert isinstance(shown, Picture)  # because the scene is interactive
     write_text(shown.html, figure)
 
 
@@ -167,7 +168,7 @@ def _draw(
     assembly: Any, figure: Path | None, exaggeration: float | None,
     error_body: str | None, assumption: str,
 ) -> None:  # fmt: skip
-    """Write the picture, or open a window."""
+    """Write the picture to a file, or open a window that shows it."""
     from forcefit.assembly.report.plot import plot_assembly
 
     plotter = plot_assembly(

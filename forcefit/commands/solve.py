@@ -39,15 +39,15 @@ def solve(
     state: Annotated[
         str,
         typer.Option(
-            help="contact (small motions) | exact (finite motions: closures hold "
-            "exactly)."
+            help="contact (small motions) | exact (finite motions, which satisfy the "
+            "closures exactly)."
         ),
     ] = "contact",
     quantities: Annotated[
         str | None,
         typer.Option(
-            help="margin: only the zone margins, the factors on all clearances at "
-            "which the robot just assembles without force."
+            help="margin: compute only the zone margins, which are the factors on all "
+            "clearances at which the robot just assembles without force."
         ),
     ] = None,
     json: JsonOption = None,
@@ -67,7 +67,7 @@ def solve(
 
 
 def _results(applied: Any) -> tuple[dict[str, Any], str]:
-    """Return the solution of small motions, problem (22), and its text."""
+    """Return the solution for small motions, problem (22), and its text."""
     from forcefit.assembly.model.statuses import OK
     from forcefit.assembly.report.results import solution_of, solution_text
 
@@ -79,7 +79,7 @@ def _results(applied: Any) -> tuple[dict[str, Any], str]:
 
 
 def _exact_results(applied: Any) -> tuple[dict[str, Any], str]:
-    """Return the solution of finite motions, and its text."""
+    """Return the solution for finite motions, and its text."""
     from forcefit.assembly.report.results import exact_of, exact_text
 
     with one_thread(), progress_lines() as update:
@@ -91,7 +91,7 @@ def _exact_results(applied: Any) -> tuple[dict[str, Any], str]:
 
 
 def _check_margins(quantities: str, exact: bool, **loads: list[str] | None) -> None:
-    """Refuse quantities other than margins, and options that no margin depends on."""
+    """Raise an error for other quantities than margins, or for options they ignore."""
     for name in (part.strip() for part in quantities.split(",")):
         if name not in _MARGINS:
             hint = nearest(name, _MARGINS)

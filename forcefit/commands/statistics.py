@@ -77,7 +77,7 @@ def statistics(
     rest: RestOption = None,
     mismatch: MismatchOption = None,
     draws: Annotated[
-        int, typer.Option(help="Number of draws of all errors.", min=2, max=10**9)
+        int, typer.Option(help="Number of draws of the errors.", min=2, max=10**9)
     ] = 10_000,
     seed: Annotated[
         int, typer.Option(help="Seed of the random draws.", min=0, max=2**63 - 1)
@@ -118,22 +118,24 @@ def statistics(
     state: Annotated[
         str | None,
         typer.Option(
-            help="Also the distribution of the platform's stiffness in a state: "
-            "contact (clearances pressed or free) | exact (internal forces too)."
+            help="Also compute the distribution of the platform's stiffness in a "
+            "state: contact (clearances pressed or free) | exact (also internal "
+            "forces)."
         ),
     ] = None,
     capability: Annotated[
         bool,
         typer.Option(
-            "--capability", help="Also Cp, Cpk and parts per million of every --limit."
+            "--capability",
+            help="Also compute Cp, Cpk and parts per million of every --limit.",
         ),
     ] = False,
     worst_case: Annotated[
         bool,
         typer.Option(
             "--worst-case",
-            help="Also the largest pose errors over all errors within tolerance and "
-            "all clearances.",
+            help="Also compute the largest pose errors over all errors within "
+            "tolerance and all clearances.",
         ),
     ] = False,
     confidence: Annotated[
@@ -150,10 +152,10 @@ def statistics(
     csv: CsvOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Draw random errors: yield, pose errors, importance.
+    """Draw random errors: estimate yield and pose errors.
 
-    With OUTPUT, finished draws are kept in OUTPUT.journal.  After an interruption the
-    same command continues from there and produces the same file.
+    With OUTPUT, finished draws are stored in OUTPUT.journal.  After an interruption,
+    the same command continues from this journal and produces the same file.
     """
     from forcefit.assembly.model.error_distributions import read_sources
     from forcefit.assembly.report.first_order import posture_status
@@ -217,7 +219,7 @@ def statistics(
     options = None
     if importance is not None:
         options = ImportanceOptions(importance, by, confidence)
-    held = ExitStack()  # keeps the journal until all files are written
+    held = ExitStack()  # keeps the journal open until all files are written
     with _interruptible(output), progress_bars() as update:
         data = run_draws(
             experiment, draws, output, workers, lambda d, n: update("draws", d, n),
@@ -247,13 +249,13 @@ def statistics(
 
 
 def _check_word(option: str, word: str, valid: Sequence[str]) -> None:
-    """Refuse a word that is not among the valid ones."""
+    """Raise an error for a word that is not valid."""
     if word not in valid:
         raise BadInput(f'{option}: found "{word[:60]}"{nearest(word, valid)}')
 
 
 def _check_clearance_model(clearance: str, contact_length: float | None) -> None:
-    """Refuse an unknown model, and a length that the model does not use."""
+    """Raise an error for an unknown model, or a length that the model does not use."""
     from forcefit.assembly.statistics.clearance_positions import CLEARANCE_MODELS
 
     _check_word("--clearance", clearance, tuple(CLEARANCE_MODELS))
@@ -270,7 +272,7 @@ def _check_clearance_model(clearance: str, contact_length: float | None) -> None
 
 @contextmanager
 def _interruptible(output: Path | None) -> Generator[None, None, None]:
-    """After Ctrl-C, report the journal and exit with status 130."""
+    """After Ctrl-C, print where results are stored, and exit with status 130."""
     try:
         yield
     except KeyboardInterrupt:
@@ -315,12 +317,12 @@ def tolerances(
     csv: CsvOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Assess present errors; with a plan, allocate tolerances.
+    """Assess the present errors; with a plan, allocate tolerances.
 
-    Without --plan: the factor on the robot's errors at which it assembles at every
-    posture, and the errors that govern its margin.  With OUTPUT, finished results are
-    kept in OUTPUT.journal.  After an interruption the same command continues from there
-    and produces the same file.
+    Without --plan, the command computes the largest factor on the errors of the robot
+    at which it assembles at every posture, and the errors that govern its margin.  With
+    OUTPUT, finished results are stored in OUTPUT.journal.  After an interruption, the
+    same command continues from this journal and produces the same file.
     """
     from dataclasses import replace
 
@@ -380,7 +382,7 @@ def tolerances(
         if json != "-":
             print(texts[0])
         raise typer.Exit(1)
-    held = ExitStack()  # keeps the journal until all files are written
+    held = ExitStack()  # keeps the journal open until all files are written
     with _interruptible(output), progress_bars() as update:
         if machine.errors.any():
             results["present"] = present_errors(
@@ -422,7 +424,7 @@ def _save_allocation(
     allocation: "Allocation", output: Path | None, figure: Path | None,
     csv: Path | None,
 ) -> None:  # fmt: skip
-    """Save the tolerances as a data set, a figure and a table, if requested."""
+    """Write the tolerances as a data set, a figure and a table, as far as requested."""
     from forcefit.assembly.statistics.allocated_tolerances import tolerance_dataset
     from forcefit.assembly.statistics.plot import allocation_figure
     from forcefit.assembly.sweeps.dataset import save_dataset

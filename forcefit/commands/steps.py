@@ -55,8 +55,8 @@ def steps(
 ) -> None:
     """Assemble the robot step by step, in the order of a plan.
 
-    Each step is an equilibrium that starts from the last: closing forces, energies,
-    spring-back at releases, wrenches locked in.
+    Each step is an equilibrium that starts from the previous one.  The results are
+    closing forces, energies, the spring-back at releases, and locked-in wrenches.
     """
     from forcefit.assembly.files.step_file import read_steps
     from forcefit.assembly.model.error_distributions import read_sources

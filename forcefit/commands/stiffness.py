@@ -1,4 +1,4 @@
-"""The commands ``forcefit stiffness ...``: each parses, calls, prints or saves."""
+"""The commands ``forcefit stiffness ...``: parse options, call a function, print."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -90,8 +90,8 @@ def beam(
 ) -> None:
     """Compute K_E of a beam, straight or along a curve.
 
-    A straight beam has a length and a constant section.  A FILE describes the pieces of
-    a tapered, bent or L-shaped beam.
+    A straight beam has a length and a constant section.  For a tapered, bent or
+    L-shaped beam, FILE describes the pieces.
     """
     from forcefit.commands.beam_options import BeamOptions
     from forcefit.stiffness.report.results import link_results, link_text
@@ -116,7 +116,7 @@ def beam(
 def _straight_link(
     options: "BeamOptions", length: float | None, along: str, up: str | None
 ) -> "LinkStiffness":
-    """Return a straight beam of constant section."""
+    """Return the stiffness of a straight beam of constant section."""
     import numpy as np
 
     from forcefit.commands.options import parse_axis
@@ -151,7 +151,7 @@ def fea(
 ) -> None:
     """Compute K_E by finite elements, refined to the required accuracy.
 
-    --part list prints the solids of a STEP file: name, volume, bounding box.
+    --part list prints the name, volume and bounding box of each solid in a STEP file.
     """
     from forcefit.inputs.errors import checked
     from forcefit.stiffness.fem.fea import Budget, FemOptions, solve_link
@@ -187,7 +187,7 @@ def fea(
 
 
 def _list_solids(file: Path, json: str | None) -> None:
-    """Print the solids of a STEP file: name, volume, bounding box."""
+    """Print the name, volume and bounding box of each solid in a STEP file."""
     from dataclasses import asdict
 
     from forcefit.stiffness.surface.surface_files import step_solids
@@ -246,7 +246,7 @@ def stress(
 ) -> None:
     """Compute the peak von Mises stress away from clamped edges.
 
-    With a section, the beam formula is evaluated too.
+    If a section is given, the beam formula is evaluated too.
     """
     import numpy as np
 

@@ -1,4 +1,4 @@
-"""Arguments and options that several stiffness commands share, and their parsing."""
+"""Arguments and options that several stiffness commands share, and their parsers."""
 
 import logging
 from pathlib import Path
@@ -91,8 +91,8 @@ Parts = Annotated[
         "--part",
         help="Part with another material: "
         '"z=0.2..0.4/young=2e11,poisson=0.3,density=7800", a box along the mesh\'s '
-        'axes [m], or "solid=one+other/young=...", of a STEP file (fea: list prints '
-        "its solids). May be repeated; the last counts.",
+        'axes [m], or "solid=one+other/young=..." for solids of a STEP file, which '
+        "--part list of fea prints. May be repeated; the last part has precedence.",
     ),
 ]
 Masses = Annotated[
@@ -126,7 +126,7 @@ TimeLimit = Annotated[float, typer.Option(help="Time limit of the solution [s]."
 
 
 def tell_progress() -> None:
-    """Print the unknowns, the error and the expected time of each mesh to stderr."""
+    """Print the number of unknowns, the error and the expected time of each mesh."""
     log = logging.getLogger("forcefit.finite_elements")
     log.setLevel(logging.INFO)
     log.handlers = [logging.StreamHandler()]
@@ -135,7 +135,7 @@ def tell_progress() -> None:
 def parse_interfaces(
     base: str | None, tip: str | None
 ) -> "tuple[Interface, Interface]":
-    """Return the interfaces of ``--base`` and ``--tip``."""
+    """Return the interfaces that ``--base`` and ``--tip`` describe."""
     from forcefit.stiffness.surface.interface import parse_interface
 
     if base is None or tip is None:
@@ -145,7 +145,7 @@ def parse_interfaces(
 
 
 def parse_up(text: str | None) -> "NDArray | None":
-    """Return the section's z axis; None if the option is absent."""
+    """Return the direction of the section's z axis, or None if the option is absent."""
     from forcefit.commands.options import parse_axis
 
     return None if text is None else parse_axis("--up", text)
@@ -154,7 +154,7 @@ def parse_up(text: str | None) -> "NDArray | None":
 def parse_materials(
     young: float | None, poisson: float | None, density: float, parts: list[str] | None
 ) -> "list[Material]":
-    """Return the materials of the link: the one that fills it, then those of parts."""
+    """Return the materials of a link: the main material first, then those of parts."""
     from forcefit.commands.beam_options import BeamOptions
     from forcefit.inputs.errors import checked
     from forcefit.stiffness.fem.material import Material
@@ -176,7 +176,7 @@ def parse_materials(
 
 
 def parse_accuracy(value: float) -> float:
-    """Return the accuracy after a check of its range."""
+    """Return the required accuracy; raise an error if it is out of range."""
     from forcefit.inputs.errors import checked
 
     return checked("--accuracy", value, "1", least=1e-5, below=0.5)
@@ -185,7 +185,7 @@ def parse_accuracy(value: float) -> float:
 def curve_link(
     path: Path, options: "BeamOptions"
 ) -> "tuple[LinkStiffness, float, float]":
-    """Return a beam along a curve, the size of its section, and its length [m]."""
+    """Return a curved beam, the size of its section [m], and its length [m]."""
     from forcefit.commands.beam_options import beam_name
     from forcefit.stiffness.beam.curve import curve_compliance, curve_length
     from forcefit.stiffness.beam.curve_file import read_curve

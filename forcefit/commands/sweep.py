@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 
 def _list_quantities(names: list[str] | None) -> list[str] | None:
-    """Print the data variables of sweeps if ``list`` is requested."""
+    """Print the names of all data variables of sweeps if ``list`` is requested."""
     if names == ["list"]:
         from forcefit.assembly.sweeps.selection import quantities_text
 
@@ -105,8 +105,9 @@ def sweep(
     state: Annotated[
         str | None,
         typer.Option(
-            help="Also K_C and the compliance of each part: nominal (clearances at "
-            "zero) | contact | exact (both with errors, loads and clearances)."
+            help="Also compute K_C and the compliance of each part: nominal "
+            "(clearances at zero) | contact | exact (both with errors, loads and "
+            "clearances)."
         ),
     ] = None,
     frequencies: Annotated[
@@ -141,10 +142,10 @@ def sweep(
     csv: CsvOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Compute margins, energy, errors over postures and designs.
+    """Compute margins, energies, errors over postures and designs.
 
-    Finished points are kept in OUTPUT.journal.  After an interruption the same command
-    continues from there and produces the same file.
+    Finished points are stored in OUTPUT.journal.  After an interruption, the same
+    command continues from this journal and produces the same file.
     """
     from forcefit.assembly.model.statuses import UNUSABLE
     from forcefit.assembly.sweeps.dataset import check_dataset, open_dataset
@@ -169,7 +170,7 @@ def sweep(
     wrench, g = parse_load(load), parse_gravity(gravity)
     covariates = parse_covariates(under)
     with progress_bars() as update:
-        update("robot", 0, 1)  # placing the robot may compile code
+        update("robot", 0, 1)  # placing the robot may compile code, which takes time
         asked = ask_sweep(
             robot,
             SweepOptions(
@@ -195,7 +196,7 @@ def sweep(
         )
     done = [0]
     solver = _solver(workers, scheduler)
-    held = ExitStack()  # keeps the journal until all files are written
+    held = ExitStack()  # keeps the journal open until all files are written
     try:
         with progress_bars() as update:
 
@@ -226,7 +227,7 @@ def sweep(
 
 
 def _solver(workers: int | None, scheduler: str | None) -> "Solver":
-    """Return solver of blocks of points: in this process, in several, on a cluster."""
+    """Return the solver of blocks: in this process, in several, or on a cluster."""
     if workers is None and scheduler is None:
         from forcefit.assembly.sweeps.sweep import solve_here
 

@@ -1,4 +1,4 @@
-"""The commands ``forcefit validation ...``: each parses, calls, prints or saves."""
+"""The commands ``forcefit validation ...``: parse options, call a function, print."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -85,7 +85,7 @@ SeedOption = Annotated[
 def _with_errors(
     posture: "Posture", errors: Path | None, seed: int, fixed: "NDArray | None"
 ) -> "Posture":
-    """Return the posture with one draw of errors, or with the robot's own errors."""
+    """Return the posture with one draw of errors, or with the declared errors."""
     if errors is None:
         return posture
     from forcefit.assembly.model.error_distributions import read_sources
@@ -97,7 +97,7 @@ def _with_errors(
 
 
 def parse_scales(text: str) -> list[float]:
-    """Return the factors on the errors, from ``--scale``.
+    """Return the factors on the errors and loads that ``--scale`` lists.
 
     Args:
         text: text such as ``"1,0.5,0.25"``.
@@ -106,7 +106,7 @@ def parse_scales(text: str) -> list[float]:
         The factors.
 
     Raises:
-        BadInput: a value is not a number > 0, or there is only one.
+        BadInput: a value is not a number > 0, or fewer than two values are given.
     """
     try:
         scales = [float(part) for part in text.split(",")]
@@ -153,9 +153,8 @@ def crosscheck(
     state: Annotated[
         str | None,
         typer.Option(
-            help="State in which the platform's stiffness is compared instead: exact "
-            "(around "
-            "the equilibrium with errors and loads)."
+            help="Compare the platform's stiffness instead of the pose, in the state "
+            "exact (around the equilibrium with errors and loads).",
         ),
     ] = None,
     grid: Annotated[
@@ -169,12 +168,12 @@ def crosscheck(
         float, typer.Option(min=0.0, help="Time limit of each simulation [s].")
     ] = 600.0,
 ) -> None:
-    """Compare with a multibody simulation, at several scales.
+    """Compare with a multibody simulation at several scales.
 
-    Errors and loads are scaled.  Joint clearances are left out in both models, unless
-    --with-clearance is given; energies and springs are then compared instead of poses.
-    Exit status 1 if a check fails, or if the robot has neither errors nor a load,
-    because nothing can be compared then.
+    Errors and loads are multiplied by each scale.  Joint clearances are left out in
+    both models, unless --with-clearance is given.  Then energies and springs are
+    compared instead of poses.  The exit status is 1 if a check fails.  It is also 1 if
+    the robot has neither errors nor a load, because then nothing can be compared.
     """
     from forcefit.assembly.effects.robot_effects import apply_robot_effects
     from forcefit.assembly.exchange.robot_files import load_robot
@@ -259,7 +258,7 @@ def _crosscheck_page(
     results: "Crosscheck | StiffnessCheck | None", failure: "dict[str, Any]",
     source: "Provenance",
 ) -> str:  # fmt: skip
-    """Return the page of a comparison at one pose."""
+    """Return the report page of a comparison at one pose."""
     from forcefit.validation.crosscheck.crosscheck import Crosscheck
     from forcefit.validation.crosscheck.report import crosscheck_page, failure_page
     from forcefit.validation.crosscheck.stiffness_page import stiffness_check_page
@@ -275,7 +274,7 @@ def _crosscheck_grid(
     machine: "Robot", grid: str, compare: "Callable[[Posture], Any]", json: str | None,
     report: Path | None, source: "Provenance",
 ) -> None:  # fmt: skip
-    """Compare at every pose of a grid, with a progress bar."""
+    """Compare at every pose of a grid; show a progress bar."""
     from forcefit.assembly.sweeps.targets import parse_grid
     from forcefit.validation.crosscheck.poses import (
         check_poses,
@@ -327,13 +326,14 @@ def validity(
     figure: FigureOption = None,
     report: ReportOption = None,
 ) -> None:
-    """Estimate the errors due to the model's assumptions.
+    """Estimate the errors due to the assumptions of the model.
 
-    Errors of position, rotation and energy, at one pose or at many: due to linear
-    closures, to beams instead of solids, to weight at the links' ends, and to disc and
-    cone instead of pins in two bushes.  Errors above 20 um or 1 % are marked.  With
-    --solids also errors of the platform's stiffness.  Exit status 1 if there is nothing
-    to compare, because the robot has no errors and no load.
+    The errors of position, rotation and energy are estimated at one pose or at many.
+    Four assumptions are tested: linear closures, beams instead of solids, weights at
+    the ends of links, and a disc and a cone as clearance zone of a pin in two bushes.
+    Errors above 20 um or 1 % are marked.  With --solids, errors of the stiffness of the
+    platform are also estimated.  The exit status is 1 if the robot has neither errors
+    nor a load, because then nothing can be compared.
     """
     from forcefit.assembly.sweeps.targets import grid_targets, parse_grid, read_targets
     from forcefit.validation.assumptions.over_poses import costs_at, costs_over_poses

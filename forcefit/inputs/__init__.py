@@ -1,5 +1,5 @@
 """Reading and checking of input files, and complete writing of output files.
 
-Begin with ``table.py``, which reads TOML, and ``errors.py``, which composes error
+Start with ``table.py``, which reads TOML, and ``errors.py``, which composes error
 messages.
 """

@@ -9,7 +9,7 @@ from forcefit.inputs.writing import Kind, check_writable, write_bytes
 
 # pillow, which writes GIF, is a requirement of matplotlib
 ANIMATION = Kind("an animation", (".gif",), (b"gif8",), ("matplotlib",))
-_COLOURS = 64  # of all pictures
+_COLOURS = 64  # number of colours that all pictures share
 
 
 def save_animation(pictures: Iterable[tuple[Any, int]], path: Path | str) -> None:

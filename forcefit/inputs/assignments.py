@@ -1,4 +1,4 @@
-"""Numbers given by name in text, such as ``young=2e11,poisson=0.3``."""
+"""Parsing of numbers given by name, such as ``young=2e11,poisson=0.3``."""
 
 import math
 from collections.abc import Iterable
@@ -7,15 +7,15 @@ from forcefit.inputs.errors import BadInput, nearest
 
 
 def check_components(given: Iterable[str], place: str, names: Iterable[str]) -> None:
-    """Raise an error if numbers are given by other names than those of components.
+    """Raise an error if numbers are given for unknown components.
 
     Args:
-        given: the names given.
+        given: names for which numbers are given.
         place: option or argument, for the message.
-        names: the names of components.
+        names: valid names of components.
 
     Raises:
-        BadInput: a name is none of them.
+        BadInput: a given name is not valid.
     """
     for name in given:
         if name not in names:
@@ -26,7 +26,7 @@ def check_components(given: Iterable[str], place: str, names: Iterable[str]) -> 
 def parse_assignments(
     texts: Iterable[str], option: str, largest: float = 1e40
 ) -> dict[str, float]:
-    """Return the numbers given as ``NAME=VALUE``, with commas or in several texts.
+    """Return numbers given as ``NAME=VALUE``, separated by commas or in several texts.
 
     Args:
         texts: texts such as ``["tx=0.1,tz=-0.5", "rz=0"]``.

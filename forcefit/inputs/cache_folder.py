@@ -1,7 +1,8 @@
-"""Folder in which meshes and solutions of links are kept.
+"""Folder that stores meshes and solutions of links for later runs.
 
-The first writable folder of a list is used.  A read-only installation, a user without a
-home folder and a full disk are not errors: if no folder is writable, nothing is kept.
+The first writable folder of a list is used.  If no folder is writable, results are not
+stored.  This is not an error: the installation may be read-only, the user may have no
+home folder, or the disk may be full.
 """
 
 import os
@@ -33,18 +34,18 @@ def is_writable(folder: Path) -> bool:
 
 
 def _candidates() -> Iterator[Path]:
-    """Return the folders in the order in which they are tried."""
+    """Yield the candidate folders in the order in which they are tried."""
     if given := os.environ.get("FORCEFIT_CACHE"):
         yield Path(given)
-    with suppress(RuntimeError):  # no home folder
+    with suppress(RuntimeError):  # the user has no home folder
         yield _of_user() / "forcefit"
-    # there is no temporary folder, or it belongs to another user
+    # no temporary folder exists, or it belongs to another user
     with suppress(OSError):
         yield _temporary()
 
 
 def _of_user() -> Path:
-    """Return the user's cache folder on this operating system."""
+    """Return the folder in which this operating system stores a user's caches."""
     if sys.platform == "win32":
         return Path(os.environ.get("LOCALAPPDATA") or Path.home())
     if sys.platform == "darwin":
@@ -53,8 +54,8 @@ def _of_user() -> Path:
 
 
 def _temporary() -> Path:
-    """Return the user's temporary folder, which only this user can write to."""
-    # otherwise other users could write values that forcefit reads
+    """Return a temporary folder that only this user can write to."""
+    # in a shared folder, other users could write values that forcefit then reads
     user = os.getuid() if hasattr(os, "getuid") else 0
     folder = Path(tempfile.gettempdir()) / f"forcefit-{user}"
     folder.mkdir(mode=0o700, exist_ok=True)

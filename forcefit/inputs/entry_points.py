@@ -1,4 +1,4 @@
-"""Objects that other distributions install for forcefit, by entry points.
+"""Entry points: objects that other installed distributions add to forcefit.
 
 A distribution names its objects in its ``pyproject.toml``::
 
@@ -21,7 +21,7 @@ Result = TypeVar("Result")
 
 
 def installed_names(group: str) -> tuple[str, ...]:
-    """Return the names in a group, in alphabetical order; nothing is imported."""
+    """Return the names in a group in alphabetical order, without importing anything."""
     return tuple(sorted({point.name for point in _points(group, tuple(sys.path))}))
 
 
@@ -31,10 +31,11 @@ def load_installed(group: str, name: str, kind: str) -> tuple[Any, str]:
     Args:
         group: group of the entry points, such as ``"forcefit.effects"``.
         name: one of :func:`installed_names`.
-        kind: what the object is, for messages, such as ``"effect"``.
+        kind: word for the kind of object in messages, such as ``"effect"``.
 
     Returns:
-        The object, and words that name it: ``"the effect their:WEAR of their-robots"``.
+        The object, and a text that names it: ``"the effect their:WEAR of
+        their-robots"``.
 
     Raises:
         BadInput: several distributions install this name, or the object cannot be
@@ -51,7 +52,7 @@ def load_installed(group: str, name: str, kind: str) -> tuple[Any, str]:
     words = f"the {kind} {point.value} of {_owner(point)}"
     try:
         return point.load(), words
-    except Exception as error:  # whatever the code of others raises
+    except Exception as error:  # code of other distributions may raise any error
         fault = f"{type(error).__name__}: {error}"
         text = str(error) if isinstance(error, ImportError) else fault
         raise BadInput(
@@ -60,15 +61,15 @@ def load_installed(group: str, name: str, kind: str) -> tuple[Any, str]:
 
 
 def naming_owner(function: Callable[..., Result], words: str) -> Callable[..., Result]:
-    """Return a function of another distribution, whose faults name the distribution.
+    """Return a function whose errors name the distribution that installed it.
 
     Args:
-        function: any function.
-        words: words that name it, of :func:`load_installed`.
+        function: function of another distribution.
+        words: text that names the function, from :func:`load_installed`.
 
     Returns:
-        The function; instead of an error other than ``BadInput`` it raises a
-        ``BadInput`` with the words, caused by that error.
+        A function with the same result.  An error other than ``BadInput`` is replaced
+        by a ``BadInput`` that contains ``words`` and has this error as its cause.
     """
 
     @wraps(function)
@@ -77,34 +78,34 @@ def naming_owner(function: Callable[..., Result], words: str) -> Callable[..., R
             return function(*values, **options)
         except BadInput:
             raise
-        except Exception as error:  # whatever the code of others raises
+        except Exception as error:  # code of other distributions may raise any error
             raise BadInput(f"{words} failed: {_fault(error)}") from error
 
     return call
 
 
 def _fault(error: Exception) -> str:
-    """Return the kind and the text of an error in one line."""
+    """Return the type and the message of an error in one line."""
     return one_line(f"{type(error).__name__}: {error}", 200)
 
 
 def version_of_installed(group: str, name: str) -> str:
-    """Return name and version of the distribution that installs an object."""
+    """Return the name and version of the distribution that installs an object."""
     dists = [point.dist for point in _named(group, name) if point.dist is not None]
     return ", ".join(f"{dist.name} {dist.version}" for dist in dists)
 
 
 def _named(group: str, name: str) -> list[EntryPoint]:
-    """Return the entry points of a name."""
+    """Return the entry points with a given name."""
     return [p for p in _points(group, tuple(sys.path)) if p.name == name]
 
 
 @lru_cache(maxsize=16)
 def _points(group: str, path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
-    """Return the entry points of a group; ``path`` is that of this search."""
+    """Return the entry points of a group; ``path`` is ``sys.path``, the cache key."""
     return tuple(entry_points(group=group))
 
 
 def _owner(point: EntryPoint) -> str:
-    """Return the name of the distribution of an entry point."""
+    """Return the name of the distribution that contains an entry point."""
     return "an unknown distribution" if point.dist is None else point.dist.name

@@ -1,7 +1,7 @@
 """Error messages: one line with the place, the value found and the value expected.
 
-:class:`BadInput` is a ``ValueError``; the command line prints it and exits with status
-2.  Long values are abbreviated, so that the message is one short line.
+:class:`BadInput` is a ``ValueError``.  The command line prints it and exits with
+status 2.  Long values are abbreviated to keep the message short.
 """
 
 import difflib
@@ -16,14 +16,14 @@ _LONGEST_MESSAGE = 800
 
 
 class BadInput(ValueError):
-    """Error due to an input; its message is one line."""
+    """Error in an input; the message is one line."""
 
     def __init__(self, message: str) -> None:
         super().__init__(one_line(message, _LONGEST_MESSAGE))
 
 
 def one_line(text: str, longest: int) -> str:
-    """Return a text without control characters, abbreviated in the middle."""
+    """Return a text without control characters; a long text is cut in the middle."""
     if len(text) > longest:
         half = (longest - 5) // 2
         text = f"{text[:half]} ... {text[-half:]}"
@@ -31,15 +31,15 @@ def one_line(text: str, longest: int) -> str:
 
 
 def printable(text: str) -> bool:
-    """Return whether a text has no line breaks, controls or lone surrogates."""
+    """Return whether a text lacks line breaks, control codes and lone surrogates."""
     return not any(unicodedata.category(c) in {"Cc", "Cs", "Zl", "Zp"} for c in text)
 
 
 def plot_label(text: str) -> str:
-    """Return a text escaped for matplotlib, which reads a formula between dollar signs.
+    """Escape a text for matplotlib, which reads a formula between dollar signs.
 
     Args:
-        text: text with a name that a user chose.
+        text: text that may contain a name chosen by a user.
 
     Returns:
         The escaped text.
@@ -48,12 +48,12 @@ def plot_label(text: str) -> str:
 
 
 def quoted(name: str) -> str:
-    """Return a name in double quotes, on one line, abbreviated if long."""
+    """Return a name in double quotes on one line, abbreviated if it is long."""
     return f'"{one_line(name, 60)}"'
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:
-    """Return ``'; did you mean "x"?'``, or the list of valid names if none is near."""
+    """Return ``'; did you mean "x"?'``, or the valid names if none is similar."""
     names = list(dict.fromkeys(str(v) for v in valid))
     close = difflib.get_close_matches(name[:200], names, n=1, cutoff=0.6)
     if close:
@@ -70,7 +70,7 @@ def describe(value: object) -> str:
 
 
 class _Short(reprlib.Repr):
-    """Python's abbreviated repr, extended to huge integers."""
+    """Python's abbreviated ``repr``, also for integers with thousands of digits."""
 
     def repr_bool(self, x: bool, level: int) -> str:
         return str(x).lower()
@@ -86,7 +86,8 @@ _SHORT.maxstring = 60
 _SHORT.maxlist = 8
 
 
-# in SI units, above any length, modulus or density; small values have the inverse limit
+# Upper limit in SI units, above any length, modulus or density.  The inverse is the
+# lower limit.
 LARGEST = 1e15
 
 
@@ -99,7 +100,7 @@ def checked(
     least: float = -math.inf,
     below: float = math.inf,
 ) -> float:
-    """Return a finite number inside its range.
+    """Return a number after checking that it is finite and inside its range.
 
     Args:
         option: name of the option, for example ``--length``, for the error message.
@@ -113,9 +114,10 @@ def checked(
         The value.
 
     Raises:
-        BadInput: the value is not finite, outside its range, or of no physical size.
+        BadInput: the value is not finite, is outside its range, or is too large
+            or too small for a physical quantity.
     """
-    if abs(value) > sys.float_info.max:  # an integer may be
+    if abs(value) > sys.float_info.max:  # true for very large integers
         value = math.copysign(math.inf, 1 if value > 0 else -1)
     if math.isfinite(value) and above < value < below and value >= least:
         in_range = abs(value) <= LARGEST and (above != 0 or value >= 1 / LARGEST)

@@ -1,7 +1,8 @@
-"""Locks on files, so that only one program at a time writes them.
+"""File locks, with which only one program at a time writes a file.
 
-The operating system locks a file ``FILE.lock`` next to the file, until the program
-ends.  A killed program leaves ``FILE.lock``; the next program removes it.
+The operating system locks an extra file ``FILE.lock`` next to the file until the
+program ends.  If a program is killed, ``FILE.lock`` remains; the next program removes
+it.
 """
 
 import atexit
@@ -11,27 +12,27 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-# errors of network disks that do not support locks
+# errors on network disks that do not support locks
 _NO_LOCKS = {errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP}
 _POLL = 0.01  # [s] time between two attempts to lock a file
 
 
 @contextmanager
 def locked_file(path: Path, wait: bool = True) -> Generator[None, None, None]:
-    """Lock a file against other programs.
+    """Lock a file so that other forcefit programs cannot write it.
 
-    Nothing is locked if the package filelock is missing or the disk has no locks.
+    Nothing is locked if the package filelock is not installed or the disk does not
+    support locks.
 
     Args:
-        path: file to lock, created if it is absent.  The program with the lock may
-            rename or remove it.
-        wait: wait until another program unlocks the file.
+        path: file to lock.  The program that holds the lock may rename or remove it.
+        wait: whether to wait until another program unlocks the file.
 
     Yields:
-        Nothing; the file is locked until the block ends.
+        None; the file is locked until the block ends.
 
     Raises:
-        BlockingIOError: another program has locked it, and ``wait`` is False.
+        BlockingIOError: another program has locked the file, and ``wait`` is False.
         OSError: the file cannot be opened.
     """
     with _lock(path.with_name(path.name + ".lock"), wait):
@@ -41,10 +42,10 @@ def locked_file(path: Path, wait: bool = True) -> Generator[None, None, None]:
 
 @contextmanager
 def _lock(own: Path, wait: bool) -> Generator[None, None, None]:
-    """Hold the lock on a file that exists only for it; remove it at the end."""
+    """Lock an extra file during a block, and remove this file at the end."""
     try:
         from filelock import FileLock, Timeout
-    except ModuleNotFoundError:  # forcefit works without the package
+    except ModuleNotFoundError:  # forcefit also works without the package filelock
         yield
         return
     lock = FileLock(own, thread_local=False, poll_interval=_POLL)
@@ -55,7 +56,7 @@ def _lock(own: Path, wait: bool) -> Generator[None, None, None]:
             lock.acquire(timeout=-1 if wait else 0)
         except Timeout:
             raise BlockingIOError(errno.EWOULDBLOCK, "locked", str(own)) from None
-        except BaseException as error:  # such as a full disk or a signal
+        except BaseException as error:  # for example because of a full disk or a signal
             if new and not lock.is_locked:
                 own.unlink(missing_ok=True)
             if getattr(error, "errno", None) not in _NO_LOCKS:
@@ -66,8 +67,8 @@ def _lock(own: Path, wait: bool) -> Generator[None, None, None]:
         del _locks[id(lock)]
 
 
-# locks to release when the program ends, because a signal may prevent an earlier
-# release
+# locks that are released when the program ends, because a signal may have prevented
+# their release
 _locks: dict[int, tuple[Any, Path]] = {}
 
 
@@ -78,9 +79,9 @@ def _release_all() -> None:
 
 
 def _release(lock: Any, own: Path) -> None:
-    """Remove the file of a lock and release it; another program's lock remains."""
-    # removed while it is locked, so that a waiting program notices this and creates a
-    # new file; Windows cannot remove an open file, but releasing the lock removes it
+    """Remove a lock file and release the lock; keep other programs' lock files."""
+    # The file is removed while it is locked: a waiting program then notices the removal
+    # and creates a new file.  Windows removes the file when the lock is released.
     if lock.is_locked:
         with suppress(OSError):
             own.unlink()

@@ -1,4 +1,4 @@
-"""Tables that note which values a reader would accept; see ``mending.py``."""
+"""Tables that record which values a reader would accept; see ``mending.py``."""
 
 import math
 from collections.abc import Iterable
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.table import Table
 
-# a file, and the keys that lead to a value in it; numbers from 1 of tables in lists
+# a file, and the keys that lead to a value in it; tables of a list are numbered from 1
 Place = tuple[str, tuple[str | int, ...]]
 
 
@@ -19,9 +19,9 @@ class Reading:
     """One run of a reader.
 
     Attributes:
-        left_out: tables of lists that are left out.
-        offers: values of the kinds that the reader required.
-        tables: all tables that it read.
+        left_out: tables that were left out of their lists.
+        offers: for each key, a value of the type that the reader requires.
+        tables: all tables that the reader read.
     """
 
     left_out: set[Place] = field(default_factory=set)
@@ -31,12 +31,12 @@ class Reading:
 
 @dataclass(eq=False)
 class MendedTable(Table):
-    """A table that offers a valid value for each key that is read.
+    """A table that records a valid value for each key that is read.
 
     Attributes:
-        reading: the run of the reader.
+        reading: run of the reader to which the table belongs.
         path: keys that lead to the table in its file.
-        first_place: place in messages before a reader changes it.
+        first_place: place of the table in messages, before a reader changes the text.
     """
 
     reading: Reading = field(default_factory=Reading)
@@ -53,36 +53,36 @@ class MendedTable(Table):
         )
 
     def _offer(self, key: str, value: Any) -> None:
-        """Note a value that the reader would accept for a key."""
+        """Record a value that the reader would accept for a key."""
         self.reading.offers[self.file, (*self.path, key)] = value
 
     def text(self, key: str, default: str | None = None, **rules: Any) -> str:
-        """Read as :meth:`Table.text`, and offer a text."""
+        """Read as :meth:`Table.text` does, and record a valid text."""
         self._offer(key, default or f"stand-in {len(self.reading.offers)}")
         return super().text(key, default, **rules)
 
     def choice(self, key: str, valid: Iterable[str], default: str | None = None) -> str:
-        """Read as :meth:`Table.choice`, and offer the first valid word."""
+        """Read as :meth:`Table.choice` does, and record the first valid word."""
         valid = tuple(valid)
         try:
             return super().choice(key, valid, default)
-        finally:  # after the offer of any text
+        finally:  # after ``text`` has recorded an arbitrary text
             self._offer(key, default or valid[0])
 
     def boolean(self, key: str, default: bool) -> bool:
-        """Read as :meth:`Table.boolean`, and offer the default."""
+        """Read as :meth:`Table.boolean` does, and record the default."""
         self._offer(key, default)
         return super().boolean(key, default)
 
     def integer(self, key: str, default: int | None = None, least: int = 0) -> int:
-        """Read as :meth:`Table.integer`, and offer a whole number."""
+        """Read as :meth:`Table.integer` does, and record a valid integer."""
         self._offer(key, max(least, 1) if default is None else default)
         return super().integer(key, default, least)
 
     def number(
         self, key: str, unit: str, default: float | None = None, **rules: Any
     ) -> float:
-        """Read as :meth:`Table.number`, and offer a number inside its range."""
+        """Read as :meth:`Table.number` does, and record a number inside its range."""
         self._offer(key, _inside(**rules))
         return super().number(key, unit, default, **rules)
 
@@ -90,17 +90,17 @@ class MendedTable(Table):
         self, key: str, shape: tuple[int, ...], unit: str,
         default: NDArray | None = None, **rules: Any,
     ) -> NDArray:  # fmt: skip
-        """Read as :meth:`Table.array`, and offer an array in general position."""
+        """Read as :meth:`Table.array` does, and record an array in general position."""
         self._offer(key, _in_general_position(shape).tolist())
         return super().array(key, shape, unit, default, **rules)
 
     def table(self, key: str) -> Table:
-        """Read as :meth:`Table.table`, and offer an empty table."""
+        """Read as :meth:`Table.table` does, and record an empty table."""
         self._offer(key, {})
         return super().table(key)
 
     def tables(self, key: str) -> list[Table]:
-        """Read as :meth:`Table.tables`, and offer an empty list."""
+        """Read as :meth:`Table.tables` does, and record an empty list."""
         self._offer(key, [])
         numbered = enumerate(super().tables(key), 1)
         paths = {path for file, path in self.reading.left_out if file == self.file}
@@ -111,7 +111,7 @@ def _inside(
     above: float = -math.inf, least: float = -math.inf, below: float = math.inf,
     largest: float = math.inf,
 ) -> float:  # fmt: skip
-    """Return a number inside its range."""
+    """Return a number inside the range that the limits define."""
     low, high = max(above, least), min(below, largest)
     if math.isinf(low):
         return max(min(0.3, high - 1.0), -largest)
@@ -119,7 +119,7 @@ def _inside(
 
 
 def _in_general_position(shape: tuple[int, ...]) -> NDArray:
-    """Return small increasing numbers, or a positive definite matrix."""
+    """Return small increasing numbers, or a positive definite matrix if square."""
     if len(shape) == 2 and shape[0] == shape[1]:
         return np.diag(np.linspace(1.0, 2.0, shape[0]))
     return np.linspace(0.11, 0.37, math.prod(shape)).reshape(shape)

@@ -1,12 +1,14 @@
-"""All messages about a file, although readers stop at the first mistake.
+"""Collection of all messages about a file, although a reader stops at the first error.
 
-:func:`all_messages` runs a reader again and again.  After each error it mends the value
-at the place that the message names: it takes the valid name that the message suggests,
-or a value of the required kind, or leaves out the row of a table.  So every message is
-the reader's own, and no second set of rules exists.
+:func:`all_messages` runs a reader repeatedly.  After each error it replaces the faulty
+value at the place that the message names.  The new value is the valid name that the
+message suggests or a value of the required type.  If neither is known, the row or table
+is left out.  All messages therefore come from the reader, and its rules are not
+repeated here.
 
-A message without a place in the file, for example that a closure is open, is reported
-only if it is the first: after a mended value it could be due to that value.
+Some messages, such as that of a closure with a gap, name no place in the file.  Such a
+message is reported only if it is the first one, because later it could be caused by a
+replaced value.
 """
 
 import re
@@ -17,8 +19,8 @@ from typing import Any
 from forcefit.inputs.mended_table import MendedTable, Place, Reading
 from forcefit.inputs.table import MENDING, BadInput, Table
 
-MOST_MESSAGES = 50  # a wrong unit is a mistake in every row of a table
-# tables that others name: without them the others' names would be reported
+MOST_MESSAGES = 50  # limit, because a wrong unit may cause a message for each row
+# tables that other tables name: if one were left out, each use of its name would fail
 _NAMED = {"frame", "body", "joint", "leg"}
 _HINT = re.compile(r'(?:did you mean |; valid: |; found )"?([^",?]+)"?')
 _FOUND = re.compile(r"""(?:found|no frame) ["']([^"']*)["']""")
@@ -28,13 +30,14 @@ _LINE = re.compile(r"line (\d+)\b")
 
 @dataclass
 class _Mended:
-    """The values that are mended in the next run of the reader.
+    """The values that are replaced in the next run of the reader.
 
     Attributes:
-        renamed: new names of keys, empty where the key is left out.
-        values: new values, the last one in use; None where the key is left out.
-        lines: files and numbers of lines that are left blank.
-        reading: the present run, and the tables of lists that are left out.
+        renamed: new names of keys; an empty name means that the key is left out.
+        values: replacement values, of which the last one is used; None means that the
+            key is left out.
+        lines: files and numbers of the lines that are replaced by blank lines.
+        reading: record of the present run, including the tables that are left out.
     """
 
     renamed: dict[Place, str] = field(default_factory=dict)
@@ -43,7 +46,7 @@ class _Mended:
     reading: Reading = field(default_factory=Reading)
 
     def text(self, path: str, text: str) -> str:
-        """Return the text of a file with its faulty lines left blank."""
+        """Return the text of a file with its faulty lines replaced by blank lines."""
         blank = {number for file, number in self.lines if file == path}
         if not blank:
             return text
@@ -51,7 +54,7 @@ class _Mended:
         return "\n".join("" if n in blank else x for n, x in enumerate(lines, 1))
 
     def root(self, content: dict[str, Any], file: str) -> Table:
-        """Return the root table of a file with its faulty values mended."""
+        """Return the root table of a file with its faulty values replaced."""
         for (name, path), new in self.renamed.items():
             if name == file:
                 owner, key = _owner(content, path), path[-1]
@@ -68,10 +71,10 @@ class _Mended:
         return MendedTable(content, file, "", reading=self.reading)
 
     def mend(self, message: str) -> tuple[bool, bool]:
-        """Mend the value at the place of a message.
+        """Replace the value at the place that a message names.
 
         Returns:
-            Whether there is such a value, and whether it was mended before.
+            Whether such a value exists, and whether it was replaced before.
         """
         for table in sorted(self.reading.tables, key=lambda t: -len(t.place)):
             for start in dict.fromkeys((table.place, table.first_place)):
@@ -84,7 +87,7 @@ class _Mended:
         return self._mend_line(message)
 
     def _mend_line(self, message: str) -> tuple[bool, bool]:
-        """Leave the line of a message blank, if it is a row of a table."""
+        """Replace the table row that a message names by a blank line."""
         file, _, rest = message.partition(": ")
         line = _LINE.match(rest)
         if line is None or not file.endswith(".csv") or int(line[1]) == 1:
@@ -95,7 +98,7 @@ class _Mended:
         return not again, again
 
     def _mend_key(self, table: MendedTable, rest: str) -> tuple[bool, bool]:
-        """Mend the value of the table's key that begins a text."""
+        """Replace the value of the key with which a text begins."""
         path, content = table.path, table.content
         key, rest = _key_of(content, rest)
         while key and rest.startswith(".") and isinstance(content[key], dict):
@@ -112,7 +115,7 @@ class _Mended:
         if not rest[len(key) :].startswith(": missing"):
             return self._leave_out((table.file, path))
         place = table.file, (*path, key)
-        # a key that was left out here is missing: no other key is meant
+        # if this key was left out before, the message is about its absence
         if hint is not None and hint[0].startswith("; found ") and (
             place not in self.values
         ):  # fmt: skip
@@ -120,7 +123,7 @@ class _Mended:
         return self._replace(place, None)
 
     def _rename(self, place: Place, name: str) -> tuple[bool, bool]:
-        """Read a value under another name, or not at all."""
+        """Read a value under another name; leave it out if the name is empty."""
         again = place in self.renamed
         if again and not self.renamed[place]:
             return False, again
@@ -128,7 +131,7 @@ class _Mended:
         return True, again
 
     def _replace(self, place: Place, value: Any) -> tuple[bool, bool]:
-        """Read another value, or none, or leave out the table of a list it is in."""
+        """Replace a value, or leave out the value or the list item that contains it."""
         tried = self.values.setdefault(place, [])
         again = bool(tried)
         known = [value, self.reading.offers.get(place)]
@@ -139,7 +142,7 @@ class _Mended:
         return self._leave_out(place)[0], again
 
     def _leave_out(self, place: Place) -> tuple[bool, bool]:
-        """Leave out the table of a list that a place is in, if nothing names it."""
+        """Leave out the list item that contains a place, unless it is referred to."""
         file, path = place
         while path and not isinstance(path[-1], int):
             path = path[:-1]
@@ -150,17 +153,17 @@ class _Mended:
             if t.file == file and t.path[:-1] == path[:-1]
         }  # fmt: skip
         if of_list <= self.reading.left_out | {(file, path)}:
-            return False, False  # a file with none of them would be refused
+            return False, False  # the reader would refuse a file without any such table
         self.reading.left_out.add((file, path))
         return True, False
 
 
 def all_messages(read: Callable[[], object]) -> list[str]:
-    """Return the messages of a reader about everything that it reads.
+    """Return all messages of a reader about the files that it reads.
 
     Args:
-        read: reader, which raises :class:`BadInput` at the first mistake; it is called
-            once for each message and a few times more.
+        read: reader that raises :class:`BadInput` at the first mistake.  It is called
+            once for each message and a few more times.
 
     Returns:
         The messages in the order in which the mistakes are found, at most
@@ -189,7 +192,7 @@ def all_messages(read: Callable[[], object]) -> list[str]:
 
 
 def _owner(content: dict[str, Any], path: tuple[str | int, ...]) -> Any:
-    """Return the table that has the last key of a path; an empty one if none has."""
+    """Return the table that contains the last key of a path, or an empty table."""
     found: Any = content
     for step in path[:-1]:
         try:
@@ -200,7 +203,7 @@ def _owner(content: dict[str, Any], path: tuple[str | int, ...]) -> Any:
 
 
 def _key_of(content: dict[str, Any], text: str) -> tuple[str, str]:
-    """Return the longest key that begins a text, and the text after it."""
+    """Return the longest key with which a text begins, and the text after the key."""
     for key in sorted(content, key=len, reverse=True):
         if text.startswith(key) and text[len(key) : len(key) + 1] in {".", ":", "["}:
             return key, text[len(key) :]
@@ -210,7 +213,7 @@ def _key_of(content: dict[str, Any], text: str) -> tuple[str, str]:
 def _suggested(
     value: Any, found: re.Match[str] | None, hint: re.Match[str] | None
 ) -> Any:  # fmt: skip
-    """Return a value with the name that a message suggests; None if there is none."""
+    """Return a value with the name that a message suggests, or None without a name."""
     if found is None or hint is None:
         return None
     if value == found[1]:

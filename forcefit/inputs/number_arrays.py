@@ -1,4 +1,4 @@
-"""Conversion of the plain values of a file or an option to numbers and arrays."""
+"""Conversion of plain values from a file or an option to numbers and arrays."""
 
 import math
 
@@ -9,15 +9,15 @@ from forcefit.inputs.errors import describe
 
 
 def find_fault(value: object, shape: tuple[int, ...], infinite: bool = False) -> str:
-    """Return the fault in numbers of a given shape, and its place counted from 1.
+    """Describe what is wrong with an array, with the place counted from 1.
 
     Args:
-        value: nested lists with a fault, or a value of another type.
+        value: nested lists that are not a valid array, or a value of another type.
         shape: expected shape.
         infinite: whether inf is allowed.
 
     Returns:
-        The wrong entry or row with its place, or the whole value, abbreviated.
+        The wrong entry or row with its place, or the abbreviated whole value.
     """
     if not isinstance(value, list):
         return describe(value)
@@ -34,7 +34,7 @@ def find_fault(value: object, shape: tuple[int, ...], infinite: bool = False) ->
 
 
 def number_array(value: object) -> NDArray | None:
-    """Return nested lists of numbers as an array; None if ragged or not numeric."""
+    """Return nested lists as an array, or None if they are ragged or not numeric."""
     if not isinstance(value, list):
         return None
     if value and all(isinstance(v, list) for v in value):
@@ -45,7 +45,7 @@ def number_array(value: object) -> NDArray | None:
 
 
 def comma_numbers(text: str) -> NDArray:
-    """Return the finite numbers between commas; none if a text is not a number."""
+    """Return the numbers between commas, or an empty array if one is not finite."""
     try:
         numbers = np.array([float(part) for part in text.split(",")])
     except ValueError:
@@ -54,7 +54,7 @@ def comma_numbers(text: str) -> NDArray:
 
 
 def as_number(value: object) -> float:
-    """Return a number as float; nan for other values, including true and false."""
+    """Return a number as a float, or NaN for any other value, including booleans."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return math.nan
     try:
@@ -64,5 +64,5 @@ def as_number(value: object) -> float:
 
 
 def _proper(values: list) -> bool:
-    """Return whether all values are numbers that a float can hold, or nan or inf."""
+    """Return whether all values are numbers that a float can represent, inf or NaN."""
     return all(isinstance(v, float) or not math.isnan(as_number(v)) for v in values)

@@ -1,7 +1,7 @@
-"""Packages that only some functions need, and how to install them.
+"""Optional packages, which only some functions need, and how to install them.
 
-A module imports such a package where it uses it.  If the package is missing,
-:func:`naming_packages` raises an error of one line; all commands use it.
+A module imports an optional package inside the function that uses it.  If the package
+is missing, :func:`naming_packages` raises an error of one line.  All commands use it.
 """
 
 from collections.abc import Generator
@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 from forcefit.inputs.errors import BadInput
 
-# name of the extra that installs each package, as in pyproject.toml
+# extra of pyproject.toml that installs each optional package
 _EXTRAS = {
     "dask": "sweeps",
     "distributed": "sweeps",
@@ -25,12 +25,12 @@ _EXTRAS = {
     "xarray": "sweeps",
     "yaml": "yaml",
 }
-# packages that every installation of forcefit has
+# packages that every installation of forcefit contains
 _REQUIRED = (
     "clarabel", "cvxpy", "exudyn", "filelock", "jinja2", "numpy", "pytetwild",
     "pyvista", "rich", "scipy", "threadpoolctl", "typer", "vtkmodules",
 )  # fmt: skip
-# packages whose distribution has a different name
+# packages whose distribution has a different name than the imported module
 _DISTRIBUTIONS = {"yaml": "pyyaml", "vtkmodules": "vtk"}
 
 
@@ -38,7 +38,7 @@ _DISTRIBUTIONS = {"yaml": "pyyaml", "vtkmodules": "vtk"}
 def naming_packages(
     whose: str = "this command", instead: str = ""
 ) -> Generator[None, None, None]:
-    """Name the package that a block of code lacks, and how to install it.
+    """Replace the import error of a block by a message with installation instructions.
 
     Args:
         whose: name of the function or command that needs the package.
@@ -66,13 +66,13 @@ def naming_packages(
 
 
 def need(*packages: str) -> None:
-    """Raise an error before a computation if a package that it needs is missing.
+    """Raise an error before a computation if a required package is not installed.
 
     Args:
         packages: names by which the packages are imported.
 
     Raises:
-        ModuleNotFoundError: names the first missing package.
+        ModuleNotFoundError: a package is missing; the message names the first one.
     """
     from importlib.util import find_spec
 

@@ -1,4 +1,4 @@
-"""Digest of the program's sources and of the versions of its libraries."""
+"""Hash of the program's source code and of the versions of its libraries."""
 
 import hashlib
 from collections.abc import Sequence
@@ -11,17 +11,19 @@ def sources_hash(packages: Sequence[ModuleType], libraries: Sequence[str]) -> st
     """Return the SHA-256 of packages' Python sources and of the versions of libraries.
 
     Args:
-        packages: all ``.py`` files in their folders are digested.
-        libraries: names of distributions; the digest also covers missing ones.
+        packages: packages; the contents of all ``.py`` files in their folders are
+            hashed.
+        libraries: names of distributions; a missing distribution changes the hash.
 
     Returns:
-        The digest, the same wherever the packages are installed.
+        The hash, which does not depend on where the packages are installed.
     """
     digest = hashlib.sha256()
     for package in packages:
         root = Path(str(package.__file__)).parent
         for path in sorted(root.rglob("*.py")):
-            # line ends depend on the checkout, so they are unified
+            # line ends differ between checkouts and are therefore unified before
+            # hashing
             source = path.read_bytes().replace(b"\r\n", b"\n")
             name = path.relative_to(root.parent).as_posix()
             digest.update(f"{name} {len(source)}\n".encode() + source)
@@ -30,7 +32,7 @@ def sources_hash(packages: Sequence[ModuleType], libraries: Sequence[str]) -> st
 
 
 def _version(name: str) -> str:
-    """Return the version of a distribution, or the text that it is absent."""
+    """Return the version of a distribution, or a text that states its absence."""
     try:
         return version(name)
     except PackageNotFoundError:

@@ -1,4 +1,4 @@
-"""Old names of arguments, fields and values, which work for one release and warn."""
+"""Old names of arguments, fields and values, valid for one release with a warning."""
 
 import warnings
 from collections.abc import Callable, Mapping
@@ -11,13 +11,13 @@ C = TypeVar("C", bound=type)
 
 
 def warn_renamed(old: str, new: str, frames: int = 3) -> None:
-    """Warn that a name is old.
+    """Warn that a name in the caller's code has been replaced.
 
     Args:
         old: name in the caller's code.
         new: present name.
-        frames: number of frames of the call stack up to the caller's line that contains
-            the name.
+        frames: number of frames of the call stack from here to the caller's line that
+            contains the name.
     """
     warnings.warn(f"{old} is now {new}", FutureWarning, stacklevel=frames)
 
@@ -25,14 +25,14 @@ def warn_renamed(old: str, new: str, frames: int = 3) -> None:
 def renamed_keywords(
     **new_names: str | tuple[str, Mapping[Any, Any]],
 ) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Return a decorator that accepts old names of keywords, with a warning for each.
+    """Return a decorator that accepts old names of keyword arguments and warns.
 
     Args:
-        new_names: present keyword by old keyword; or the present keyword, with its
-            present values by old values.
+        new_names: for each old keyword, the present keyword; or the present keyword
+            together with a mapping from old to present values.
 
     Returns:
-        A decorator.
+        The decorator.
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
@@ -57,10 +57,10 @@ def renamed_fields(**new_names: str) -> Callable[[C], C]:
     """Return a decorator for dataclasses that accepts old names of fields and warns.
 
     Args:
-        new_names: new field by old field.
+        new_names: present field for each old field.
 
     Returns:
-        A decorator.
+        The decorator.
     """
 
     def decorate(cls: C) -> C:
@@ -77,7 +77,7 @@ def current_value(argument: str, value: str, new_values: Mapping[str, str]) -> s
     Args:
         argument: name of the argument, for the warning.
         value: word in the caller's code.
-        new_values: present word by old word.
+        new_values: present word for each old word.
 
     Returns:
         The present word; ``value`` itself if it is not an old word.

@@ -1,7 +1,8 @@
-"""Reading of TOML files, with a separate error message for each mistake.
+"""Reader of TOML files that reports each mistake by a separate error message.
 
-A message names the file, the place in it, the value found and the value expected. For a
-wrong name it proposes the most similar valid one; see ``forcefit/inputs/errors.py``.
+A message names the file, the place in the file, the value found and the value expected.
+For a wrong name, the message suggests the most similar valid name; see
+``forcefit/inputs/errors.py``.
 """
 
 import csv
@@ -40,9 +41,9 @@ __all__ = [
     "read_toml",
 ]
 
-# [byte] largest accepted file; a robot of a million frames needs less
+# [byte] largest accepted file; the file of a robot with a million frames is smaller
 _LARGEST_FILE = 64 << 20
-# a key with 100 dots, such as a.a.a. ...
+# a key with at least 100 dots, such as a.a.a. ...
 _DEEP_KEY = re.compile(r"(?<![\w-])(?:[\w-]+\s*\.\s*){100}")
 
 
@@ -50,10 +51,10 @@ class Mending(Protocol):
     """Replacement of faulty values while a file is read; see ``mending.py``."""
 
     def text(self, path: str, text: str) -> str:
-        """Return the text to be read in place of that of a file."""
+        """Return the text to be read instead of the given text of a file."""
 
     def root(self, content: dict[str, Any], file: str) -> "Table":
-        """Return the root table to be read in place of that of a file."""
+        """Return the root table to be read instead of the content of a file."""
 
 
 MENDING: ContextVar[Mending | None] = ContextVar("mending", default=None)
@@ -69,10 +70,10 @@ def read_bytes(path: Path | str) -> bytes:
         The bytes of the file.
 
     Raises:
-        BadInput: the file is absent, a folder, unreadable or too large.
+        BadInput: the file is absent, is a folder, or is unreadable or too large.
     """
     try:
-        with Path(path).open("rb") as file:  # a pipe may have no end
+        with Path(path).open("rb") as file:  # a pipe may never end
             content = file.read(_LARGEST_FILE + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
@@ -95,8 +96,8 @@ def read_text(path: Path | str) -> str:
         The text with line ends ``\n``.
 
     Raises:
-        BadInput: the file is absent, a folder, unreadable, too large, not UTF-8, or
-            contains NUL.
+        BadInput: the file is absent, is a folder, is unreadable or too large,
+            is not UTF-8, or contains a NUL character.
     """
     content = read_bytes(path)
     try:
@@ -107,13 +108,15 @@ def read_text(path: Path | str) -> str:
         ) from None
     if (place := text.find("\0")) >= 0:
         line = text.count("\n", 0, place) + 1
-        raise BadInput(f"{path}: line {line} holds NUL; expected a text file in UTF-8")
+        raise BadInput(
+            f"{path}: line {line} contains NUL; expected a text file in UTF-8"
+        )
     mending = MENDING.get()
     return text if mending is None else mending.text(str(path), text)
 
 
 def read_rows(path: Path | str) -> list[list[str]]:
-    """Return the cells of a CSV file, as one list for each line.
+    """Return the cells of a CSV file as a list for each line.
 
     Args:
         path: path of the file.
@@ -122,7 +125,7 @@ def read_rows(path: Path | str) -> list[list[str]]:
         The cells as text; an empty list for a blank line.
 
     Raises:
-        BadInput: the file cannot be read, or a quoted cell has no end.
+        BadInput: the file cannot be read, or a quoted cell is not closed.
     """
     rows = csv.reader(read_text(path).splitlines())
     try:
@@ -138,13 +141,13 @@ def read_toml(path: Path | str) -> "Table":
         path: path of the file.
 
     Returns:
-        The table, whose methods read its keys.
+        The root table; its methods read the keys.
 
     Raises:
         BadInput: the file cannot be read or is not TOML.
     """
     text = read_text(path)
-    if _DEEP_KEY.search(text):  # tomllib would need minutes
+    if _DEEP_KEY.search(text):  # tomllib would need minutes for such a key
         raise BadInput(f"{path}: not valid TOML: nested too deeply")
     mending = MENDING.get()
     try:
@@ -154,18 +157,18 @@ def read_toml(path: Path | str) -> "Table":
         return Table(content, str(path), "")
     except RecursionError:
         raise BadInput(f"{path}: not valid TOML: nested too deeply") from None
-    # the text of the error ends with line and column
+    # the error text of tomllib ends with the line and column
     except tomllib.TOMLDecodeError as error:
         reason = one_line(str(error), 200)
         raise BadInput(f"{path}: not valid TOML: {reason}") from None
-    except ValueError:  # Python cannot parse a whole number of thousands of digits
+    except ValueError:  # Python refuses integers of thousands of digits
         reason = "found a whole number of thousands of digits"
         raise BadInput(f"{path}: not valid TOML: {reason}") from None
 
 
 @dataclass(eq=False)
 class Table:
-    """A TOML table that records the keys that were read, to refuse all others.
+    """A TOML table that records which keys were read, so that it can refuse all others.
 
     Attributes:
         content: keys and values of the table.
@@ -184,7 +187,7 @@ class Table:
         return BadInput(f"{self.file}: {where}{': ' if where else ''}{message}")
 
     def has(self, key: str) -> bool:
-        """Return whether the key exists; it then counts as read."""
+        """Return whether the key exists, and record the key as read."""
         self._asked.add(key)
         return key in self.content
 
@@ -194,7 +197,7 @@ class Table:
         return self.content.get(key, default)
 
     def require(self, key: str, expected: str) -> Any:
-        """Return the value of a key that must exist, unchecked.
+        """Return the unchecked value of a key that must exist.
 
         Args:
             key: name of the key.
@@ -251,7 +254,7 @@ class Table:
         return value
 
     def choice(self, key: str, valid: Iterable[str], default: str | None = None) -> str:
-        """Return a string that is among a few valid ones.
+        """Return a string that must be among the valid ones.
 
         Returns:
             The string.
@@ -391,7 +394,7 @@ class Table:
         return array
 
     def table(self, key: str) -> "Table":
-        """Return the table of a key of this table.
+        """Return the table under a key of this table.
 
         Returns:
             The table.
@@ -405,10 +408,10 @@ class Table:
         return self._inner(value, ".".join(filter(None, (self.place, key))), key)
 
     def tables(self, key: str) -> list["Table"]:
-        """Return the tables of ``[[key]]``; none if the key is absent.
+        """Return the tables of ``[[key]]``; an empty list if the key is absent.
 
         Returns:
-            A :class:`Table` for each; messages number them from 1.
+            A :class:`Table` for each list item; messages number the items from 1.
 
         Raises:
             BadInput: the value is not a list of tables.
@@ -426,11 +429,11 @@ class Table:
     def _inner(
         self, content: dict[str, Any], place: str, *at: str | int
     ) -> "Table":  # fmt: skip
-        """Return a table inside this one, ``at`` its key and, in a list, its number."""
+        """Return an inner table; ``at`` is its key and, in a list, its number."""
         return Table(content, self.file, place)
 
     def finish(self) -> None:
-        """Raise an error if the table has keys that were not read.
+        """Raise an error if the table contains keys that were not read.
 
         Raises:
             BadInput: an unknown key was found; the message names it.

@@ -1,7 +1,7 @@
 """Writing of output files, either completely or not at all.
 
-The content is written to ``FILE.part`` in the same folder, and the complete file is
-then renamed.  The next program overwrites the remains of a killed one.
+The content is written to ``FILE.part`` in the same folder, which is renamed when it is
+complete.  If a program is killed, the next program overwrites its ``FILE.part``.
 """
 
 import io
@@ -29,7 +29,8 @@ class Kind:
     Attributes:
         name: name of the kind, for error messages.
         endings: valid endings of the file names.
-        begins: accepted first bytes of the files, in upper or lower case.
+        begins: accepted first bytes of the files; upper and lower case are
+        equivalent.
         packages: optional packages that write the files.
     """
 
@@ -61,15 +62,16 @@ ROBOT = Kind(
 
 
 def check_writable(path: Path | str, kind: Kind | None = None) -> None:
-    """Raise an error before the computation if a file cannot be written.
+    """Raise an error, before a long computation, if a file cannot be written.
 
     Args:
         path: path of a file that will be written later.
         kind: kind of the file; an existing file must be of this kind.
 
     Raises:
-        BadInput: the ending is not valid; the folder is absent or not writable; or the
-            existing file is not regular, not writable, or of another kind.
+        BadInput: the ending is not valid, or the folder is absent or not
+            writable.  The same error is raised if a file exists that is not
+            regular, not writable, or of another kind.
         ModuleNotFoundError: a package that writes this kind is missing.
     """
     path = Path(path)
@@ -98,7 +100,7 @@ def check_writable(path: Path | str, kind: Kind | None = None) -> None:
 
 
 def _check_there(path: Path, mode: int, kind: Kind | None) -> None:
-    """Raise an error if an existing file is not writable or of another kind."""
+    """Raise an error if an existing file is not writable or is of another kind."""
     if stat.S_ISDIR(mode):
         raise BadInput(f"{path}: found a folder, expected a file or nothing")
     if not stat.S_ISREG(mode):
@@ -134,11 +136,11 @@ def whole_file(path: Path | str) -> Generator[Path, None, None]:
     """Write a file completely or not at all.
 
     Args:
-        path: path of the file; for a symbolic link, its target is written.
+        path: path of the file; if it is a symbolic link, the target is written.
 
     Yields:
-        The path to write to.  At the end of the block the written file is renamed;
-        after an error it is removed, and the old file is unchanged.
+        The path to write to.  At the end of the block the written file is renamed.
+        After an error the written file is removed, and an older file is unchanged.
 
     Raises:
         BadInput: the file cannot be written, for example because the disk is full.
@@ -151,7 +153,7 @@ def whole_file(path: Path | str) -> Generator[Path, None, None]:
         with locked_file(part):
             try:
                 yield part
-                with part.open("r+b") as file:  # Windows needs a writable file here
+                with part.open("r+b") as file:  # for fsync on Windows
                     os.fsync(file.fileno())
                 if real.exists():
                     shutil.copymode(real, part)
@@ -164,7 +166,7 @@ def whole_file(path: Path | str) -> Generator[Path, None, None]:
 
 
 def check_new_folder(folder: Path | str) -> None:
-    """Raise an error before the computation if a folder cannot be filled.
+    """Raise an error, before a long computation, if a folder cannot be filled.
 
     Args:
         folder: path of a new or empty folder.
@@ -183,13 +185,13 @@ def check_new_folder(folder: Path | str) -> None:
 
 @contextmanager
 def whole_folder(folder: Path | str) -> Generator[Path, None, None]:
-    """Write a folder completely, with all its files, or not at all.
+    """Write a folder with all its files completely or not at all.
 
     Args:
         folder: path of a new or empty folder.
 
     Yields:
-        The folder in which the files are to be written.
+        The folder in which the block must write the files.
 
     Raises:
         BadInput: the folder contains a file, or cannot be written.
@@ -201,7 +203,7 @@ def whole_folder(folder: Path | str) -> Generator[Path, None, None]:
     try:
         part.mkdir()
         yield part
-        if folder.is_dir():  # the folder is empty; Windows cannot replace a folder
+        if folder.is_dir():  # Windows cannot replace a folder, even an empty one
             folder.rmdir()
         part.replace(folder)
     except OSError as error:
@@ -214,7 +216,7 @@ def path_from(folder: Path, path: Path | str) -> str:
     """Return a path relative to a folder, with slashes on every system.
 
     Args:
-        folder: folder of the file that will contain the path.
+        folder: folder of the file in which the path will be written.
         path: absolute path, or path relative to the working folder.
 
     Returns:
@@ -230,13 +232,13 @@ def write_text(text: str, path: Path | str) -> None:
     r"""Write a text file completely or not at all.
 
     Args:
-        text: text with line ends ``\n``, kept on every system; written in UTF-8.
+        text: text with line ends ``\n``, which are not converted; encoded in UTF-8.
         path: path of the file.
 
     Raises:
         BadInput: the file cannot be written.
     """
-    # names of files may contain bytes that are not UTF-8
+    # file names in the text may contain bytes that are not UTF-8
     write_bytes(text.encode("utf-8", errors="backslashreplace"), path)
 
 
@@ -266,7 +268,7 @@ def save_figure(figure: Any, path: Path | str) -> None:
     """
     check_writable(path, PICTURE)
     content = io.BytesIO()
-    # matplotlib draws a box for a character that the font lacks, and warns
+    # for a character that the font lacks, matplotlib draws a box and warns
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         figure.savefig(content, dpi=150, format=Path(path).suffix[1:].lower())
@@ -293,7 +295,7 @@ def save_pixels(pixels: Any, path: Path | str) -> None:
 
 
 def check_json(target: str | None) -> str | None:
-    """Raise an error before the computation if :func:`write_json` could not write.
+    """Raise an error, before a long computation, if the JSON cannot be written.
 
     Args:
         target: a path, ``"-"`` for standard output, or None for no output.
@@ -329,7 +331,7 @@ def write_json(results: dict, target: str | None) -> None:
 
 
 def plain(value: Any) -> Any:
-    """Return a value for JSON: arrays as lists, infinities and NaN as None."""
+    """Return a value for JSON: arrays become lists, infinities and NaN become None."""
     if isinstance(value, dict):
         return {str(k): plain(v) for k, v in value.items()}
     if hasattr(value, "tolist"):

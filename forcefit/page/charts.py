@@ -1,8 +1,8 @@
-"""Charts and maps of a page: data in SI, drawn by plotly.js; a click shows values.
+"""Charts and maps of a page, which plotly.js draws from data in SI units.
 
-A chart is a list of plotly traces.  Every axis has its SI unit and a display unit.  A
-map shows several quantities over one or two axes, and has all numbers of each point.  A
-scene shows a robot, see :mod:`forcefit.assembly.report.scene`.
+A chart is a list of plotly traces.  Every axis defines an SI unit and a display unit.
+A map shows several quantities over one or two axes; a click shows all values of a
+point. A scene shows a robot, see :mod:`forcefit.assembly.report.scene`.
 """
 
 import html
@@ -19,7 +19,7 @@ from forcefit.page.tables import Value
 from forcefit.results.units import shown_in
 
 BLUE, RED, GREY = "#1f6fb4", "#c0392b", "#858e97"
-# lines and bars of one chart; grey is reserved for the sum of the others
+# colours of the lines and bars of a chart; grey is used only for the sum of other bars
 COLOURS = (
     BLUE, RED, "#2e8b57", "#8e5ea2", "#d98b1f", "#179cb0", "#a3541c", "#d2679f",
     "#7d8f14", "#5b63d3", "#e2703a", "#0f7a6c",
@@ -32,8 +32,8 @@ class Axis:
 
     Attributes:
         title: words that describe the quantity of the axis.
-        unit: SI unit, empty for a number without unit.
-        options: options of plotly's axis, such as ``{"type": "log"}``.
+        unit: SI unit; empty for a dimensionless number.
+        options: options of the plotly axis, such as ``{"type": "log"}``.
     """
 
     title: str
@@ -49,7 +49,7 @@ class Layer:
         key: name of the quantity in the results.
         title: words that describe the quantity.
         unit: SI unit.
-        values: (nx, ny), or (nx,) over one axis; NaN at points without a value.
+        values: (nx, ny), or (nx,) over one axis; NaN where a point has no value.
     """
 
     key: str
@@ -67,17 +67,17 @@ def chart(
     traces: Sequence[Mapping[str, Any]], x: Axis, y: Axis, caption: str,
     bars: str = "overlay",
 ) -> str:  # fmt: skip
-    """Return a chart of plotly traces with data in SI.
+    """Return a chart of plotly traces whose data are in SI units.
 
     Args:
-        traces: traces of plotly.js; ``x``, ``y`` and ``error_*.array`` are in SI.
+        traces: traces of plotly.js; ``x``, ``y`` and ``error_*.array`` are in SI units.
         x: the horizontal axis.
         y: the vertical axis.
         caption: text below the chart.
-        bars: mode of several bars at one position: ``"overlay"`` or ``"stack"``.
+        bars: arrangement of several bars at one position: ``"overlay"`` or ``"stack"``.
 
     Returns:
-        HTML of a chart that is drawn when the page is opened.
+        HTML of a chart, which is drawn when the page is opened.
     """
     axes = {"x": _axis(x, [t["x"] for t in traces]),
             "y": _axis(y, [t["y"] for t in traces])}  # fmt: skip
@@ -92,17 +92,17 @@ def bars(
     values: Mapping[str, float], x: Axis, caption: str, line: float = 1.0,
     rest: str = "",
 ) -> str:  # fmt: skip
-    """Return horizontal bars, the first on top, with their numbers.
+    """Return a chart of horizontal bars with their values, the first bar at the top.
 
     Args:
         values: lengths of the bars [SI], by name.
         x: the horizontal axis.
         caption: text below the chart.
         line: [SI] coordinate of a line across all bars; NaN for no line.
-        rest: name of a bar that is the sum of the others, which is grey.
+        rest: name of the bar that shows the sum of all other items; it is grey.
 
     Returns:
-        HTML.
+        HTML of the chart.
     """
     trace: dict[str, Any] = {
         "type": "bar", "orientation": "h", "x": list(values.values()),
@@ -124,19 +124,19 @@ def matrix(
     values: ArrayLike, names: Sequence[str], title: str, caption: str, around: bool,
     most: float = 1.0,
 ) -> str:  # fmt: skip
-    """Return a chart of a square matrix: coloured cells with numbers.
+    """Return a chart of a square matrix, in which coloured cells show the numbers.
 
     Args:
-        values: (n, n).
+        values: (n, n) matrix.
         names: names of the rows and columns.
         title: title of the colour scale.
         caption: text below the chart.
-        around: True: the colour scale is centred at zero; False: it extends from 0 to
-            ``most``.
+        around: if True, the colour scale is centred at zero; if False, it extends from
+            0 to ``most``.
         most: upper end of the colour scale.
 
     Returns:
-        HTML.
+        HTML of the chart.
     """
     size = float(np.abs(values).max()) or 1.0
     trace: dict[str, Any] = {
@@ -158,16 +158,16 @@ def value_map(
     axes: Sequence[tuple[Axis, NDArray]], layers: Sequence[Layer], states: NDArray,
     caption: str,
 ) -> str:  # fmt: skip
-    """Return a map of quantities over a grid; a click shows all quantities of a point.
+    """Return a map of quantities over a grid; a click shows all values of a point.
 
     Args:
-        axes: one or two axes, with their values in SI.
-        layers: the quantities; a constant quantity is stated in words instead.
-        states: state of every point, in words.
+        axes: one or two axes, with their values in SI units.
+        layers: the quantities; a constant quantity is stated in a sentence instead.
+        states: state of every point, as text.
         caption: text below the map.
 
     Returns:
-        HTML.
+        HTML of the map.
     """
     flat = {one.key: _constant(one) for one in layers}
     drawn = [one for one in layers if flat[one.key] is None]
@@ -196,30 +196,30 @@ def value_map(
 
 
 def scene(spec: Mapping[str, Any], caption: str) -> str:
-    """Return a robot that the reader can rotate, magnify and close.
+    """Return a robot that the reader can rotate, zoom and close.
 
     Args:
-        spec: plain values in SI, in the form that ``page.js`` reads.
+        spec: plain values in SI units, in the form that ``page.js`` reads.
         caption: text below the robot.
 
     Returns:
-        HTML.
+        HTML of the scene.
     """
     return _figure(spec, "scene", caption)
 
 
 def grid(*charts: str) -> str:
-    """Return charts in a row."""
+    """Return HTML that places charts in a row."""
     return piece("grid", charts)
 
 
 def _constant(layer: Layer) -> float | None:
-    """Return the value of a constant layer; NaN if the layer varies or has no value."""
+    """Return the value of a constant layer; NaN if the layer varies or lacks values."""
     values = np.asarray(layer.values, dtype=float)
     finite = values[np.isfinite(values)]
     if not len(finite):
         return float("nan")
-    # a smaller variation is due to rounding, and a map would show it as a pattern
+    # a smaller variation is due to rounding, which a map would show as a pattern
     same = np.ptp(finite) <= 1e-9 * np.abs(finite).max()
     return float(finite[0]) if same else None
 
@@ -242,5 +242,5 @@ def _axis(axis: Axis, data: Sequence[ArrayLike]) -> dict[str, Any]:
 
 
 def _figure(spec: Mapping[str, Any], kind: str, caption: str) -> str:
-    """Return a figure whose content ``page.js`` draws."""
+    """Return the HTML of a figure whose content ``page.js`` draws."""
     return piece("figure", kind, plain(spec), caption)

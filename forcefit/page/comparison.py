@@ -1,4 +1,4 @@
-"""Comparison of two results: every number that differs, the largest change first."""
+"""Comparison of two results: all values that differ, the largest change first."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,9 +10,9 @@ from forcefit.page.page import Page, Provenance, Tile, page, section
 from forcefit.page.tables import Cell, Value, table
 from forcefit.results.quantities import in_words, unit_of
 
-SAME = 1e-9  # relative difference due to rounding
-_LISTED = 60  # number of changes that are shown unfolded, about two printed sheets
-# keys that describe the accuracy and cost of a result, and are not compared
+SAME = 1e-9  # largest relative difference that is attributed to rounding
+_LISTED = 60  # number of changes that are always shown, about two printed sheets
+# keys of values that describe accuracy or cost; these values are not compared
 _MEASURES = {"certificate", "seconds", "cuts"}
 _NAMES = ("name", "part", "what", "error", "term", "frame", "component")
 _HEADLINES = {"worst_clearance", "within_limits", "error", "allocation"}
@@ -35,7 +35,7 @@ class Change:
 
     @property
     def relative(self) -> float:
-        """Relative change; infinite from zero, NaN without a value."""
+        """Relative change; infinite from zero, NaN if a value is missing."""
         a, b = self.before, self.after
         if not (_is_number(a) and _is_number(b)):
             return math.nan
@@ -43,12 +43,12 @@ class Change:
 
     @property
     def name(self) -> str:
-        """The place in words."""
+        """The place of the value, described in words."""
         return ", ".join(map(in_words, self.place))
 
     @property
     def unit(self) -> str:
-        """SI unit of the last key that has one; empty without such a key."""
+        """SI unit of the last key that has a known unit; empty if no key has one."""
         units = (unit_of(key) for key in reversed(self.place))
         return next(filter(None, units), "")
 
@@ -60,9 +60,9 @@ class Comparison:
     Attributes:
         names: names of both results.
         titles: subject of each result, such as its robot.
-        changes: changes of numbers, the largest relative change first; then texts.
+        changes: changes of numbers, the largest relative change first; then of texts.
         same: number of equal values.
-        only: places that only one of the results has.
+        only: places that exist in only one of the results.
     """
 
     names: tuple[str, str]
@@ -91,8 +91,8 @@ def compare(
         names: names of both results.
 
     Returns:
-        All differences.  The numbers of a certificate are excluded, because they bound
-        the errors of other numbers.
+        All differences.  The numbers of a certificate are not compared, because they
+        bound the errors of other numbers.
     """
     a, b = (dict(_leaves(one, ())) for one in (first, second))
     both = [place for place in a if place in b]
@@ -125,7 +125,7 @@ def _leaves(value: Any, place: tuple[str, ...]) -> Any:
 
 
 def _named(row: Any) -> str:
-    """Return name of a list item, because the order may change; empty without one."""
+    """Return the name by which a list item is matched; empty if it has none."""
     if not isinstance(row, Mapping):
         return ""
     names = (row.get(key) for key in _NAMES)
@@ -133,19 +133,19 @@ def _named(row: Any) -> str:
 
 
 def _is_number(value: Any) -> bool:
-    """Return whether a value is a number and not a truth value."""
+    """Return whether a value is a number but not a boolean."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _vector(place: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the place of the vector or matrix of a component, or the place itself."""
+    """Return the place of the vector or matrix that contains a component."""
     while len(place) > 1 and place[-1].isdigit():
         place = place[:-1]
     return place
 
 
 def _sizes(leaves: Mapping[tuple[str, ...], Any]) -> dict[tuple[str, ...], float]:
-    """Return largest component of each vector, which determines its rounding errors."""
+    """Return the largest component of each vector, the scale of its rounding errors."""
     sizes: dict[tuple[str, ...], float] = {}
     for place, value in leaves.items():
         if _is_number(value) and math.isfinite(value):
@@ -162,21 +162,21 @@ def _same(a: Any, b: Any, size: float) -> bool:
 
 
 def _is_headline(place: tuple[str, ...]) -> bool:
-    """Return whether a place is a headline number; components of vectors are not."""
+    """Return whether a place is that of a headline number, not a vector component."""
     if any(key.isdigit() for key in place):
         return False
     return place[0] in _HEADLINES or place[-2:] in _FIGURES
 
 
 def _size(change: Change) -> tuple[int, float, tuple[str, ...]]:
-    """Return a sort key: headline numbers, other numbers by their change, texts."""
+    """Return a sort key: headline numbers, other numbers by change, then texts."""
     relative = change.relative
     group = 2 if math.isnan(relative) else int(not _is_headline(change.place))
     return (group, 0.0 if group == 2 else -abs(relative), change.place)
 
 
 def _title(results: Mapping[str, Any]) -> str:
-    """Return the title, the campaign or the robot of a result."""
+    """Return the title, the campaign or the robot that a result describes."""
     keys = [key for key in ("title", "campaign", "robot") if key in results]
     return str(results[keys[0]]) if keys else "results"
 
@@ -198,7 +198,7 @@ def comparison_text(comparison: Comparison, most: int = 20) -> str:
         most: largest number of lines.
 
     Returns:
-        A sentence and a line for each change, the largest change first.
+        A sentence with the number of changes, and then a line for each change.
     """
     lines = [_sentence(comparison)]
     for one in comparison.changes[:most]:
@@ -216,7 +216,7 @@ def _brief(value: Any) -> str:
 
 
 def _sentence(comparison: Comparison) -> str:
-    """Return a sentence with the number of changes."""
+    """Return a sentence that states the number of changes."""
     changed, same = len(comparison.changes), comparison.same
     text = f"{changed} of {changed + same} values differ"
     if comparison.only:
@@ -229,10 +229,10 @@ def comparison_page(comparison: Comparison, provenance: Provenance) -> str:
 
     Args:
         comparison: comparison of two results.
-        provenance: command, and names of both files.
+        provenance: command, and the paths of both files.
 
     Returns:
-        HTML that needs no other file.
+        HTML that does not refer to other files.
     """
     numbers = [c for c in comparison.changes if not math.isnan(c.relative)]
     tiles = [
@@ -270,7 +270,7 @@ def comparison_page(comparison: Comparison, provenance: Provenance) -> str:
 def _listed(
     changes: Sequence[Change], names: tuple[str, str], what: str
 ) -> Iterator[str]:
-    """Yield the first changes as a table; the others are folded and not printed."""
+    """Yield a table of the first changes, and a folded table of the other changes."""
     head = ["quantity", *names, "change"]
     yield table(head, [_row(one) for one in changes[:_LISTED]], what)
     more = [_row(one) for one in changes[_LISTED:]]
@@ -289,6 +289,6 @@ def _row(change: Change) -> list[Cell]:
 
 
 def _percent(change: Change) -> str:
-    """Return the change in per cent."""
+    """Return the relative change in per cent, as text."""
     relative = change.relative
     return f"{100 * relative:+.3g} %" if math.isfinite(relative) else "-"

@@ -1,4 +1,4 @@
-"""The markup of pages: the macros of ``page.jinja``, which escape all texts."""
+"""HTML of pages from the macros of ``page.jinja``, which escape all texts."""
 
 import re
 from functools import cache, partial
@@ -9,22 +9,22 @@ _BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|[nµumkM]?(?:m|rad|N|J|Pa|Hz))(?![\w
 
 
 def piece(macro: str, *values: Any) -> str:
-    """Return a piece of a page as HTML: the result of a macro of ``page.jinja``."""
+    """Return a piece of a page as HTML, rendered by a macro of ``page.jinja``."""
     return str(getattr(_template(), macro)(*values))
 
 
 def packaged(name: str) -> bytes:
-    """Return the content of a file of this package."""
+    """Return the content of a file that is installed with this package."""
     return files("forcefit.page").joinpath(*name.split("/")).read_bytes()
 
 
 @cache
 def _template() -> Any:
-    """Return macros of ``page.jinja``; jinja2 is imported for the first page only."""
+    """Return the macros of ``page.jinja``; import jinja2 only when this is called."""
     from jinja2 import Environment, StrictUndefined
 
     pages = Environment(autoescape=True, trim_blocks=True, undefined=StrictUndefined)
-    # a line must not be broken between a number and its unit
+    # a line break between a number and its unit is not allowed
     pages.filters["unbroken"] = partial(_BEFORE_UNIT.sub, "&nbsp;")
     compact = {"allow_nan": False, "separators": (",", ":")}
     pages.policies["json.dumps_kwargs"] = compact

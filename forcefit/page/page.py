@@ -1,12 +1,13 @@
 """A page: conclusions, sections, assumptions and provenance.
 
 ======================  =============================================================
-:func:`page`            the page around its pieces
+:func:`page`            the whole page, from its pieces
 :class:`Tile`           one conclusion at the top
-:class:`Provenance`     command, versions and digests of the files that were read
+:class:`Provenance`     command, versions, and hashes of the files that were read
 ======================  =============================================================
 
-plotly.js draws; it is inside the page, compressed, and nothing is fetched.
+plotly.js draws the charts.  It is stored compressed in the page, so that the page needs
+no network.
 """
 
 import base64
@@ -28,8 +29,8 @@ from forcefit.page.markup import packaged, piece
 from forcefit.page.tables import Value, table
 
 _PACKAGES = ("numpy", "scipy", "clarabel", "cvxpy", "exudyn")
-_DIGITS = 300  # largest number of digits of an integer that a float can represent
-# class and word of the verdict: favourable, with a reservation, unfavourable
+_DIGITS = 300  # largest number of decimal digits of an integer that fits a float
+# CSS class and word of the verdict: favourable, favourable with reservation, or not
 _STATES = {True: ("good", "OK"), None: ("mixed", "Caution"), False: ("bad", "Not OK")}
 _HEADING = re.compile(r'<section id="([^"]+)"><h2>(.*?) <a class=anchor')
 
@@ -41,7 +42,7 @@ class Tile:
     Attributes:
         title: subject of the conclusion.
         answer: the conclusion in a few words or numbers.
-        note: a sentence of texts and numbers.
+        note: a sentence, given as texts and numbers.
     """
 
     title: str
@@ -54,9 +55,9 @@ class Provenance:
     """Origin of the numbers of a page.
 
     Attributes:
-        command: command that computed the numbers; empty without a command.
+        command: command that computed the numbers; empty if no command did.
         files: files that the command read.
-        settings: further settings in words, such as the seed.
+        settings: further settings as text, such as the seed.
     """
 
     command: str = ""
@@ -73,13 +74,13 @@ class Page:
         verdict: the conclusion in one sentence.
         good: whether the result is favourable (green); None if it has a reservation
             (amber).  ``docs/reports.md`` states the rule of each report.
-        tiles: main conclusions, at the top.
-        about: a text below the title that states what was computed.
-        body: pieces of HTML, in their order.
-        assumed: assumptions, one sentence for each.
+        tiles: main conclusions, shown at the top.
+        about: text below the title that states what was computed.
+        body: pieces of HTML in the order in which they are shown.
+        assumed: assumptions, each as a sentence.
         provenance: origin of the numbers.
         results: plain values, stored in the page for ``forcefit report compare``.
-        details: further sentences, below the verdict.
+        details: further sentences, shown below the verdict.
     """
 
     title: str
@@ -95,7 +96,7 @@ class Page:
 
 
 def command_line() -> str:
-    """Return the forcefit command as typed; empty if another program is running."""
+    """Return the forcefit command as typed, or an empty text in another program."""
     import shlex
 
     name = Path(sys.argv[0]).name
@@ -104,13 +105,13 @@ def command_line() -> str:
 
 
 def page(content: Page) -> str:
-    """Return a page as an HTML text that needs no other file.
+    """Return a page as an HTML text that does not refer to other files.
 
     Args:
         content: content of the page.
 
     Returns:
-        HTML with the results as JSON, in SI and with all digits.
+        HTML that contains the results as JSON, in SI units and with all digits.
     """
     sections = [
         *filter(None, content.body),
@@ -127,7 +128,7 @@ def page(content: Page) -> str:
 
 
 def results_in(text: str, where: str) -> dict[str, Any]:
-    """Return the results in a page or in a JSON file.
+    """Return the results that a page or a JSON file contains.
 
     Args:
         text: text of a page, or of a JSON file written by a command.
@@ -147,7 +148,7 @@ def results_in(text: str, where: str) -> dict[str, Any]:
         text = rest.partition("</script>")[0]
     try:
         results = json.loads(text, parse_int=_whole)
-    except (ValueError, RecursionError):  # thousands of nested brackets
+    except (ValueError, RecursionError):  # too deep brackets
         expected = "a report of forcefit or the JSON file of a command"
         raise BadInput(f"{where}: found other text, expected {expected}") from None
     if not isinstance(results, dict):
@@ -156,12 +157,12 @@ def results_in(text: str, where: str) -> dict[str, Any]:
 
 
 def _whole(text: str) -> int | float:
-    """Return an integer of JSON; infinity if it is too large for a float."""
+    """Return a JSON integer as a number, or infinity if it is too large for a float."""
     return int(text) if len(text) <= _DIGITS else float(text)
 
 
 def section(title: str, *pieces: str) -> str:
-    """Return a heading with a link to itself, and the pieces below it."""
+    """Return a section whose heading is a link to itself."""
     name = re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")
     return piece("section", title, f"section-{name}", pieces)
 
@@ -172,12 +173,12 @@ def paragraph(*texts: str | Value) -> str:
 
 
 def listed(texts: Sequence[str]) -> str:
-    """Return texts as a list."""
+    """Return an HTML list of texts."""
     return piece("list", texts)
 
 
 def _provenance(provenance: Provenance) -> str:
-    """Return a table of command, versions and digests."""
+    """Return a table of the command, the versions and the file hashes."""
     rows = [["command", provenance.command]] if provenance.command else []
     rows += [[name, value] for name, value in provenance.settings.items()]
     rows += [["forcefit", _version("forcefit")], ["Python", platform.python_version()]]
@@ -187,7 +188,7 @@ def _provenance(provenance: Provenance) -> str:
 
 
 def _version(package: str) -> str:
-    """Return the version of a package, or ``absent``."""
+    """Return the version of a package, or ``absent`` if it is not installed."""
     try:
         return version(package)
     except PackageNotFoundError:
@@ -195,7 +196,7 @@ def _version(package: str) -> str:
 
 
 def _digest(path: Path) -> str:
-    """Return the SHA-256 of the present content of a file."""
+    """Return the SHA-256 hash of the present content of a file."""
     try:
         return hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:
@@ -204,11 +205,11 @@ def _digest(path: Path) -> str:
 
 @cache
 def packed_plotly() -> str:
-    """Return plotly.js with the traces that pages use, compressed, as text.
+    """Return plotly.js as text: reduced to the traces that pages use, and compressed.
 
-    ``plotly/build.mjs`` builds it.  A browser decompresses it in 0.1 s.
+    ``plotly/build.mjs`` creates the reduced file.  A browser decompresses it in 0.1 s.
 
     Returns:
-        A gzip file in base64.
+        A gzip file, encoded in base64.
     """
     return base64.b64encode(packaged("plotly/plotly.min.js.gz")).decode()

@@ -1,4 +1,4 @@
-"""Interactive figures for notebooks: one figure of a page, in a frame of its own."""
+"""Interactive figures for notebooks: a figure of a page in a separate frame."""
 
 import html
 import sys
@@ -12,18 +12,19 @@ from forcefit.page.page import packed_plotly
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_HEIGHT = 760  # [px] of a scene with its controls and its caption
+_HEIGHT = 760  # [px] height of a scene with its controls and caption
 
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A figure that the reader of a notebook can turn, exaggerate and switch.
+    """A figure that the reader of a notebook can rotate, scale and switch.
 
-    Nothing is fetched and no program must run: plotly.js is inside, 0.8 MB.
+    The figure contains plotly.js (0.8 MB).  It therefore needs neither the network nor
+    a running Python process.
 
     Attributes:
-        title: of the figure.
-        html: a complete HTML page, which may be written to a file.
+        title: title of the figure.
+        html: a complete HTML page, which may also be written to a file.
     """
 
     title: str
@@ -33,7 +34,7 @@ class Picture:
         return f"Picture of {self.title}: its html is a page for a browser"
 
     def _repr_html_(self) -> str:
-        """Return the page in a frame, in which its styles and names are its own."""
+        """Return the page in a frame, which isolates its styles and its identifiers."""
         title, inside = (html.escape(text) for text in (self.title, self.html))
         style = f"width:100%;height:{_HEIGHT}px;border:0;background:white"
         return f'<iframe title="{title}" style="{style}" srcdoc="{inside}"></iframe>'
@@ -43,8 +44,8 @@ def picture(title: str, figure: str) -> Picture:
     """Return a figure of :mod:`forcefit.page.charts` as a picture.
 
     Args:
-        title: of the page around it.
-        figure: HTML.
+        title: title of the page that contains the figure.
+        figure: HTML of the figure.
 
     Returns:
         The picture.
@@ -55,15 +56,15 @@ def picture(title: str, figure: str) -> Picture:
 
 
 def in_notebook() -> bool:
-    """Return whether a notebook shows what its cells return: IPython with a kernel."""
+    """Return whether the code runs in a notebook, that is, in IPython with a kernel."""
     return getattr(_shell(), "kernel", None) is not None
 
 
 def show_figures_of_cells() -> None:
-    """Let a notebook show a figure of matplotlib that is the result of a cell.
+    """Let a notebook display a matplotlib figure that is the result of a cell.
 
-    IPython does so itself only after the first figure of pyplot.  A way that the user
-    chose, such as ``%matplotlib inline``, is left as it is.
+    IPython displays such figures only after pyplot has made a figure.  If the user
+    chose a display method, such as ``%matplotlib inline``, it is not changed.
     """
     if not in_notebook():
         return
@@ -82,5 +83,5 @@ def _png(figure: "Figure") -> bytes:
 
 
 def _shell() -> Any:
-    """Return IPython's shell, None outside IPython."""
+    """Return the shell of IPython, or None outside IPython."""
     return getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()

@@ -1,4 +1,4 @@
-"""Tables and numbers of a page; each number has its SI value, to change the units."""
+"""Tables and numbers of a page, stored in SI units so that the unit can be changed."""
 
 import math
 from collections.abc import Sequence
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from forcefit.page.markup import piece
 from forcefit.results.units import Shown, number_text, shown_in
 
-_LONG = 48  # [characters] texts that are longer may be wrapped in their cells
+_LONG = 48  # [characters] a cell with a longer text may be wrapped
 Marked = tuple[dict[str, str], str]  # attributes and text of a cell
 
 
@@ -17,7 +17,7 @@ class Value:
 
     Attributes:
         value: value in SI.
-        unit: SI unit; empty for a number without unit.
+        unit: SI unit; empty for a dimensionless number.
         digits: number of significant digits on the page.
     """
 
@@ -44,13 +44,13 @@ class Value:
 def rotation_and_translation(
     rotation: float, translation: float, digits: int = 4
 ) -> list[str | Value]:
-    """Return the sizes of a rotation [rad] and of a translation [m], in this order."""
+    """Return the magnitudes of a rotation [rad] and of a translation [m] as text."""
     return [Value(rotation, "rad", digits), " and ", Value(translation, "m", digits)]
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of numbers in one unit, which its head states.
+    """A column of numbers in one unit, which the column head states.
 
     Attributes:
         title: words that describe the quantity.
@@ -72,12 +72,12 @@ def table(
     """Return a table; a click on its head sorts it, and a button copies it as CSV.
 
     Args:
-        head: head of each column; numbers under a :class:`Column` have its unit.
-        rows: texts, numbers (under a :class:`Column`) or :class:`Value`.
-        name: name of the table, for the label of the button.
+        head: head of each column; numbers below a :class:`Column` are in its unit.
+        rows: cells, each a text, a number (in a :class:`Column`) or a :class:`Value`.
+        name: name of the table, for the label of the copy button.
 
     Returns:
-        HTML, in which texts are escaped.
+        HTML, in which special characters of the texts are escaped.
     """
     columns = [_shown_column(h, [row[k] for row in rows]) for k, h in enumerate(head)]
     heads = [_head_cell(h, s) for h, s in zip(head, columns, strict=True)]
@@ -89,7 +89,7 @@ def table(
 
 
 def _shown_column(head: str | Column, cells: Sequence[Cell]) -> Shown:
-    """Return the display unit of a column, which depends on the size of its numbers."""
+    """Return the display unit of a column, chosen by the size of its numbers."""
     if isinstance(head, str):
         return Shown("", "", 1.0)
     sizes = [abs(c) for c in cells if isinstance(c, int | float) and math.isfinite(c)]
@@ -107,7 +107,7 @@ def _head_cell(head: str | Column, shown: Shown) -> Marked:
 
 
 def _cell(cell: Cell, head: str | Column, shown: Shown) -> Marked:
-    """Return cell of a text, of a number in the column's unit, or of a ``Value``."""
+    """Return the HTML cell of a text, a number in the column's unit, or a ``Value``."""
     if isinstance(cell, str):
         return {"class": "long"} if len(cell) > _LONG else {}, cell
     if isinstance(cell, Value):

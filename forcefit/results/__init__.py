@@ -1,4 +1,4 @@
-"""Quantities of all results: one table for texts, JSON and attributes.
+"""Quantities of all results: a table that defines names, units and descriptions.
 
-Begin with :mod:`forcefit.results.quantities`.
+Start with :mod:`forcefit.results.quantities`.
 """

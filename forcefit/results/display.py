@@ -1,12 +1,12 @@
 """Short representations of objects: a title and a few values with their units.
 
-A dataclass uses them by one line in its body::
+A dataclass uses these functions by one line in its body::
 
     __repr__, _repr_html_ = short_repr, html_table
 
-The values are those of the method ``_figures`` of the object; without this method, they
-are its fields, abbreviated.  The text is for a console, and the table is for a
-notebook; both have a few lines.
+The values come from the method ``_figures`` of the object.  Without this method, the
+abbreviated fields of the object are shown.  The text is for a console, and the HTML
+table is for a notebook.  Both are a few lines long.
 """
 
 import html
@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 
 Figures = dict[str, str]
 
-_LONGEST = 72  # [characters] longest text of a value
-# largest number of elements that are shown; of a longer array, only the shape is shown
+_LONGEST = 72  # [characters] limit on the text of a value
+# largest array that is shown with its elements; of a longer array, the shape is shown
 _FEW = 6
 
 
@@ -37,11 +37,11 @@ def short_repr(self: Any) -> str:
 
 
 def show(self: Any, **options: Any) -> Any:
-    """Return a picture: interactive in a notebook, a figure of matplotlib elsewhere.
+    """Return a picture: interactive in a notebook, otherwise a matplotlib figure.
 
     Args:
-        self: what is drawn.
-        options: of ``forcefit.show``.
+        self: object to draw.
+        options: options of ``forcefit.show``.
 
     Returns:
         The picture of ``forcefit.show``.
@@ -52,20 +52,20 @@ def show(self: Any, **options: Any) -> Any:
 
 
 def listing(title: str, lines: Mapping[str, str], notes: Sequence[str] = ()) -> str:
-    """Return a title, aligned lines of words and values, and notes."""
+    """Return a title, aligned lines of names and values, and notes as text."""
     width = max(map(len, lines), default=0)
     rows = [f"  {words:{width}}  {value}" for words, value in lines.items()]
     return "\n".join([title, *rows, *(f"note: {note}" for note in notes)])
 
 
 def html_table(self: Any) -> str:
-    """Return a title and a table of the values in HTML, for notebooks.
+    """Return an HTML table of the values below a title, for notebooks.
 
     Args:
         self: a dataclass; its method ``_figures`` is optional.
 
     Returns:
-        HTML, in which names from files are escaped.
+        HTML, in which special characters of names are escaped.
     """
     rows = "".join(
         f'<tr><th style="text-align:left">{html.escape(name)}</th>'
@@ -89,7 +89,7 @@ def title(thing: object) -> str:
 
 
 def brief(value: object) -> str:
-    """Return a value as a short line; only its kind if the line would be too long."""
+    """Return a value as a short text; only its kind if the text would be too long."""
     if isinstance(value, np.ndarray):
         if 0 < value.size <= _FEW and value.dtype.kind in "fiu":
             return "[" + " ".join(f"{v:.4g}" for v in value.ravel()) + "]"
@@ -109,12 +109,12 @@ def brief(value: object) -> str:
 
 
 def numbers(values: Iterable[float]) -> str:
-    """Return the numbers in brackets, rounded by :func:`rounded`."""
+    """Return a text of numbers in brackets, rounded by :func:`rounded`."""
     return "[" + " ".join(f"{rounded(v):.4g}" for v in values) + "]"
 
 
 def rounded(value: float) -> float:
-    """Return a number for display; below 1e-9, a rounding error, it becomes 0."""
+    """Round a number for display; a size below 1e-9 is rounding and becomes 0."""
     return 0.0 if abs(value) < 1e-9 else float(value)
 
 
@@ -122,7 +122,7 @@ def pose_text(pose: Mapping[str, float]) -> str:
     """Return a pose as text, rotations first as in a screw.
 
     Args:
-        pose: components ``rx .. tz`` [rad, m], or some of them.
+        pose: all or some of the components ``rx .. tz`` [rad, m].
 
     Returns:
         Text such as ``[0 0 0] rad, [0.1 0 -0.5] m``.
@@ -134,39 +134,39 @@ def pose_text(pose: Mapping[str, float]) -> str:
 
 
 def screw_text(screw: ArrayLike) -> str:
-    """Return the text of a platform screw (6,) [rad, m]."""
+    """Return a platform screw (6,) [rad, m] as text."""
     s = 1e3 * np.asarray(screw, dtype=float)
     return f"{numbers(s[:3])} mrad, {numbers(s[3:])} mm"
 
 
 def largest(screws: ArrayLike) -> str:
-    """Return the largest rotation and translation of screws (..., 6) [rad, m]."""
+    """Return the largest rotation and the largest translation of screws (..., 6)."""
     parts = np.asarray(screws, dtype=float).reshape(-1, 2, 3)
     turn, shift = 1e3 * np.linalg.norm(parts, axis=-1).max(axis=0, initial=0.0)
     return f"{turn:.4g} mrad, {shift:.4g} mm" if turn or shift else "none"
 
 
 def largest_row(sizes: ArrayLike) -> int:
-    """Return the row of the largest number; the first row of numbers equal within 1e-9.
+    """Return the row of the largest number; the first row of numbers equal to 1e-9.
 
     Args:
         sizes: (k,) numbers >= 0, with k > 0.
 
     Returns:
-        Number of the row, which is the same on every processor.
+        Row number, which does not depend on the processor.
     """
     values = np.asarray(sizes, dtype=float)
     return int(np.argmax(values >= (1 - 1e-9) * np.nanmax(values)))
 
 
 def bracket(bounds: Sequence[float] | NDArray, unit: str) -> str:
-    """Return two bounds [rad or m] as text in mrad or mm."""
+    """Return a lower and an upper bound [rad or m] as text in mrad or mm."""
     low, high = 1e3 * bounds[0], 1e3 * bounds[1]
     return f"{low:.6g} to {high:.6g} {unit}" if low < float("inf") else "without bound"
 
 
 def _figures(thing: Any) -> Figures:
-    """Return the values of an object from its method ``_figures``, or its fields."""
+    """Return the values that represent an object: ``_figures`` or the fields."""
     if hasattr(thing, "_figures"):
         return thing._figures()
     shown = [one.name for one in fields(thing) if one.repr and one.name != "name"]
@@ -174,6 +174,6 @@ def _figures(thing: Any) -> Figures:
 
 
 def _cut(text: str) -> str:
-    """Return a text on one line, shortened to the largest length."""
+    """Return a text on one line, shortened to the largest allowed length."""
     text = " ".join(text.split())
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4]} ..."

@@ -15,7 +15,7 @@ from forcefit.results.records import (
 
 _SHARE = number("share")
 _AXIS = ("axis",)
-# keys that several outputs have in common
+# records that several outputs contain
 POSE = record("rx? ry? rz? tx? ty? tz?")
 _POSTURE = record("robot status reason?", pose=POSE)
 INTERVAL = record("probability lower upper undecided?")

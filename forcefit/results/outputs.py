@@ -1,4 +1,4 @@
-"""Records of the JSON of every command, composed of the table's quantities."""
+"""Records of the JSON output of every command, composed of quantities of the table."""
 
 from collections.abc import Mapping
 

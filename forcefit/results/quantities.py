@@ -1,7 +1,7 @@
 """Table of quantities: words, unit, symbol, meaning and dimensions of every result.
 
-A quantity has one name in Python, JSON, NetCDF files and tables.  ``--json`` outputs
-are composed of these names in :mod:`forcefit.results.outputs`.
+A quantity has the same name in Python, JSON, NetCDF files and tables.  The records in
+:mod:`forcefit.results.outputs` compose the ``--json`` outputs from these names.
 """
 
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 Kind = Literal["number", "integer", "string", "boolean"]
-# labels of the dimensions that many quantities share
+# labels of the dimensions that several quantities share
 LABELS: dict[str, tuple[str, ...]] = {
     "screw": ("RX", "RY", "RZ", "TX", "TY", "TZ"),
     "wrench_component": ("MX", "MY", "MZ", "FX", "FY", "FZ"),
@@ -26,14 +26,14 @@ class Quantity:
     """One quantity of the results.
 
     Attributes:
-        words: its name in reports and texts, without an article.
-        unit: SI unit; ``"1"`` for a number without unit, ``"rad, m"`` for the two
-            halves of a screw, empty if the result states its unit.
-        dims: its dimensions; dimensions in :data:`LABELS` have a fixed length.
-        meaning: its definition, if the words are not sufficient.
-        symbol: its symbol in the paper, empty if the paper has none.
-        kind: type of its values.
-        shown: display unit in texts, if it is not the SI unit.
+        words: name of the quantity in reports and texts, without an article.
+        unit: SI unit.  ``"1"`` denotes a dimensionless number, and ``"rad, m"`` the two
+            halves of a screw.  The unit is empty if the result itself states it.
+        dims: names of the dimensions; those in :data:`LABELS` have a fixed length.
+        meaning: definition of the quantity, if the words are not sufficient.
+        symbol: symbol of the quantity in the paper; empty if the paper has none.
+        kind: type of the values.
+        shown: display unit in texts, if it differs from the SI unit.
         digits: number of significant digits in texts.
     """
 
@@ -48,22 +48,22 @@ class Quantity:
 
     @property
     def display_unit(self) -> str:
-        """Unit of the values in texts."""
+        """Unit in which texts show the values."""
         return self.shown or self.unit
 
     @property
     def attributes(self) -> dict[str, str]:
-        """Attributes of the NetCDF variable of this quantity."""
+        """Attributes of the NetCDF variable that stores this quantity."""
         return {"units": self.unit, "long_name": self.meaning or self.words}
 
 
 def number(words: str, unit: str = "1", *dims: str) -> Quantity:
-    """Return a quantity of numbers."""
+    """Return a quantity whose values are floating-point numbers."""
     return Quantity(words, unit, dims)
 
 
 def text(words: str, *dims: str, meaning: str = "") -> Quantity:
-    """Return a quantity of texts."""
+    """Return a quantity whose values are texts."""
     return Quantity(words, dims=dims, meaning=meaning, kind="string")
 
 
@@ -73,7 +73,7 @@ def count(words: str, *dims: str, meaning: str = "") -> Quantity:
 
 
 def flag(words: str, *dims: str) -> Quantity:
-    """Return a quantity of truth values."""
+    """Return a quantity whose values are booleans."""
     return Quantity(words, dims=dims, kind="boolean")
 
 
@@ -522,12 +522,12 @@ QUANTITIES: Mapping[str, Quantity] = {
 
 
 def in_words(key: str) -> str:
-    """Return words for a key of the results; without an entry, the key itself."""
+    """Return words for a key of the results, or the key if it is not listed."""
     return QUANTITIES[key].words if key in QUANTITIES else key.replace("_", " ")
 
 
 def unit_of(key: str) -> str:
-    """Return SI unit of a key; empty for pure numbers, mixed units and unknown keys."""
+    """Return the SI unit of a key; empty if pure, of mixed units or unknown."""
     unit = QUANTITIES[key].unit if key in QUANTITIES else ""
     mixed = unit == "1" or "," in unit or ".." in unit or " or " in unit
     return "" if mixed else unit

@@ -1,4 +1,4 @@
-"""Records: the quantities of a result in JSON, and their nesting."""
+"""Records, which declare the quantities in a JSON result and their nesting."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -21,12 +21,12 @@ Content = Union[
 
 @dataclass(frozen=True)
 class Record:
-    """An object whose keys are known.
+    """A JSON object whose keys are declared.
 
     Attributes:
-        content: content of each key.
+        content: declared content of each key.
         optional: keys that may be absent.
-        closed: whether other keys are forbidden.
+        closed: whether undeclared keys are forbidden.
     """
 
     content: Mapping[str, Content]
@@ -36,55 +36,55 @@ class Record:
 
 @dataclass(frozen=True)
 class Each:
-    """An object whose keys are names, such as names of frames, with equal contents."""
+    """A JSON object whose keys are names, such as frame names, with equal contents."""
 
     content: Content
 
 
 @dataclass(frozen=True)
 class Listed:
-    """A list whose items have equal contents."""
+    """A JSON list whose items all have the same declared content."""
 
     content: Content
 
 
 @dataclass(frozen=True)
 class Either:
-    """One of several contents."""
+    """A value that matches one of several declared contents."""
 
     contents: tuple[Content, ...]
 
 
 @dataclass(frozen=True)
 class Words:
-    """One of several words."""
+    """A text that equals one of several words."""
 
     words: tuple[str | int, ...]
 
 
 @dataclass(frozen=True)
 class Anything:
-    """Any content."""
+    """A value of any type."""
 
 
 @dataclass(frozen=True)
 class WithUnits:
-    """A content whose numbers may be texts with a unit."""
+    """A content in which each number may also be a text with a unit."""
 
     content: Content
 
 
 def record(names: str = "", /, *merged: Record, **content: Content) -> Record:
-    """Return a record from names of quantities, other records, and contents.
+    """Return a record composed of quantities, other records and further contents.
 
     Args:
         names: names separated by blanks; a question mark after a name, or an underscore
             after a key, marks it as optional.
-        merged: records whose keys are added.
-        content: contents of other keys.
+        merged: other records, whose keys are added to the record.
+        content: contents of further keys.
 
     Returns:
-        The record, with its keys in this order.
+        The record, with its keys in the order of the arguments.
 
     Raises:
         KeyError: a name is not in the table.
@@ -93,7 +93,7 @@ def record(names: str = "", /, *merged: Record, **content: Content) -> Record:
     optional: set[str] = set()
     for name in names.split():
         key = name.rstrip("?")
-        QUANTITIES[key]  # refuses a name that is not in the table
+        QUANTITIES[key]  # raises the error for a name that is not in the table
         every[key] = key
         optional |= {key} if name.endswith("?") else set()
     for other in merged:

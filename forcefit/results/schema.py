@@ -1,7 +1,7 @@
-"""JSON Schema (draft 2020-12) of outputs and input files, from their records.
+"""JSON Schema (draft 2020-12) of outputs and input files, generated from their records.
 
-Every value of an output may be null, except for truth values.  Null means a number that
-is not finite, or a result that a failed computation lacks.
+Every value of an output may be null, except for booleans.  Null represents a number
+that is not finite, or a result that is missing because a computation failed.
 """
 
 from typing import Any
@@ -30,7 +30,7 @@ def schema_of(content: Content, title: str = "", file: bool = False) -> dict[str
         file: whether the content is an input file in TOML, which has no null.
 
     Returns:
-        Plain values.
+        The schema as plain values.
     """
     schema = _schema(content)
     return {"$schema": DRAFT, "title": title} | (
@@ -39,7 +39,7 @@ def schema_of(content: Content, title: str = "", file: bool = False) -> dict[str
 
 
 def _without_null(schema: Any) -> Any:
-    """Return a schema that does not allow null."""
+    """Remove null from the types that a schema allows."""
     if isinstance(schema, list):
         return [_without_null(one) for one in schema]
     if not isinstance(schema, dict):
@@ -74,7 +74,7 @@ def _schema(content: Content) -> dict[str, Any]:
 
 
 def _with_texts(schema: Any) -> Any:
-    """Return a schema that allows a text for each number."""
+    """Allow a text in addition to each number of a schema."""
     if isinstance(schema, list):
         return [_with_texts(one) for one in schema]
     if not isinstance(schema, dict):
@@ -88,7 +88,7 @@ def _with_texts(schema: Any) -> Any:
 
 
 def _object(content: Record) -> dict[str, Any]:
-    """Return the schema of an object whose keys are known."""
+    """Return the schema of an object whose keys are declared."""
     one: dict[str, Any] = {
         "type": ["object", "null"],
         "properties": {key: _schema(inner) for key, inner in content.content.items()},
@@ -102,7 +102,7 @@ def _object(content: Record) -> dict[str, Any]:
 
 
 def _array(one: Quantity, dims: tuple[str, ...]) -> dict[str, Any]:
-    """Return the schema of values over dimensions."""
+    """Return the schema of an array with the given dimensions."""
     if not dims:
         return {"type": [one.kind, "null"]}
     length = len(LABELS.get(dims[0], ()))
@@ -112,7 +112,7 @@ def _array(one: Quantity, dims: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _described(schema: dict[str, Any], one: Quantity) -> dict[str, Any]:
-    """Return a schema with the words, meaning and unit of a quantity."""
+    """Return a schema extended by the words, meaning and unit of a quantity."""
     words = f"{one.words}: {one.meaning}" if one.meaning else one.words
     unit = "" if one.unit in {"", "1"} or one.kind != "number" else f" [{one.unit}]"
     return schema | {"description": words + unit}

@@ -1,6 +1,6 @@
-"""Results as text: quantities of the table, one for each line, and tables of numbers.
+"""Results as text: a line for each quantity of the table, and tables of numbers.
 
-Commands print the same lines that represent an object briefly.
+Commands and the short representation of an object print the same lines.
 """
 
 import math
@@ -19,10 +19,10 @@ def value_text(quantity: Quantity | str, value: Any) -> str:
 
     Args:
         quantity: the quantity, or its name in the table.
-        value: a number, vector, text or truth value, several of them, or None.
+        value: a number, vector, text, boolean or list of these, or None.
 
     Returns:
-        Text with its unit; ``none`` if the number does not exist.
+        Text with the unit; ``none`` if the number does not exist.
     """
     known = QUANTITIES[quantity] if isinstance(quantity, str) else quantity
     if value is None or (isinstance(value, float) and math.isnan(value)):
@@ -52,16 +52,16 @@ def value_text(quantity: Quantity | str, value: Any) -> str:
 
 
 def in_unit(value: float, unit: str, digits: int = 4) -> str:
-    """Return a number in SI as text in a display unit, such as ``um``."""
+    """Return a number in SI units as text in a display unit, such as ``um``."""
     return _with_unit(f"{FACTORS.get(unit, 1.0) * value + 0.0:.{digits}g}", unit)
 
 
 def readings_text(sizes: Mapping[str, float | None], digits: int = 4) -> str:
-    """Return errors of readings as text; errors that are not known are omitted.
+    """Return errors of readings as text; unknown errors are left out.
 
     Args:
-        sizes: ``position`` [m], ``rotation`` [rad], and ``normalised``, divided by
-            sigma.
+        sizes: ``position`` [m], ``rotation`` [rad], and ``normalised``, the error
+            divided by sigma.
         digits: number of significant digits.
 
     Returns:
@@ -82,10 +82,10 @@ def lines_of(results: Mapping[str, Any], names: str) -> dict[str, str]:
     Args:
         results: plain values of a command.
         names: names of quantities, separated by blanks; a dot separates a record from
-            its key.  An absent quantity and the status ``ok`` have no line.
+            its key.  Absent quantities and the status ``ok`` are left out.
 
     Returns:
-        The values as text, by the words of the quantities.
+        Values as text; the keys are the words of the quantities.
     """
     lines: dict[str, str] = {}
     for path in names.split():
@@ -99,7 +99,7 @@ def lines_of(results: Mapping[str, Any], names: str) -> dict[str, str]:
 
 
 def forced_lines(assembly: Any) -> dict[str, str]:
-    """Return pose, load, energy and platform error of a forced assembly as text."""
+    """Return the pose, load, energy and platform error of a forced assembly as text."""
     values = {
         "pose": assembly.posture.pose(),
         "energy": assembly.energy,
@@ -113,16 +113,16 @@ def forced_lines(assembly: Any) -> dict[str, str]:
 def table_lines(
     head: Sequence[str], rows: Mapping[str, Sequence[Any]], digits: int = 5
 ) -> list[str]:
-    """Return aligned rows of numbers under column heads.
+    """Return aligned rows of numbers below column heads.
 
     Args:
         head: head of the row names, then the head of each column with its unit.
-        rows: numbers or texts, by name of the row; a number that is not finite is a
-            dash.
+        rows: numbers or texts of each row, by row name; a number that is not finite is
+            printed as a dash.
         digits: number of significant digits.
 
     Returns:
-        Lines.
+        Lines of text.
     """
     first, *columns = head
     width = max(map(len, (first, *rows)))
@@ -141,10 +141,10 @@ def table_lines(
 
 
 def _cell(value: float, digits: int) -> str:
-    """Return the text of a number in a table."""
+    """Return a number of a table as text."""
     return f"{value + 0.0:.{digits}g}" if math.isfinite(value) else "-"
 
 
 def _with_unit(text: str, unit: str) -> str:
-    """Return a text with its unit, if it has one."""
+    """Return a text followed by the unit, if there is a unit."""
     return text if unit in {"", "1"} else f"{text} {unit}"

@@ -1,9 +1,9 @@
-"""Display units: by the size of numbers on pages, by the quantity in text."""
+"""Display units: chosen by size on pages, and by quantity in text."""
 
 import math
 from dataclasses import dataclass
 
-# for each SI unit: (least size [SI], display unit, factor), the largest unit first
+# for each SI unit: (smallest size [SI], display unit, factor), the largest unit first
 _SHOWN: dict[str, tuple[tuple[float, str, float], ...]] = {
     "m": ((1e-4, "mm", 1e3), (0.0, "µm", 1e6)),
     "rad": ((0.1, "deg", 180 / math.pi), (1e-4, "mrad", 1e3), (0.0, "µrad", 1e6)),
@@ -24,12 +24,12 @@ FACTORS = {
 
 @dataclass(frozen=True)
 class Shown:
-    """Display unit of numbers in one SI unit.
+    """Display unit for numbers in an SI unit.
 
     Attributes:
-        unit: SI unit, empty for a number without unit.
+        unit: SI unit; empty for a dimensionless number.
         shown: display unit.
-        factor: displayed number = factor * number in SI.
+        factor: displayed number divided by the number in SI units.
     """
 
     unit: str
@@ -41,18 +41,18 @@ def shown_in(unit: str, size: float = 1.0) -> Shown:
     """Return the display unit for numbers of an SI unit.
 
     Args:
-        unit: SI unit, such as ``"m"``; empty, ``"1"`` or ``"-"`` for a number without
-            unit.
-        size: [unit] largest of the numbers.
+        unit: SI unit, such as ``"m"``; empty, ``"1"`` or ``"-"`` if the number is
+            dimensionless.
+        size: [unit] largest absolute value of the numbers.
 
     Returns:
-        The display unit and its factor; the SI unit if no other unit is usual.
+        The display unit and its factor; the SI unit if no other unit is customary.
     """
     if unit in {"", "1", "-"}:
         return Shown("", "", 1.0)
     usual = _SHOWN.get(unit, ((0.0, unit, 1.0),))
     size = abs(size) if math.isfinite(size) else math.inf
-    size = size or 1e-3  # zero is shown in mm and mrad
+    size = size or 1e-3  # zero is displayed in mm or mrad
     return next(
         Shown(unit, name, factor) for least, name, factor in usual if size >= least
     )
@@ -64,5 +64,5 @@ def number_text(value: float, unit: str = "", digits: int = 4) -> str:
         return "none"
     if math.isinf(value):
         return "unbounded"
-    # minus zero is zero
+    # minus zero is printed as zero
     return f"{value + 0.0:.{digits}g} {unit}".rstrip()

@@ -1,4 +1,4 @@
 """Closed forms for links: sections, straight and curved beams, and their stress.
 
-Begin at ``beam.py``, the compliance of a cantilever.
+Start with ``beam.py``, which computes the compliance of a cantilever.
 """

@@ -33,20 +33,20 @@ def beam_compliance(
 ) -> NDArray:
     r"""Return the tip compliance of a straight cantilever of constant section.
 
-    The link is clamped at its base; the screw is read at its tip.  Bending, torsion,
-    stretching and (Timoshenko) shear are included.  Warping restraint, taper and the
-    local compliance of the end fittings are left out;
+    The link is clamped at its base, and the screw is read at its tip.  Bending,
+    torsion, stretching and (Timoshenko) shear are included.  Warping restraint, taper
+    and the local compliance of the end fittings are not included;
     :func:`forcefit.stiffness.fem.fea.mesh_link` includes them.
 
     Args:
-        length: [m] from the clamped section to the tip, > 0.
+        length: [m] distance from the clamped section to the tip, > 0.
         section: constants of the cross-section.
         E: [Pa] Young's modulus, > 0.
         nu: [-] Poisson's ratio, in (-1, 0.5).
         theory: ``"timoshenko"``, or ``"euler"`` for bending without shear.
         axis: (3,) vector of any length from base to tip, in the axes of the result.
-        up: (3,) the section's z axis, in the same axes; its component along the axis is
-            removed.  The default is y, or z for a beam along y.
+        up: (3,) vector along the section's z axis, in the same axes; its component
+            along the beam is removed.  The default is y, or z for a beam along y.
 
     Returns:
         (6, 6) [rad/(N m), rad/N, m/(N m), m/N] compliance, symmetric positive definite.
@@ -100,19 +100,19 @@ def _compliance_in_section_axes(
 
 
 def section_axes(axis: ArrayLike, up: ArrayLike | None = None) -> NDArray:
-    """Return the axes of a section, as columns x (along the beam), y, z (up).
+    """Return the axes of a section as columns: x (along the beam), y and z (up).
 
     Args:
         axis: (3,) vector of any length from base to tip.
-        up: (3,) the section's z axis; its component along the axis is removed.  The
-            default is y, or z for a beam along y.
+        up: (3,) vector along the section's z axis; its component along the beam is
+            removed.  The default is y, or z for a beam along y.
 
     Returns:
-        (3, 3) axes, a proper orthogonal matrix.
+        (3, 3) proper orthogonal matrix, whose columns are the axes.
 
     Raises:
-        BadInput: a vector is not three finite numbers, is zero, or ``up`` lies along
-            the axis.
+        BadInput: a vector does not consist of three finite numbers or is zero, or
+            ``up`` is parallel to the beam.
     """
     x = unit_vector("axis", axis)
     if up is None:
@@ -127,7 +127,7 @@ def section_axes(axis: ArrayLike, up: ArrayLike | None = None) -> NDArray:
 
 
 def unit_vector(name: str, vector: ArrayLike) -> NDArray:
-    """Return the unit vector along a vector given by the user.
+    """Normalise a vector given by the user to length one.
 
     Args:
         name: name for error messages.
@@ -137,7 +137,7 @@ def unit_vector(name: str, vector: ArrayLike) -> NDArray:
         (3,) vector of length one.
 
     Raises:
-        BadInput: the vector is not three finite numbers, or is zero.
+        BadInput: the vector does not consist of three finite numbers, or is zero.
     """
     direction = np.asarray(vector, dtype=float)
     if direction.shape != (3,) or not np.isfinite(direction).all():

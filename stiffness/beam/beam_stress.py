@@ -29,12 +29,13 @@ from numpy.typing import ArrayLike, NDArray
 from forcefit.inputs.table import BadInput
 from forcefit.stiffness.beam.sections import Section, declared_section
 
-# number of fibres around a round section; the error between two fibres is at most 4e-5
+# number of fibres around a round section; the relative error between two fibres is at
+# most 4e-5
 _AROUND = 360
 # number of fibres along a side; the error of a parabola between two fibres is at most
 # 1e-3
 _ACROSS = 33
-_CHUNK = 2048  # number of sections in a batch: 2048 x 1089 x 3 values are 54 MB
+_CHUNK = 2048  # number of sections in a batch: 2048 x 1089 x 3 numbers occupy 54 MB
 # number of sections of a heavy beam; the error of a parabola between two is at most
 # 1e-3
 _ALONG = 33
@@ -50,15 +51,17 @@ def peak_beam_stress(
     """Return the largest von Mises stress in a straight beam, and its position.
 
     Axial force, bending, torsion and shear act together.  The stress is evaluated in
-    the sections at base and tip, for a beam with weight also between them, at
+    the sections at the base and at the tip.  For a beam with weight, sections between
+    them are evaluated too.  In each section, the stress is evaluated at
 
     - round bar and tube: 360 points of the outer circle;
     - solid rectangle: a grid of 33 x 33 points, corners and middles included;
     - hollow rectangle: 33 points along each outer side.
 
-    Two local effects are left out: the stress where a joint holds the link's ends (a
-    held edge is singular, see :mod:`forcefit.stiffness.fem.stress`), and the stress in
-    the inner corners of a hollow rectangle, which depends on their fillets.
+    Two local effects are not included.  The first is the stress where a joint holds the
+    ends of the link; a clamped edge is singular, see
+    :mod:`forcefit.stiffness.fem.stress`.  The second is the stress in the inner corners
+    of a hollow rectangle, which depends on the radius of their fillets.
 
     Args:
         section: ``radius`` and optionally ``inner_radius``, or ``width`` (along y) and
@@ -120,7 +123,7 @@ def peak_beam_stress(
 
 
 def _sections(wrench: NDArray, weight: NDArray, length: float) -> NDArray:
-    """Return (n, k) [m] distances of sections from the tip; the base is first."""
+    """Return (n, k) [m] distances of sections from the tip, starting with the base."""
     ends = np.broadcast_to([length, 0.0], (len(wrench), 2))
     if not weight.any():
         return ends
@@ -139,9 +142,9 @@ def _on_sections(
     """Return (n, k, 6) [N m, N] loads on sections at distances s from the tip."""
     on = np.repeat(wrench[:, None], s.shape[1], axis=1)
     share = s / length if length else np.zeros_like(s)
-    # mean force between tip and section: half of the weight between them is added
+    # mean force between tip and section: half of the weight of this length is added
     middle = wrench[:, None, 3:] + share[..., None] * weight[:, None] / 2
-    on[..., 1] -= s * middle[..., 2]  # arm times force
+    on[..., 1] -= s * middle[..., 2]  # lever arm times force
     on[..., 2] += s * middle[..., 1]
     on[..., 3:] += share[..., None] * weight[:, None]
     return on
@@ -179,7 +182,7 @@ def section_stress(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
             f"stress: found a section of {', '.join(section) or 'nothing'}; "
             f"expected {_SHAPES}"
         )
-    # only the factors of shear deformation depend on Poisson's ratio
+    # Poisson's ratio affects only the factors of shear deformation
     constants = declared_section(section, nu=0.3)
     if "radius" in section:
         return _round(constants, section["radius"], section.get("inner_radius", 0.0))
@@ -221,7 +224,7 @@ def _rectangle(
     influence = _bending(section, y, z)
     if width <= height:
         tau_y, tau_z = _torsion(y, z, width / 2, height / 2)
-    else:  # a quarter turn about x, after which the short side is along z
+    else:  # rotate by a quarter turn about x, so that the short side is along z
         tau_z, minus_tau_y = _torsion(z, -y, height / 2, width / 2)
         tau_y = -minus_tau_y
     influence[:, 1, 0], influence[:, 2, 0] = tau_y / section.J, tau_z / section.J
@@ -251,7 +254,7 @@ def _hollow(
     share = np.linspace(-0.5, 0.5, _ACROSS)
     places, influences = [], []
     for turns in range(4):
-        # the right side of a section that is rotated by quarter turns
+        # one routine computes the right side; the section is rotated by quarter turns
         across, up = (width, height) if turns % 2 == 0 else (height, width)
         second = section.I_y if turns % 2 == 0 else section.I_z
         out = np.round([np.cos(turns * np.pi / 2), np.sin(turns * np.pi / 2)])
@@ -260,14 +263,16 @@ def _hollow(
         influence = _bending(section, *where.T)
         b, h = across - wall, up - wall
         around = 2 * (b + h)
-        # Bredt's flow over the wall, and the twist of the wall itself at its outer face
+        # shear flow of Bredt in the wall, plus the twist of the wall itself at the
+        # outer face
         twist = 2 * b * h / around / section.J + wall / section.J
-        # V Q / (I b): flange above, then the wall; there is no wall beyond the hole
+        # V Q / (I b) of the flange and then of the wall; the wall ends at the hole
         inside = np.minimum(np.abs(up * share), up / 2 - wall)
         flange = across * (up**2 - (up - 2 * wall) ** 2) / 8
         Q = flange + wall * ((up / 2 - wall) ** 2 - inside**2)
         parallel = Q / (second * 2 * wall)
-        # shear flow of a transverse force along this side, zero at its middle
+        # shear flow of a transverse force along this side, zero at the middle of the
+        # side
         other = section.I_z if turns % 2 == 0 else section.I_y
         crossing = -b / 2 * (up * share) / other
         flow = parallel[:, None] * along + crossing[:, None] * out

@@ -1,14 +1,14 @@
 r"""Beams along a curve: tapered, bent and L-shaped, by integration of the compliance.
 
-The wrench at the tip of a cantilever acts through every section, so the compliance is
-the integral of the compliance of its slices, each of them read at the tip,
+The wrench at the tip of a cantilever acts through every section.  The compliance is
+therefore the integral of the compliances of its slices, each expressed at the tip,
 
     C = integral A(s) c(s) A(s)^T ds,   A(s) = screw_map(p(s) - tip, R(s)),
 
 with c(s) = diag(1/GJ, 1/EI_y, 1/EI_z, 1/EA, 1/GA_y, 1/GA_z) per unit length in the
-section's axes R(s).  This is exact for beams whose radius of curvature is large
-compared with their section.  The theory of thick curved bars and warping at kinks are
-left out.
+section's axes R(s).  The formula is accurate for beams whose radius of curvature is
+large compared with their section.  The theory of thick curved bars and warping at kinks
+are not included.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,11 +32,12 @@ class Piece:
 
     Attributes:
         place: function of t that returns the position (3,) [m].
-        tangent: function of t that returns the derivative (3,) [m] of the position by
-            t.
+        tangent: function of t that returns the derivative (3,) [m] of the position with
+            respect to t.
         section: function of t that returns the section.
-        up: function of t that returns the section's z (3,), whose component along the
-            tangent is removed; None for the default of
+        up: function of t that returns a vector (3,) along the section's z axis; its
+            component along the tangent is removed.  None selects the default of
+            :func:`forcefit.stiffness.beam.beam.section_axes`.
             :func:`forcefit.stiffness.beam.beam.section_axes`.
     """
 
@@ -58,7 +59,7 @@ def straight_piece(
         start: (3,) [m] position of the start.
         end: (3,) [m] position of the end.
         section: constant section, or a function of t from 0 to 1.
-        up: (3,) the section's z axis.
+        up: (3,) vector along the section's z axis.
 
     Returns:
         The piece.
@@ -83,7 +84,7 @@ def arc_piece(
     turn: ArrayLike,
     section: Section | Callable[[float], Section],
 ) -> Piece:
-    """Return an arc of a circle; the section's z is the axis of rotation.
+    """Return a piece along an arc of a circle; the section's z is the axis of rotation.
 
     Args:
         start: (3,) [m] position of the start.
@@ -131,18 +132,19 @@ def curve_compliance(
     """Return the tip compliance of a beam along a curve.
 
     Args:
-        pieces: pieces from base to tip; each begins where the piece before it ends.
+        pieces: pieces from base to tip; each starts where the previous one ends.
         E: [Pa] Young's modulus, > 0.
         nu: [-] Poisson's ratio, in (-1, 0.5).
         theory: ``"timoshenko"``, or ``"euler"`` for bending without shear.
-        tolerance: [1] error of the integral, for entries scaled by sqrt(C_ii C_jj).
+        tolerance: [1] largest error of the integral, for entries scaled by
+            sqrt(C_ii C_jj).
 
     Returns:
         (6, 6) [rad/(N m) .. m/N] compliance, symmetric positive definite, read at the
         end of the last piece, in the axes of the pieces.
 
     Raises:
-        BadInput: there are no pieces or a gap between two, an argument is out of its
+        BadInput: no piece is given, two pieces do not meet, an argument is out of its
             range, or a section changes too abruptly for the integration.
 
     Example:
@@ -188,15 +190,16 @@ def curve_compliance(
 def curve_mass(
     pieces: Sequence[Piece], density: float
 ) -> tuple[float, NDArray, NDArray]:
-    """Return mass, centre and moments of inertia of a beam along a curve.
+    """Return the mass, the centre of mass and the inertia of a beam along a curve.
 
     Args:
         pieces: pieces from base to tip.
         density: [kg/m^3] density.
 
     Returns:
-        [kg], (3,) [m], and (3, 3) [kg m^2] about that centre, in the axes the pieces
-        are given in; its sections are plane, normal to the curve.
+        Mass [kg]; centre of mass (3,) [m]; and inertia (3, 3) [kg m^2] about the
+        centre of mass.  All are in the axes of the pieces.  Sections are treated as
+        plane and normal to the curve.
     """
     mass, moment, second, own = 0.0, np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3))
     for piece in pieces:
@@ -216,13 +219,13 @@ def curve_mass(
 
 
 def curve_length(pieces: Sequence[Piece]) -> float:
-    """Return the length of a beam along its curve.
+    """Return the length of a beam measured along its curve.
 
     Args:
         pieces: straight pieces and arcs, from base to tip.
 
     Returns:
-        The length [m].
+        Length [m].
     """
     speeds = [
         [np.linalg.norm(piece.tangent((x + 1) / 2)) for x in _POINTS]
@@ -232,7 +235,7 @@ def curve_length(pieces: Sequence[Piece]) -> float:
 
 
 def _check_joined(pieces: Sequence[Piece]) -> None:
-    """Check that each piece begins where the piece before it ends."""
+    """Raise an error if a piece does not start where the previous one ends."""
     for number, (one, next_one) in enumerate(
         zip(pieces[:-1], pieces[1:], strict=True), start=2
     ):
@@ -248,7 +251,7 @@ def _check_joined(pieces: Sequence[Piece]) -> None:
 def _integral(
     piece: Piece, tip: NDArray, E: float, nu: float, theory: str, parts: int
 ) -> NDArray:
-    """Return compliance of one piece, by ten Gauss points in each of equal parts."""
+    """Return the compliance of one piece, integrated by Gauss points in equal parts."""
     G, shear = E / (2 * (1 + nu)), theory == "timoshenko"
     total = np.zeros((6, 6))
     for first in range(parts):

@@ -1,4 +1,4 @@
-"""Beams along a curve from a file: straight pieces, tapered pieces and arcs."""
+"""Reader of beams along a curve: straight pieces, tapered pieces and arcs."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -10,20 +10,20 @@ from forcefit.inputs.table import BadInput, Table, read_toml
 from forcefit.stiffness.beam.curve import Piece, arc_piece, straight_piece
 from forcefit.stiffness.beam.sections import Section, check_section, declared_section
 
-_LARGEST = 1e6  # largest absolute value in SI units; no beam has a larger one
+_LARGEST = 1e6  # largest accepted absolute value in SI units
 
 
 def read_curve(path: Path | str, nu: float) -> list[Piece]:
-    """Return the pieces of a beam.
+    """Read the pieces of a beam from a file.
 
     Args:
-        path: TOML file with tables ``[[piece]]``.  Each has a ``section``, as in a
-            robot file or with ``wall`` (a box), ``web`` and ``flange`` (an I); if
-            absent, the section of the piece before it is used.  A straight piece has
-            ``end``, optionally ``up``, and ``tip_section`` if it is tapered (its
-            lengths change linearly).  An arc has ``center`` and ``turn``, a rotation
-            vector.  ``start`` [m] belongs to the first piece and is the origin if
-            absent.
+        path: TOML file with tables ``[[piece]]``.  The ``section`` of a piece is given
+            as in a robot file, or with ``wall`` (a box) or ``web`` and ``flange`` (an
+            I).  A piece without ``section`` has the section of the previous piece.
+            ``end`` defines a straight piece; ``up`` is optional, and ``tip_section``
+            makes it tapered, with lengths that change linearly.  ``center`` and
+            ``turn``, a rotation vector, define an arc.  ``start`` [m] of the first
+            piece is optional; its default is the origin.
         nu: [-] Poisson's ratio, on which shear factors depend.
 
     Returns:
@@ -83,7 +83,7 @@ def _section(part: Table, key: str) -> dict[str, float]:
 def _piece(
     part: Table, start: NDArray, section: Mapping[str, float], nu: float
 ) -> Piece:
-    """Return one piece of the curve."""
+    """Return one piece of the curve from its table."""
     try:
         shape = _tapered(part, section, nu)
         if part.has("turn"):

@@ -6,7 +6,7 @@ symbol    meaning                                                 unit
 y z       section axes, z up                                      -
 I_y I_z   second moments of area; I_y bends about y               m^4
 J         Saint-Venant's torsion constant                         m^4
-shear_*   share of the area that resists a force along y, z       1
+shear_*   shear area for a force along y, z, over the area        1
 ========  ======================================================  =====
 """
 
@@ -28,8 +28,8 @@ class Section:
         I_y: [m^4] second moment of area for bending about y (deflection along z).
         I_z: [m^4] second moment of area for bending about z (deflection along y).
         J: [m^4] torsion constant.
-        shear_y: [-] share of the area that resists a force along y.
-        shear_z: [-] share of the area that resists a force along z.
+        shear_y: [-] shear area for a force along y, divided by the area.
+        shear_z: [-] shear area for a force along z, divided by the area.
     """
 
     area: float
@@ -45,7 +45,7 @@ class Section:
 
     @property
     def size(self) -> float:
-        """[m] twice the larger radius of gyration; for a solid round bar its radius."""
+        """[m] twice the larger radius of gyration; the radius of a solid round bar."""
         return 2 * math.sqrt(max(self.I_y, self.I_z) / self.area)
 
 
@@ -65,8 +65,8 @@ def round_section(radius: float, nu: float, inner_radius: float = 0.0) -> Sectio
     Args:
         radius: [m] outer radius, > 0.
         nu: [-] Poisson's ratio, in (-1, 0.5); the shear factor depends on it.
-        inner_radius: [m] radius of the hole, smaller than ``radius``; 0 for a solid
-            bar.
+        inner_radius: [m] radius of the hole, smaller than ``radius``; 0 if the bar is
+            solid.
 
     Returns:
         The section.
@@ -126,16 +126,16 @@ def rectangular_section(width: float, height: float, nu: float) -> Section:
 
 
 def _rectangle_torsion(width: float, height: float) -> float:
-    """Return the torsion constant by Saint-Venant's series, to 1e-16."""
+    """Return the torsion constant from Saint-Venant's series, accurate to 1e-16."""
     long, short = max(width, height), min(width, height)
     odd = np.arange(1.0, 2001.0, 2.0)
-    # tanh is 1 for all but the first few terms; their tail decays as n^-4
+    # tanh equals 1 in all but the first few terms; the remaining sum decays as n^-4
     tail = np.sum(np.tanh(odd * math.pi * long / (2 * short)) / odd**5)
     return long * short**3 / 3 * (1 - 192 / math.pi**5 * short / long * float(tail))
 
 
 def box_section(width: float, height: float, wall: float, nu: float) -> Section:
-    """Return the section of a hollow rectangle with one wall thickness.
+    """Return the section of a hollow rectangle whose walls have the same thickness.
 
     Args:
         width: [m] outer width, along y.
@@ -144,8 +144,8 @@ def box_section(width: float, height: float, wall: float, nu: float) -> Section:
         nu: [-] Poisson's ratio.
 
     Returns:
-        The section.  Its torsion constant is that of a closed thin wall, plus the twist
-        of the wall itself; its shear factors are those of thin walls.
+        The section.  The torsion constant is that of a closed thin wall plus the
+        torsion constant of the wall itself.  The shear factors are those of thin walls.
 
     Raises:
         BadInput: a dimension or Poisson's ratio is out of its range.
@@ -173,8 +173,9 @@ def box_section(width: float, height: float, wall: float, nu: float) -> Section:
 
 
 def _box_shear(along: float, across: float, nu: float) -> float:
-    """Return Cowper's shear factor of a thin box, for a force along one side."""
-    # for equal walls, the ratio of flange to web area is the ratio of the sides
+    """Return Cowper's shear factor of a thin box for a force parallel to one side."""
+    # all walls have the same thickness, so the areas of flange and web have the ratio
+    # of the side lengths
     m = n = across / along
     top = 10 * (1 + nu) * (1 + 3 * m) ** 2
     plain = 12 + 72 * m + 150 * m**2 + 90 * m**3
@@ -186,7 +187,7 @@ def _box_shear(along: float, across: float, nu: float) -> float:
 def i_section(
     width: float, height: float, web: float, flange: float, nu: float
 ) -> Section:
-    """Return the section of an I-beam with equal flanges, the web along z (up).
+    """Return the section of an I-beam with equal flanges and its web along z (up).
 
     Args:
         width: [m] width of the flanges, along y.
@@ -196,8 +197,8 @@ def i_section(
         nu: [-] Poisson's ratio.
 
     Returns:
-        The section.  Its torsion constant is that of an open thin wall with free
-        warping. The flanges carry shear along y like two rectangles.
+        The section.  The torsion constant is that of an open thin wall that is free to
+        warp. A shear force along y is carried by the flanges as by two rectangles.
 
     Raises:
         BadInput: a dimension or Poisson's ratio is out of its range.
@@ -231,7 +232,7 @@ def i_section(
 
 
 def declared_section(given: Mapping[str, float], nu: float) -> Section:
-    """Return the section of a beam from the values that declare it.
+    """Return the section that lengths or constants describe.
 
     Args:
         given: ``radius`` and optionally ``inner_radius``; or ``width`` and ``height``
@@ -256,7 +257,7 @@ def declared_section(given: Mapping[str, float], nu: float) -> Section:
 
 
 def check_section(place: str, given: Mapping[str, float]) -> None:
-    """Reject values that do not describe a section.
+    """Raise an error if the values do not describe a section.
 
     Args:
         place: name of the key, for the message.
@@ -264,8 +265,8 @@ def check_section(place: str, given: Mapping[str, float]) -> None:
             :func:`forcefit.stiffness.beam.sections.declared_section`.
 
     Raises:
-        BadInput: a name does not belong to a section, a name is missing, or a value is
-            invalid.
+        BadInput: a name does not belong to a section, a required name is missing, or a
+            value is invalid.
     """
     if set(given) in _SECTIONS:
         for name, value in given.items():
@@ -286,7 +287,7 @@ def check_section(place: str, given: Mapping[str, float]) -> None:
 
 
 def check_material(who: str, E: float, nu: float) -> None:
-    """Reject elastic constants that no isotropic solid can have.
+    """Raise an error for elastic constants that no isotropic solid can have.
 
     Args:
         who: name of the part, for the message.
@@ -294,26 +295,26 @@ def check_material(who: str, E: float, nu: float) -> None:
         nu: [-] Poisson's ratio.
 
     Raises:
-        BadInput: E is not finite and positive, or nu not in (-1, 0.5).
+        BadInput: E is not finite and positive, or nu is not in (-1, 0.5).
     """
     check_positive(who, "E", E)
     check_poisson(who, nu)
 
 
 def check_poisson(who: str, nu: float) -> None:
-    """Reject a Poisson's ratio outside (-1, 0.5), which no isotropic solid can have."""
+    """Raise an error for a Poisson's ratio that no isotropic solid can have."""
     if not -1.0 < nu < 0.5:
         raise BadInput(f"{who}: nu = {nu:g} must lie between -1.0 and 0.5")
 
 
 def check_positive(who: str, name: str, value: float) -> None:
-    """Reject a number that is not finite and positive."""
+    """Raise an error for a number that is not finite and positive."""
     if not (math.isfinite(value) and value > 0):
         raise BadInput(f"{who}: {name} = {value:g} must be finite and > 0")
 
 
 def _check(**lengths: float) -> None:
-    """Check that all lengths are positive and finite."""
+    """Raise an error if a length is not finite and positive."""
     for name, value in lengths.items():
         if not 0 < value < float("inf"):
             raise BadInput(f"section: {name} = {value:g} m must be finite and > 0")

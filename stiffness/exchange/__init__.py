@@ -1,5 +1,5 @@
 """Import and export of links between forcefit and finite-element programs.
 
-Begin at ``import_link.py``; ``two_interfaces.py`` defines the matrix of a body between
+Start with ``import_link.py``.  ``two_interfaces.py`` defines the matrix of a body with
 two interfaces.
 """

@@ -1,11 +1,13 @@
 """Files of Ansys: Harwell-Boeing matrices, and the degrees of freedom of their rows.
 
-Ansys assembles matrices in an internal order of rows.  A mapping file states this
-order. It is next to the matrix and has the same name with the suffix ``.mapping``:
+Ansys orders the rows of a matrix internally.  The order is stated in a mapping file
+next to the matrix, which has the same name with the suffix ``.mapping``.  This file is
 
-- from ``HBMAT,name,,,ASCII,STIFF,NO,YES``: lines of row, node and label (``UX``..);
-- from ``*VEC,map,I,IMPORT,FULL,file.full,BACK`` and ``*EXPORT,map,MMF,name.mapping``:
-  a Matrix Market vector of the nodes; each has all its degrees of freedom in sequence.
+- either written by ``HBMAT,name,,,ASCII,STIFF,NO,YES``: lines of row, node and label
+  (``UX``, ...);
+- or written by ``*VEC,map,I,IMPORT,FULL,file.full,BACK`` and
+  ``*EXPORT,map,MMF,name.mapping``: a Matrix Market vector of nodes, for each of which
+  the matrix contains all degrees of freedom in sequence.
 
 Sources:
     Ansys Command Reference, HBMAT, *EXPORT, *VEC; Duff, Grimes, Lewis (1992), Users'
@@ -29,10 +31,10 @@ _NUMBER = re.compile(r"[+-]?\d+(?:\.\d*)?(?:[ED][+-]?\d+)?|[+-]?\.\d+(?:[ED][+-]
 
 
 def harwell_boeing(path: Path, text: str) -> csr_array:
-    """Read an assembled real matrix; a symmetric one (RSA) is stored as one half.
+    """Read an assembled real matrix; a symmetric one (type RSA) is stored as one half.
 
-    SciPy's reader refuses three features that ``HBMAT`` writes: RSA, right-hand sides,
-    and exponents with a D (SciPy 1.17).
+    SciPy's reader refuses three features of files from ``HBMAT``: the type RSA,
+    right-hand sides, and exponents written with a D (SciPy 1.17).
 
     Args:
         path: path of the file, for error messages.
@@ -42,7 +44,7 @@ def harwell_boeing(path: Path, text: str) -> csr_array:
         (n, n) matrix with both halves.
 
     Raises:
-        BadInput: the file is of a different kind, or its length differs from its
+        BadInput: the file is of a different type, or its length does not agree with its
             header.
     """
     lines = text.split("\n")
@@ -89,12 +91,12 @@ def harwell_boeing(path: Path, text: str) -> csr_array:
 
 
 def both_halves(matrix: csr_array) -> csr_array:
-    """Return a symmetric matrix with both halves, from one half."""
+    """Return the full symmetric matrix of which one half is given."""
     return csr_array(matrix + matrix.T - diags_array(matrix.diagonal()))
 
 
 def _fields(path: Path, lines: list[str], width: int) -> NDArray:
-    """Return the numbers in fields of a fixed width."""
+    """Return the numbers that a text contains in fields of a fixed width."""
     words = [
         line[k : k + width].strip()
         for line in lines
@@ -107,16 +109,16 @@ def _fields(path: Path, lines: list[str], width: int) -> NDArray:
 
 
 def read_mapping(path: Path) -> list[int] | list[tuple[int, int]]:
-    """Return the degree of freedom of each row.
+    """Return the degree of freedom of each row of a matrix from its mapping file.
 
     Args:
-        path: a mapping file.
+        path: mapping file.
 
     Returns:
-        Node and direction, 1 to 6, of each row; or the nodes in their order.
+        Node and direction (1 to 6) of each row; or the nodes in the order of the rows.
 
     Raises:
-        BadInput: the file is of neither kind.
+        BadInput: the file has neither of the two forms.
     """
     text = read_text(path)
     lines = [line for line in text.split("\n") if line.strip()]
@@ -135,7 +137,7 @@ def read_mapping(path: Path) -> list[int] | list[tuple[int, int]]:
     for line in lines:
         words = line.split()
         if not words[0].isdecimal():
-            continue  # a heading
+            continue  # the line is a heading
         if len(words) != 3:
             raise BadInput(
                 f"{path}: found {describe(line.strip())}, expected row, node and label"
@@ -155,7 +157,7 @@ def read_mapping(path: Path) -> list[int] | list[tuple[int, int]]:
 
 
 def _whole(path: Path, word: str) -> int:
-    """Return the integer number of a row or node."""
+    """Return the number of a row or a node."""
     if not re.fullmatch("[0-9]{1,12}", word):
         raise BadInput(f"{path}: found {describe(word)}, expected a number of a node")
     return int(word)

@@ -23,22 +23,23 @@ _GRID = re.compile(r"^GRID\*?[\s,]", re.M | re.I)
 _NODE = re.compile(r"^\*NODE\s*(?:,.*)?$", re.M | re.I)
 _WORKBENCH = re.compile(r"Node Number\tX Location \((\w+)\)")
 _LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254}
-# relative to the body's size: largest distance of a node that is on an interface
+# largest distance of an interface's nodes from it, relative to the size of the body
 _ON = 1e-6
 
 
 def read_nodes(path: Path | str, unit: float) -> dict[int, NDArray]:
-    """Return the positions of nodes: lines of number, x, y, z between commas or blanks.
+    """Read the positions of nodes from lines of number, x, y and z.
 
     Args:
-        path: file; lines that begin with ``*`` or ``#`` are ignored.  In an input file
-            of Abaqus or CalculiX the lines after ``*NODE`` are read, in one of Nastran
-            the lines ``GRID``. In a named selection of Ansys Workbench the lines below
-            its heading are read; their numbers may have decimal commas.
+        path: file with numbers separated by commas or blanks; lines that begin with
+            ``*`` or ``#`` are ignored.  In an input file of Abaqus or CalculiX the
+            lines after ``*NODE`` are read, and in one of Nastran the ``GRID`` lines.
+            In a named selection of Ansys Workbench the lines below the heading are
+            read; decimal commas are accepted there.
         unit: [m] unit of the file's lengths.
 
     Returns:
-        (3,) [m] positions by number of the node.
+        (3,) [m] position of each node, by node number.
 
     Raises:
         BadInput: a line has a different form.
@@ -69,7 +70,7 @@ def read_nodes(path: Path | str, unit: float) -> dict[int, NDArray]:
 
 
 def _node_lines(text: str) -> Iterator[tuple[int, list[str], str]]:
-    """Yield number of each line with a node, its words (node, x, y, z), the line."""
+    """Yield number, words (node, x, y, z) and text of each line with a node."""
     if _GRID.search(text):
         yield from _grids(text)
         return
@@ -89,7 +90,7 @@ def _node_lines(text: str) -> Iterator[tuple[int, list[str], str]]:
 
 
 def _grids(text: str) -> Iterator[tuple[int, list[str], str]]:
-    """Yield Nastran's ``GRID`` lines; with wide fields a node takes two lines."""
+    """Yield Nastran's ``GRID`` lines; a node with wide fields occupies two lines."""
     lines = text.split("\n")
     for number, line in enumerate(lines, 1):
         if _GRID.match(line):
@@ -162,7 +163,7 @@ def interface_rows(
 
 
 def _on(interface: Interface, places: NDArray) -> NDArray:
-    """Return (n,) bool: nodes on an interface."""
+    """Return (n,) bool, True for positions on an interface."""
     size = float(np.ptp(places, axis=0).max(initial=0.0)) or 1.0
     near = interface.distance(places) < _ON * size
     if interface.kind == "disc":
@@ -174,14 +175,15 @@ def _on(interface: Interface, places: NDArray) -> NDArray:
 def condensed(
     matrix: FileMatrix, ends: tuple[tuple[NDArray, NDArray], tuple[NDArray, NDArray]]
 ) -> tuple[NDArray, NDArray]:
-    """Return the matrix of two interfaces; other degrees of freedom are without load.
+    """Condense a matrix onto two interfaces; all other degrees of freedom are unloaded.
 
     Args:
         matrix: (n, n) stiffness matrix.
         ends: rows and motions of base and tip, from :func:`interface_rows`.
 
     Returns:
-        (12, 12) matrix, base first, and (n, 12) motions of all rows for unit screws.
+        (12, 12) matrix, base first, and (n, 12) motions of all rows for unit screws of
+        the interfaces.
 
     Raises:
         BadInput: the interfaces share rows, or other degrees of freedom are not
@@ -217,6 +219,6 @@ def condensed(
                 f"{matrix.file}: found a singular stiffness between the "
                 "interfaces; expected a body in one piece that connects them"
             )
-    # computed from the energy of the fields, where errors of the solution are squared
+    # from the energy of the displacement fields, in which solution errors enter squared
     K12 = fields.T @ (K @ fields)
     return (K12 + K12.T) / 2, fields

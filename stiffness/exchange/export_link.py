@@ -1,4 +1,4 @@
-"""``forcefit stiffness export``: a link as a matrix of nodes 1 (base), 2 (tip)."""
+"""``forcefit stiffness export``: a link as a matrix of two nodes, base and tip."""
 
 import io
 import json
@@ -14,21 +14,21 @@ from forcefit.stiffness.exchange.two_interfaces import both_ends
 from forcefit.stiffness.report.export import PROGRAMS, stiffness_for
 
 FORMATS = ("matrix-market", "abaqus", "calculix", "nastran", "numpy", *PROGRAMS)
-# indices that put translations before rotations at each node
+# row order that places translations before rotations at each node
 _FEM = [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]
 
 
 def read_link_results(path: Path | str) -> tuple[NDArray, NDArray]:
-    """Return K_E, and the vector from tip to base, of a link's ``--json`` results.
+    """Read K_E and the vector from tip to base from a link's ``--json`` results.
 
     Args:
         path: the JSON file.
 
     Returns:
-        K_E (6, 6), and the vector (3,) [m].
+        K_E (6, 6) in SI units, and the vector (3,) [m] from tip to base.
 
     Raises:
-        BadInput: the file does not hold the results of a link.
+        BadInput: the file does not contain the results of a link.
     """
     try:
         content = json.loads(read_text(path))
@@ -55,7 +55,7 @@ def read_link_results(path: Path | str) -> tuple[NDArray, NDArray]:
 def link_file(
     stiffness: NDArray, base_from_tip: NDArray, to: str, unit: str = "m"
 ) -> bytes:
-    """Return the content of a file for another program.
+    """Return the text of a file in the format of another program.
 
     Args:
         stiffness: (6, 6) K_E at the tip, in SI units, rotations first.
@@ -64,11 +64,11 @@ def link_file(
         unit: unit of lengths in the file; forces are in N, rotations in rad.
 
     Returns:
-        The content, with translations first at each node; for ``exudyn``, ``adams`` and
+        The text, with translations first at each node; for ``exudyn``, ``adams`` and
         ``mapdl`` the result of :func:`forcefit.stiffness.report.export.stiffness_for`.
 
     Raises:
-        BadInput: the format or unit is unknown, or the format has a fixed unit.
+        BadInput: the format or unit is unknown, or the format requires metres.
     """
     for option, value, valid in (("--to", to, FORMATS), ("--unit", unit, LENGTHS)):
         if value not in valid:
@@ -94,7 +94,7 @@ def link_file(
 
 
 def _lower(K: NDArray) -> list[tuple[int, int, float]]:
-    """Return row, column and value of each entry of the lower half, by columns."""
+    """Return row, column and value of the lower half's entries, column by column."""
     return [(i, j, float(K[i, j])) for j in range(12) for i in range(j, 12)]
 
 
@@ -106,7 +106,7 @@ def _matrix_market(K: NDArray) -> str:
 
 
 def _user_element(K: NDArray) -> str:
-    """Return the text of an Abaqus ``*USER ELEMENT``, with four numbers per line."""
+    """Return the text of an Abaqus ``*USER ELEMENT``, with four numbers in a line."""
     lines = ["*USER ELEMENT,NODES=2,LINEAR", "** ELEMENT NODES", "** 1, 2",
              "1, 2, 3, 4, 5, 6", "*MATRIX,TYPE=STIFFNESS"]  # fmt: skip
     for i in range(12):
@@ -116,7 +116,7 @@ def _user_element(K: NDArray) -> str:
 
 
 def _five_columns(K: NDArray) -> str:
-    """Return lines of node, direction, node, direction, value."""
+    """Return lines that contain node, direction, node, direction and value."""
     return "".join(
         f"{i // 6 + 1},{i % 6 + 1},{j // 6 + 1},{j % 6 + 1},{v!r}\n"
         for i, j, v in _lower(K)
@@ -124,7 +124,7 @@ def _five_columns(K: NDArray) -> str:
 
 
 def _dmig(K: NDArray) -> str:
-    """Return the text of a Nastran DMIG in large fields, form 6."""
+    """Return the text of a Nastran DMIG (form 6, symmetric) in large fields."""
     lines = ["DMIG    K2GG           0       6       2       0"]
     for j in range(12):
         lines.append(f"DMIG*   {'K2GG':16}{j // 6 + 1:16}{j % 6 + 1:16}")

@@ -30,26 +30,26 @@ def import_link(
     unit: str = "m",
     order: str = ORDERS[0],
 ) -> LinkStiffness:
-    """Return a link from a matrix of 6, 12 or more degrees of freedom.
+    """Import a link from a stiffness matrix of 6, 12 or more degrees of freedom.
 
     Args:
         path: file of the stiffness matrix, see
             :mod:`forcefit.stiffness.exchange.matrix_file`.
-        mass: file of the mass matrix for the same degrees of freedom; None without one.
-        nodes: file with the positions of nodes, needed for interfaces of many nodes.
-            Their order applies to rows that the matrix file does not name.
-        base: node, or interface such as ``"z=0"`` [m], that is held.
-        tip: node or interface at which screws are read.
+        mass: file of the mass matrix for the same degrees of freedom, or None.
+        nodes: file with the positions of nodes, required for interfaces of several
+            nodes.  Its node order applies to rows that the matrix file does not name.
+        base: held node, or held interface such as ``"z=0"`` [m].
+        tip: node or interface at which the screw is read.
         unit: unit of lengths in all files; forces are in N, rotations in rad.
         order: order of the six degrees of freedom of a node, if the file does not name
             them.
 
     Returns:
-        The link, in the axes of the file.
+        The link, expressed in the axes of the file.
 
     Raises:
-        BadInput: a file is invalid, or the matrix is not that of a free elastic body
-            between the two interfaces.
+        BadInput: a file is invalid, or the matrix is not the stiffness of a free
+            elastic body between the two interfaces.
     """
     for option, value, valid in (("--unit", unit, LENGTHS), ("--order", order, ORDERS)):
         if value not in valid:
@@ -91,7 +91,7 @@ def import_link(
             f"{mass}: found nodes or directions that {path} does not have, or too "
             "few; expected the same in both files"
         )
-    # a file with named degrees of freedom omits those without mass
+    # a file that names its degrees of freedom omits those without mass
     moved = fields[[row[freedom] for freedom in heavy.freedoms]]
     M12 = moved.T @ (heavy.matrix @ moved)
     kilograms, centre, inertia = mass_of_both_ends(M12, link.base - link.tip)
@@ -103,7 +103,7 @@ def import_link(
 def _ends(
     matrix: FileMatrix, base: str, tip: str, places: Mapping[int, NDArray] | None
 ) -> list[tuple[NDArray, NDArray, NDArray | None]]:
-    """Return the rows, motions and point of base and tip."""
+    """Return the rows, the motions and the points of base and tip."""
     return [
         interface_rows(matrix, asked, option, places)
         for asked, option in ((base, "--base"), (tip, "--tip"))
@@ -111,7 +111,7 @@ def _ends(
 
 
 def reordered(matrix: FileMatrix, order: str) -> FileMatrix:
-    """Return the matrix with its degrees of freedom named in the order of the file."""
+    """Return the matrix with its degrees of freedom in the stated order."""
     if matrix.named or order == ORDERS[0]:
         return matrix
     freedoms = tuple((node, (d + 2) % 6 + 1) for node, d in matrix.freedoms)
@@ -119,7 +119,7 @@ def reordered(matrix: FileMatrix, order: str) -> FileMatrix:
 
 
 def in_metres(matrix: FileMatrix, length: float) -> FileMatrix:
-    """Return the matrix with translations in metres and energies in joules.
+    """Convert a matrix to translations in metres and energies in joules.
 
     Args:
         matrix: matrix with forces in N, rotations in rad and translations in
@@ -127,8 +127,8 @@ def in_metres(matrix: FileMatrix, length: float) -> FileMatrix:
         length: [m] unit of length of the matrix.
 
     Returns:
-        The matrix in SI units; a mass matrix must have a consistent unit (tonnes with
-        mm, N and s).
+        The matrix in SI units.  The unit of a mass matrix must be consistent, for
+        example tonnes with mm, N and s.
     """
     turns = np.array([direction > 3 for _, direction in matrix.freedoms])
     scale = np.where(turns, 1.0, 1.0 / length)

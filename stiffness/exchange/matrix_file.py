@@ -1,4 +1,4 @@
-"""Matrices in files of other programs, with the degrees of freedom of their rows.
+"""Reader of matrices of other programs, with the degrees of freedom of their rows.
 
 =================  ===============================================================
 file               written by
@@ -8,9 +8,9 @@ Matrix Market      Ansys (``*EXPORT,..,MMF``), SciPy, Exudyn scripts: ``.mtx``;
 Harwell-Boeing     Ansys (``HBMAT``): ``.matrix``; see
                    :mod:`forcefit.stiffness.exchange.ansys_files` for its ``.mapping``
 user element       Abaqus and CalculiX, ``*SUBSTRUCTURE MATRIX OUTPUT``: ``.mtx``
-five columns       Abaqus ``*MATRIX OUTPUT``: node, direction, twice, and a value
-three columns      the same with ``FORMAT=COORDINATE``: row, column, value; CalculiX
-                   ``SOLVER=MATRIXSTORAGE``: ``.sti``, ``.mas``, with their ``.dof``
+five columns       Abaqus ``*MATRIX OUTPUT``: node and direction, twice, and value
+three columns      Abaqus ``FORMAT=COORDINATE``: row, column, value; CalculiX
+                   ``SOLVER=MATRIXSTORAGE``: ``.sti`` or ``.mas``, and ``.dof``
 DMIG               Nastran: ``.pch``, ``.dmig``; see
                    :mod:`forcefit.stiffness.exchange.nastran_files`
 NumPy              ``.npy``, SciPy's sparse ``.npz``
@@ -55,9 +55,9 @@ class FileMatrix:
     Attributes:
         file: name of the file, for messages.
         matrix: (n, n) matrix with both halves.
-        freedoms: node and direction of each row; directions 1 to 3 are translations, 4
-            to 6 rotations.
-        named: whether the file itself names the degrees of freedom.
+        freedoms: node and direction of each row; directions 1 to 3 are translations,
+            and 4 to 6 are rotations.
+        named: whether the file states the degree of freedom of each row.
     """
 
     file: str
@@ -72,23 +72,23 @@ def read_matrix(
     nodes: Sequence[int] | None = None,
     mapped: Path | str | None = None,
 ) -> FileMatrix:
-    """Return a matrix from a file, whose kind is recognised by its content.
+    """Read a matrix from a file whose format is recognised by its content.
 
     Args:
         path: file of the matrix.
-        which: ``"stiffness"`` or ``"mass"``, for a file that holds both.
-        nodes: nodes in the order of rows that the file does not name; None for 1, 2,
-            ...
-        mapped: file of a matrix with the same rows, whose ``.mapping`` is used if this
-            file has none.
+        which: ``"stiffness"`` or ``"mass"``, for a file that contains both.
+        nodes: order of the nodes for rows that the file does not name; None for 1, 2,
+            and so on.
+        mapped: file of a matrix with the same rows; its ``.mapping`` is used if this
+            matrix has none.
 
     Returns:
-        The matrix.  Rows that the file does not name are three per node of ``nodes``,
-        as for solids, if their number agrees, otherwise six.
+        The matrix.  Unnamed rows are assigned to the ``nodes`` in their order: three
+        rows for each node, as for solids, if the number agrees, and otherwise six.
 
     Raises:
-        BadInput: the file is of no known kind; its matrix is not square, finite and
-            symmetric; or it has no degrees of freedom.
+        BadInput: the format is unknown; the matrix is not square, finite and
+            symmetric; or the degrees of freedom of its rows are unknown.
     """
     path = Path(path)
     ending = path.suffix.lower()
@@ -120,7 +120,7 @@ def read_matrix(
 
 
 def _mapped(path: Path, n: int) -> list[Freedom]:
-    """Return the degrees of freedom of n rows from a mapping file."""
+    """Return the degrees of freedom of n rows from the mapping file."""
     given = read_mapping(path)
     freedoms: list[Freedom] = []
     each = n // len(given)
@@ -143,7 +143,7 @@ def _checked(
     freedoms: list[Freedom] | None,
     nodes: Sequence[int] | None,
 ) -> FileMatrix:
-    """Return the matrix, if it is square, finite and symmetric."""
+    """Return the matrix after checking that it is square, finite and symmetric."""
     n = matrix.shape[0]
     if matrix.shape != (n, n) or not n:
         raise BadInput(f"{path}: found {matrix.shape} numbers, expected a square")
@@ -167,7 +167,7 @@ def _checked(
 
 
 def _in_order(path: Path, n: int, nodes: Sequence[int] | None) -> list[Freedom]:
-    """Return the degrees of freedom of n unnamed rows: three or six for each node."""
+    """Return the degrees of freedom of n unnamed rows, three or six for each node."""
     numbers = range(1, n // 6 + 1) if nodes is None else nodes
     for each in (3, 6):
         if n == each * len(numbers):
@@ -182,7 +182,7 @@ def _in_order(path: Path, n: int, nodes: Sequence[int] | None) -> list[Freedom]:
 
 
 def _numpy(path: Path) -> csr_array:
-    """Return a matrix from ``.npy``, or from a sparse ``.npz``; pickles are refused."""
+    """Read a matrix from ``.npy`` or a sparse ``.npz``; refuse pickled data."""
     from scipy.sparse import load_npz
 
     try:
@@ -204,7 +204,7 @@ def _numpy(path: Path) -> csr_array:
 
 
 def _user_element(path: Path, text: str, which: str) -> tuple[csr_array, list[Freedom]]:
-    """Read ``*USER ELEMENT``: nodes in comments, degrees of freedom, lower halves."""
+    """Read ``*USER ELEMENT``: nodes (in comments), degrees of freedom, lower halves."""
     nodes: list[int] = []
     lines: list[list[int]] = []
     values: dict[str, list[float]] = {"stiffness": [], "mass": []}
@@ -285,7 +285,7 @@ def _columns(path: Path, text: str) -> tuple[csr_array, list[Freedom] | None]:
 
 
 def _named_by(path: Path, n: int) -> list[Freedom]:
-    """Return degrees of freedom in CalculiX's ``.dof``: ``node.direction`` per row."""
+    """Read the degrees of freedom of rows from CalculiX's ``.dof`` file."""
     words = read_text(path).split()
     freedoms: list[Freedom] = []
     for word in words:
@@ -304,7 +304,7 @@ def _named_by(path: Path, n: int) -> list[Freedom]:
 def _from_entries(
     path: Path, entries: dict[tuple[Freedom, Freedom], float]
 ) -> tuple[csr_array, list[Freedom]]:
-    """Return a matrix from the entries of one half or of both halves."""
+    """Return a matrix from entries that describe one half or both halves."""
     freedoms = sorted({freedom for pair in entries for freedom in pair})
     if not freedoms or len(freedoms) > LARGEST:
         raise BadInput(f"{path}: found no entries of a matrix")
@@ -315,7 +315,7 @@ def _from_entries(
 def _of_rows(
     entries: Mapping[tuple[Any, Any], float], row: Mapping[Any, int]
 ) -> csr_array:
-    """Return a matrix from entries whose rows and columns are named."""
+    """Return a matrix from entries whose rows and columns name degrees of freedom."""
     # a missing half is the transpose of the other half
     whole = {**{(b, a): v for (a, b), v in entries.items()}, **entries}
     i, j = [row[a] for a, _ in whole], [row[b] for _, b in whole]

@@ -22,11 +22,11 @@ _MARKET = (
 
 
 def matrix_market(path: Path, text: str) -> csr_array:
-    """Read a square matrix.
+    """Read a square matrix from the text of a Matrix Market file.
 
-    SciPy's reader is not used, because it reads 4D3 as 4, and an entry "2 1.5 1" as 0.5
-    in column 1, without an error (SciPy 1.17).  A check of every line before it would
-    take as long as this reader.
+    SciPy 1.17 is not used for reading, because it reads 4D3 as 4, and the entry
+    "2 1.5 1" as 0.5 in column 1, without raising an error.  Checking every line before
+    SciPy reads the file would take as long as this function.
 
     Args:
         path: path of the file, for error messages.
@@ -36,7 +36,7 @@ def matrix_market(path: Path, text: str) -> csr_array:
         (n, n) matrix; a missing half is the transpose of the other half.
 
     Raises:
-        BadInput: the file is of a different kind, or its length differs from its
+        BadInput: the file is of a different type, or its length does not agree with its
             header.
     """
     head, *lines = text.split("\n")
@@ -68,9 +68,9 @@ def matrix_market(path: Path, text: str) -> csr_array:
         expected = n * n if whole else n * (n + 1) // 2
         if len(rest) != expected:
             raise BadInput(f"{path}: found {len(rest)} numbers, expected {expected}")
-        j, i = np.indices((n, n)) if whole else np.triu_indices(n)  # column by column
+        j, i = np.indices((n, n)) if whole else np.triu_indices(n)  # in column order
         matrix = csr_array(coo_array((rest, (i.ravel(), j.ravel())), shape=(n, n)))
-    # Ansys writes one half, although its header declares a general matrix
+    # Ansys writes only one half, although the header declares a general matrix
     half = not triu(matrix, 1).nnz or not tril(matrix, -1).nnz
     by_ansys = re.search(r"^%.*ANSYS", text, re.M | re.I)
     return (
@@ -89,7 +89,7 @@ def _numbers(path: Path, lines: list[str]) -> NDArray:
 
 
 def _size(path: Path, sizes: NDArray) -> int:
-    """Return number of rows of a square matrix, from the first numbers of a file."""
+    """Return the number of rows of a square matrix from the line of sizes."""
     rows, columns = (*sizes.tolist(), 0.0, 0.0)[:2]
     if not rows == columns == round(min(rows, 2.0 * LARGEST)) > 0 or rows > LARGEST:
         raise BadInput(

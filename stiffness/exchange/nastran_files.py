@@ -1,12 +1,13 @@
-"""Nastran's bulk data: fields of a line, and matrices given by ``DMIG``.
+"""Nastran's bulk data: the fields of a line, and matrices given by ``DMIG``.
 
-Fields have eight characters, or sixteen if the first field ends in ``*``; or they are
-separated by commas or blanks.  With commas, a line may have more than eight fields.
+A field has eight characters, or sixteen if the first field ends with ``*``.
+Alternatively, fields are separated by commas or blanks.  A line with commas may have
+more than eight fields.
 
 Sources:
     MSC Nastran Quick Reference Guide: Bulk Data, free and fixed fields; DMIG (form 6
-    gives one half); EXTSEOUT, whose punch file has KAAX, K4AAX (structural damping),
-    BAAX (viscous damping) and MAAX together.
+    contains one half); EXTSEOUT, whose punch file contains KAAX, K4AAX (structural
+    damping), BAAX (viscous damping) and MAAX.
 """
 
 import re
@@ -19,7 +20,7 @@ from forcefit.stiffness.exchange.real_numbers import real, whole
 Freedom = tuple[int, int]
 Entries = dict[tuple[Freedom, Freedom], float]
 DMIG = re.compile(r"^DMIG[*\s,]", re.M | re.I)
-# names that Nastran itself gives to matrices
+# names that Nastran gives to matrices
 _OWN_NAME = re.compile(r"(K4|K|B|M)2?(AAX?|GG|PP|LL|FF)")
 _WHAT = {"K": "stiffness", "M": "mass", "K4": "structural damping",
          "B": "viscous damping"}  # fmt: skip
@@ -29,11 +30,12 @@ def bulk_fields(line: str) -> tuple[str, list[str]]:
     """Return the fields of a line of bulk data.
 
     Args:
-        line: line with fields of fixed width, or separated by commas or blanks.
+        line: line whose fields have a fixed width, or are separated by commas or
+        blanks.
 
     Returns:
-        The first field in capitals, with its ``*``, and the other fields; four or eight
-        fields of fixed width, otherwise all.
+        The first field in capitals, including ``*``, and the other fields: four or
+        eight if the width is fixed, otherwise all.
     """
     if "," in line:
         head, *fields = [word.strip() for word in line.split(",")]
@@ -42,7 +44,7 @@ def bulk_fields(line: str) -> tuple[str, list[str]]:
     width = 16 if "*" in head else 8
     fields = [line[k : k + width].strip() for k in range(8, 72, width)]
     if any(re.search(r"\s", field) for field in (head, *fields)):
-        # a field of fixed width has no blank inside
+        # a field of fixed width contains no blank between characters
         head, *fields = line.split()
     return head.upper(), fields
 
@@ -56,11 +58,11 @@ def dmig_entries(path: Path | str, text: str, which: str) -> Entries:
         which: ``"stiffness"`` or ``"mass"``.
 
     Returns:
-        Values by the degrees of freedom of row and column, of one half or both halves.
+        Value for each pair of degrees of freedom (row, column), of one or both halves.
 
     Raises:
-        BadInput: no matrix or several are of this kind, or the matrix is not square and
-            real.
+        BadInput: the file contains no or several matrices of this kind, or the matrix
+            is not square and real.
     """
     matrices: dict[str, Entries] = {}
     forms: dict[str, str] = {}
@@ -101,8 +103,8 @@ def _terms(
     Args:
         path: path of the file, for error messages.
         fields: fields of a line after the fields that name the column.
-        packed: whether blanks separate the fields, so that no field is empty and there
-            is no imaginary part.
+        packed: whether fields are separated by blanks; then no field is empty, and
+            imaginary parts are absent.
 
     Returns:
         Row and value of each term.
@@ -113,7 +115,7 @@ def _terms(
     """
     terms, waiting = [], list(fields)
     while waiting:
-        if not waiting[0] or waiting[0].startswith(("+", "*")):  # a continuation mark
+        if not waiting[0] or waiting[0].startswith(("+", "*")):  # continuation field
             waiting.pop(0)
             continue
         if len(waiting) < 3:
@@ -138,7 +140,7 @@ def _terms(
 def _chosen(
     path: Path | str, names: Iterable[str], forms: Mapping[str, str], which: str
 ) -> str:
-    """Return the name of the only stiffness or mass matrix."""
+    """Return the name of the stiffness or mass matrix, which must be the only one."""
     names = list(names)
     initial = {kind: letter for letter, kind in _WHAT.items()}[which]
     found = [name for name in names if forms.get(name, "") in {"1", "6", ""}]
@@ -158,6 +160,6 @@ def _chosen(
 
 
 def _kind(name: str) -> str | None:
-    """Return the kind of matrix with a Nastran name; None if it is unknown."""
+    """Return the kind of a matrix from its Nastran name, or None if it is unknown."""
     match = _OWN_NAME.fullmatch(name)
     return _WHAT[match[1]] if match else None

@@ -1,4 +1,4 @@
-"""Numbers as Fortran writes them: with exponents without a letter, or with a D."""
+"""Reader of numbers written by Fortran, whose exponents may have a D or no letter."""
 
 import re
 from pathlib import Path
@@ -9,7 +9,7 @@ _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]?\d+))?")
 
 
 def real(path: Path | str, word: str) -> float:
-    """Return a number from a file.
+    """Convert a number from a file, as written by Fortran, to a float.
 
     Args:
         path: path of the file, for error messages.
@@ -29,7 +29,7 @@ def real(path: Path | str, word: str) -> float:
 
 
 def whole(path: Path | str, word: str) -> int:
-    """Return an integer from a file.
+    """Convert a text from a file to an integer.
 
     Args:
         path: path of the file, for error messages.

@@ -1,11 +1,11 @@
-"""A body between two interfaces: twelve degrees of freedom, six of them rigid motions.
+"""Matrix of a free body with two interfaces, each with six degrees of freedom.
 
 ======  ============  =======================================================
 symbol  shape         meaning
 ======  ============  =======================================================
-K12     (12, 12)      stiffness of base and tip, [R T] of each
-K       (6, 6)        K_E: the tip's block of K12, with the base held
-X       (6, 6)        rigid motion transferred from base to tip: K12 [s; X s] = 0
+K12     (12, 12)      stiffness matrix of the screws [R T] of base and tip
+K       (6, 6)        K_E: block of K12 for the tip, with the base held
+X       (6, 6)        rigid motion from base to tip: K12 [s; X s] = 0
 ======  ============  =======================================================
 """
 
@@ -16,20 +16,20 @@ from forcefit.inputs.errors import BadInput
 from forcefit.stiffness.link import LinkStiffness, check_definite, inverted
 from forcefit.stiffness.screws import screw_map, skew
 
-# relative to the scale of K12: residual wrench due to text of seven digits
+# residual wrench due to numbers with seven digits, relative to the scale of K12
 _BALANCED = 1e-5
 _FARTHEST = 1e6  # [m] largest accepted distance between base and tip
 
 
 def both_ends(stiffness: ArrayLike, base_from_tip: ArrayLike) -> NDArray:
-    """Return the matrix K12 of a link.
+    """Compute the matrix K12 of a link from its K_E.
 
     Args:
         stiffness: (6, 6) K_E at the tip.
         base_from_tip: (3,) [m] vector from tip to base.
 
     Returns:
-        (12, 12) matrix K12: base first, then tip; rotations first at each.
+        (12, 12) matrix K12, base before tip, with rotations first at each.
     """
     K = np.asarray(stiffness, dtype=float)
     X = screw_map(base_from_tip)
@@ -43,20 +43,20 @@ def link_of_both_ends(
     base: ArrayLike | None = None,
     tip: ArrayLike | None = None,
 ) -> LinkStiffness:
-    """Return the link of a matrix of two interfaces.
+    """Return the link that a matrix of two interfaces describes.
 
     Args:
         K12: (12, 12) matrix in SI units, rotations first at each interface.
         who: name of the file, for messages.
         base: (3,) [m] point of the base; None to compute it from the matrix.
-        tip: (3,) [m] point of the tip; both points are given or neither.
+        tip: (3,) [m] point of the tip; ``base`` and ``tip`` are given together or not.
 
     Returns:
-        The link; if the points are unknown, the tip is the origin.
+        The link; if the points are unknown, the tip is placed at the origin.
 
     Raises:
-        BadInput: K_E is not a stiffness, or the body is connected to another body, so
-            that the matrix resists rigid motions.
+        BadInput: K_E is not a stiffness, or the body is held elsewhere, so that the
+            matrix resists rigid motions.
     """
     K12 = np.asarray(K12, dtype=float)
     K = K12[6:, 6:]
@@ -93,7 +93,7 @@ def link_of_both_ends(
 def mass_of_both_ends(
     M12: ArrayLike, offset: ArrayLike
 ) -> tuple[float, NDArray, NDArray]:
-    """Return mass, centre and inertia from a mass matrix of two interfaces.
+    """Compute mass, centre of mass and inertia from a mass matrix of two interfaces.
 
     Args:
         M12: (12, 12) matrix in SI units, rotations first at each interface.
@@ -111,7 +111,7 @@ def mass_of_both_ends(
     mass = float(np.trace(M[3:, 3:]) / 3)
     if not mass > 0:
         raise BadInput(f"the mass matrix: found a mass of {mass:g} kg, expected > 0")
-    # v = t + w x c: the block below the diagonal is -m [c]x
+    # from v = t + w x c: the block below the diagonal is -m [c]x
     arm = -M[3:, :3] / mass
     centre = np.array([arm[2, 1] - arm[1, 2], arm[0, 2] - arm[2, 0],
                        arm[1, 0] - arm[0, 1]]) / 2  # fmt: skip

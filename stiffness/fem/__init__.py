@@ -1,4 +1,4 @@
-"""K_E from tetrahedra: elements, condensation, error estimate, stress.
+"""K_E from tetrahedra: elements, condensation, error estimate and stress.
 
-Begin at ``fea.py``, which refines until the estimated error is small enough.
+Start with ``fea.py``, which refines the mesh until the estimated error is small enough.
 """

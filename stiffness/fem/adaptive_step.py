@@ -4,9 +4,9 @@ The error indicator (:mod:`forcefit.stiffness.fem.error_indicator`) is multiplie
 effectivity index.  This is the change of the stiffness in the last refinement, divided
 by the change of the indicator.
 
-K_h is an upper bound of the exact stiffness, and the error estimate E bounds the
-difference.  So K lies between K_h - E and K_h.  The middle of this interval is
-returned; its error is at most half as large, on the same mesh.
+K_h is an upper bound of the exact stiffness K, and the estimate E bounds the
+difference. K therefore lies between K_h - E and K_h.  The middle of this interval is
+returned, because its error is at most half of E on the same mesh.
 """
 
 from collections.abc import Callable, Sequence
@@ -44,8 +44,9 @@ from forcefit.stiffness.mesh.refine import refine
 from forcefit.stiffness.mesh.regions import is_jagged
 from forcefit.stiffness.mesh.solid import Solid
 
-# effectivity index of the first mesh; 0.6 to 1.1 was measured on the training parts of
-# benchmarks/evidence/stiffness_random_parts.py
+# Effectivity index assumed on the first mesh, where it cannot be computed.  It was
+# measured as 0.6 to 1.1 on the training parts of
+# benchmarks/evidence/stiffness_random_parts.py.
 DEFAULT_EFFECTIVITY = 2.0
 SAFETY_FACTOR = 1.3
 
@@ -60,7 +61,7 @@ class Level:
         material: (t, 3) lambda [Pa], mu [Pa], density [kg/m^3] of each element.
         solution: condensed stiffness and fields.
         errors: (s, 6, 6) local error indicators: contribution of each tetrahedron of
-            the solid to K_h - K, without an effectivity index.
+            the solid to K_h - K, before multiplication by the effectivity index.
         geometry_errors: (s, 6, 6) local errors due to the geometry of curved elements.
         volume_error: [1] relative difference of the volumes of elements and part.
     """
@@ -74,7 +75,7 @@ class Level:
     volume_error: float = 0.0
 
     def totals(self) -> tuple[NDArray, NDArray, NDArray]:
-        """Return the (6, 6) stiffness, its indicated error and the geometry's error."""
+        """Return the (6, 6) stiffness, its indicated error and its geometry error."""
         return (
             self.solution.stiffness,
             self.errors.sum(axis=0),
@@ -97,7 +98,7 @@ def solve_level(
         materials: materials; the first fills the link, later ones fill their regions.
         centers: (2, 3) [m] centres of base and tip.
         interface: kind of the interfaces, one of ``KINDS``.
-        check: function called with the number of unknowns before the solution.
+        check: function that is called with the number of unknowns before the solution.
 
     Returns:
         The solution on cubic elements with a layer along the singular edges.
@@ -122,13 +123,15 @@ def solve_level(
     indicated = error_matrices(
         mesh, solution.fields, lam, mu, singular, solution.stiffness
     )
-    # at singular edges s_3 is reliable, while tractions overestimate by a factor of 2
+    # at singular edges s_3 is reliable, but tractions overestimate the error by a
+    # factor 2
     free = np.flatnonzero((mesh.patch > max(ENDS)) & ~singular[mesh.owner])
     residual = np.zeros_like(indicated)
     tractions = traction_errors(mesh, solution.fields, lam, mu, free)
     np.add.at(residual, mesh.owner[free], tractions)
     sizes = 1 / np.diag(solution.stiffness)
-    # the larger one of two indicators of the same error, inside and at the surface
+    # two indicators, inside and at the surface, estimate the same error; the larger is
+    # used
     larger = np.einsum("tii,i->t", residual - indicated, sizes) > 0
     indicated[larger] = residual[larger]
     errors, geometry = np.zeros((2, len(solid.cells), 6, 6))
@@ -149,7 +152,7 @@ def solve_level(
 def estimated_error(
     history: Sequence[tuple[NDArray, NDArray, NDArray]],
 ) -> tuple[NDArray, float]:
-    """Return the estimated error of the last mesh's stiffness.
+    """Return the estimated error of the stiffness on the last mesh.
 
     Args:
         history: totals of the :class:`Level` of each mesh, finest last.
@@ -179,7 +182,7 @@ def estimated_error(
 def middle_stiffness(
     K_h: NDArray, E: NDArray, geometry: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return the middle of the interval that contains the exact stiffness.
+    """Return the middle of the interval in which the exact stiffness lies.
 
     Args:
         K_h: (6, 6) stiffness of a mesh, an upper bound except for the error of the
@@ -188,8 +191,8 @@ def middle_stiffness(
         geometry: (6, 6) indicated error of the geometry, of either sign.
 
     Returns:
-        (6, 6) K_h - E / 2, and (6, 6) the size of its error.  Less of E is subtracted
-        if otherwise less than half of K_h would remain in a motion.
+        (6, 6) stiffness K_h - E / 2, and (6, 6) the magnitude of its error.  If less
+        than half of K_h would remain for a motion, less of E is subtracted there.
     """
     largest = eigh(scaled(E, K_h), scaled(K_h, K_h), eigvals_only=True)[-1]
     part = 0.5 / max(1.0, largest)
@@ -202,8 +205,8 @@ def refine_level(level: Level, growth: float) -> Solid:
 
     Args:
         level: the mesh to refine.
-        growth: factor on the number of elements before neighbours are bisected for a
-            conforming mesh; including neighbours, the factor is about its square.
+        growth: factor on the number of elements that are selected.  Neighbours must
+            also be bisected for a conforming mesh; the total factor is about growth^2.
 
     Returns:
         The finer mesh.

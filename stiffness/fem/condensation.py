@@ -1,12 +1,16 @@
-"""Static condensation of a solid on two interfaces, six degrees of freedom each.
+"""Static condensation of a solid onto two interfaces of six degrees of freedom each.
 
-``rigid`` (RBE2): every node of an interface moves with its joint, as if it were bolted
-to a much stiffer part.  ``distributing`` (RBE3): the base is rigid, but the wrench of
-the tip is distributed over its interface as tractions that vary linearly.  This
-interface can deform; the screw of the tip is its mean motion, the least-squares rigid
-motion over the area.  ``distributing-both`` does the same at the base, so that the
-stiffness does not depend on which end is the tip.  Each kind is more compliant than the
-kind before it.
+The kind of the interfaces states how a joint is coupled to the surface:
+
+- ``rigid`` (RBE2): all nodes of an interface move with the joint as a rigid body, as
+  if the interface were bolted to a much stiffer part. - ``distributing`` (RBE3): the
+  base is rigid.  The wrench at the tip is distributed over the interface as tractions
+  that vary linearly.  This interface can deform.  The screw of the tip is the mean
+  motion of the interface: the rigid motion that fits the displacements best, by least
+  squares over the area. - ``distributing-both``: both interfaces are distributing, so
+  that the stiffness does not depend on which end is the tip.
+
+Each kind is more compliant than the previous one.
 """
 
 from dataclasses import dataclass, replace
@@ -25,7 +29,7 @@ KINDS = ("rigid", "distributing", "distributing-both")
 
 @dataclass(frozen=True, eq=False)
 class Condensed:
-    """A link's stiffness on one mesh, and its displacement fields.
+    """The stiffness of a link on one mesh, with its displacement fields.
 
     Attributes:
         stiffness: (6, 6) stiffness at the tip's centre, with the base held.
@@ -47,7 +51,7 @@ def condense(
     centers: NDArray,
     kind: str = "rigid",
 ) -> Condensed:
-    """Return the stiffness of a meshed link.
+    """Condense a meshed link onto its interfaces.
 
     Args:
         mesh: tetrahedra; patch 0 is the base, patch 1 the tip.
@@ -68,7 +72,7 @@ def condense(
 
 
 def rigid_motions(points: NDArray, center: NDArray) -> NDArray:
-    """Return the displacements of points for unit screws at a centre.
+    """Return the displacements of points for unit screws read at a centre.
 
     Args:
         points: (n, 3) [m] points.
@@ -82,12 +86,12 @@ def rigid_motions(points: NDArray, center: NDArray) -> NDArray:
 
 
 def _product(upper: csr_array, fields: NDArray) -> NDArray:
-    """Return the product of K and fields, from K's upper triangle."""
+    """Return the product of K and displacement fields from the upper triangle of K."""
     return upper @ fields + upper.T @ fields - upper.diagonal()[:, None] * fields
 
 
 def _rigid(mesh: Elements, upper: csr_array, tip_center: NDArray) -> Condensed:
-    """Return the solution with base nodes fixed and tip nodes moved by unit screws."""
+    """Return the solution for fixed base nodes and tip nodes moved by unit screws."""
     fields = np.zeros((len(mesh.nodes), 3, 6))
     base = np.unique(mesh.faces[mesh.patch == 0])
     tip = np.unique(mesh.faces[mesh.patch == 1])
@@ -98,7 +102,7 @@ def _rigid(mesh: Elements, upper: csr_array, tip_center: NDArray) -> Condensed:
     flat = fields.reshape(-1, 6)
     loads = -_product(upper, flat)[free]
     flat[free] = solve(upper[free][:, free], loads)
-    # computed from the energy of the fields, where errors of the solution are squared
+    # from the energy of the displacement fields, in which solution errors enter squared
     K = flat.T @ _product(upper, flat)
     return Condensed((K + K.T) / 2, fields, int(free.sum()))
 
@@ -106,7 +110,7 @@ def _rigid(mesh: Elements, upper: csr_array, tip_center: NDArray) -> Condensed:
 def _distributing_tip(
     mesh: Elements, upper: csr_array, tip_center: NDArray
 ) -> Condensed:
-    """Return the solution with base nodes fixed and wrenches distributed at the tip."""
+    """Return the solution for fixed base nodes and wrenches spread over the tip."""
     flat = _distributed_loads(mesh, 1, tip_center).reshape(-1, 6)
     free = np.ones(len(mesh.nodes), dtype=bool)
     free[np.unique(mesh.faces[mesh.patch == 0])] = False
@@ -115,7 +119,7 @@ def _distributing_tip(
 
 
 def _distributing_both(mesh: Elements, upper: csr_array, centers: NDArray) -> Condensed:
-    """Return the solution with wrenches distributed at the tip and at the base."""
+    """Return the solution for wrenches distributed over the tip and over the base."""
     base, tip = (_distributed_loads(mesh, k, centers[k]) for k in (0, 1))
     # unit wrenches at the tip and their reactions at the base
     to_base = screw_map(centers[0] - centers[1])
@@ -124,13 +128,13 @@ def _distributing_both(mesh: Elements, upper: csr_array, centers: NDArray) -> Co
     supports = _isostatic_supports(mesh)
     free = np.ones(len(flat), dtype=bool)
     free[supports] = False
-    # mean motion of the tip relative to that of the base; the supports have no
-    # reactions
+    # motion of the tip relative to the mean motion of the base; the supports carry no
+    # load
     return _from_loads(upper, flat, free)
 
 
 def _from_loads(upper: csr_array, loads: NDArray, free: NDArray) -> Condensed:
-    """Return the stiffness from the work of six load cases on all displacements."""
+    """Return the stiffness from the work of six load cases on their displacements."""
     u = np.zeros_like(loads)
     u[free] = solve(upper[free][:, free], loads[free])
     C = loads.T @ u
@@ -140,7 +144,7 @@ def _from_loads(upper: csr_array, loads: NDArray, free: NDArray) -> Condensed:
 
 
 def _distributed_loads(mesh: Elements, patch: int, center: NDArray) -> NDArray:
-    """Return (n, 3, 6) nodal loads of unit wrenches; transposed, mean motions."""
+    """Return (n, 3, 6) nodal loads of unit wrenches; transposed: mean motions."""
     faces = mesh.faces[mesh.patch == patch]
     nodes, index = np.unique(faces, return_inverse=True)
     index = index.reshape(faces.shape)

@@ -8,12 +8,12 @@ G      their gradients in space                                   (t, q, m, 3)
 w      quadrature weights times the Jacobian's determinant        (t, q)
 ====== ========================================================== ==========
 
-An element's m nodes are those of its lattice (:mod:`forcefit.stiffness.mesh.lagrange`):
-20 in a cubic tetrahedron, 10 in a quadratic one.  The stiffness is assembled from the
-scalar gradients of all elements together, which is much faster than from a weak form:
-K[ai, bj] = sum_q w (lam G_ai G_bj + mu G_aj G_bi + mu d_ij G_a . G_b). Straight
-tetrahedra are integrated exactly; for curved ones the rule is exact to two more
-degrees.
+The m nodes of an element are those of its lattice
+(:mod:`forcefit.stiffness.mesh.lagrange`): 20 in a cubic tetrahedron, 10 in a quadratic
+one.  The stiffness is assembled from the scalar gradients of all elements together:
+K[ai, bj] = sum_q w (lam G_ai G_bj + mu G_aj G_bi + mu d_ij G_a . G_b).  This is much
+faster than the evaluation of a weak form. Straight tetrahedra are integrated exactly.
+For curved ones, the quadrature rule is exact for two additional degrees.
 """
 
 from collections.abc import Iterator
@@ -36,20 +36,20 @@ from forcefit.stiffness.mesh.lagrange import (
 from forcefit.stiffness.mesh.quadrature import quadrature
 from forcefit.stiffness.mesh.solid import Solid
 
-# cubic; quadratic elements need several times as many unknowns for an error of 0.1 %
+# cubic; for an error of 0.1 %, quadratic elements need several times as many unknowns
 ORDER = 3
-# derivatives of the barycentric coordinates by the coordinates of the reference element
+# derivatives of the barycentric coordinates with respect to the reference coordinates
 _COORDINATES = np.vstack([-np.ones(3), np.eye(3)])
-_CHUNK = 3_600_000  # number of values of the elements' matrices in a batch, 30 MB
+_CHUNK = 3_600_000  # values of the element matrices in a batch, 30 MB
 
 
 @dataclass(frozen=True, eq=False)
 class Elements:
-    """A solid's isoparametric tetrahedra.
+    """Isoparametric tetrahedra of a solid.
 
     Attributes:
         order: order of the polynomials, 2 or 3.
-        nodes: (n, 3) [m] nodes, corners first; boundary nodes are on the exact shapes.
+        nodes: (n, 3) [m] nodes, corners first; boundary nodes lie on the exact shapes.
         cells: (t, m) nodes of each tetrahedron.
         faces: (f, k) nodes of each boundary triangle.
         patch: (f,) number of each face's patch; 0 is the base interface, 1 the tip.
@@ -89,12 +89,12 @@ class Chunk(NamedTuple):
 def isoparametric(
     solid: Solid, order: int = ORDER, parts: Parts | None = None
 ) -> Elements:
-    """Return the elements whose boundary nodes lie on the exact shapes.
+    """Return isoparametric elements whose boundary nodes lie on the exact shapes.
 
     Args:
         solid: the straight tetrahedra.
         order: order of the polynomials, 2 or 3.
-        parts: parts of the tetrahedra, each of which becomes an element.
+        parts: pieces into which the tetrahedra are cut; each becomes an element.
 
     Returns:
         The elements.
@@ -103,7 +103,8 @@ def isoparametric(
     cells, count = numbered(parts.corners, order)
     nodes = np.zeros((count, 3))
     L = (lattice(order) / order) @ parts.places
-    # there are few different cuts, so all parts with the same cut are treated together
+    # only a few different cuts occur, so all pieces with the same cut are treated
+    # together
     cuts = parts.places.reshape(len(L), 16)
     _, first, cut = np.unique(cuts, axis=0, return_index=True, return_inverse=True)
     for k, example in enumerate(first):
@@ -111,7 +112,7 @@ def isoparametric(
         N, _ = shape_functions(order, L[example])
         corners = whole.nodes[whole.cells[parts.parent[members]]]
         nodes[cells[members]] = np.einsum("na,tax->tnx", N, corners)
-    # a face of a part is on the boundary if it is within a boundary face of its
+    # a face of a piece is on the boundary if it is part of a boundary face of the
     # tetrahedron
     faces, patch, owner = [], [], []
     for side, on in zip(FACES, face_nodes(order), strict=True):
@@ -134,7 +135,7 @@ def isoparametric(
 
 
 def integration(mesh: Elements, some: NDArray | None = None) -> Iterator[Chunk]:
-    """Yield the quadrature of the elements, in batches.
+    """Yield the quadrature points and weights of the elements in batches.
 
     Args:
         mesh: the tetrahedra.
@@ -166,7 +167,7 @@ def _chunks(members: NDArray, nodes: int) -> Iterator[NDArray]:
 def gradients_on_faces(
     mesh: Elements, faces: NDArray
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Return the quadrature of stresses over boundary triangles.
+    """Return the points and weights for integrals of stresses over boundary triangles.
 
     Args:
         mesh: the tetrahedra.
@@ -199,7 +200,7 @@ def gradients_on_faces(
 
 
 def _jacobians(dN: NDArray, corners: NDArray) -> NDArray:
-    """Return (c, q, 3, 3) derivatives of position; reference coordinates are first."""
+    """Return (c, q, 3, 3) derivatives of position by reference coordinates (axis 2)."""
     q, m, _ = dN.shape
     flat = dN.transpose(0, 2, 1).reshape(3 * q, m) @ corners
     return np.asarray(flat.reshape(len(corners), q, 3, 3)).swapaxes(2, 3)
@@ -208,15 +209,15 @@ def _jacobians(dN: NDArray, corners: NDArray) -> NDArray:
 def node_gradients(
     mesh: Elements, members: NDArray | None = None
 ) -> Iterator[tuple[NDArray, NDArray]]:
-    """Yield gradients of the shape functions at the nodes of each element.
+    """Yield the gradients of the shape functions at the nodes of each element.
 
     Args:
         mesh: the tetrahedra.
         members: (c,) indices of the elements; all if absent.
 
     Yields:
-        Indices (c,) of elements and gradients (c, m, m, 3) [1/m]: node, function,
-        direction.
+        Indices (c,) of elements, and gradients (c, m, m, 3) [1/m] with the axes
+        element, node, shape function and direction.
     """
     dN = shape_functions(mesh.order, lattice(mesh.order) / mesh.order)[1]
     members = np.arange(len(mesh.cells)) if members is None else members
@@ -225,7 +226,7 @@ def node_gradients(
 
 
 def triangle_areas(mesh: Elements, faces: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the quadrature over curved triangles.
+    """Return the shape functions and weights for integrals over curved triangles.
 
     Args:
         mesh: the mesh with the triangles' nodes.
@@ -260,7 +261,7 @@ def triangle_rule(order: int) -> tuple[NDArray, NDArray, NDArray]:
 
 
 def lame(E: float, nu: float) -> tuple[float, float]:
-    """Return Lame's constants.
+    """Return Lame's constants of an isotropic material.
 
     Args:
         E: [Pa] Young's modulus.
@@ -273,7 +274,7 @@ def lame(E: float, nu: float) -> tuple[float, float]:
 
 
 def assemble(mesh: Elements, lam: NDArray, mu: NDArray) -> csr_array:
-    """Return the stiffness of all elements together.
+    """Assemble the stiffness matrix of all elements.
 
     Args:
         mesh: the tetrahedra.
@@ -281,7 +282,8 @@ def assemble(mesh: Elements, lam: NDArray, mu: NDArray) -> csr_array:
         mu: (t,) [Pa] shear modulus of each element.
 
     Returns:
-        (3n, 3n) [N/m] the upper triangle; row 3 i + k is direction k of node i.
+        (3n, 3n) [N/m] upper triangle of the matrix; row 3 i + k is direction k of node
+        i.
     """
     cells, count = mesh.cells, np.int64(len(mesh.nodes))
     a, b = np.triu_indices(cells.shape[1])
@@ -296,8 +298,8 @@ def assemble(mesh: Elements, lam: NDArray, mu: NDArray) -> csr_array:
         block = np.where(swapped[part, None], turned, block)
         place = position[part].ravel()
         for k in range(9):
-            # np.bincount would allocate sums for all pairs between the batch's first
-            # and last
+            # np.bincount would allocate sums for all pairs between the first and the
+            # last pair of the batch
             np.add.at(values[k], place, block[:, k].ravel())
     return _upper(values, code // count, code % count, int(count))
 
@@ -305,10 +307,10 @@ def assemble(mesh: Elements, lam: NDArray, mu: NDArray) -> csr_array:
 def _node_blocks(
     mesh: Elements, lam: NDArray, mu: NDArray, a: NDArray, b: NDArray
 ) -> Iterator[tuple[NDArray, NDArray]]:
-    """Yield indices (c,) of elements and stiffness (c, 9, p) of pairs a, b of nodes."""
+    """Yield element indices (c,) and stiffnesses (c, 9, p) of the node pairs a, b."""
     L, weights = quadrature(2 * (mesh.order - 1))
     _, dN = shape_functions(mesh.order, L)
-    # integrals of products of derivatives in the coordinates of a straight element
+    # integrals of products of derivatives, in the coordinates of a straight element
     own = np.einsum("q,qpx,qpy->xyp", weights, dN[:, a], dN[:, b]).reshape(9, -1)
     for part in _chunks(np.flatnonzero(~mesh.curved), dN.shape[1]):
         corners = mesh.nodes[mesh.cells[part, :4]]
@@ -334,7 +336,7 @@ def _hooke(S: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
 
 
 def _upper(values: NDArray, row: NDArray, column: NDArray, count: int) -> csr_array:
-    """Return the upper triangle from blocks (9, k) of nodes' pairs, row by row."""
+    """Return the upper triangle from the (9, k) blocks of node pairs, row by row."""
     start = np.searchsorted(row, np.arange(count + 1))
     width = np.diff(start)
     # a node's diagonal block is first: its second row lacks one entry, its third row

@@ -1,27 +1,27 @@
 r"""A posteriori error indicator of a finite element stiffness, element by element.
 
 The stiffness of cubic elements is too large by the energy of the discretisation error.
-The stresses of these elements are quadratic.  In every element they are split into the
-best linear part and a remainder, and the linear part into its mean and a remainder.
-s_3 and s_2 are the energies of these two remainders.  If an error e decreases with the
-polynomial degree p as p^-b, the decay s_3 / s_2 = (e_2 - e_3) / (e_1 - e_2) determines
-b.  From b follows the ratio e_3 / (e_2 - e_3) of the remaining error to s_3: nearly
-zero in a smooth field, one and more otherwise.  For elements on a singular edge it is
-set to 1.2.
+The stresses of a cubic element are quadratic.  In every element they are split into
+three parts: a constant mean, a linear part, and a quadratic part.  s_2 is the energy of
+the linear part, and s_3 is the energy of the quadratic part.  Let the error e_p of
+elements of degree p decrease as p^-b.  Then the decay
+s_3 / s_2 = (e_2 - e_3) / (e_1 - e_2) determines b, and b determines the ratio
+e_3 / (e_2 - e_3) of the remaining error to s_3.  The ratio is nearly zero in a smooth
+field, and one or more otherwise.  For elements at a singular edge it is set to 1.2.
 
 At the free edge of a twisted plate the stresses change direction within a boundary
-layer of a third of the wall.  An element that is much wider than the wall does not
-resolve this layer.  Its s_2, dominated by the plate's linear stresses, suggests a
-smooth field, but residual tractions t remain on the free surface.  A surface wave of
-half wavelength l, the smallest height of the face, balances these tractions and decays
-as exp(-pi x / l).  Its energy, the integral of t^2 / (2 mu) l / pi, is used if it is
-larger.
+layer, whose width is a third of the wall thickness.  An element that is much wider than
+the wall does not resolve this layer.  The large linear stresses of the plate increase
+s_2 and thus suggest a smooth field, but residual tractions t remain on the free
+surface. Let l be the smallest height of the face.  A surface wave of half wavelength l
+balances the tractions and decays as exp(-pi x / l).  Its energy is the integral of t^2
+/ (2 mu) l / pi.  The indicator is the larger one of both estimates.
 
-The indicator does not contain the error of the geometry, the distance of curved
-elements from their shapes: see :func:`geometry_errors`.
+The indicator does not include the error of the geometry, which is the distance of the
+curved elements from the exact shapes: see :func:`geometry_errors`.
 
 Sources:
-    Mavriplis (1990) for the decay of an element's own coefficients as an estimate;
+    Mavriplis (1990) for an error estimate from the decay of an element's coefficients;
     Schwab (1998), p- and hp-Finite Element Methods, for the rate p^-b;
     Friedrichs & Dressler (1961) for the layer at a plate's free edge.
 """
@@ -36,7 +36,7 @@ from forcefit.stiffness.surface.primitives import Plane, Shape
 from forcefit.stiffness.surface.true_surface import TrueSurface
 
 VOIGT = np.array([[0, 0], [1, 1], [2, 2], [1, 2], [0, 2], [0, 1]])
-_SAME_MODULUS = 1e-6  # relative difference of two moduli that count as equal
+_SAME_MODULUS = 1e-6  # relative difference up to which moduli count as equal
 _CHUNK = 1024  # number of faces in a batch
 # ratio of the remaining error e_3 to the indicator s_3 at a singular edge,
 # calibrated on the example links in meshes/
@@ -56,7 +56,7 @@ def error_matrices(
     singular: NDArray,
     stiffness: NDArray,
 ) -> NDArray:
-    """Return the estimated error of the stiffness, element by element.
+    """Estimate the contribution of each element to the error of the stiffness.
 
     Args:
         mesh: cubic tetrahedra.
@@ -68,7 +68,7 @@ def error_matrices(
             scaled.
 
     Returns:
-        (t, k, k) [unit of the stiffness] contributions, whose sum estimates K_h - K.
+        (t, k, k) [unit of the stiffness] contributions; their sum estimates K_h - K.
     """
     errors = np.zeros((len(mesh.cells), *stiffness.shape))
     for part, L, weights, _, G, w in integration(mesh):
@@ -94,14 +94,14 @@ def error_matrices(
 def traction_errors(
     mesh: Elements, fields: NDArray, lam: NDArray, mu: NDArray, free: NDArray
 ) -> NDArray:
-    """Return the energies of the fields that balance residual tractions on free faces.
+    """Return the energies of the fields that would balance residual surface tractions.
 
     Args:
         mesh: the tetrahedra.
         fields: (n, 3, k) [m] displacements of k unit load cases.
         lam: (t,) [Pa] Lame's first constant.
         mu: (t,) [Pa] shear modulus.
-        free: (f,) indices of boundary triangles without loads.
+        free: (f,) indices of boundary triangles on which no load acts.
 
     Returns:
         (f, k, k) [unit of the stiffness] energies.
@@ -124,7 +124,7 @@ def traction_errors(
 
 
 def _smallest_height(mesh: Elements, faces: NDArray) -> NDArray:
-    """Return (f,) [m] the smaller of a triangle's height and its element's depth."""
+    """Return (f,) [m] the smaller one of triangle height and element depth."""
     a, b, c = np.moveaxis(mesh.nodes[mesh.faces[faces, :3]], 1, 0)
     across = np.cross(b - a, c - a)
     twice = np.linalg.norm(across, axis=1)
@@ -143,7 +143,7 @@ def geometry_errors(
     mu: NDArray,
     surface: TrueSurface | None = None,
 ) -> NDArray:
-    """Return the error of the stiffness due to deviations from the exact shapes.
+    """Estimate the error of the stiffness due to deviations from the exact shapes.
 
     Args:
         mesh: the tetrahedra.
@@ -151,16 +151,16 @@ def geometry_errors(
         fields: (n, 3, k) [m] displacements of k unit load cases.
         lam: (t,) [Pa] Lame's first constant.
         mu: (t,) [Pa] shear modulus.
-        surface: surface for patches that meet others smoothly, because an element may
-            be on both sides of their border; if absent, each face is compared with the
-            shape of its own patch.
+        surface: surface used for patches that meet others smoothly, where an element
+            may lie on both sides of their border.  If it is None, each face is
+            compared with the shape of its patch.
 
     Returns:
         (f, k, k) [unit of the stiffness] contribution of each boundary triangle: the
         energy density times the distance to the shape, to first order.
 
     Sources:
-        Hadamard (1908): derivative of the energy when a free surface moves.
+        Hadamard (1908), for the derivative of the energy when a free surface moves.
     """
     cases = fields.shape[2]
     errors = np.zeros((len(mesh.faces), cases, cases))
@@ -197,7 +197,7 @@ def material_errors(
     mu: NDArray,
     shear_at: Callable[[NDArray], NDArray],
 ) -> NDArray:
-    """Return the error of the stiffness due to elements that contain two materials.
+    """Estimate the error of the stiffness due to elements that contain two materials.
 
     Args:
         mesh: the tetrahedra.
@@ -208,9 +208,9 @@ def material_errors(
             [m].
 
     Returns:
-        (t, k, k) [unit of the stiffness] contributions, positive where an element is
-        too stiff: the energy of its part in the other material, times the ratio of the
-        moduli.
+        (t, k, k) [unit of the stiffness] contributions, positive if an element is too
+        stiff.  A contribution equals the energy of the part of the element in the
+        other material, times the ratio of the moduli.
     """
     cases = fields.shape[2]
     errors = np.zeros((len(mesh.cells), cases, cases))
@@ -218,7 +218,7 @@ def material_errors(
         places = np.einsum("qa,tax->tqx", N, mesh.nodes[mesh.cells[part]])
         own = mu[part][:, None]
         true = shear_at(places.reshape(-1, 3)).reshape(w.shape)
-        # tractions are continuous across the face, so the more compliant side has more
+        # tractions are continuous across the face, so the compliant side stores more
         # energy
         ratio = np.maximum(own / true, true / own)
         sign = np.where(own > true, 1.0, -1.0) * (np.abs(ratio - 1) > _SAME_MODULUS)
@@ -233,7 +233,7 @@ def material_errors(
 
 
 def _energy_roots(G: NDArray, u: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
-    """Return (c, q, k, 7) stresses whose products are energies: deviatoric and bulk."""
+    """Return (c, q, k, 7) roots of the energy density: deviatoric and bulk parts."""
     count, points, nodes, _ = G.shape
     cases = u.shape[3]
     slope = u.transpose(0, 3, 2, 1).reshape(count, 1, 3 * cases, nodes) @ G
@@ -249,7 +249,7 @@ def _energy_roots(G: NDArray, u: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
 
 
 def _energy_products(roots: NDArray, w: NDArray) -> NDArray:
-    """Return the (c, k, k) integrals of products of energy roots, case by case."""
+    """Return the (c, k, k) integrals of products of energy roots for pairs of cases."""
     count, _, cases, _ = roots.shape
     flat = (
         (roots * np.sqrt(w)[:, :, None, None]).swapaxes(1, 2).reshape(count, cases, -1)

@@ -49,8 +49,8 @@ from forcefit.stiffness.surface.patches import (
 from forcefit.stiffness.surface.surface import Surface, read_surface
 
 _LOG = logging.getLogger("forcefit.finite_elements")
-_SETUP = 2.0  # [s] time of a solution that does not depend on the mesh
-# share of the budget's seconds for the mesher; the rest is for the solver
+_SETUP = 2.0  # [s] part of the solution time that does not depend on the mesh
+# share of the time budget for the mesher; the remaining time is for the solver
 _MESHER = 0.6
 
 
@@ -59,7 +59,7 @@ class Budget:
     """Limits of the computing cost of a solution.
 
     Attributes:
-        seconds: [s] time after which no finer mesh is begun.
+        seconds: [s] time after which no finer mesh is started.
         unknowns: [-] largest number of unknowns, on which the memory depends.
         levels: [-] largest number of meshes, including the first one.
     """
@@ -78,7 +78,7 @@ class FemOptions:
         interface: ``"rigid"``, ``"distributing"`` (the tip) or ``"distributing-both"``,
             see :mod:`forcefit.stiffness.fem.condensation`.
         budget: limits of the computing cost.
-        cache: folder of meshes; the user's cache folder if absent.
+        cache: folder in which meshes are stored; by default the user's cache folder.
     """
 
     accuracy: float = 0.005
@@ -102,10 +102,10 @@ _STANDARD = FemOptions()
 
 @dataclass(frozen=True, eq=False)
 class MeshedLink:
-    """A link solved on its finest mesh, from which stresses can be computed.
+    """A link with the solution on its finest mesh, from which stresses are computed.
 
     Attributes:
-        link: the stiffness, with error, report on the mesh, and mass.
+        link: the stiffness with its error, the mesh report and the mass properties.
         level: the finest mesh with its stiffness, fields and materials.
         centers: (2, 3) [m] centres of the base and the tip interface.
     """
@@ -126,21 +126,21 @@ def mesh_link(
     unit: str = "m",
     options: FemOptions = _STANDARD,
 ) -> LinkStiffness:
-    """Return the stiffness of a link of one material from a surface file.
+    """Compute the stiffness of a link of one material from a surface file.
 
     Args:
         surface: file of the closed surface (STL, OBJ, PLY, VTK, MSH, STEP).
-        base: the held interface, in metres, in the axes of the surface; or its text,
-            such as ``"z=0"``, see
+        base: held interface, in metres and in the axes of the surface; or a text such
+            as ``"z=0"``, see
             :func:`forcefit.stiffness.surface.interface.parse_interface`.
-        tip: the interface that moves.
-        material: material of the link; without a density it has no mass and inertia.
-        unit: unit of the surface file's coordinates.
+        tip: interface that moves, in the same form.
+        material: material of the link; if its density is 0, the link has no mass.
+        unit: unit of length of the surface file.
         options: options of the solution.
 
     Returns:
-        The stiffness at the tip's centre, in the axes of the surface.  Its ``mesh``
-        states whether the required accuracy was ``reached``.
+        The stiffness at the centre of the tip, in the axes of the surface.  The entry
+        ``reached`` of its ``mesh`` states whether the required accuracy was reached.
 
     Raises:
         BadInput: the file or an interface is invalid.
@@ -170,19 +170,19 @@ def solve_link(
 
     Args:
         surface: surface of the link.
-        base: the held interface.
-        tip: the interface that moves.
-        materials: materials; the first fills the link, later ones fill their regions;
-            or one for each solid of a STEP file.
+        base: held interface.
+        tip: interface that moves.
+        materials: the first material fills the link, and later ones fill their
+            regions; or one material for each solid of a STEP file.
         options: options of the solution.
-        point_masses: point masses that are added to mass, centre and inertia.
+        point_masses: point masses that contribute to mass, centre and inertia.
 
     Returns:
         The link and its finest mesh.
 
     Raises:
-        BadInput: an interface is invalid, both interfaces share an edge, there is no
-            material, or a solid named by a material does not exist.
+        BadInput: an interface is invalid, the interfaces share an edge, no material is
+            given, or a solid named by a material does not exist.
     """
     start, busy = time.monotonic(), _processor_seconds()
     check_materials(materials)
@@ -208,13 +208,13 @@ def solve_link(
 def solve_bar(
     section: Mapping[str, float], material: Material, options: FemOptions = _STANDARD
 ) -> MeshedLink:
-    """Solve a straight bar of unit length along z to a required accuracy.
+    """Solve a straight bar of unit length along z, extruded without a mesher.
 
     Args:
         section: lengths of the section relative to the bar's length, see
             :func:`forcefit.stiffness.mesh.straight_bar.straight_bar`.
         material: material of the bar.
-        options: options of the solution; no mesher runs.
+        options: options of the solution.
 
     Returns:
         The bar and its finest mesh.  The base is at z = 0, the tip at z = 1; the
@@ -234,14 +234,14 @@ def _refined(
     start: float,
     pace: float = 1.0,
 ) -> tuple[Level, NDArray, NDArray, dict[str, Any]]:
-    """Solve on finer meshes until the error is small enough or the budget is used.
+    """Solve on successively finer meshes, up to the accuracy or the end of the budget.
 
     Args:
-        first: mesh to begin with.
+        first: coarsest mesh.
         materials: materials; the first fills the link, later ones fill their regions.
         centers: (2, 3) [m] centres of base and tip.
         options: options of the solution.
-        start: [s] time from which the budget's seconds count.
+        start: [s] start of the time budget.
         pace: [-] present slowness of this machine, relative to an idle one.
 
     Returns:
@@ -266,7 +266,7 @@ def _refined(
         if worst <= accuracy or len(history) == budget.levels:
             break
         if level.volume_error > max(accuracy, 0.7 * worst):
-            break  # the file's facets limit the accuracy, not the mesh
+            break  # the facets of the file limit the accuracy
         growth = _wanted_growth(history, sizes, worst / accuracy)
         pace = _pace(level.solution.unknowns, time.monotonic() - begun)
         solid = _affordable_mesh(level, growth, budget, start, pace)
@@ -297,7 +297,7 @@ def interface_center(surface: Surface, interface: Interface, name: str) -> NDArr
         name: base or tip, for messages.
 
     Returns:
-        (3,) [m] given point of a disc or a bore; centroid of the area of a plane.
+        (3,) [m] the given point of a disc or bore, or the area centroid of a plane.
 
     Raises:
         BadInput: no part of the surface lies on the interface.
@@ -308,7 +308,8 @@ def interface_center(surface: Surface, interface: Interface, name: str) -> NDArr
     areas = np.linalg.norm(surface.normals()[members], axis=1)
     corners = surface.points[surface.triangles[members]]
     center = np.average(corners.mean(axis=1), axis=0, weights=areas)
-    # STL has single precision, so the centre is moved onto the requested plane
+    # coordinates in STL are single precision, so the centre is moved exactly onto the
+    # plane
     height = (center - interface.point) @ interface.direction
     center = center - height * interface.direction
     return np.where(np.abs(center) < 1e-12 * surface.diagonal, 0.0, center)
@@ -321,21 +322,21 @@ def first_mesh(
     budget: Budget,
     cache: Path | str | None = None,
 ) -> Solid:
-    """Return a coarse mesh to refine from that resolves the part's walls.
+    """Return a coarse mesh that resolves the walls of the part, to be refined further.
 
     Args:
         surface: surface of the link.
         base: the held interface.
         tip: the interface that moves.
         budget: budget, whose seconds limit the mesher.
-        cache: folder of meshes; the user's cache folder if absent.
+        cache: folder in which meshes are stored; by default the user's cache folder.
 
     Returns:
         The solid.
 
     Raises:
         BadInput: no part of the surface is on an interface.
-        MeshFailed: three attempts gave no usable mesh, or the time is used up.
+        MeshFailed: three attempts did not give a usable mesh, or the time is over.
     """
     wall = 2 * surface.volume / surface.area / surface.diagonal
     envelope, edge = min(2e-3, wall / 8), 0.1 * surface.diagonal
@@ -343,7 +344,7 @@ def first_mesh(
     start = time.monotonic()
     if (bar := slender_bar(surface, base, tip)) is not None:
         return bar
-    patches = find_patches(surface, base, tip)  # 3 s for a part with 70 patches
+    patches = find_patches(surface, base, tip)  # takes 3 s for a part with 70 patches
 
     def mesh(share: float) -> Solid:
         left = budget.seconds - (time.monotonic() - start)
@@ -369,18 +370,18 @@ def first_mesh(
 
 
 def _pace(unknowns: int, seconds: float) -> float:
-    """Return the time of a solution relative to the expected time, at least 1."""
+    """Return the measured solution time relative to the expected one, at least 1."""
     return max(1.0, (seconds - _SETUP) / expected_cost(unknowns)[1])
 
 
 def _processor_seconds() -> float:
-    """Return processor time [s] of this process and its finished child processes."""
+    """Return the processor time [s] of this process and of its finished children."""
     return sum(os.times()[:4])
 
 
 def _pace_so_far(elapsed: float, busy: float) -> float:
     """Return the ratio of elapsed time to processor time, at least 1."""
-    # short times are unreliable; Windows does not count the mesher's time
+    # short times are unreliable; on Windows the time of the mesher is not measured
     if elapsed < _SETUP or os.name == "nt":
         return 1.0
     return max(1.0, elapsed / max(busy, 0.1 * elapsed))
@@ -389,7 +390,7 @@ def _pace_so_far(elapsed: float, busy: float) -> float:
 def _refuse_cost(
     unknowns: int, budget: Budget, spent: float, pace: float = 1.0
 ) -> None:
-    """Reject a first mesh whose solution exceeds the budget."""
+    """Raise an error if the solution on the first mesh would exceed the budget."""
     memory, seconds = expected_cost(unknowns)
     seconds *= pace
     if unknowns > budget.unknowns or spent + seconds > budget.seconds:
@@ -416,8 +417,8 @@ def _wanted_growth(
 def _affordable_mesh(
     level: Level, growth: float, budget: Budget, start: float, pace: float = 1.0
 ) -> Solid | None:
-    """Return a finer mesh within the budget, with the requested growth of elements."""
-    part = growth**0.55 - 1  # neighbours add about as many elements
+    """Return a finer mesh within the budget, with the wanted growth if possible."""
+    part = growth**0.55 - 1  # about as many elements are bisected as neighbours
     solid = refine_level(level, 1 + part)
     added = len(solid.cells) / len(level.solid.cells) - 1
     if not 0.85 < added / (growth - 1) < 1.08:

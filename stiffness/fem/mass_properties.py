@@ -1,4 +1,4 @@
-"""Mass, centre and inertia of a meshed link as a rigid body."""
+"""Mass, centre of mass and inertia of a meshed link as a rigid body."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from forcefit.stiffness.fem.elements import Elements, integration
 
 @dataclass(frozen=True, eq=False)
 class PointMass:
-    """A point mass on the link, without stiffness.
+    """A point mass on the link, which does not change the stiffness.
 
     Attributes:
         mass: [kg] mass.
@@ -25,7 +25,7 @@ class PointMass:
 def mass_properties(
     mesh: Elements, density: NDArray, point_masses: Sequence[PointMass] = ()
 ) -> tuple[float, NDArray, NDArray]:
-    """Return the mass, centre and inertia of elements and added points.
+    """Return mass, centre of mass and inertia of the elements and point masses.
 
     Args:
         mesh: the tetrahedra.
@@ -33,8 +33,8 @@ def mass_properties(
         point_masses: point masses that are added to the elements.
 
     Returns:
-        Mass [kg], centre of mass (3,) [m], inertia (3, 3) [kg m^2] about the centre;
-        zeros without mass.
+        Mass [kg], centre of mass (3,) [m], inertia (3, 3) [kg m^2] about the centre of
+        mass; all are zero if the mass is zero.
     """
     origin = mesh.nodes.mean(axis=0)
     mass, first, second = 0.0, np.zeros(3), np.zeros((3, 3))

@@ -1,4 +1,4 @@
-"""Materials of a link and their regions."""
+"""Materials of a link, and the regions in which they apply."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -22,12 +22,12 @@ class Material:
         E: [Pa] Young's modulus.
         nu: [-] Poisson's ratio.
         density: [kg/m^3] density; 0 for a link without mass.
-        where: function that selects the points (n, 3) [m], in the mesh's axes, of this
-            material.  The material of an element is the last one whose region contains
-            its centre.
+        where: function that returns which points (n, 3) [m], in the mesh's axes, are in
+            the region of this material.  If regions overlap, the last material applies.
+            An element has the material at its centre.
         faces: faces of the region, along which the mesh is cut.
-        solid: name of the solid of a STEP file with this material, or ``one+other``;
-            replaces ``where`` and ``faces``.
+        solid: name of the solid of a STEP file that consists of this material, or
+            ``one+other`` for two solids; replaces ``where`` and ``faces``.
     """
 
     E: float
@@ -51,14 +51,14 @@ def material_of_elements(
     Args:
         mesh: the tetrahedra.
         materials: materials; the first fills the link, later ones fill their regions.
-        cut_region: (t,) region of each element, among the regions along whose faces the
-            mesh was cut; None if it was not cut.
+        cut_region: (t,) region of each element, counting only regions along whose
+            faces the mesh was cut; None if it was not cut.
 
     Returns:
         (t, 3) lambda [Pa], mu [Pa] and density [kg/m^3].
 
     Raises:
-        BadInput: there is no material, or the first one does not fill the link.
+        BadInput: no material is given, or the first one does not fill the link.
     """
     check_materials(materials)
     centers = mesh.nodes[mesh.cells[:, :4]].mean(axis=1)
@@ -94,7 +94,7 @@ def regions_of(materials: Sequence[Material]) -> tuple[Region, ...]:
         materials: materials; the first fills the link, later ones fill their regions.
 
     Returns:
-        The regions; later ones have precedence.
+        The regions; where they overlap, later ones apply.
     """
     return tuple(
         Region(material.where or _everywhere, material.faces)
@@ -107,13 +107,13 @@ def _everywhere(points: NDArray) -> NDArray:
 
 
 def check_materials(materials: Sequence[Material]) -> None:
-    """Reject a link without a material.
+    """Raise an error if a link has no material.
 
     Args:
-        materials: materials of a link.
+        materials: materials of the link.
 
     Raises:
-        BadInput: there is no material.
+        BadInput: the list is empty.
     """
     if not materials:
         raise BadInput("materials: found none, expected at least one")

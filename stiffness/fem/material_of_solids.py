@@ -1,4 +1,4 @@
-"""Regions of materials that are given as solids of a STEP file."""
+"""Regions of materials that are assigned to solids of a STEP file."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,17 +19,18 @@ from forcefit.stiffness.surface.triangle_graph import TriangleGraph
 def placed_materials(
     surface: Surface, materials: Sequence[Material]
 ) -> tuple[Material, ...]:
-    """Assign the regions of solids to the materials that name these solids.
+    """Find the region of each material that names solids of a STEP file.
 
     Args:
         surface: surface of the link, with its solids.
-        materials: materials; the first fills the link, or each solid has one.
+        materials: the first material fills the link, or each solid has a material.
 
     Returns:
-        The materials with regions; none of them names a solid any more.
+        The materials with regions instead of names of solids.
 
     Raises:
-        BadInput: there is no such solid, solids overlap, or a solid has no material.
+        BadInput: a named solid does not exist, solids overlap, or a solid has no
+            material.
     """
     named = [material for material in materials if material.solid]
     if not named:
@@ -60,13 +61,13 @@ def placed_materials(
         _placed(solids, names, material) if material.solid else material
         for names, material in zip(members, materials, strict=True)
     ]
-    # if each solid has a material, the first one fills what later ones leave
+    # if each solid has a material, the first one also fills space outside other solids
     first = replace(materials[0], solid="") if materials[0].solid else materials[0]
     return first, *placed[1:]
 
 
 def _members(name: str, solids: FilledSolids, material: Material) -> tuple[str, ...]:
-    """Return the names of the solids to which a material belongs."""
+    """Return the names of the solids that consist of a material."""
     text = material.solid
     names = (text,) if text in solids.names or not text else tuple(text.split("+"))
     for one in names if text else ():
@@ -79,7 +80,7 @@ def _members(name: str, solids: FilledSolids, material: Material) -> tuple[str, 
 def _placed(
     solids: FilledSolids, names: tuple[str, ...], material: Material
 ) -> Material:
-    """Return a material with the region and the faces of its solids."""
+    """Return a material with the region and the boundary faces of its solids."""
     triangles, within = solids.around(names)
     triangles = orient_shells(triangles)[0]
     used, index = np.unique(triangles, return_inverse=True)
@@ -96,7 +97,7 @@ def _placed(
 
 
 def _enclosed(bound: Surface, points: NDArray) -> NDArray:
-    """Return whether points are inside a closed surface."""
+    """Return (n,) bool, True for points inside a closed surface."""
     import pyvista
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkFiltersModeling import vtkSelectEnclosedPoints

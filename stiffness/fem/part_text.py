@@ -1,4 +1,4 @@
-"""Parts of a link given as text: boxes and solids of another material, point masses."""
+"""Texts that describe parts of another material (boxes, solids) and point masses."""
 
 from functools import partial
 
@@ -22,7 +22,7 @@ _MASS = '"1.5/0,0,0.452", kilograms and a place in metres'
 
 
 def parse_part(option: str, text: str) -> Material:
-    """Return a material within a box, or of solids of a STEP file, from text.
+    """Parse a material that fills a box or solids of a STEP file.
 
     Args:
         option: name of the option, for the error message.
@@ -56,7 +56,7 @@ def parse_part(option: str, text: str) -> Material:
 
 
 def _box(option: str, text: str, region: str) -> tuple[NDArray, NDArray]:
-    """Return lower and upper corner of a box, infinite along omitted axes."""
+    """Return the lower and upper corner of a box, infinite along omitted axes."""
     low, high = np.full(3, -np.inf), np.full(3, np.inf)
     for part in region.split(","):
         axis, _, span = (word.strip() for word in part.partition("="))
@@ -68,13 +68,13 @@ def _box(option: str, text: str, region: str) -> tuple[NDArray, NDArray]:
 
 
 def read_parts(link: Table) -> tuple[str, ...]:
-    """Read ``parts`` of a link's table, a list of texts of :func:`parse_part`.
+    """Read ``parts`` of a link's table, a list of texts for :func:`parse_part`.
 
     Args:
         link: the table.
 
     Returns:
-        The texts; none if there is no list.
+        The texts; an empty tuple if the key is absent.
 
     Raises:
         BadInput: the value is not a list of such texts.
@@ -89,14 +89,14 @@ def read_parts(link: Table) -> tuple[str, ...]:
 
 
 def scaled_part(text: str, factor: float) -> str:
-    """Scale the modulus of a part.
+    """Multiply the Young's modulus in the text of a part by a factor.
 
     Args:
         text: text of :func:`parse_part`.
         factor: [1] factor on the modulus.
 
     Returns:
-        Text of the same part, with its modulus multiplied by the factor.
+        Text of the same part with the new modulus.
     """
     region, _, constants = text.rpartition("/")
     values = parse_assignments([constants], "part")
@@ -105,7 +105,7 @@ def scaled_part(text: str, factor: float) -> str:
 
 
 def parse_mass(option: str, text: str) -> PointMass:
-    """Return a mass at a point, ``1.5/0,0,0.452``.
+    """Parse a point mass such as ``1.5/0,0,0.452``.
 
     Args:
         option: name of the option, for the error message.
@@ -125,7 +125,7 @@ def parse_mass(option: str, text: str) -> PointMass:
 
 
 def _planes(low: NDArray, high: NDArray) -> tuple[CutFace, ...]:
-    """Return the faces of a box, except those at infinity."""
+    """Return the faces of a box, except for faces at infinity."""
     axes = np.eye(3)
     return tuple(
         CutFace(Plane(end[k] * axes[k], axes[k]))
@@ -136,5 +136,5 @@ def _planes(low: NDArray, high: NDArray) -> tuple[CutFace, ...]:
 
 
 def _inside(low: NDArray, high: NDArray, points: NDArray) -> NDArray:
-    """Return whether points are in a box."""
+    """Return (n,) bool, True for points in a box."""
     return np.asarray(((points >= low) & (points <= high)).all(axis=-1))

@@ -1,4 +1,4 @@
-"""Quality of a mesh of tetrahedra, for the report."""
+"""Quality measures of a mesh of tetrahedra, for reports."""
 
 from typing import Any
 
@@ -10,25 +10,25 @@ from forcefit.stiffness.mesh.lagrange import EDGES
 from forcefit.stiffness.mesh.solid import Solid, element_quality
 from forcefit.stiffness.surface.surface import directed_edges
 
-_FLAT = 0.01  # quality below which a tetrahedron is inaccurate and badly conditioned
+_FLAT = 0.01  # quality below which tetrahedra are inaccurate and ill-conditioned
 
 
 def mesh_report(solid: Solid, mesh: Elements) -> dict[str, Any]:
-    """Return the counts, size and shape of a mesh.
+    """Return element counts, sizes and quality measures of a mesh.
 
     Args:
         solid: the straight tetrahedra.
-        mesh: its elements, curved and with layers along singular edges.
+        mesh: elements of the solid, curved and with layers along singular edges.
 
     Returns:
-        ``nodes``, ``elements``; ``volume`` [m^3] and ``area`` [m^2] of the curved
-        elements; ``closed``, whether every edge of the boundary has two faces;
+        ``nodes`` and ``elements``; ``volume`` [m^3] and ``area`` [m^2] of the curved
+        elements; ``closed``, whether every boundary edge belongs to two faces;
         ``worst_quality`` and ``mean_quality``; ``smallest_angle`` and ``largest_angle``
         [rad] between two faces of a tetrahedron; ``flat_elements``, the number of
-        elements with a quality below 0.01; ``drawn_out``, whether a bar's section was
-        extruded in long elements, which do not count as flat.  Quality and angles are
-        those of the tetrahedra before graded layers are cut off, because the layers are
-        thin on purpose.
+        elements with a quality below 0.01; ``drawn_out``, whether the section of a bar
+        was extruded to long elements, which are not counted as flat.  Quality and
+        angles are those of the tetrahedra before layers along singular edges are cut
+        off, because the layers are thin on purpose.
     """
     quality, angles = element_quality(solid), dihedral_angles(solid)
     edges = np.sort(directed_edges(solid.faces), axis=1)
@@ -49,14 +49,14 @@ def mesh_report(solid: Solid, mesh: Elements) -> dict[str, Any]:
 
 
 def volume_error(solid: Solid, mesh: Elements) -> float:
-    """Return the largest possible relative difference of the volumes of mesh and part.
+    """Bound the relative difference between the volumes of the mesh and of the part.
 
     Args:
         solid: the straight tetrahedra.
         mesh: its elements.
 
     Returns:
-        [-] relative to the volume of the part; zero if the surface is unknown.
+        [-] bound relative to the volume of the part; zero if the surface is unknown.
     """
     if solid.surface is None:
         return 0.0
@@ -72,14 +72,16 @@ def dihedral_angles(solid: Solid) -> NDArray:
         solid: straight tetrahedra.
 
     Returns:
-        (t, 6) [rad] angles at the edges 01 02 03 12 13 23; arccos(1/3) if regular.
+        (t, 6) [rad] angles at the edges 01 02 03 12 13 23; arccos(1/3) in a regular
+        tetrahedron.
     """
     corners = solid.points[solid.cells]
     angles = []
     for i, j in EDGES:
         k, l = (v for v in range(4) if v not in (i, j))
         along = corners[:, j] - corners[:, i]
-        # components of the positions of the other two corners normal to the edge
+        # the positions of the other two corners, projected onto the plane normal to the
+        # edge
         one, other = (np.cross(along, corners[:, v] - corners[:, i]) for v in (k, l))
         across = np.linalg.norm(np.cross(one, other), axis=1)
         angles.append(np.arctan2(across, np.einsum("ij,ij->i", one, other)))

@@ -1,7 +1,7 @@
-"""Solution of a symmetric positive definite system, with many right-hand sides.
+"""Solution of symmetric positive definite systems with many right-hand sides.
 
-The solver is MKL's PARDISO if its package is installed, otherwise SciPy's SuperLU,
-which needs about ten times the time and twice the memory.
+If the package of MKL is installed, MKL's PARDISO solves the system.  Otherwise SciPy's
+SuperLU is used, which needs about ten times the time and twice the memory.
 """
 
 import os
@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, csr_matrix, triu
 from scipy.sparse.linalg import splu
 
-# PARDISO's iparm: defaults for symmetric matrices, except 8: no iterative refinement,
-# because the error of the solution is squared in the energy; 24: two-level
-# factorisation, which saves an eighth of the time; 37: rows whose patterns agree to 90
-# %, such as the three rows of a node, form one block, which halves the time of the
-# analysis
+# Parameters iparm of PARDISO: the defaults for symmetric matrices, except for 8: no
+# iterative refinement, because the error of the solution enters the energy squared; 24:
+# two-level factorisation, which saves an eighth of the time; 37: rows whose patterns
+# agree to 90 %, such as the three rows of a node, form a block, which halves the time
+# of the analysis
 _SETTINGS = {1: 1, 2: 2, 8: 0, 10: 8, 18: -1, 24: 1, 37: -90}
 
 
@@ -44,7 +44,7 @@ def solver_name() -> str:
 
 
 def _mkl() -> str | None:
-    """Return the path of MKL's library from the files of its package."""
+    """Return the path of the MKL library, found in the file list of its package."""
     try:
         listed = files("mkl") or []
     except PackageNotFoundError:
@@ -58,7 +58,7 @@ def _mkl() -> str | None:
 
 
 def solve(upper: csr_array, loads: NDArray, solver: str | None = None) -> NDArray:
-    """Solve K x = loads.
+    """Solve K x = loads for symmetric positive definite K.
 
     Args:
         upper: (n, n) upper triangle of a symmetric positive definite matrix K.
@@ -88,13 +88,13 @@ def solve(upper: csr_array, loads: NDArray, solver: str | None = None) -> NDArra
 
 
 def _solve_with_pardiso(upper: csr_array, loads: NDArray) -> NDArray:
-    """Solve by PARDISO for symmetric positive definite matrices."""
+    """Solve with PARDISO for symmetric positive definite matrices."""
     import pypardiso
 
     solver = pypardiso.PyPardisoSolver(mtype=2)
     for number, value in _SETTINGS.items():
         solver.set_iparm(number, value)
-    # pypardiso needs csr_matrix, not csr_array, and sorted 32 bit indices
+    # pypardiso requires csr_matrix instead of csr_array, and sorted 32 bit indices
     matrix = csr_matrix(upper)
     matrix.sort_indices()
     try:
@@ -109,7 +109,7 @@ def _solve_with_pardiso(upper: csr_array, loads: NDArray) -> NDArray:
 
 
 def expected_cost(unknowns: int) -> tuple[float, float]:
-    """Return the approximate cost of a mesh, measured for 40 k to 850 k unknowns.
+    """Estimate the cost of a solution from measurements with 40 k to 850 k unknowns.
 
     Args:
         unknowns: number of rows of the matrix.

@@ -1,11 +1,11 @@
 """Stress in a link under a wrench at its tip.
 
-Stresses superpose, so six fields are sufficient, one for each component of the wrench.
-At the edge of a rigid interface the elastic solution is singular: the peak grows
-without bound as the mesh is refined, and has no meaning.  So stresses are reported only
-from a certain distance to the interfaces, one interface radius by default, and the
-report states this distance.  The stress within that distance, and the effect of a real
-joint, are left out.
+Stresses superpose linearly, so six displacement fields are sufficient, one for each
+component of the wrench.  At the edge of a rigid interface the elastic solution is
+singular: the largest stress grows without bound as the mesh is refined, so it is not a
+physical value.  Stresses are therefore reported only beyond a certain distance from the
+interfaces.  The default distance is the radius of the interface, and the report states
+it.  The stress within this distance and the effect of a real joint are not included.
 """
 
 from collections.abc import Mapping
@@ -34,20 +34,20 @@ from forcefit.stiffness.fem.stress_error import (
 )
 from forcefit.stiffness.link import inverted
 
-_CHUNK = 4096  # number of elements in a batch: 4096 x 20 x 36 values are 24 MB
+_CHUNK = 4096  # number of elements in a batch: 4096 x 20 x 36 numbers are 24 MB
 
 
 @dataclass(frozen=True, eq=False)
 class StressSource:
-    """The mesh from which a stress field was computed.
+    """The solved mesh from which a stress field was computed.
 
     Attributes:
         level: the solved mesh with n nodes, numbered by
             :func:`forcefit.stiffness.fem.stress_error.nodes_by_material`.
-        far: (n,) bool, True for nodes far enough from the interfaces.
+        far: (n,) bool, True for nodes outside the excluded distance from interfaces.
         singular: (n,) bool, True for nodes on re-entrant edges without a fillet.
-        faceted: (n,) bool, True for nodes on a surface of no recognised shape.
-        left_out: (n,) bool, True for nodes where the mesh does not follow the surface;
+        faceted: (n,) bool, True for nodes on surfaces whose shape was not recognised.
+        left_out: (n,) bool, True for nodes where the mesh deviates from the surface;
             their stresses are not reported.
     """
 
@@ -65,14 +65,15 @@ class StressInfluence:
     Attributes:
         places: (p, 3) [m] positions of the nodes, in the link's axes.
         influence: (p, 6, 6) [Pa/(N m), Pa/N] stress xx yy zz yz xz xy for each
-            component of the tip's wrench.  If the link was solved under its own weight
-            (:func:`forcefit.stiffness.fem.own_weight.with_own_weight`), it is (p, 9, 6)
-            and the last three rows [Pa per m/s^2] are for gravity; a wrench then has
-            nine components, gravity last.
+            component of the wrench at the tip.  If the own weight of the link was
+            included (:func:`forcefit.stiffness.fem.own_weight.with_own_weight`), the
+            shape is (p, 9, 6), and the last three rows [Pa per m/s^2] are for gravity.
+            A wrench then has nine components, with gravity last.
         away: [m] smallest distance of these nodes from an interface.
         reentrant_edges: whether some of the nodes are on re-entrant edges without a
-            fillet, where the elastic stress is singular too.
-        source: mesh of the stresses; without it errors are unknown.
+            fillet, where the elastic stress is also singular.
+        source: mesh from which the stresses were computed; if it is None, errors are
+            unknown.
     """
 
     places: NDArray
@@ -128,7 +129,7 @@ class StressInfluence:
         return float(values[worst]), self.places[worst]
 
     def peak_error(self, wrench: ArrayLike) -> float:
-        """Return estimated error of the peak stress of a tip wrench due to the mesh.
+        """Estimate the error of the peak stress of a tip wrench due to the mesh.
 
         Args:
             wrench: (6,) [N m, N] at the tip, in the link's axes.
@@ -163,14 +164,15 @@ class PeakStress:
     Attributes:
         wrench: (6,) [N m, N] at the tip, in the link's axes.
         von_mises: [Pa] the peak stress.
-        error: [Pa] estimated error of the mesh; infinite where the stress is singular.
+        error: [Pa] estimated error due to the mesh; infinite where stress is singular.
         place: (3,) [m] position of the peak.
         region: description of the evaluated points.
         away: [m] smallest distance of these points from an interface.
-        beam: [Pa] peak stress and (3,) [m] its position by the beam formula, between
-            the sections at this distance from base and tip; None without a section.
-        beam_whole: [Pa] peak stress by the beam formula over the whole length; NaN
-            without a section.
+        beam: [Pa] peak stress and (3,) [m] its position by the beam formula, over the
+            part of the beam that is at least ``away`` from base and tip; None if no
+            section is given.
+        beam_whole: [Pa] peak stress by the beam formula over the whole length; NaN if
+            no section is given.
     """
 
     wrench: NDArray
@@ -192,27 +194,27 @@ def peak_stress(
     away: float | None = None,
     gravity: ArrayLike | None = None,
 ) -> PeakStress:
-    """Return the peak stress of a tip wrench, by elements and by the beam formula.
+    """Compute the peak stress of a tip wrench, by elements and by the beam formula.
 
     Args:
         solved: result of :func:`forcefit.stiffness.fem.fea.solve_link`.
         wrench: (6,) [N m, N] at the tip, in the link's axes.
         section: section of a straight beam from base to tip, in the form of
             :func:`forcefit.stiffness.beam.beam_stress.peak_beam_stress`.
-        up: (3,) the section's z axis, in the link's axes.
-        away: [m] distance from the interfaces; one interface radius if absent.
+        up: (3,) vector along the section's z axis, in the link's axes.
+        away: [m] excluded distance from interfaces; by default the interface radius.
         gravity: (3,) [m/s^2] in the link's axes, for the link's own weight.
 
     Returns:
         The peak stress, with its position and region.
 
     Raises:
-        BadInput: no node has this distance, the section has no formula, or gravity acts
-            on a link without a density.
+        BadInput: all nodes are within this distance, the beam formula does not cover
+            the section, or gravity acts on a link without a density.
     """
     w = np.asarray(wrench, dtype=float)
     if section is not None:
-        # invalid sections are refused before the long computation
+        # an invalid section is refused before the long computation
         peak_beam_stress(section, 0.0, np.zeros(6))
     field, acting = stress_influence(solved, away), w
     if gravity is not None:
@@ -234,7 +236,7 @@ def peak_stress(
     whole, _ = peak_beam_stress(section, length, in_beam, weight)
     near_tip = in_beam.copy()
     near_tip[:3] += np.cross([field.away, 0, 0], in_beam[3:])
-    # weight of the end piece that is not evaluated
+    # weight of the end piece, in which stress is not evaluated
     beyond = weight * field.away / length
     near_tip[:3] += np.cross([field.away / 2, 0, 0], beyond)
     near_tip[3:] += beyond
@@ -260,13 +262,13 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
     Args:
         solved: result of :func:`forcefit.stiffness.fem.fea.solve_link`; a node between
             two materials counts once for each material.
-        away: [m] distance from the interfaces; one interface radius if absent.
+        away: [m] excluded distance from interfaces; by default the interface radius.
 
     Returns:
         The stresses of unit wrenches.
 
     Raises:
-        BadInput: no node has this distance.
+        BadInput: all nodes are within this distance.
     """
     from scipy.spatial import cKDTree
 
@@ -276,7 +278,7 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
     distance = max(radii) if away is None else away
     clamped = np.unique(mesh.faces[mesh.patch <= 1])
     gap = cKDTree(mesh.nodes[clamped]).query(mesh.nodes[node])[0]
-    far = gap >= distance * (1 - 1e-9)  # includes nodes at exactly this distance
+    far = gap >= distance * (1 - 1e-9)  # a node at exactly this distance is included
     if not far.any():
         raise BadInput(
             f"stress: found no node {distance:.4g} m away from the interfaces; "
@@ -297,7 +299,7 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
 
 
 def _peaks_on_facets(field: StressInfluence, wrench: NDArray) -> bool:
-    """Return whether the peak lies on a surface of no recognised shape."""
+    """Return whether the peak is on a surface whose shape was not recognised."""
     if field.source is None:
         return False
     worst = int(np.argmax(von_mises(field.stresses(wrench))))
@@ -305,15 +307,15 @@ def _peaks_on_facets(field: StressInfluence, wrench: NDArray) -> bool:
 
 
 def _motions(level: Level) -> NDArray:
-    """Return (k, k) motions of the tip's unit wrenches and, if solved, of gravity."""
-    # computed from the stiffness of the fields, so that they balance the wrench exactly
+    """Return (k, k) tip motions due to unit wrenches and, if solved, unit gravity."""
+    # the stiffness of these fields is used, so that they balance the wrench exactly
     motions = np.eye(level.solution.fields.shape[2])
     motions[:6, :6] = inverted(level.solution.stiffness)
     return motions
 
 
 def _interface_radius(mesh: Elements, patch: int) -> float:
-    """Return the [m] largest distance of an interface's nodes from its centroid."""
+    """Return the largest distance [m] of an interface's nodes from their centroid."""
     faces = mesh.faces[mesh.patch == patch]
     N, area = triangle_areas(mesh, faces)
     first = np.einsum("tq,qa,tax->x", area, N, mesh.nodes[faces])
@@ -322,7 +324,7 @@ def _interface_radius(mesh: Elements, patch: int) -> float:
 
 
 def _nodal_stresses(level: Level) -> NDArray:
-    """Return the (n, k, 6) stress of each unit screw at each node, averaged."""
+    """Return the (n, k, 6) averaged nodal stresses for each unit screw."""
     cells, nodes = nodes_by_material(level)
     screws = np.eye(level.solution.fields.shape[2])
     total = np.zeros((len(nodes), len(screws), 6))

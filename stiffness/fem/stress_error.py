@@ -1,17 +1,17 @@
-r"""Estimated error of a peak stress, from differences between elements around it.
+r"""Estimated error of a peak stress, from differences between neighbouring elements.
 
-Stresses of neighbouring elements differ at their common nodes by about the error of the
-mesh; their mean is the stress at a node.  The estimate is the root mean square of the
-largest deviations from the mean, times a factor.  It is computed over the nodes of the
-elements at the peak, and over all nodes where the stress is nearly as large.  The
-factor is needed because the peak is the largest of many values with errors.  Where the
-mesh does not follow the part's surface, stresses are left out; larger stresses at such
-nodes are added to the error.  Where the stress is singular there is neither a value nor
-an error.
+At a common node, the stresses of neighbouring elements differ by about the error of the
+mesh.  The mean of these stresses is the nodal stress.  The estimated error is a factor
+times the root mean square of the largest deviations from the mean.  It is computed over
+the nodes of the elements at the peak, and over all nodes where the stress is nearly as
+large.  The factor is needed because the peak is the largest of many values with errors.
+Nodes where the mesh deviates from the surface of the part are excluded; if their
+stresses are larger, the difference is added to the error.  At a singularity neither the
+stress nor the error is defined.
 
 Sources:
-    Zienkiewicz & Zhu (1987), A simple error estimator, for recovered stresses as the
-    better ones.
+    Zienkiewicz & Zhu (1987), A simple error estimator, for the use of recovered
+    stresses as the more accurate ones.
 """
 
 from typing import TYPE_CHECKING
@@ -28,15 +28,15 @@ from forcefit.stiffness.surface.facets import Facets
 if TYPE_CHECKING:
     from forcefit.stiffness.fem.adaptive_step import Level
 
-# ratio of the error of a peak to the differences around it: at most 1.6, and 0.3 in the
-# median, for 9 shouldered bars in tension, torsion and bending on their first meshes
+# ratio of the error of a peak to the differences around it: at most 1.6, median 0.3,
+# for 9 shouldered bars in tension, torsion and bending on their first meshes
 SAFETY_FACTOR = 1.6
 # cosine of the largest angle at which two patches form a smooth surface
 _SMOOTH = np.cos(np.radians(5.0))
-# distance from the shape, relative to the size of a face, above which the face does not
-# follow the shape; cubic faces follow a fillet to 1e-4
+# distance of a face from the exact shape, relative to its size, above which the face
+# counts as deviating; cubic faces follow a fillet to 1e-4
 _OFF = 5e-3
-ZONE = 0.9  # relative to the peak: smallest stress that counts as nearly as large
+ZONE = 0.9  # fraction of the peak above which a stress counts as nearly as large
 
 
 def von_mises(stress: ArrayLike) -> NDArray:
@@ -86,14 +86,14 @@ def element_stresses(level: "Level", members: NDArray, motion: NDArray) -> NDArr
 
 
 def nodes_by_material(level: "Level") -> tuple[NDArray, NDArray]:
-    """Return node numbers that differ between materials, because stresses jump there.
+    """Number nodes separately for each material, because stresses jump at the border.
 
     Args:
         level: a solved mesh of n nodes.
 
     Returns:
-        (t, k) number of each element's nodes, and (m,) the node of each number; m is n
-        for a link of one material.
+        (t, k) new numbers of each element's nodes, and (m,) the node of each new
+        number.  m equals n for a link of one material.
     """
     cells, constants = level.mesh.cells, level.material[:, :2]
     kind = np.unique(constants, axis=0, return_inverse=True)[1].reshape(-1)
@@ -114,11 +114,11 @@ def estimated_error(
         motion: (6,) [rad, m] screw of the tip.
         node: number of the node with the peak.
         zone: (n,) bool, True for nodes where the stress is nearly as large.
-        left_out: (n,) bool, True for nodes where the stress may be larger, but the mesh
-            does not follow the surface.
+        left_out: (n,) bool, True for nodes where the mesh deviates from the surface,
+            and where the stress may be larger.
 
     Returns:
-        [Pa] error.
+        [Pa] estimated error.
     """
     mean, largest = _means_and_deviations(level, motion)
     cells, _ = nodes_by_material(level)
@@ -129,7 +129,7 @@ def estimated_error(
 
 
 def _means_and_deviations(level: "Level", motion: NDArray) -> tuple[NDArray, NDArray]:
-    """Return (n, 6) [Pa] stresses at nodes, and (n,) largest deviations from them."""
+    """Return (n, 6) [Pa] nodal stresses, and (n,) the largest deviations from them."""
     cells, nodes = nodes_by_material(level)
     count = len(nodes)
     total, largest = np.zeros((count, 6)), np.zeros(count)
@@ -155,7 +155,7 @@ def on_inner_edges(level: "Level") -> NDArray:
     edges, cells = singular_edges(level.solid, ()), level.mesh.cells
     on = np.zeros(len(level.mesh.nodes), dtype=bool)
     if len(edges):
-        # coarse faces of a fillet meet at an angle, although the shapes do not
+        # coarse faces of a fillet meet at an angle, but their exact shapes do not
         on[edges[_meet_at_an_angle(level, edges)]] = True
     if level.solid.region is not None:
         on[edges_between(level.solid, level.solid.region)] = True
@@ -184,15 +184,15 @@ def _meet_at_an_angle(level: "Level", edges: NDArray) -> NDArray:
 
 
 def off_shapes(level: "Level") -> NDArray:
-    """Return the nodes where the mesh does not follow the part's surface.
+    """Return the nodes where the mesh deviates from the surface of the part.
 
     Args:
         level: a solved mesh of n nodes.
 
     Returns:
-        (n,) bool, True for nodes of elements with a node off its patch's shape by more
-        than 0.5 % of the face's size (elements that would be inverted were
-        straightened), and for nodes of their neighbours.
+        (n,) bool, True for nodes of elements with a node that is farther from the
+        shape of its patch than 0.5 % of the face size (elements that would be inverted
+        were straightened), and for nodes of neighbouring elements.
     """
     mesh = level.mesh
     off = np.zeros(len(mesh.nodes), dtype=bool)
@@ -210,13 +210,13 @@ def off_shapes(level: "Level") -> NDArray:
 
 
 def on_facets(level: "Level") -> NDArray:
-    """Return the nodes on a surface of no recognised shape.
+    """Return the nodes on surfaces whose shape was not recognised.
 
     Args:
         level: a solved mesh of n nodes.
 
     Returns:
-        (n,) bool, True where facets were taken as smooth.
+        (n,) bool, True where facets were treated as a smooth surface.
     """
     mesh, shapes = level.mesh, level.solid.shapes
     lifted = np.array([isinstance(shape, Facets) for shape in shapes], dtype=bool)

@@ -1,9 +1,10 @@
 """Stiffness and consistent mass of a meshed link for motions of both ends.
 
-Both ends are rigid and free to move.  Between them the solid follows statically
-(Guyan), so the mass is exact for rigid motions, and as accurate as a beam's cubic for
-bending.  A motion of the base is a rigid motion of the link minus the resulting motion
-of the tip, so the fields with the base held are sufficient.
+Both ends are rigid and free to move.  The solid between them deforms statically (Guyan
+reduction).  The mass matrix is therefore exact for rigid motions, and as accurate as
+that of a cubic beam element for bending.  A motion of the base equals a rigid motion of
+the link minus the resulting motion of the tip, so the fields for a held base are
+sufficient.
 """
 
 from dataclasses import dataclass
@@ -19,11 +20,11 @@ from forcefit.stiffness.screws import screw_map
 
 @dataclass(frozen=True, eq=False)
 class TwoEnds:
-    """A link with two rigid ends; rows of the base, then of the tip, at their centres.
+    """Matrices of a link with two rigid ends: rows of the base centre, then of the tip.
 
     Attributes:
-        stiffness: (12, 12) [N m/rad .. N/m]; zero for rigid motions.
-        mass: (12, 12) [kg m^2 .. kg], zero without a density.
+        stiffness: (12, 12) [N m/rad .. N/m] stiffness; rigid motions cause no force.
+        mass: (12, 12) [kg m^2 .. kg] mass matrix; zero if the density is zero.
     """
 
     stiffness: NDArray
@@ -31,7 +32,7 @@ class TwoEnds:
 
 
 def two_ends(solved: MeshedLink) -> TwoEnds:
-    """Condense a meshed link onto both its ends.
+    """Condense a meshed link onto both ends.
 
     Args:
         solved: link solved on its finest mesh.

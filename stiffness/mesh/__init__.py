@@ -1,4 +1,4 @@
-"""Tetrahedra from a surface; they are refined where the solution is singular.
+"""Tetrahedra from a surface, refined where the solution is singular.
 
-Begin at ``mesh.py``; ``lagrange.py`` numbers the unknowns of curved elements.
+Start with ``mesh.py``.  ``lagrange.py`` numbers the nodes of curved elements.
 """

@@ -1,11 +1,11 @@
-"""Nodes of a solid's elements, on the exact shapes of its boundary.
+"""Nodes of curved elements, placed on the exact shapes of a solid's boundary.
 
-The nodes of straight elements are on their lattices.  Nodes on the edges of the
-boundary are moved onto the shapes of their patches.  Inner faces follow their edges,
-and the faces of the boundary are then moved onto their shapes.  The mesh is conforming,
-and the error of the geometry is the error of interpolating the shapes.  Cubic edges and
-faces are interpolated at points where this error has zero mean, so the error of a
-volume decreases with the sixth power of h.
+The nodes of straight elements form a lattice.  Nodes on boundary edges are moved onto
+the shapes of their patches.  Inner faces follow their edges, and nodes on boundary
+faces are then moved onto their shapes.  The mesh is conforming, and its geometric error
+is the interpolation error of the shapes.  Cubic edges and faces interpolate the shapes
+at points for which this error has zero mean, so the error of a volume decreases with
+the sixth power of the element size h.
 """
 
 from collections.abc import Callable
@@ -28,11 +28,11 @@ from forcefit.stiffness.mesh.refine import refine
 from forcefit.stiffness.mesh.solid import Solid, node_patches, on_shapes
 from forcefit.stiffness.surface.primitives import Shape
 
-_LARGEST_MOVE = 0.05  # relative to the part's size: largest displacement of a node
-# ratio of smallest to largest Jacobian determinant of an element, below which it is
-# inverted
+_LARGEST_MOVE = 0.05  # largest displacement of a node, relative to the part's size
+# ratio of the smallest to the largest Jacobian determinant in an element, below which
+# the element counts as inverted
 _INVERTED = 0.05
-_PASSES = 3  # largest number of passes in which inverted elements are bisected
+_PASSES = 3  # largest number of passes that bisect inverted elements
 # solution of 9 t^3 - 10 t^2 + 3.6 t = 0.4: value of two of three coordinates L
 _SAMPLE = 0.2128543571118083
 
@@ -43,11 +43,11 @@ class CurvedElements:
 
     Attributes:
         cells: (t, m) nodes of each tetrahedron, with its corners in increasing order.
-        nodes: (n, 3) [m].
+        nodes: (n, 3) [m] positions of the nodes.
         patch: (t, 4) patch of each face, in the order of ``FACES``; -1 inside.
         curved: (t,) bool, True for an element that is not straight.
-        inverted: (t,) bool, True if the Jacobian changed sign, so that it was
-            straightened.
+        inverted: (t,) bool, True for an element whose Jacobian changed sign; such an
+            element was straightened.
     """
 
     cells: NDArray
@@ -65,7 +65,8 @@ def curved_elements(solid: Solid, order: int) -> CurvedElements:
         order: order of the elements, 2 or 3.
 
     Returns:
-        The elements; inverted elements are straightened in steps.
+        The elements; an inverted element is straightened step by step until it is
+        valid.
     """
     corners = np.sort(solid.cells, axis=1)
     cells, count = numbered(corners, order)
@@ -135,7 +136,7 @@ def patches_of_cells(faces: NDArray, patch: NDArray, corners: NDArray) -> NDArra
 
 
 def refine_inverted(solid: Solid, order: int) -> Solid:
-    """Bisect the elements that would be inverted on their exact shapes.
+    """Bisect the elements that would be inverted when their faces are curved.
 
     Args:
         solid: straight tetrahedra.
@@ -155,9 +156,9 @@ def refine_inverted(solid: Solid, order: int) -> Solid:
 def _cubic_edges(
     ends: NDArray, pairs: NDArray, moved_nodes: Callable[[NDArray, NDArray], NDArray]
 ) -> NDArray:
-    """Return (t, 6, 2, 3) displacements of edge nodes, at the thirds of edges."""
-    # interpolated at the Lobatto points, where the error of a cubic against an arc has
-    # zero mean, then evaluated at the thirds of the edge
+    """Return (t, 6, 2, 3) displacements of the two nodes at the thirds of each edge."""
+    # the shape is interpolated at the Lobatto points, where the error of a cubic
+    # against an arc has zero mean, and then evaluated at the thirds of the edge
     s = (1 + np.array([-1, 1]) / np.sqrt(5)) / 2
     places = np.zeros((int(pairs.max()) + 1, 3))
     places[pairs] = ends[:, :, :1] + s[:, None] * (ends[:, :, 1:] - ends[:, :, :1])
@@ -170,7 +171,7 @@ def _cubic_edges(
 
 
 def _face_nodes_by_edges(moved: NDArray) -> NDArray:
-    """Return (t, 4, 3) displacements of face nodes, from (t, 20, 3) of edge nodes."""
+    """Return (t, 4, 3) displacements of face nodes from those of edges (t, 20, 3)."""
     # along an edge the displacement is L_a L_b (c_0 + c_1 (L_b - L_a)), extended over
     # the faces; at the middle of a face each of its edges adds c_0 / 9
     carried = np.zeros((len(moved), 4, 3))
@@ -185,7 +186,7 @@ def _face_nodes_by_edges(moved: NDArray) -> NDArray:
 def _cubic_faces(
     corners: NDArray, patch: NDArray, shapes: tuple[Shape | None, ...], reach: float
 ) -> NDArray:
-    """Return (f, 3) displacements of faces' middle nodes; other nodes are final."""
+    """Return (f, 3) displacements of face middles, given those of all other nodes."""
     # interpolated at three points; there the cubic that equals the quartic x^2, with x
     # = L_1 L_2 + L_2 L_3 + L_3 L_1, along the edges also has the integral of x^2, so
     # that the error of a shape has zero mean
@@ -203,7 +204,7 @@ def _cubic_faces(
 def _straightened(
     straight: NDArray, curved: NDArray, cells: NDArray, order: int
 ) -> tuple[NDArray, NDArray]:
-    """Return curved nodes, straightened in steps at inverted elements; and these."""
+    """Return nodes after inverted elements are straightened, and these elements."""
     nodes = curved.copy()
     suspects = np.flatnonzero((curved != straight)[cells].any(axis=(1, 2)))
     places = np.concatenate([quadrature(6)[0], lattice(order) / order])
@@ -219,7 +220,7 @@ def _straightened(
             break
         inverted[bad] = True
         touched = np.unique(cells[bad])
-        # straight elements are never inverted, so the loop ends
+        # the loop ends because straight elements are never inverted
         kept = 0.5 if step < 4 else 0.0
         nodes[touched] += (1 - kept) * (straight - nodes)[touched]
     return nodes, inverted

@@ -1,9 +1,9 @@
 """A mesh cut along the smooth outline of an interface.
 
-The mesher keeps only sharp edges.  Where an interface continues in a fillet, triangles
-of the mesh cross the outline, and the interface would be too wide or too narrow by
-parts of them.  Corners near the outline are moved onto it, and edges that still cross
-it are split.
+The mesher reproduces only sharp edges.  Where an interface continues into a fillet,
+triangles of the mesh cross the outline of the interface, and its area would be wrong by
+parts of these triangles.  Corners near the outline are therefore moved onto it, and
+edges that still cross it are split.
 """
 
 from dataclasses import replace
@@ -16,10 +16,10 @@ from forcefit.stiffness.mesh.solid import Solid
 from forcefit.stiffness.mesh.split_crossing import split_crossing
 from forcefit.stiffness.surface.smooth_outline import SmoothOutline
 
-# relative to the shortest edge at a corner: distance within which it is moved onto the
-# outline
+# distance within which a corner is moved onto the outline, relative to the shortest
+# edge at the corner
 _NEAR = 0.3
-_REACH = 0.005  # relative to the part's size: largest displacement of a corner
+_REACH = 0.005  # largest displacement of a corner, relative to the part's size
 
 
 def cut_along(solid: Solid, outline: SmoothOutline) -> Solid:
@@ -30,7 +30,7 @@ def cut_along(solid: Solid, outline: SmoothOutline) -> Solid:
         outline: outline of an interface.
 
     Returns:
-        The solid; each triangle at the outline belongs to the patch on its side.
+        The solid; each triangle at the outline is in the patch on its side.
     """
 
     def crossing(finer: Solid, on: NDArray, ends: NDArray) -> tuple[NDArray, NDArray]:
@@ -41,19 +41,19 @@ def cut_along(solid: Solid, outline: SmoothOutline) -> Solid:
 
 
 def _members(solid: Solid, outline: SmoothOutline) -> NDArray:
-    """Return the (f,) boundary triangles of the two patches at the outline."""
+    """Return (f,) bool, True for boundary triangles of both patches at the outline."""
     return np.isin(solid.patch, outline.patches)
 
 
 def _boundary_edges(solid: Solid, outline: SmoothOutline) -> NDArray:
-    """Return the (k, 2) edges of the triangles of both patches, in increasing order."""
+    """Return the (k, 2) edges of the triangles of both patches, corners ascending."""
     faces = solid.faces[_members(solid, outline)]
     pairs = np.sort(faces[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=1)
     return np.unique(pairs, axis=0)
 
 
 def _corners_on(solid: Solid, outline: SmoothOutline) -> NDArray:
-    """Return (n,) bool: corners so near the outline that they count as on it."""
+    """Return (n,) bool, True for corners that count as being on the outline."""
     pairs = _boundary_edges(solid, outline)
     length = np.linalg.norm(
         solid.points[pairs[:, 0]] - solid.points[pairs[:, 1]], axis=1
@@ -75,7 +75,7 @@ def _corners_on(solid: Solid, outline: SmoothOutline) -> NDArray:
 def _crossing_edges(
     solid: Solid, outline: SmoothOutline, on: NDArray, ends: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return (e,) bool: edges that cross the outline; and the shares of crossing."""
+    """Return (e,) bool, True for edges that cross the outline, and where they cross."""
     pairs = _boundary_edges(solid, outline)
     index = np.searchsorted(
         edge_code(ends, len(on)), edge_code(pairs, len(on))
@@ -95,12 +95,12 @@ def _crossing_edges(
 
 
 def _sides(solid: Solid, outline: SmoothOutline, on: NDArray) -> NDArray:
-    """Return (f,) patches; triangles at the outline are assigned by their side."""
+    """Return (f,) patches; a triangle at the outline is assigned by its side of it."""
     patch = solid.patch.copy()
     near = np.flatnonzero(_members(solid, outline) & on[solid.faces].any(axis=1))
     corners = solid.points[solid.faces[near]]
     away = outline.outside(corners.reshape(-1, 3)).reshape(-1, 3)
-    # a corner on the outline has no side
+    # a corner on the outline is on neither side
     mean = np.where(on[solid.faces[near]], 0.0, away).sum(axis=1)
     mean = np.where(on[solid.faces[near]].all(axis=1), away.sum(axis=1), mean)
     patch[near] = np.where(mean > 0, outline.patches[1], outline.patches[0])

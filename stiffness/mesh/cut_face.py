@@ -1,8 +1,9 @@
 """Cutting of a mesh along a plane or curved face inside a link.
 
-Tetrahedra that are too large to follow a curved face are bisected first.  Corners near
-the face are moved onto it, and edges that still cross it are split.  The cut continues
-a little beyond the border of the face, so that tetrahedra on the border are cut too.
+First, tetrahedra that are too large to follow a curved face are bisected.  Then corners
+near the face are moved onto it, and edges that still cross it are split.  The cut is
+extended slightly beyond the border of the face, so that it also divides the tetrahedra
+that contain this border.
 """
 
 from dataclasses import dataclass, replace
@@ -22,17 +23,17 @@ from forcefit.stiffness.mesh.split_crossing import one_of_each, split_crossing
 from forcefit.stiffness.surface.facets import Facets
 from forcefit.stiffness.surface.primitives import Plane, Shape, project
 
-# relative to a corner's shortest edge: distance within which it is moved onto the face
+# distance within which a corner is moved onto the face, relative to its shortest edge
 _NEAR = 0.3
-_REACH = 0.005  # relative to the part's size: largest displacement of a corner
+_REACH = 0.005  # largest displacement of a corner, relative to the part's size
 # smallest ratio of a tetrahedron's volumes after and before its corners are moved
 _LEAST = 0.2
-# relative to the part's size: distance of a corner that is on the face; shapes are
-# accurate to 2e-6
+# distance up to which a corner counts as on the face, relative to the part's size;
+# shapes are accurate to 2e-6
 ON_FACE = 1e-6
-# cosine of the largest rotation of a curved face's normal along an edge
+# cosine of the largest rotation of the normal of a curved face along an edge
 _TURN = np.cos(np.radians(35.0))
-_PASSES = 12  # largest number of passes in which too large tetrahedra are bisected
+_PASSES = 12  # largest number of passes that bisect too large tetrahedra
 _HALVINGS = 12  # number of bisections to find where an edge crosses a curved face
 
 
@@ -53,10 +54,10 @@ class CutFace:
 
         Args:
             points: (n, 3) [m] points.
-            reach: (n,) [m] largest distance of each point.
+            reach: (n,) [m] distance that counts as near, for each point.
 
         Returns:
-            (n,) bool, True for a point within its distance of the face.
+            (n,) bool, True for a point that is nearer than its ``reach``.
         """
         near = np.abs(self.shape.signed(points)[0]) <= reach
         if self.facets is not None and near.any():
@@ -65,10 +66,10 @@ class CutFace:
 
 
 def faces_inside(cells: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the faces that two tetrahedra have in common.
+    """Return the faces that are shared by two tetrahedra.
 
     Args:
-        cells: (t, 4).
+        cells: (t, 4) corners of the tetrahedra.
 
     Returns:
         (f, 3) corners of each face, and (f, 2) its two tetrahedra.
@@ -81,7 +82,7 @@ def faces_inside(cells: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def face_code(corners: NDArray, points: int) -> NDArray:
-    """Return a number for each triangle, which depends only on its set of corners.
+    """Return a number for each triangle that identifies its corners in any order.
 
     Args:
         corners: (..., 3) corners in any order.
@@ -103,7 +104,7 @@ def cut(solid: Solid, face: CutFace) -> Solid:
         face: face inside the solid.
 
     Returns:
-        The solid; its ``inner`` triangles include those on the face.
+        The solid; the triangles on the face are added to its ``inner`` triangles.
     """
     if not isinstance(face.shape, Plane):
         solid = _resolved(solid, face)
@@ -116,14 +117,14 @@ def cut(solid: Solid, face: CutFace) -> Solid:
 
 
 def without_chords(solid: Solid) -> Solid:
-    """Split edges that join two corners of a curved face but are not on the face.
+    """Split edges whose two ends are on a curved face but whose inside is not.
 
     Args:
-        solid: solid with its ``inner`` triangles.
+        solid: solid with ``inner`` triangles.
 
     Returns:
-        The solid.  No tetrahedron has two sides on a curved face, because it would
-        become flat when these sides are curved.
+        The solid without such edges.  Otherwise a tetrahedron could have two sides on a
+        curved face, and would become flat when these sides are curved.
     """
     for number in np.unique(solid.inner_patch):
         if isinstance(solid.shapes[number], Plane):
@@ -169,7 +170,7 @@ def _resolved(solid: Solid, face: CutFace) -> Solid:
 def _crossing(
     solid: Solid, face: CutFace, on: NDArray, ends: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return (e,) bool: edges that cross the face; and the share where they cross."""
+    """Return (e,) bool, True for edges that cross the face, and where they cross."""
     value = np.where(on, 0.0, face.shape.signed(solid.points)[0])
     low, high = value[ends].T
     across = low * high < 0
@@ -195,7 +196,7 @@ def _crossing(
 def _share_of_crossing(
     shape: Shape, start: NDArray, end: NDArray, low: NDArray, high: NDArray
 ) -> NDArray:
-    """Return (e,) shares at which edges cross a shape, by bisection and secant."""
+    """Return (e,) fractions of edges at which they cross a shape, found numerically."""
     left, right = np.zeros(len(low)), np.ones(len(low))
     for _ in range(0 if isinstance(shape, Plane) else _HALVINGS):
         middle = (left + right) / 2
@@ -208,13 +209,13 @@ def _share_of_crossing(
 
 
 def _with_cut(solid: Solid, on: NDArray, face: CutFace) -> Solid:
-    """Return a solid whose inner triangles include those on a face."""
+    """Return the solid after adding the triangles on a face to its inner triangles."""
     number, count = len(solid.shapes), len(solid.points)
     solid = replace(solid, shapes=(*solid.shapes, face.shape))
     faces, owners = faces_inside(solid.cells)
     size = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     known = face_code(solid.inner, count)
-    for _ in range(2):  # corners may come onto the face when others are moved
+    for _ in range(2):  # moving corners may bring others onto the face
         value = face.shape.signed(solid.points)[0]
         on |= np.abs(value) < ON_FACE * size
         side = np.sign(np.where(on, 0.0, value)[solid.cells].sum(axis=1))
@@ -228,7 +229,7 @@ def _with_cut(solid: Solid, on: NDArray, face: CutFace) -> Solid:
 
 
 def _onto(solid: Solid, face: CutFace) -> tuple[Solid, NDArray]:
-    """Return the solid with corners near a face moved onto it, and which are on it."""
+    """Move the corners near a face onto it; also return which are on it."""
     size = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     height = np.abs(face.shape.signed(solid.points)[0])
     ends, _ = edges_of(solid.cells, len(solid.points))
@@ -240,7 +241,7 @@ def _onto(solid: Solid, face: CutFace) -> tuple[Solid, NDArray]:
         np.maximum.at(longest, ends[:, k], length)
     near = height < reach
     near[near] = face.is_near(solid.points[near], longest[near])
-    # also beyond the border of the face, where the cut continues
+    # corners beyond the border are moved too, because the cut is extended
     near |= height < ON_FACE * size
     target, on = _targets(solid, face.shape, near, reach, ON_FACE * size)
     already, before = on & (height < ON_FACE * size), solid.volumes()
@@ -255,7 +256,7 @@ def _onto(solid: Solid, face: CutFace) -> tuple[Solid, NDArray]:
 def _targets(
     solid: Solid, shape: Shape, near: NDArray, reach: NDArray, close: float
 ) -> tuple[NDArray, NDArray]:
-    """Return (n, 3) [m] target positions of corners near a shape, and (n,) movable."""
+    """Return (n, 3) [m] target positions, and (n,) bool, True for movable corners."""
     # corners on the boundary or on other inner faces must stay on their shapes
     target, on = solid.points.copy(), np.zeros(len(near), dtype=bool)
     free = near.copy()

@@ -1,16 +1,16 @@
 r"""Layers of thin elements along the edges at which the stress is singular.
 
-Near an edge that is clamped on one side and free on the other, or near a re-entrant
-edge of the part, strains increase as r^(a - 1) with a < 1.  There, polynomials on
-elements of one size converge slowly, whatever their degree.  A layer of elements that
-is thin across the edge, and as long as its neighbours along it, costs little and
-removes most of the error.
+Strains increase as r^(a - 1) with a < 1 near two kinds of edges: re-entrant edges of
+the part, and edges that separate a clamped from a free face.  There, elements of
+uniform size converge slowly, whatever the degree of their polynomials.  A layer of
+elements that are thin across the edge, and as long along it as their neighbours,
+removes most of the error at little cost.
 
-A tetrahedron with an edge on a singular edge is cut at the same share of its other
-edges, measured from the singular edge.  It becomes a wedge along the edge and a
-remainder.  A tetrahedron with only a corner on a singular edge becomes a small
-tetrahedron and a remainder.  Neighbours cut their common face at the same points.  The
-cuts are made in the coordinates of the curved element, so that thin layers follow a
+A tetrahedron with an edge on a singular edge is cut into a wedge along this edge and a
+remaining part.  The cut divides the other edges in the same ratio, measured from the
+singular edge.  A tetrahedron with only a corner on a singular edge is cut into a small
+tetrahedron and a remaining part.  Neighbours cut their common face at the same points.
+The cuts are made in the coordinates of the curved element, so that thin layers follow a
 round edge.
 """
 
@@ -32,17 +32,19 @@ from forcefit.stiffness.mesh.solid import Solid, moved_onto_shapes
 ENDS = (0, 1)  # patches of base and tip; distributed tractions end at their outlines
 # ratio of layer thickness to element size; 0.15 to 0.3 are equally accurate
 LAYER_SHARE = 0.25
-# largest number of passes that split joining edges; 3 to 12 suffice for meshes/
+# largest number of passes that split edges between singular edges; 3 to 12 are
+# sufficient for the parts in meshes/
 _PASSES = 100
-# cosine of 35 degrees: a flatter re-entrant edge is hardly singular
+# cosine of 35 degrees: stress at a flatter re-entrant edge is hardly singular
 _REENTRANT = np.cos(np.radians(35.0))
-# edges that are cut at a singular corner or edge; singular corners are first
+# edges that are cut, for a singular corner or a singular edge; singular corners first
 _CUT_EDGES = {1: [[0, 1], [0, 2], [0, 3]], 2: [[0, 2], [0, 3], [1, 2], [1, 3]]}
-# Parts, by corners 0 to 3 and by cuts in the order above from 4: a small tetrahedron
-# and a prism, or two prisms.  Each prism becomes three tetrahedra by the diagonals that
-# start at the smallest number of each side, so that neighbours agree (Dompierre et al.
-# 1999). Corner numbers increase and cut numbers follow them, so the diagonals are the
-# same in all tetrahedra.
+# Pieces of a cut tetrahedron: a small tetrahedron and a prism, or two prisms.  Corners
+# have the numbers 0 to 3, and cut points follow from 4 in the order above.  Each prism
+# is divided into three tetrahedra.  The diagonal of each side starts at its smallest
+# number, so that neighbours agree (Dompierre et al. 1999).  The numbers of corners
+# increase, and cut points come after them, so the diagonals are the same in all
+# tetrahedra.
 _PARTS = {
     1: np.array([[0, 4, 5, 6], [1, 3, 2, 6], [1, 6, 2, 5], [1, 6, 5, 4]]),
     2: np.array([
@@ -54,11 +56,11 @@ _PARTS = {
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """A solid's tetrahedra cut into smaller ones.
+    """Tetrahedra of a solid cut into smaller tetrahedra, the parts.
 
     Attributes:
-        corners: (t, 4) numbers of the parts' corners, increasing in each row; numbers
-            below the solid's count are corners of the solid.
+        corners: (t, 4) numbers of the parts' corners, increasing in each row; a number
+            below the number of the solid's points denotes a corner of the solid.
         places: (t, 4, 4) barycentric coordinates of the corners in their parent
             tetrahedron, whose corners are in increasing order.
         parent: (t,) tetrahedron of the solid that contains each part.
@@ -70,7 +72,7 @@ class Parts:
 
 
 def whole_elements(solid: Solid) -> Parts:
-    """Return each tetrahedron as a single part."""
+    """Return uncut tetrahedra, each as a single part."""
     count = len(solid.cells)
     places = np.broadcast_to(np.eye(4), (count, 4, 4))
     return Parts(np.sort(solid.cells, axis=1), places, np.arange(count))
@@ -92,7 +94,7 @@ def singular_edges(solid: Solid, held: tuple[int, ...]) -> NDArray:
     code = edge_code(pairs, count).ravel()
     order = np.argsort(code, kind="stable")
     code, owner = code[order], order // 3
-    # two bodies that touch have an edge with four faces, of which any pairing is valid
+    # where two bodies touch, an edge has four faces; any pairing of these is valid
     code, left, right = code[::2], owner[::2], owner[1::2]
     border = solid.patch[left] != solid.patch[right]
     clamped = np.isin(solid.patch[left], held) | np.isin(solid.patch[right], held)
@@ -109,7 +111,7 @@ def singular_edges(solid: Solid, held: tuple[int, ...]) -> NDArray:
 def graded_edges(
     solid: Solid, held: tuple[int, ...], regions: tuple[Region, ...]
 ) -> NDArray:
-    """Return singular edges, and edges between materials at the boundary.
+    """Return the singular edges, including boundary edges between two materials.
 
     Args:
         solid: solid with patches.
@@ -126,7 +128,7 @@ def graded_edges(
 def split_joining_edges(
     solid: Solid, held: tuple[int, ...], regions: tuple[Region, ...] = ()
 ) -> Solid:
-    """Split the edges that join two singular edges.
+    """Split the edges that connect two singular edges.
 
     Args:
         solid: solid with patches.
@@ -134,8 +136,8 @@ def split_joining_edges(
         regions: regions of the link.
 
     Returns:
-        A solid whose tetrahedra each have at most one corner or one edge on the
-        singular edges; a few have more if more than a hundred passes would be needed.
+        A solid in which each tetrahedron has at most one corner or one edge on singular
+        edges.  After a hundred passes, a few tetrahedra may still have more.
     """
     settled = False
     for _ in range(_PASSES):
@@ -146,7 +148,7 @@ def split_joining_edges(
         ends, of_cell = edges_of(solid.cells, count)
         joining = touched[ends].all(axis=1)
         rank = length_ranks(solid.points, ends)
-        # of a triangle with three singular edges, the longest edge is split too
+        # if a triangle has three singular edges, its longest edge is split too
         triangle = joining[of_cell].sum(axis=1) > 2
         longest = np.where(joining, rank, -1)[of_cell].argmax(axis=1)
         longest = of_cell[np.arange(len(of_cell)), longest]
@@ -158,7 +160,7 @@ def split_joining_edges(
                 return solid
             solid, settled = moved_onto_shapes(solid), True
             continue
-        # edges that are the longest joining edge of all their tetrahedra are first
+        # edges that are the longest such edge of all their tetrahedra are split first
         rank[~joining] = -1
         highest = rank[of_cell].max(axis=1)
         own = rank[of_cell] == np.maximum(highest, 0)[:, None]
@@ -179,21 +181,21 @@ def layered(
     Args:
         solid: result of :func:`split_joining_edges`.
         held: patches that are clamped or loaded.
-        share: thickness of the layer, as a share of each edge from its singular end.
+        share: thickness of the layer, as a fraction of each edge from its singular end.
         regions: regions of the link.
 
     Returns:
-        The parts; tetrahedra that touch no singular edge remain whole.
+        The parts; a tetrahedron without a singular corner or edge remains uncut.
     """
     parts = whole_elements(solid)
     count = len(solid.points)
     touched = np.zeros(count, dtype=bool)
     touched[graded_edges(solid, held, regions)] = True
-    # corners of tetrahedra that touch several singular edges get no graded layer
+    # tetrahedra that touch several singular edges are not cut
     while (several := touched[parts.corners].sum(axis=1) > 2).any():
         touched[parts.corners[several]] = False
     on = touched[parts.corners]
-    # singular corners are first; the orientation does not matter
+    # singular corners come first; the orientation of the tetrahedron does not matter
     order = np.argsort(~on, axis=1, kind="stable")
     corners = np.take_along_axis(parts.corners, order, axis=1)
     places = np.take_along_axis(parts.places, order[:, :, None], axis=1)

@@ -1,9 +1,10 @@
-"""Improvement of badly shaped tetrahedra: corners moved, inner edges split.
+"""Improvement of badly shaped tetrahedra by moving corners and splitting inner edges.
 
-When corners are moved onto the part's shapes, tetrahedra may become flat.  This happens
-most where two shapes meet tangentially and all corners of a tetrahedron are on the
-boundary.  An inner edge of such a tetrahedron is split, and corners are moved, on their
-shapes or inside, to the position where the worst tetrahedron around them is best.
+When corners are moved onto the shapes of the part, tetrahedra may become flat.  This is
+most frequent where two shapes meet tangentially and all corners of a tetrahedron are on
+the boundary.  An inner edge of such a tetrahedron is split.  Then corners are moved, on
+their shapes or inside the part, to the position at which the worst adjacent tetrahedron
+has the best quality.
 
 Source: Freitag & Ollivier-Gooch (1997), local optimisation of the worst element.
 """
@@ -28,7 +29,7 @@ from forcefit.stiffness.mesh.solid import (
 from forcefit.stiffness.mesh.split_crossing import one_of_each
 from forcefit.stiffness.surface.primitives import project
 
-# quality below which a tetrahedron is improved; those of pytetwild are better
+# quality below which a tetrahedron is improved; tetrahedra of pytetwild are better
 POOR = 0.08
 _ROUNDS = 4
 # number of steps in the search for a corner's position; without improvement a step is
@@ -43,14 +44,14 @@ def fitted(solid: Solid, limit: float | None = None) -> Solid:
     Args:
         solid: solid whose corners may be off the shapes of their patches.
         limit: [-] quality below which tetrahedra are improved; by default :data:`POOR`,
-            or less if the solid's own tetrahedra are worse.
+            or a lower value if the tetrahedra of the solid are worse.
 
     Returns:
-        The solid, with more tetrahedra if some had to be split.  If this fails, some
-        corners remain off their shapes, as in :func:`moved_onto_shapes`.
+        The solid, with more tetrahedra if some had to be split.  If the improvement
+        fails, some corners remain off their shapes, as in :func:`moved_onto_shapes`.
     """
     least = float(element_quality(solid).min())
-    # elements of a structured bar are long by design
+    # elements of an extruded bar are long by design
     good = solid.surface is None or least > POOR / 4
     poor = limit or (min(POOR, least / 2) if good else POOR)
     target = corners_on_shapes(solid)
@@ -70,7 +71,7 @@ def fitted(solid: Solid, limit: float | None = None) -> Solid:
 
 
 def _split_inside(solid: Solid, limit: float) -> Solid:
-    """Split an inner edge of each poor tetrahedron that has no inner corner."""
+    """Split an inner edge of each poor tetrahedron all of whose corners are outside."""
     boundary = np.zeros(len(solid.points), dtype=bool)
     boundary[solid.faces] = True
     ends, of_cell = edges_of(solid.cells, len(solid.points))
@@ -106,7 +107,7 @@ def _relaxed(solid: Solid, limit: float) -> Solid:
 def _best_place(
     solid: Solid, points: NDArray, star: NDArray, corner: int, key: tuple[int, ...]
 ) -> NDArray:
-    """Return (3,) [m] position of a corner that is best for its worst tetrahedron."""
+    """Return the position (3,) [m] of a corner that maximises the worst quality."""
     place = points[corner]
     around = points[star]
     mine = star == corner

@@ -1,4 +1,4 @@
-r"""Polynomials on tetrahedra and triangles by their values on a lattice of points.
+r"""Polynomials on tetrahedra and triangles, defined by values at lattice points.
 
 ====== ========================================================== ==========
 symbol meaning                                                    shape
@@ -8,11 +8,11 @@ N      shape functions at the points                              (q, m)
 dN     derivatives of N, with L_1 .. L_(c-1) as variables          (q, m, c-1)
 ====== ========================================================== ==========
 
-c is 4 for a tetrahedron, 3 for a triangle.  The lattice of degree p consists of all
-points whose coordinates are multiples of 1 / p: corners first, then along the edges, in
-the faces, inside.  The corners of an element are always in increasing order of their
-numbers, so that two elements have the nodes of a common edge or face in the same order.
-Half of the elements are therefore left-handed.
+c is 4 for a tetrahedron and 3 for a triangle.  The lattice of degree p consists of all
+points whose barycentric coordinates are multiples of 1 / p.  They are ordered: corners,
+points on edges, points on faces, inner points.  The corners of each element are in
+increasing order of their numbers.  Two elements therefore have the nodes of a common
+edge or face in the same order, and half of the elements are left-handed.
 """
 
 from functools import lru_cache
@@ -27,7 +27,7 @@ FACES = np.array(list(combinations(range(4), 3)))  # face k is opposite to corne
 
 @lru_cache(maxsize=16)
 def lattice(degree: int, corners: int = 4) -> NDArray:
-    """Return the barycentric coordinates of a lattice, as multiples of 1 / degree.
+    """Return the lattice points in barycentric coordinates, as multiples of 1 / degree.
 
     Args:
         degree: degree of the polynomials, >= 1.
@@ -47,7 +47,7 @@ def lattice(degree: int, corners: int = 4) -> NDArray:
 
 
 def _partitions(total: int, parts: int) -> list[tuple[int, ...]]:
-    """Yield the ways to split a total into positive parts; the first varies slowest."""
+    """Return all ways to split a total into positive parts, in ascending order."""
     if parts == 1:
         return [(total,)]
     return [
@@ -58,7 +58,7 @@ def _partitions(total: int, parts: int) -> list[tuple[int, ...]]:
 
 
 def shape_functions(degree: int, L: NDArray) -> tuple[NDArray, NDArray]:
-    """Return polynomials that are 1 at one point of the lattice and 0 at the others.
+    """Return the polynomials that equal 1 at one lattice point and 0 at the others.
 
     Args:
         degree: degree of the polynomials.
@@ -88,7 +88,7 @@ def shape_functions(degree: int, L: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def numbered(corners: NDArray, degree: int) -> tuple[NDArray, int]:
-    """Return numbers of lattice points, equal for points that elements share.
+    """Number the lattice points of elements; shared points have the same number.
 
     Args:
         corners: (t, 4) numbers of the corners, increasing in each row.
@@ -120,14 +120,14 @@ def numbered(corners: NDArray, degree: int) -> tuple[NDArray, int]:
 
 @lru_cache(maxsize=8)
 def face_nodes(degree: int) -> NDArray:
-    """Return the lattice points on the faces of a tetrahedron.
+    """Return the indices of the lattice points on each face of a tetrahedron.
 
     Args:
         degree: degree of the polynomials.
 
     Returns:
-        (4, k) lattice points; one row for each of ``FACES``, in the order of a
-        triangle's lattice.
+        (4, k) indices; a row for each of ``FACES``, in the order of the lattice of a
+        triangle.
     """
     whole = [tuple(point) for point in lattice(degree)]
     rows = []

@@ -1,11 +1,11 @@
 """Tetrahedra from surfaces, with exact interfaces and curved faces.
 
-Pytetwild makes the tetrahedra from a surface with fewer triangles
-(:mod:`forcefit.stiffness.surface.decimate`), in a separate process with a time limit.
-The boundary of the mesh follows the surface only to within an envelope.  So every
-boundary triangle is assigned to a patch of the surface, and the nodes are projected
-onto the exact shapes of the patches. Meshes are cached by their input, because
-pytetwild is slow and never makes the same mesh twice.
+Pytetwild makes the tetrahedra in a separate process with a time limit, from a surface
+with fewer triangles (:mod:`forcefit.stiffness.surface.decimate`).  The boundary of the
+mesh follows this surface only within a tolerance, the envelope.  Every boundary
+triangle is therefore assigned to a patch of the surface, and its nodes are projected
+onto the exact shape of the patch.  Meshes are stored and found again by a hash of their
+input, because pytetwild is slow and does not reproduce a mesh.
 """
 
 import hashlib
@@ -34,9 +34,9 @@ from forcefit.stiffness.surface.surface import Surface, read_surface
 __all__ = ["Interface", "Solid", "mesh_solid", "parse_interface", "read_surface"]
 
 _WORKER = Path(__file__).with_name("mesh_worker.py")
-# library that makes meshes reproducible; available only with the GNU C++ library
+# library that makes meshes reproducible; usable only with the GNU C++ library
 _SAME_NUMBERS = Path(__file__).with_name("same_random_numbers.so")
-# version of the format of cached meshes, increased when their content changes
+# version of the format of stored meshes; increase it if their content changes
 _FORMAT = 4
 
 
@@ -51,26 +51,27 @@ def mesh_solid(
     cache: Path | str | None = None,
     patches: Patches | None = None,
 ) -> Solid:
-    """Return the tetrahedra of a surface, from the cache if it was meshed before.
+    """Return the tetrahedra of a surface; read them if they were stored before.
 
     Args:
         surface: surface of the link.
         base: the held interface.
         tip: the loaded interface.
         edge: [m] requested length of edges; by default a twentieth of the diagonal.
-        envelope: [-] largest deviation of the mesh from a surface with fewer triangles,
-            relative to the diagonal; that surface deviates from this one by as much.
-        time_limit: [s] largest time of the mesher.
+        envelope: [-] largest deviation of the mesh from the coarser surface that the
+            mesher reads, relative to the diagonal; the coarser surface may deviate from
+            the given one by the same amount.
+        time_limit: [s] time limit of the mesher.
         cache: folder of meshes; by default
             :func:`forcefit.inputs.cache_folder.cache_folder`.
-        patches: patches of the surface with these interfaces; computed if absent.
+        patches: patches of the surface with these interfaces; computed if None.
 
     Returns:
         The solid.
 
     Raises:
         BadInput: no part of the surface is on an interface.
-        MeshFailed: the mesher exceeded its time or made no mesh.
+        MeshFailed: the mesher exceeded its time limit or made no mesh.
     """
     patches = patches or find_patches(surface, base, tip)
     edge = surface.diagonal / 20 if edge is None else edge
@@ -87,7 +88,7 @@ def mesh_solid(
 
 
 def _from_cache(path: Path) -> tuple[NDArray, NDArray] | None:
-    """Return the points and cells of a cached mesh; None if absent or damaged."""
+    """Return the points and cells of a stored mesh, or None if absent or damaged."""
     try:
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as stored:
             points, cells = stored["points"], stored["cells"]
@@ -98,7 +99,7 @@ def _from_cache(path: Path) -> tuple[NDArray, NDArray] | None:
 
 
 def _to_cache(path: Path, points: NDArray, cells: NDArray) -> None:
-    """Write a mesh completely or not at all; a full or read-only disk is ignored."""
+    """Store a mesh completely or not at all; ignore a full or read-only disk."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(path) as part, part.open("wb") as file:
@@ -116,12 +117,13 @@ def _tetrahedralize(
         given, made = Path(folder, "surface.npz"), Path(folder, "mesh.npz")
         points, triangles = coarser_surface(surface, envelope * surface.diagonal)
         np.savez(given, points=points, triangles=triangles, settings=[edge, envelope])
-        # -P prevents that modules in the current folder replace others of the same name
+        # -P prevents modules in the current folder from replacing others of the same
+        # name
         command = [sys.executable, "-P", str(_WORKER), str(given), str(made)]
         if _SAME_NUMBERS.exists():
             command.append(str(_SAME_NUMBERS))
         try:
-            # the mesher writes a file to its current folder
+            # the mesher writes a file into its current folder
             run = subprocess.run(
                 command,
                 timeout=time_limit,

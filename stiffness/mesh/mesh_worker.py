@@ -1,8 +1,8 @@
-"""Process in which pytetwild meshes a stored surface.
+"""Program that meshes a stored surface with pytetwild, in a separate process.
 
 ``python stiffness/mesh/mesh_worker.py SURFACE.npz MESH.npz [LIBRARY]``
 
-LIBRARY is built from ``same_random_numbers.cpp``.
+LIBRARY is compiled from ``same_random_numbers.cpp``.
 """
 
 import ctypes
@@ -12,25 +12,26 @@ from types import ModuleType
 
 import numpy as np
 
-# largest number of passes of the mesher's optimisation; simple parts need fewer, and
-# where walls meet at acute angles twelve passes are as good as eighty
+# largest number of optimisation passes of the mesher; simple parts need fewer, and for
+# parts whose walls meet at acute angles twelve passes are as good as eighty
 _PASSES = 12
 
 
 def main(given: Path, made: Path, library: str | None = None) -> None:
-    """Read a surface and its settings, write points and cells.
+    """Read a surface and mesher settings, and write the points and cells of its mesh.
 
     Args:
         given: file with ``points`` (n, 3) [m], ``triangles`` (m, 3) and ``settings``:
             edge length [m], and envelope as a share of the diagonal.
-        made: file with ``points`` (n, 3) [m] and ``cells`` (t, 4).
-        library: library with which the same surface and settings give the same mesh.
+        made: output file with ``points`` (n, 3) [m] and ``cells`` (t, 4).
+        library: library that makes the mesher reproducible, or None.
     """
-    # loaded before the mesher, because the first definition is used
+    # loaded before the mesher, because the first loaded definition of a function is
+    # used
     if library is not None:
         ctypes.CDLL(library, mode=ctypes.RTLD_GLOBAL)
-    # pytetwild imports pyvista, which takes half a second, only to add a method to its
-    # classes; an empty module replaces it here
+    # pytetwild imports pyvista only to add a method to its classes, which takes half a
+    # second; an empty module replaces pyvista here
     sys.modules["pyvista"] = ModuleType("pyvista")
     import pytetwild
 

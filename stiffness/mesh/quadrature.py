@@ -1,9 +1,9 @@
 """Quadrature rules on the reference triangle and the reference tetrahedron.
 
-The points of a rule are written as words with a letter for each barycentric coordinate:
-``aab`` is the point (a, a, b).  Points with the same letters in a different order have
-the same weight.  All weights are positive, because negative weights would amplify
-rounding and could make an energy of stresses negative.
+Each point of a rule is written as a word with a letter for each barycentric coordinate:
+``aab`` is the point (a, a, b).  Points whose words consist of the same letters have the
+same weight.  All weights are positive, because negative weights would amplify rounding
+errors and could make an energy of stresses negative.
 
 Sources: Hammer and Stroud (1956) for degree 2; Radon (1948) for 5 and Dunavant (1985)
 for 4 and 6 in the triangle; Keast (1986) for 4, 5 and 6 in the tetrahedron.
@@ -20,10 +20,10 @@ class _Rule(NamedTuple):
     """A quadrature rule that is exact up to a degree.
 
     Attributes:
-        degree: degree of the polynomials integrated exactly.
-        points: words, in the order in which they are summed.
-        coordinates: values of a, b, c and so on.
-        weights: weight of each group of points with the same letters.
+        degree: degree up to which polynomials are integrated exactly.
+        points: words of the points, in the order of summation.
+        coordinates: values of the letters a, b, c and so on.
+        weights: weight of each group of points whose words have the same letters.
     """
 
     degree: int
@@ -105,17 +105,18 @@ _TETRAHEDRON = (
 
 @lru_cache(maxsize=16)
 def quadrature(degree: int, corners: int = 4) -> tuple[NDArray, NDArray]:
-    """Return a rule on the reference element, exact to at least a degree.
+    """Return a rule on the reference element that is exact to at least a degree.
 
     Args:
         degree: degree of the polynomials, at most 6.
         corners: 4 for a tetrahedron, 3 for a triangle.
 
     Returns:
-        L (q, corners), and positive weights (q,) whose sum is the size of the element.
+        L (q, corners), and positive weights (q,) whose sum is the size (area or volume)
+        of the reference element.
 
     Raises:
-        ValueError: no rule has this degree.
+        ValueError: no rule of this degree is available.
     """
     rules = _TETRAHEDRON if corners == 4 else _TRIANGLE
     rule = next((r for r in rules if r.degree >= degree), None)
@@ -124,5 +125,5 @@ def quadrature(degree: int, corners: int = 4) -> tuple[NDArray, NDArray]:
     words = rule.points.split()
     letters = np.array([[ord(c) - ord("a") for c in word] for word in words])
     L = np.array(rule.coordinates)[letters]
-    L[:, 0] = 1 - L[:, 1:].sum(axis=1)  # removes the rounding of tables
+    L[:, 0] = 1 - L[:, 1:].sum(axis=1)  # corrects the rounding of tabulated values
     return L, np.array([rule.weights["".join(sorted(word))] for word in words])

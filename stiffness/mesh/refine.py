@@ -1,9 +1,9 @@
 """Local refinement of tetrahedra by longest-edge bisection (Rivara).
 
-An edge is split only if it is the longest edge of every tetrahedron around it, so the
-mesh is conforming after every step.  Otherwise neighbours are split first.  Boundary
-triangles are split together with their tetrahedra and keep their patch.  New corners
-are moved onto the shape of the patch.
+An edge is split only if it is the longest edge of all tetrahedra around it.  Otherwise
+neighbouring tetrahedra are split first.  The mesh is therefore conforming after every
+step.  Boundary triangles are split together with their tetrahedra and remain in their
+patch.  New corners are moved onto the shape of the patch.
 """
 
 from dataclasses import dataclass, replace
@@ -31,11 +31,11 @@ class Refined:
 
 
 def refine(solid: Solid, halvings: NDArray) -> Refined:
-    """Bisect tetrahedra as requested, and neighbours for a conforming mesh.
+    """Bisect tetrahedra as requested, and neighbours as needed for a conforming mesh.
 
     Args:
         solid: solid to refine.
-        halvings: (t,) number of times each tetrahedron's volume is halved.
+        halvings: (t,) number of times that the volume of each tetrahedron is halved.
 
     Returns:
         The finer solid.
@@ -57,19 +57,19 @@ def split_edges(
     split: NDArray,
     places: NDArray | None = None,
 ) -> tuple[Solid, NDArray]:
-    """Split edges and their tetrahedra, at most one edge of each tetrahedron.
+    """Split edges and their tetrahedra, with at most one edge in each tetrahedron.
 
     Args:
         solid: solid to refine; new corners are not yet moved onto its shapes.
         ends: (e, 2) corners of all edges, from :func:`edges_of`.
         of_cell: (t, 6) edges of each tetrahedron, from :func:`edges_of`.
         split: (e,) bool, True for edges to split.
-        places: (k, 3) [m] positions of the new corners; by default the middles of the
+        places: (k, 3) [m] positions of the new corners; by default the midpoints of the
             edges.
 
     Returns:
-        The solid, and the tetrahedra (r,) that were halved.  Their first halves keep
-        their indices; the second halves are appended in this order.
+        The solid, and the indices (r,) of the bisected tetrahedra.  The first half of
+        each remains at its index, and the second halves are appended in this order.
     """
     count = len(solid.points)
     middle = np.full(len(ends), -1)
@@ -110,8 +110,8 @@ def edges_of(cells: NDArray, points: int) -> tuple[NDArray, NDArray]:
         points: total number of corners.
 
     Returns:
-        Corners (e, 2) of the edges, in increasing order; and the edges (t, 6) of each
-        cell.
+        (e, 2) corners of the edges, in increasing order; and (t, 6) the edges of each
+        tetrahedron.
     """
     ends = np.sort(cells[:, EDGES].reshape(-1, 2), axis=1)
     code, index = np.unique(edge_code(ends, points), return_inverse=True)
@@ -120,7 +120,7 @@ def edges_of(cells: NDArray, points: int) -> tuple[NDArray, NDArray]:
 
 
 def edge_code(ends: NDArray, points: int) -> NDArray:
-    """Return one number for each ordered pair of corners.
+    """Return a number that identifies each ordered pair of corners.
 
     Args:
         ends: (..., 2) corners.
@@ -140,8 +140,8 @@ def length_ranks(points: NDArray, ends: NDArray) -> NDArray:
         ends: (e, 2) corners.
 
     Returns:
-        (e,) rank of each edge, 0 for the shortest; of equal edges the first has the
-        lower rank.
+        (e,) rank of each edge, 0 for the shortest; of two equally long edges the first
+        has the lower rank.
     """
     length = np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1)
     rank = np.empty(len(ends), dtype=int)
@@ -150,7 +150,7 @@ def length_ranks(points: NDArray, ends: NDArray) -> NDArray:
 
 
 def chosen_by_all(of_cell: NDArray, chosen: NDArray, edges: int) -> NDArray:
-    """Return the edges that are chosen by all tetrahedra around them.
+    """Return the edges that are chosen by all tetrahedra to which they belong.
 
     Args:
         of_cell: (t, 6) edges of each tetrahedron, from :func:`edges_of`.
@@ -158,7 +158,7 @@ def chosen_by_all(of_cell: NDArray, chosen: NDArray, edges: int) -> NDArray:
         edges: number of edges.
 
     Returns:
-        (e,) bool.
+        (e,) bool, True for such edges.
     """
     around = np.bincount(of_cell.ravel(), minlength=edges)
     return np.asarray(around == np.bincount(chosen, minlength=edges))
@@ -167,7 +167,7 @@ def chosen_by_all(of_cell: NDArray, chosen: NDArray, edges: int) -> NDArray:
 def _terminal_edges(
     points: NDArray, ends: NDArray, of_cell: NDArray, wanted: NDArray
 ) -> NDArray:
-    """Return (e,) edges to split now: longest in all their cells, near wanted cells."""
+    """Return (e,) bool: longest edges of all their cells, to split for wanted cells."""
     rank = length_ranks(points, ends)
     longest = np.take_along_axis(
         of_cell, rank[of_cell].argmax(axis=1)[:, None], axis=1
@@ -183,7 +183,7 @@ def _terminal_edges(
 
 
 def _halved(cells: NDArray, middle: NDArray, pairs: NDArray) -> tuple[NDArray, NDArray]:
-    """Return cells with split edges as two cells each, seconds appended; indices."""
+    """Return bisected cells, second halves appended, and indices of the cells."""
     row, which = np.nonzero(middle >= 0)
     new = middle[row, which]
     first, second = cells[row].copy(), cells[row].copy()

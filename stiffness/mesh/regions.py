@@ -1,7 +1,7 @@
 """Regions of different materials, and a mesh cut along the faces between them.
 
-Known faces, such as planes of a box or faces between two solids, become faces of
-tetrahedra.  In later steps their corners stay on the shapes of these faces.
+Known faces between regions, such as planes of a box or faces between two solids, become
+faces of tetrahedra.  In later steps their corners remain on the shapes of these faces.
 """
 
 from collections.abc import Callable
@@ -23,8 +23,8 @@ from forcefit.stiffness.mesh.lagrange import FACES
 from forcefit.stiffness.mesh.refine import edge_code
 from forcefit.stiffness.mesh.solid import Solid
 
-_POOR = 0.2  # quality from which tetrahedra remain valid when they follow a curved face
-# share of a piece's volume in one region, from which on the whole piece belongs to it
+_POOR = 0.2  # quality at which a tetrahedron can still follow a curved face
+# fraction of a piece's volume in one region at which the whole piece is assigned to it
 _AGREED = 0.9
 
 
@@ -33,9 +33,9 @@ class Region:
     """Region of a link that consists of one material.
 
     Attributes:
-        where: function that selects the points (n, 3) [m] in the region.
-        faces: faces along which the mesh is cut; without faces the region consists of
-            elements.
+        where: function that returns which points (n, 3) [m] are in the region.
+        faces: faces along which the mesh is cut; without faces, whole elements are
+            assigned to the region.
     """
 
     where: Callable[[NDArray], NDArray]
@@ -50,7 +50,7 @@ def region_of_cells(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
         regions: regions; later ones have precedence.
 
     Returns:
-        (t,) 1 for the first region, and so on; 0 outside all.
+        (t,) number of the region, starting from 1; 0 outside all regions.
     """
     centers = solid.points[solid.cells].mean(axis=1)
     return region_of_places(centers, regions, solid.region)
@@ -64,11 +64,11 @@ def region_of_places(
     Args:
         places: (n, 3) [m] points.
         regions: regions; later ones have precedence.
-        cut_region: (n,) region of the tetrahedron at each point, among the regions
-            along whose faces the mesh was cut; None if it was not cut.
+        cut_region: (n,) region of the tetrahedron that contains each point, counting
+            only regions along whose faces the mesh was cut; None if it was not cut.
 
     Returns:
-        (n,) 1 for the first region, and so on; 0 outside all.
+        (n,) number of the region, starting from 1; 0 outside all regions.
     """
     label = np.zeros(len(places), dtype=int) if cut_region is None else cut_region
     for number, region in enumerate(regions, 1):
@@ -79,14 +79,14 @@ def region_of_places(
 
 
 def cut_by_regions(solid: Solid, regions: tuple[Region, ...]) -> Solid:
-    """Cut a mesh so that regions' faces are faces of tetrahedra.
+    """Cut a mesh so that faces between regions are faces of tetrahedra.
 
     Args:
         solid: straight tetrahedra.
         regions: regions of the link.
 
     Returns:
-        The solid with the region of each tetrahedron, and with the triangles between
+        The solid with the region of each tetrahedron and with the triangles between
         regions.
     """
     if not any(region.faces for region in regions):
@@ -109,7 +109,7 @@ def cut_by_regions(solid: Solid, regions: tuple[Region, ...]) -> Solid:
 
 
 def is_jagged(solid: Solid, regions: tuple[Region, ...]) -> bool:
-    """Return whether tetrahedra contain a face between regions.
+    """Return whether a face between two regions passes through tetrahedra.
 
     Args:
         solid: straight tetrahedra.
@@ -163,7 +163,7 @@ def edges_between(solid: Solid, region: NDArray) -> NDArray:
 
 
 def _owners(solid: Solid) -> NDArray:
-    """Return the (f,) tetrahedron of each boundary triangle."""
+    """Return (f,) the tetrahedron to which each boundary triangle belongs."""
     known = face_code(solid.cells[:, FACES], len(solid.points)).ravel()
     order = np.argsort(known)
     wanted = face_code(solid.faces, len(solid.points))
@@ -172,7 +172,7 @@ def _owners(solid: Solid) -> NDArray:
 
 
 def _places_inside(solid: Solid) -> NDArray:
-    """Return (t, 3) [m] points inside tetrahedra, away from cut faces."""
+    """Return (t, 3) [m] a point inside each tetrahedron, away from cut faces."""
     on = np.zeros(len(solid.points), dtype=bool)
     on[solid.inner] = True
     off = ~on[solid.cells]
@@ -182,7 +182,7 @@ def _places_inside(solid: Solid) -> NDArray:
 
 
 def _pieces(solid: Solid) -> NDArray:
-    """Return the (t,) piece of each tetrahedron, where cuts separate the pieces."""
+    """Return (t,) the piece between cuts to which each element belongs."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -196,7 +196,7 @@ def _pieces(solid: Solid) -> NDArray:
 
 
 def _between_regions(solid: Solid) -> Solid:
-    """Return the solid with only those cuts that separate two regions."""
+    """Return the solid without those cuts that do not separate two regions."""
     assert solid.region is not None
     faces, owners = faces_inside(solid.cells)
     one, other = solid.region[owners].T
@@ -205,7 +205,7 @@ def _between_regions(solid: Solid) -> Solid:
     kept = np.isin(known, between)
     inner, patch = [solid.inner[kept]], [solid.inner_patch[kept]]
     lacking = faces[~np.isin(between, known)]
-    # a corner may have come onto the face when it was moved onto the boundary
+    # a corner that was moved onto the boundary may be on the face too
     close = ON_FACE * float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     for number in np.unique(solid.inner_patch):
         shape = solid.shapes[number]

@@ -1,9 +1,9 @@
 """Meshes of slender and thin-walled straight bars recognised from their surfaces.
 
-The mesher makes elements that are as wide as long.  It needs minutes, or does not end,
-for a rod that is a thousand times as long as thick or for a tube whose wall is a
-hundredth of its radius.  Extruded from their sections, such bars need a few thousand
-elements.
+The mesher makes elements of similar length in all directions.  For a rod that is a
+thousand times longer than thick, or a tube whose wall is a hundredth of its radius, it
+needs minutes or does not end.  Extruding the section of such a bar requires only a few
+thousand elements.
 """
 
 import math
@@ -20,16 +20,15 @@ from forcefit.stiffness.surface.primitives import Cone, Plane, Shape
 from forcefit.stiffness.surface.surface import Surface
 from forcefit.stiffness.surface.true_surface import TrueSurface
 
-# ratio of length to width of the section from which on a bar is slender
+# ratio of length to width of the section at which a bar counts as slender
 _SLENDER = 50.0
 # ratio of wall to width (for a tube, to diameter) below which a section is thin-walled
 _THIN = 0.04
-_LAYERS = 60.0  # number of element layers along a bar, without the layers at its ends
-# ratio of the length of a layer to the width of the section, for a bar that is not
-# slender
+_LAYERS = 60.0  # number of layers along a bar, without the thin layers at its ends
+# length of a layer relative to the width of the section, for a bar that is not slender
 _LONGEST = 2.0
-_PARALLEL = 1e-6  # [rad] largest angle of parallel directions
-_SAME = 1e-6  # relative to the length: largest difference of two positions that agree
+_PARALLEL = 1e-6  # [rad] largest angle between directions that count as parallel
+_SAME = 1e-6  # largest difference of equal positions, relative to the length
 _SAME_VOLUME = 1e-3
 
 
@@ -42,9 +41,9 @@ def slender_bar(surface: Surface, base: Interface, tip: Interface) -> Solid | No
         tip: the loaded interface.
 
     Returns:
-        A mesh to refine from, in the axes of the surface; None if the link is not a
-        round bar, tube, rectangle or box between base and tip, or is neither slender
-        nor thin-walled.
+        A mesh in the axes of the surface, to be refined further.  None if the link is
+        not a round bar, tube, rectangle or box between base and tip, or if it is
+        neither slender nor thin-walled.
 
     Raises:
         BadInput: no part of the surface is on an interface.
@@ -58,7 +57,7 @@ def slender_bar(surface: Surface, base: Interface, tip: Interface) -> Solid | No
         return None
     along = (surface.points - base.point) @ axis
     off = np.minimum(np.abs(along), np.abs(along - length))
-    # all corners of a bar are at its ends; this test is faster than recognising shapes
+    # a bar has corners only at its ends; this test is faster than recognising shapes
     if off.max() > 10 * _SAME * length:
         return None
     patches = find_patches(surface, base, tip)
@@ -81,7 +80,7 @@ def slender_bar(surface: Surface, base: Interface, tip: Interface) -> Solid | No
 def _section(
     shapes: tuple[Shape, ...], axis: NDArray
 ) -> tuple[dict[str, float], NDArray, NDArray] | None:
-    """Return lengths of a bar's section, a point on its axis, its first direction."""
+    """Return the section's lengths, a point on the axis, and the first direction."""
     if all(isinstance(shape, Cone) for shape in shapes):
         return _round_section([s for s in shapes if isinstance(s, Cone)], axis)
     if all(isinstance(shape, Plane) for shape in shapes) and len(shapes) in (4, 8):
@@ -92,7 +91,7 @@ def _section(
 def _round_section(
     cones: list[Cone], axis: NDArray
 ) -> tuple[dict[str, float], NDArray, NDArray] | None:
-    """Return the section of a disc or a ring."""
+    """Return the section of a solid or hollow circle."""
     if len(cones) > 2 or not cones:
         return None
     largest = max(cones, key=lambda cone: cone.radius)
@@ -114,7 +113,7 @@ def _round_section(
 def _angular_section(
     planes: list[Plane], axis: NDArray
 ) -> tuple[dict[str, float], NDArray, NDArray] | None:
-    """Return the section of a rectangle, or of a box with one wall thickness."""
+    """Return the section of a rectangle, or of a box with equal wall thicknesses."""
     first = planes[0].normal
     second = np.cross(axis, first)
     middle = np.mean([plane.point for plane in planes], axis=0)
@@ -157,7 +156,7 @@ def _area(lengths: dict[str, float]) -> float:
 
 
 def _placed(bar: Solid, frame: NDArray, foot: NDArray, length: float) -> Solid:
-    """Return a bar of unit length along z after rotation, scaling and translation."""
+    """Rotate, scale and move a bar of unit length along z to its place."""
 
     def moved(shape: Shape | None) -> Shape | None:
         if isinstance(shape, Plane):

@@ -1,4 +1,4 @@
-"""A link as straight tetrahedra, with its corners on the exact shapes."""
+"""A link as tetrahedra with straight edges, whose corners are on the exact shapes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -11,7 +11,7 @@ from forcefit.stiffness.mesh.lagrange import EDGES
 from forcefit.stiffness.surface.primitives import Shape, project
 from forcefit.stiffness.surface.true_surface import TrueSurface
 
-# corners of each face, in outward orientation
+# corners of each face, ordered so that the normal points outward
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
 
@@ -20,16 +20,18 @@ class Solid:
     """A link as tetrahedra with straight edges, and the shapes of its boundary.
 
     Attributes:
-        points: (n, 3) [m] corners; they are on the exact shapes where these are known.
+        points: (n, 3) [m] corners; they are on the exact shapes as far as these are
+        known.
         cells: (t, 4) corners of tetrahedra with positive volume.
         faces: (f, 3) corners of boundary triangles, in outward orientation.
         patch: (f,) number of each face's patch; 0 is the base interface, 1 the tip.
-        shapes: shape of each patch; None leaves the nodes of a patch unchanged.
-        walls: for a pair of an interface and a patch that continues it smoothly, the
+        shapes: shape of each patch; None if the shape is unknown, so that the nodes of
+            the patch are not moved.
+        walls: for each pair of an interface and a patch that continues it smoothly, the
             wall through their common line, see
             :mod:`forcefit.stiffness.surface.smooth_outline`.
-        surface: surface to approximate; None if the shapes of the patches are
-            sufficient.
+        surface: surface that the mesh approximates; None if the shapes of the patches
+            are sufficient.
         inner: (k, 3) corners of triangles inside the link, between regions.
         inner_patch: (k,) index of the shape of each inner triangle.
         region: (t,) region of each tetrahedron, see
@@ -58,7 +60,7 @@ class Solid:
 def meeting_shapes(
     solid: Solid, key: tuple[int, ...], points: NDArray
 ) -> tuple[Shape, ...]:
-    """Return the shapes on which corners must be.
+    """Return the shapes on which corners of a solid must be.
 
     Args:
         solid: straight tetrahedra.
@@ -66,19 +68,19 @@ def meeting_shapes(
         points: (n, 3) [m] positions of the corners.
 
     Returns:
-        The shapes of the patches, or the replacement where two patches meet smoothly.
+        The shapes of the patches, or their replacement where two patches meet smoothly.
     """
     return _meeting_shapes(key, solid.shapes, solid.walls, points) if key else ()
 
 
 def corner_groups(solid: Solid) -> list[tuple[tuple[int, ...], NDArray]]:
-    """Return the corners of a solid that must be on shapes, grouped by shapes.
+    """Group the corners that must be on shapes by the shapes on which they must be.
 
     Args:
         solid: straight tetrahedra.
 
     Returns:
-        Groups as in :func:`node_patches`, for the boundary and faces between regions.
+        Groups as in :func:`node_patches`, for boundary faces and faces between regions.
     """
     faces = np.concatenate([solid.faces, solid.inner])
     patch = np.r_[solid.patch, solid.inner_patch]
@@ -91,8 +93,8 @@ def _meeting_shapes(
     walls: Mapping[tuple[int, int], Shape],
     points: NDArray,
 ) -> tuple[Shape, ...]:
-    """Return the shapes whose intersection contains points of some patches."""
-    # tangent shapes do not determine their common line; the wall through it does
+    """Return the shapes that intersect in the points shared by several patches."""
+    # tangent shapes do not determine their common line, but the wall through it does
     standing = {pair: wall for pair, wall in walls.items() if set(pair) <= set(key)}
     replaced = {other for _, other in standing}
     known = [s for p in key if p not in replaced and (s := shapes[p]) is not None]
@@ -103,7 +105,7 @@ def _meeting_shapes(
 
 
 def _tangent(one: Shape | None, other: Shape, points: NDArray) -> bool:
-    """Return whether two shapes have the same normal at points."""
+    """Return whether two shapes have the same normals at given points."""
     if one is None:
         return False
     along = np.einsum("ni,ni->n", one.signed(points)[1], other.signed(points)[1])
@@ -160,7 +162,7 @@ def boundary_faces(cells: NDArray) -> NDArray:
 def node_patches(
     nodes: int, members: NDArray, patch: NDArray
 ) -> list[tuple[tuple[int, ...], NDArray]]:
-    """Return the nodes grouped by the set of patches they lie on.
+    """Group nodes by the set of patches on which they are.
 
     Args:
         nodes: number of nodes.
@@ -168,7 +170,7 @@ def node_patches(
         patch: (f,) patch of each face.
 
     Returns:
-        Pairs of a set of patches, and the nodes that are on exactly these patches.
+        Pairs of a set of patches and the nodes that are on exactly these patches.
     """
     pairs = np.column_stack([members.ravel(), np.repeat(patch, members.shape[1])])
     pairs = np.unique(pairs, axis=0)
@@ -187,17 +189,17 @@ def on_shapes(
     reach: float,
     walls: Mapping[tuple[int, int], Shape] | None = None,
 ) -> NDArray:
-    """Return the points moved onto the shapes of their patches.
+    """Move points onto the shapes of their patches.
 
     Args:
         points: (n, 3) [m] points.
         groups: points by their patches.
         shapes: shapes of the patches.
-        reach: [m] largest motion of a point.
-        walls: walls as in :class:`Solid`; none if absent.
+        reach: [m] largest displacement of a point.
+        walls: walls as in :class:`Solid`, or None.
 
     Returns:
-        (n, 3) [m] positions.
+        (n, 3) [m] new positions.
     """
     moved = points.copy()
     for key, group in groups:
@@ -210,14 +212,14 @@ def on_shapes(
 
 
 def corners_on_shapes(solid: Solid) -> NDArray:
-    """Return the positions of a solid's corners on its shapes.
+    """Project the corners of a solid onto its shapes.
 
     Args:
         solid: solid whose corners may be off the shapes of their patches.
 
     Returns:
-        (n, 3) [m] positions; boundary corners are projected unless their distance
-        exceeds a hundredth of the part's size.
+        (n, 3) [m] positions; a boundary corner that is farther from its shapes than a
+        hundredth of the part's size is not moved.
     """
     size = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     groups = corner_groups(solid)
@@ -225,7 +227,7 @@ def corners_on_shapes(solid: Solid) -> NDArray:
 
 
 def moved_onto_shapes(solid: Solid) -> Solid:
-    """Move corners onto their shapes; reduce moves that would invert tetrahedra.
+    """Move corners onto their shapes, but less where tetrahedra would be inverted.
 
     Args:
         solid: solid whose corners may be off the shapes of their patches.

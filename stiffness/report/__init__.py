@@ -1,4 +1,4 @@
-"""Results on K_E: text, comparison with a beam, export, and libraries.
+"""Results for K_E: text, comparison with a beam, export, and libraries.
 
-Begin at ``library.py`` for many links, at ``compare.py`` for one.
+Start with ``library.py`` for many links, or with ``compare.py`` for one link.
 """

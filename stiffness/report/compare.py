@@ -1,14 +1,15 @@
-"""Comparison of a beam with finite elements: the difference and its physical part.
+"""Comparison of a beam with finite elements: the difference and its physical cause.
 
-A beam's section warps and contracts freely; a rigid face prevents this.  The ends of a
-solid link are therefore stiffer than those of the beam.  The effect is that of a beam
-shorter by a fixed share of its radius: K / K_beam = 1 + c r / L, where c depends only
-on the section and on Poisson's ratio.  The difference vanishes as the link becomes
-slender; a difference that does not vanish is an error of one of the two models.
+A beam's section warps and contracts freely, but a rigid face prevents both.  The ends
+of a solid link are therefore stiffer than those of the beam.  The solid is as stiff as
+a beam that is shorter by a fixed multiple of the section's size r: K / K_beam = 1 + c r
+/ L.  The coefficient c depends only on the section and on Poisson's ratio.  The
+difference vanishes as the link becomes slender.  If it does not, one of the two models
+is wrong.
 
-The most common error is a section with exchanged width and height, or a missing ``up``:
-the beam is then rotated about its axis.  The beam is therefore also compared after
-rotations by multiples of 90 degrees, and a rotation with much better agreement is
+The most common mistake is a section with exchanged width and height, or a missing
+``up``.  The beam is then rotated about its axis.  The beam is therefore also compared
+after rotations by multiples of 90 degrees, and a rotation that agrees much better is
 reported.
 """
 
@@ -22,22 +23,22 @@ from forcefit.results.display import html_table, short_repr
 from forcefit.stiffness.link import LinkStiffness, scaled
 from forcefit.stiffness.screws import rotation_matrix, screw_map
 
-# largest ratio of the remaining to the original difference for a reported rotation
+# largest difference after a reported rotation, relative to the original difference
 _MUCH_BETTER = 0.25
 _TURNS = (90, 180, 270)  # [deg] rotations of the beam about its axis that are tried
 
 
 @dataclass(frozen=True, eq=False)
 class LinkComparison:
-    """One link computed by a beam formula and by finite elements.
+    """A link computed by a beam formula and by finite elements.
 
     Attributes:
         beam: link by the beam formula.
         fea: link by finite elements, with the same tip and axes.
         difference: (6, 6) [1] fea minus beam, scaled by sqrt(K_ii K_jj) of the beam.
         length: [m] length from base to tip along the beam.
-        size: [m] size of the section: twice the radius of gyration, for a round bar its
-            radius.
+        size: [m] size of the section: twice the radius of gyration, which for a round
+            bar is its radius.
     """
 
     beam: LinkStiffness
@@ -50,20 +51,20 @@ class LinkComparison:
 
     @property
     def slenderness(self) -> float:
-        """Ratio L / r of the length to the size of the section."""
+        """Ratio L / r of the length to the section's size."""
         return self.length / self.size
 
     @property
     def end_effect(self) -> NDArray:
-        """(6,) [1] c in ``K_ii / K_ii of the beam = 1 + c r / L``."""
+        """(6,) [1] coefficient c in ``K_ii / K_ii of the beam = 1 + c r / L``."""
         return np.diag(self.difference) * self.slenderness
 
     @property
     def better_turn(self) -> tuple[int, float]:
         """Rotation of the beam about the line from base to tip that agrees much better.
 
-        The angle [deg], or 0 if there is none, and the largest remaining difference
-        [1].
+        Returns the angle [deg], or 0 if no rotation agrees much better, and the largest
+        remaining difference [1].
         """
         worst = float(np.abs(self.difference).max())
         axis = self.fea.tip - self.fea.base
@@ -74,7 +75,8 @@ class LinkComparison:
             for angle in _TURNS
         }
         noise = 2 * self.fea.relative_error_estimate
-        # the smallest of rotations whose difference is due to mesh error and rounding
+        # of several rotations whose difference is mesh error and rounding, use the
+        # smallest
         least = min(remaining.values()) + noise + 1e-9 * worst
         best = min(angle for angle in remaining if remaining[angle] <= least)
         better = remaining[best] < _MUCH_BETTER * worst and worst > noise
@@ -82,7 +84,7 @@ class LinkComparison:
 
     @property
     def explanation(self) -> str:
-        """Description of the difference."""
+        """Text that explains the difference."""
         angle, remaining = self.better_turn
         if angle:
             worst = 100 * np.abs(self.difference).max()
@@ -110,7 +112,7 @@ class LinkComparison:
 
 
 def _turned_difference(comparison: LinkComparison, rotation: NDArray) -> float:
-    """Return the [1] largest difference from the beam rotated about its tip."""
+    """Return the largest difference [1] after rotating the beam about its tip."""
     axis = rotation / np.linalg.norm(comparison.fea.tip - comparison.fea.base)
     A = screw_map(np.zeros(3), rotation_matrix(axis))
     K = A @ comparison.beam.stiffness @ A.T
@@ -123,11 +125,11 @@ def compare_link(
     size: float,
     length: float | None = None,
 ) -> LinkComparison:
-    """Compare two stiffnesses of one link.
+    """Compare the stiffnesses of one link by a beam formula and by finite elements.
 
     Args:
         beam: link by the beam formula.
-        fea: link by finite elements, read at the same tip in the same axes.
+        fea: link by finite elements, with the same tip and axes.
         size: [m] size of the section; for a round bar its radius.
         length: [m] length of the beam; by default from base to tip.
 
@@ -135,7 +137,7 @@ def compare_link(
         The comparison.
 
     Raises:
-        BadInput: the two tips are further apart than 1e-6 m and 0.1 % of the length.
+        BadInput: the distance of the tips exceeds 1e-6 m and 0.1 % of the length.
     """
     length = float(np.linalg.norm(fea.tip - fea.base)) if length is None else length
     gap = float(np.linalg.norm(fea.tip - beam.tip))
@@ -151,7 +153,7 @@ def compare_link(
 
 
 def entries_that_matter(stiffness: NDArray) -> list[tuple[int, int]]:
-    """Return the upper entries of a stiffness above one thousandth of their scale.
+    """Return the upper entries of a stiffness above a thousandth of their scale.
 
     Args:
         stiffness: (6, 6) stiffness.

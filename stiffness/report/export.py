@@ -1,4 +1,4 @@
-"""Stiffnesses in the order and syntax of other programs."""
+"""Export of stiffness matrices in the order and syntax of other programs."""
 
 import csv
 import io
@@ -11,13 +11,13 @@ from forcefit.inputs.table import BadInput, nearest
 from forcefit.stiffness.report.library import Entry
 from forcefit.stiffness.screws import SCREW
 
-# programs that put translations and forces first; here the order is [R T] / [m f]
+# programs whose order is translations first; in forcefit rotations are first
 PROGRAMS = ("exudyn", "adams", "mapdl")
 _SWAPPED = [3, 4, 5, 0, 1, 2]
 
 
 def translations_first(matrix: ArrayLike) -> NDArray:
-    """Return a stiffness or compliance in the order [T R] / [f m].
+    """Rearrange a stiffness or compliance to the order [T R] / [F M].
 
     Args:
         matrix: (6, 6) matrix in the order [R T] / [m f].
@@ -33,8 +33,9 @@ def stiffness_for(program: str, stiffness: ArrayLike, name: str = "link") -> str
 
     Args:
         program: ``"exudyn"`` for ``stiffness`` of a RigidBodySpringDamper; ``"adams"``
-            for the K matrix of a FIELD statement; ``"mapdl"`` for a MATRIX27 stiffness,
-            lower triangle of the nodes I (base, at the same place) and J (tip).
+            for the K matrix of a FIELD statement; ``"mapdl"`` for the lower triangle
+            of a MATRIX27 stiffness between the nodes I (base) and J (tip), which are at
+            the same position.
         stiffness: (6, 6) K_E in the order [R T] / [m f].
         name: name of the link, for comments.
 
@@ -66,7 +67,7 @@ def stiffness_for(program: str, stiffness: ArrayLike, name: str = "link") -> str
 
 
 def library_csv(entries: Sequence[Entry]) -> str:
-    """Return a library as a table: parameters of each entry, then the upper half of K.
+    """Return a library as CSV: the parameters of each entry, then the upper half of K.
 
     Args:
         entries: entries of one library.

@@ -1,9 +1,9 @@
-"""Libraries of link stiffnesses on disk, with their provenance.
+"""Libraries of link stiffnesses on disk, with the origin of each stiffness.
 
-A library is a folder with one JSON file for each entry.  An entry holds the stiffness
-and its error, the mesh, the parameters and the material, the digest of the geometry,
-the version of the program and the date.  :mod:`forcefit.stiffness.report.library_build`
-makes entries.
+A library is a folder with one JSON file for each entry.  An entry contains the
+stiffness and its error, the mesh report, the parameters, the material, a hash of the
+geometry, the version of the program, and the date.
+:mod:`forcefit.stiffness.report.library_build` makes entries.
 """
 
 import itertools
@@ -35,7 +35,7 @@ class Entry:
         stiffness_error: (6, 6) estimate of the error of the stiffness.
         tip: (3,) [m] position of the tip.
         parameters: lengths [m] and material constants of the link, by name.
-        about: the whole content of the file.
+        about: complete content of the file.
     """
 
     key: str
@@ -59,7 +59,7 @@ def read_entry(path: Path | str, key: str) -> Entry:
         The entry.
 
     Raises:
-        BadInput: there is no such library or entry, or the file is damaged.
+        BadInput: the library or the entry does not exist, or the file is damaged.
     """
     path = Path(path)
     if not os.path.isdir(path):
@@ -114,10 +114,10 @@ def read_compliance(path: Path | str, key: str) -> NDArray:
         key: name of the entry.
 
     Returns:
-        (6, 6) [rad/(N m) .. m/N].
+        (6, 6) [rad/(N m) .. m/N] compliance.
 
     Raises:
-        BadInput: there is no such library or entry, or the file is damaged.
+        BadInput: the library or the entry does not exist, or the file is damaged.
     """
     return inverted(read_entry(path, key).stiffness)
 
@@ -132,7 +132,7 @@ def read_library(path: Path | str) -> list[Entry]:
         The entries in the order of their keys.
 
     Raises:
-        BadInput: there is no library, it is empty, or an entry is damaged.
+        BadInput: the library does not exist, is empty, or contains a damaged entry.
     """
     path = Path(path)
     files = sorted(path.glob("*.json")) if os.path.isdir(path) else []
@@ -144,22 +144,23 @@ def read_library(path: Path | str) -> list[Entry]:
 def look_up(
     entries: Sequence[Entry], wanted: Mapping[str, float], family: str = ""
 ) -> tuple[NDArray, NDArray]:
-    """Return the stiffness at given parameters, interpolated between entries of a grid.
+    """Interpolate the stiffness between entries whose parameters form a grid.
 
-    Logarithms of the diagonal, and the scaled other entries, are interpolated by
-    polynomials of the logarithms of the parameters, through up to four neighbours along
-    each axis. Stiffnesses of links are nearly powers of their lengths.
+    Stiffnesses of links are nearly products of powers of their lengths.  Therefore the
+    logarithms of the diagonal, and the scaled other entries, are interpolated by
+    polynomials of the logarithms of the parameters.  The polynomials use up to four
+    neighbours along each axis.
 
     Args:
         entries: entries of a full grid.
         wanted: value of every parameter; a parameter with a single value in the grid
             may be omitted.
-        family: name of a family of parts given by surfaces; if absent, the grid of a
-            shape, or the only family.
+        family: name of a family of parts given by surfaces; if empty, the grid of a
+            shape is used, or the only family.
 
     Returns:
-        (6, 6) stiffness, and (6, 6) estimate of its error: the change if the farthest
-        entry along each axis is left out, plus the errors of the entries.
+        (6, 6) stiffness, and (6, 6) estimate of its error.  The estimate is the change
+        when the farthest entry along each axis is left out, plus the entries' errors.
 
     Raises:
         BadInput: a parameter is unknown, missing or outside the grid, or the entries do
@@ -210,8 +211,8 @@ def look_up(
 
 
 def _grid_of(entries: Sequence[Entry], family: str) -> list[Entry]:
-    """Return the entries of a family, or of the grid of a shape."""
-    # single parts belong to no grid
+    """Return the entries of a family, or the entries on the grid of a shape."""
+    # single parts do not belong to a grid
     families = sorted({e.about["family"] for e in entries if e.about.get("family")})
     grid = [entry for entry in entries if "surface" not in entry.about]
     if family and family not in families:
@@ -235,7 +236,7 @@ def _interpolated(
     at: Sequence[float],
     most: Sequence[int],
 ) -> NDArray:
-    """Return the tensor product of Lagrange polynomials through the nearest values."""
+    """Return the tensor-product Lagrange interpolation through the nearest values."""
     chosen, weights = [], []
     for axis, value, count in zip(axes, at, most, strict=True):
         near = sorted(axis, key=lambda v: abs(np.log(v / value)))[: max(count, 1)]

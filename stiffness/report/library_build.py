@@ -1,7 +1,7 @@
-"""Building of a library of links from a file: a grid of one shape, parts by surface.
+"""Building of a library from a file: a grid of one shape, and parts by surface.
 
-An entry is written completely or not at all, so a build can be interrupted, resumed and
-shared.
+An entry is written completely or not at all.  A build can therefore be interrupted and
+continued, and several processes can share it.
 """
 
 import itertools
@@ -45,9 +45,9 @@ class Spec:
         folder: folder of the library.
         shape: shape of all entries of the grid.
         method: ``"beam"`` or ``"fea"``.
-        grid: values of each parameter: lengths [m], ``young`` [Pa], ...
+        grid: values of each parameter: lengths [m], ``young`` [Pa] and so on.
         accuracy: required relative error of the finite elements.
-        links: parts given by their surfaces, in addition to the grid or instead of it.
+        links: parts given by their surfaces, in addition to or instead of the grid.
     """
 
     folder: Path
@@ -58,7 +58,7 @@ class Spec:
     links: tuple[SurfaceLink, ...] = ()
 
     def points(self) -> list[dict[str, float]]:
-        """Return every combination of the grid's values; none without a shape."""
+        """Return all combinations of the grid's values; empty without a shape."""
         if not self.shape:
             return []
         names = list(self.grid)
@@ -72,12 +72,12 @@ def read_spec(path: Path | str) -> Spec:
     """Read a build file.
 
     Args:
-        path: TOML file with ``library`` and ``accuracy``.  It has ``shape``, ``method``
-            and a table ``grid`` of lists of numbers, or tables ``[[link]]`` of parts
-            given by their surfaces, or both.
+        path: TOML file with ``library`` and ``accuracy``.  It contains ``shape``,
+            ``method`` and a table ``grid`` of lists of numbers; or tables ``[[link]]``
+            of parts given by their surfaces; or both.
 
     Returns:
-        The content; the folder is relative to the file.
+        The content; the library folder is relative to the folder of the file.
 
     Raises:
         BadInput: the file, a name or a value is invalid.
@@ -128,18 +128,18 @@ def read_spec(path: Path | str) -> Spec:
 
 
 def _is_number(value: object) -> bool:
-    """Return whether a value is a number of valid size, not a truth value."""
+    """Return whether a value is a number of valid size, but not a boolean."""
     proper = isinstance(value, int | float) and not isinstance(value, bool)
     return proper and -LARGEST <= value <= LARGEST  # type: ignore[operator]
 
 
 def _lengths(point: Mapping[str, float]) -> dict[str, float]:
-    """Return the parameters that are lengths."""
+    """Return the parameters that are lengths [m]."""
     return {name: v for name, v in point.items() if name not in _MATERIAL}
 
 
 def entry_key(spec: Spec, point: Mapping[str, float]) -> str:
-    """Return the name of an entry, unique to its parameters.
+    """Return the name of an entry, which is unique for its parameters.
 
     Args:
         spec: content of the library.
@@ -157,19 +157,18 @@ def build_library(
     workers: int = 1,
     update: Callable[[int, int], None] | None = None,
 ) -> list[Path]:
-    """Compute the missing entries.
+    """Compute the entries that the library does not contain yet.
 
     Args:
         spec: content of the library.
         workers: number of processes.
-        update: called with the number of finished entries and the number of all
-            entries.
+        update: function that is called with the numbers of finished and of all entries.
 
     Returns:
-        Files of all entries of the library.
+        Paths of all entries of the library.
 
     Raises:
-        BadInput: the folder cannot be made, or an entry cannot be computed.
+        BadInput: the folder cannot be created, or an entry cannot be computed.
     """
     _make_folder(spec.folder, write=False)
     wanted: list[dict[str, float] | SurfaceLink] = [*spec.points(), *spec.links]
@@ -200,7 +199,7 @@ def build_library(
 
 
 def _make_folder(folder: Path, write: bool = True) -> None:
-    """Make the folder of a library; without ``write`` only check the possibility."""
+    """Create the library folder; without ``write`` only check that this is possible."""
     try:
         made = [one for one in (folder, *folder.parents) if not one.exists()]
         folder.mkdir(parents=True, exist_ok=True)
@@ -219,7 +218,7 @@ def _key(spec: Spec, wanted: dict[str, float] | SurfaceLink) -> str:
 
 
 def _make_entry(spec: Spec, wanted: dict[str, float] | SurfaceLink) -> None:
-    """Compute one entry and write it."""
+    """Compute an entry and write its file."""
     if isinstance(wanted, SurfaceLink):
         request = wanted.request()
         link, parameters = wanted.solve(), wanted.parameters
@@ -247,7 +246,7 @@ def _make_entry(spec: Spec, wanted: dict[str, float] | SurfaceLink) -> None:
 
 
 def _solve_point(spec: Spec, point: dict[str, float]) -> tuple[LinkStiffness, str]:
-    """Return the link at one point of the grid, and the digest of its geometry."""
+    """Return the link at a point of the grid, and a hash of its geometry."""
     lengths, E, nu = _lengths(point), point["young"], point["poisson"]
     tip = np.array([0.0, 0.0, lengths["length"]])
     if spec.method == "beam":
@@ -269,7 +268,7 @@ def _solve_point(spec: Spec, point: dict[str, float]) -> tuple[LinkStiffness, st
 
 
 def _program() -> str:
-    """Return name and version of this program."""
+    """Return the name and version of this program."""
     try:
         return f"forcefit {version('forcefit')}"
     except PackageNotFoundError:

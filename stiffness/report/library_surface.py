@@ -1,6 +1,6 @@
 """Library entries of parts given by their surfaces: single parts and families.
 
-A family is a table of files and sizes, between which ``look_up`` interpolates.
+A family is a table of surface files and sizes, between which ``look_up`` interpolates.
 
 An entry is computed again if the content of its surface file or another setting has
 changed.
@@ -36,13 +36,13 @@ class SurfaceLink:
         tip: text of the interface that moves.
         young: [Pa] Young's modulus.
         poisson: [-] Poisson's ratio.
-        density: [kg/m^3] density; 0 leaves out mass and inertia.
+        density: [kg/m^3] density; if 0, mass and inertia are not computed.
         unit: unit of the surface file.
         interface: one of :data:`forcefit.stiffness.fem.condensation.KINDS`.
         accuracy: [1] required relative error of every entry of K.
         family: name of a family of parts that differ in their sizes; empty for a single
             part.
-        sizes: [m] sizes of a part of a family, by name.
+        sizes: [m] sizes of this part of a family, by name.
         parts: texts of parts of another material, as on the command line.
     """
 
@@ -62,15 +62,15 @@ class SurfaceLink:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Sizes and material constants, in the form of a grid's entries."""
+        """Sizes and material constants by name, as for an entry of a grid."""
         given = dict(self.sizes) | {"young": self.young, "poisson": self.poisson}
         return given | ({"density": self.density} if self.density else {})
 
     def request(self) -> dict[str, Any]:
-        """Return all data on which the entry depends, with the surface file's digest.
+        """Return all data on which the entry depends, including a hash of the surface.
 
         Returns:
-            Plain values, which are equal for equal settings.
+            Plain values; equal settings have equal values.
 
         Raises:
             BadInput: the surface file cannot be read.
@@ -92,13 +92,13 @@ class SurfaceLink:
         return given | {"surface_digest": hashlib.sha256(content).hexdigest()}
 
     def solve(self) -> LinkStiffness:
-        """Return the link by finite elements.
+        """Compute the stiffness of the part by finite elements.
 
         Returns:
             The stiffness at the tip's centre, in the axes of the surface.
 
         Raises:
-            BadInput: the surface or an interface is not usable.
+            BadInput: the surface or an interface is invalid.
         """
         from forcefit.stiffness.fem.fea import FemOptions, solve_link
         from forcefit.stiffness.fem.material import Material
@@ -119,14 +119,14 @@ class SurfaceLink:
 
 
 def read_surface_links(root: Table, accuracy: float) -> tuple[SurfaceLink, ...]:
-    """Return the tables ``[[link]]`` and ``[[family]]`` of a build file.
+    """Read the tables ``[[link]]`` and ``[[family]]`` of a build file.
 
     Args:
-        root: the file's table.
-        accuracy: required accuracy of links that do not state one.
+        root: root table of the file.
+        accuracy: required accuracy of parts for which the file does not state one.
 
     Returns:
-        The links, in order.
+        The parts in the order of the file.
 
     Raises:
         BadInput: a value is invalid, a file is missing, or a name is given twice.
@@ -149,7 +149,7 @@ def read_surface_links(root: Table, accuracy: float) -> tuple[SurfaceLink, ...]:
 
 
 def _add(links: dict[str, SurfaceLink], link: SurfaceLink, table: Table) -> None:
-    """Add a link; reject a name that another link has."""
+    """Add a part; raise an error if another part has the same name."""
     if link.name in links:
         found = f"found {quoted(link.name)} twice, expected other names"
         raise table.bad("name", found)
@@ -157,7 +157,7 @@ def _add(links: dict[str, SurfaceLink], link: SurfaceLink, table: Table) -> None
 
 
 def _link(table: Table, surface: Path, accuracy: float) -> SurfaceLink:
-    """Read the keys that tables of a link and of a family share."""
+    """Read the keys that the tables of links and families have in common."""
     from forcefit.stiffness.fem.condensation import KINDS
     from forcefit.stiffness.fem.part_text import read_parts
 
@@ -183,16 +183,16 @@ def _link(table: Table, surface: Path, accuracy: float) -> SurfaceLink:
 
 
 def family_of(common: SurfaceLink, file: Path) -> list[SurfaceLink]:
-    """Return the parts of a family: a CSV table of their files and sizes.
+    """Read the parts of a family from a CSV table of files and sizes.
 
     Args:
-        common: keys that all parts share, with the name of the family; interfaces may
-            name sizes in braces, such as ``"z={length}"``.
+        common: settings of all parts, with the name of the family; the texts of
+            interfaces may contain sizes in braces, such as ``"z={length}"``.
         file: table with a column ``surface``, relative to its folder, and a column for
             each size [m].
 
     Returns:
-        A link for each row.
+        A part for each row.
 
     Raises:
         BadInput: the table, a file or an interface is invalid.
@@ -242,7 +242,7 @@ def _size(place: str, name: str, cell: str) -> float:
 
 
 def _filled(interface: Any, sizes: Mapping[str, float]) -> Any:
-    """Return an interface with the values of its sizes."""
+    """Replace the sizes in the text of an interface by their values."""
     if not isinstance(interface, str):
         return interface
     for name, value in sizes.items():
@@ -255,10 +255,10 @@ def is_current(file: Path, link: SurfaceLink) -> bool:
 
     Args:
         file: file of the entry.
-        link: the requested link.
+        link: the requested part.
 
     Returns:
-        The answer; False also for a damaged file.
+        Whether the entry can be used; False if its file is damaged.
 
     Raises:
         BadInput: the surface file cannot be read.

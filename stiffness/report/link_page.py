@@ -29,14 +29,14 @@ _UNITS = {"surface_volume": "m^3", "surface_area": "m^2",
 
 
 def link_page(link: LinkStiffness, provenance: Provenance) -> str:
-    """Return the page of a link that was computed by finite elements.
+    """Return the report page of a link that was computed by finite elements.
 
     Args:
         link: result of :func:`forcefit.stiffness.fem.fea.solve_link`.
         provenance: command and files.
 
     Returns:
-        HTML, which needs no other file.
+        HTML that does not refer to other files.
     """
     place = ", ".join(f"{v:g}" for v in link.tip)
     return page(
@@ -70,7 +70,7 @@ def _errors(link: LinkStiffness) -> str:
 
 
 def _verdict(link: LinkStiffness) -> str:
-    """Return the estimated error, the required one, and the number of doubts."""
+    """Return a sentence with the estimated error, the requirement and the doubts."""
     mesh, error = link.mesh, 100 * link.relative_error_estimate
     outcome = "reached" if mesh["reached"] else "not reached within the budget"
     text = (
@@ -82,14 +82,14 @@ def _verdict(link: LinkStiffness) -> str:
 
 
 def _good(link: LinkStiffness) -> bool | None:
-    """Return whether the accuracy is reached; None if the surface has doubts."""
+    """Return whether the accuracy is reached; None if the surface is doubtful."""
     if not link.mesh["reached"]:
         return False
     return None if _doubtful(link) else True
 
 
 def _doubtful(link: LinkStiffness) -> list[str]:
-    """Return sentences on what is doubtful about the surface and its mesh."""
+    """Return sentences that describe doubts about the surface and its mesh."""
     mesh = link.mesh
     found = [f"Repaired: {one}." for one in mesh["repairs"]]
     if not mesh["closed"]:
@@ -103,13 +103,13 @@ def _doubtful(link: LinkStiffness) -> list[str]:
 
 
 def _doubts(link: LinkStiffness) -> str:
-    """Return the section on doubts about the surface; empty without any."""
+    """Return the section on doubts about the surface; empty if there are none."""
     found = _doubtful(link)
     return section("Doubts about the surface", listed(found)) if found else ""
 
 
 def _tiles(link: LinkStiffness) -> list[Tile]:
-    """Return tiles of the error, the smallest stiffnesses, the mesh and the mass."""
+    """Return tiles with the error, the smallest stiffnesses, the mesh and the mass."""
     K = np.diag(link.stiffness)
     turn, shift = int(np.argmin(K[:3])), 3 + int(np.argmin(K[3:]))
     tiles = [
@@ -129,7 +129,7 @@ def _tiles(link: LinkStiffness) -> list[Tile]:
 
 
 def _matrices(link: LinkStiffness) -> str:
-    """Return K_E and its inverse."""
+    """Return the tables of K_E and of its inverse."""
     return section(
         "Stiffness and compliance",
         paragraph("K_E [N m/rad, N/rad; N m/m, N/m], wrench = K_E screw:"),
@@ -143,18 +143,18 @@ def matrix_table(
     values: NDArray, rows: tuple[str, ...], name: str,
     columns: tuple[str, ...] = SCREW,
 ) -> str:  # fmt: skip
-    """Return a (6, 6) matrix as a table.
+    """Return a (6, 6) matrix as an HTML table.
 
     Args:
-        values: (6, 6) stiffness or compliance; entries that are rounding errors of
-            sqrt(K_ii K_jj) are shown as zero, and entries that are not finite as
-            ``rigid``.
+        values: (6, 6) stiffness or compliance.  Entries that are rounding errors
+            relative to sqrt(K_ii K_jj) are shown as zero; entries that are not finite
+            are shown as ``rigid``.
         rows: names of the rows.
         name: name of the table.
         columns: names of the columns.
 
     Returns:
-        HTML.
+        HTML of the table.
     """
     size = np.sqrt(np.abs(np.nan_to_num(np.diag(values), posinf=0.0)))
     shown = np.where(np.abs(values) < 1e-10 * np.outer(size, size), 0.0, values)
@@ -185,7 +185,7 @@ def _mesh(link: LinkStiffness) -> str:
 
 
 def _cell(key: str, value: Any) -> Cell:
-    """Return a number of the mesh with its unit."""
+    """Return a value of the mesh report with its unit."""
     if isinstance(value, str):
         return value
     unit = _UNITS.get(key) or unit_of(key)

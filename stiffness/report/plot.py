@@ -22,13 +22,14 @@ if TYPE_CHECKING:
 
 
 def plot_comparison(comparison: LinkComparison) -> "Figure":
-    """Return a figure of K_E by finite elements and by a beam, and of their difference.
+    """Plot K_E by finite elements and by a beam, and their difference.
 
     Args:
         comparison: comparison of one link by two methods.
 
     Returns:
-        The figure: a pair of bars for each significant entry, and a map of differences.
+        A figure with a pair of bars for each significant entry, and a map of
+        differences.
     """
     from matplotlib.figure import Figure
 
@@ -72,13 +73,13 @@ def _plot_entries(axes: "Axes", links: "Sequence[LinkStiffness]") -> None:
 
 
 def plot_slenderness(sweep: SlendernessSweep) -> "Figure":
-    """Return a figure of the difference of elements and beam over L / r, with the fit.
+    """Plot the difference between elements and beam over L / r, with the fitted curve.
 
     Args:
         sweep: comparisons of one section at several lengths.
 
     Returns:
-        The figure: a curve for each significant entry, with error bars of the meshes.
+        A figure with a curve for each significant entry; error bars show mesh errors.
     """
     from matplotlib.figure import Figure
 
@@ -87,7 +88,7 @@ def plot_slenderness(sweep: SlendernessSweep) -> "Figure":
     ratio = sweep.slenderness
     fine = np.geomspace(ratio.min(), ratio.max(), 200)
     errors = [100 * c.fea.relative_error_estimate for c in sweep.comparisons]
-    # entries of a round section come in pairs, of which the second would hide the first
+    # the entries of a round section occur in equal pairs, of which only one is plotted
     plotted: list[tuple[int, int]] = []
     for entry in entries_that_matter(sweep.comparisons[0].beam.stiffness):
         c, d = sweep.end_effect[entry], sweep.second[entry]
@@ -120,19 +121,19 @@ def plot_stress(
     section: "Mapping[str, float] | None" = None,
     up: ArrayLike | None = None,
 ) -> "Figure":
-    """Return a figure of the von Mises stress of one wrench from base to tip.
+    """Plot the von Mises stress of one wrench from base to tip.
 
     Args:
-        everywhere: stresses of unit wrenches at all nodes, also at the interfaces.
+        everywhere: stresses of unit wrenches at all nodes, including the interfaces.
         peak: peak stress of the wrench.
         base: (3,) [m] position of the base.
         tip: (3,) [m] position of the tip.
         section: section of a beam whose stress is plotted too.
-        up: (3,) the section's z axis.
+        up: (3,) vector along the section's z axis.
 
     Returns:
-        A dot for each node, and the largest stress in each section of the beam as a
-        line; the evaluated region is white.
+        A figure with a dot for each node.  A line shows the largest stress in each
+        section of the beam.  The region that was evaluated is white.
     """
     from matplotlib.figure import Figure
 

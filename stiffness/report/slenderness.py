@@ -1,13 +1,13 @@
 r"""Comparison of beam and finite elements over slenderness: the end effect.
 
-One section is compared at several lengths.  A rigid face keeps the section from warping
-and contracting over a distance that depends on the section and not on the length, so
-the link is as stiff as a beam that is shorter by a fixed length:
+One section is compared at several lengths.  Near a rigid face the section cannot warp
+or contract.  The size of this zone depends on the section but not on the length.  The
+link is therefore as stiff as a beam that is shorter by a fixed length:
 
     K / K_beam = 1 + c r / L + d (r / L)^2.
 
-c depends on the section, the interfaces and Poisson's ratio.  The residual of the two
-terms should not exceed the error of the meshes.
+c depends on the section, the interfaces and Poisson's ratio.  The residual after these
+two terms should not exceed the error of the meshes.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -34,13 +34,13 @@ _SHAPES = {
 
 @dataclass(frozen=True, eq=False)
 class SlendernessSweep:
-    """One section at several lengths, by beam theory and by finite elements.
+    """Comparisons of a section at several lengths, and the fitted end effect.
 
     Attributes:
         comparisons: comparisons of beam and finite elements, shortest link first.
-        end_effect: (6, 6) [1] c, for K scaled by sqrt(K_ii K_jj) of the beam.
-        end_effect_error: (6, 6) [1] error of c due to the meshes' estimated errors.
-        second: (6, 6) [1] coefficient d of the second-order term.
+        end_effect: (6, 6) [1] fitted c, for K scaled by sqrt(K_ii K_jj) of the beam.
+        end_effect_error: (6, 6) [1] error of c due to the estimated mesh errors.
+        second: (6, 6) [1] fitted coefficient d of the second-order term.
         residual: (n, 6, 6) [1] differences minus the fit.
     """
 
@@ -59,7 +59,7 @@ class SlendernessSweep:
 
     @property
     def explanation(self) -> str:
-        """Description of the end effect."""
+        """Text that explains the end effect."""
         c, error = np.diag(self.end_effect), np.diag(self.end_effect_error)
         turns, shifts = (" ".join(f"{v:.3f}" for v in part) for part in (c[:3], c[3:]))
         left = 100 * np.abs(self.residual).max()
@@ -82,7 +82,7 @@ def sweep_slenderness(
     interface: str = "rigid",
     update: Callable[[int, int], None] | None = None,
 ) -> SlendernessSweep:
-    """Compare a section's beam and solid at several lengths.
+    """Compare a section's beam theory and finite elements at several lengths.
 
     Args:
         section: ``radius`` and optionally ``inner_radius``, or ``width`` and ``height``
@@ -93,14 +93,14 @@ def sweep_slenderness(
             :attr:`forcefit.stiffness.beam.sections.Section.size`.
         accuracy: [1] required relative error of the finite elements.
         interface: kind of the interfaces of the solid.
-        update: called with the number of finished lengths and the number of all
-            lengths.
+        update: function that is called with the numbers of finished and of all lengths.
 
     Returns:
         The comparisons and the fit.
 
     Raises:
-        BadInput: the section has a different kind, or there are fewer than two lengths.
+        BadInput: the section is not of these kinds, or fewer than two lengths are
+        given.
     """
     from forcefit.stiffness.fem.fea import FemOptions, solve_link
     from forcefit.stiffness.fem.material import Material

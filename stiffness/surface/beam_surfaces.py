@@ -1,4 +1,4 @@
-"""Surfaces of common link shapes from lengths; the axis is z, with the base at 0."""
+"""Surfaces of common link shapes from lengths; the axis is z, and the base is z = 0."""
 
 from collections.abc import Mapping
 
@@ -10,7 +10,7 @@ from forcefit.stiffness.beam.curve import Piece, straight_piece
 from forcefit.stiffness.beam.sections import Section, declared_section, round_section
 from forcefit.stiffness.surface.surface import Surface, check_surface
 
-# names of the lengths of each shape, with the default of an optional length
+# names of the lengths of each shape, and the default values of optional lengths
 SHAPES: dict[str, dict[str, float | None]] = {
     "round": {"length": None, "radius": None},
     "tube": {"length": None, "radius": None, "inner_radius": None},
@@ -22,7 +22,7 @@ _FACETS = 64
 
 
 def check_shape(shape: str, lengths: Mapping[str, float]) -> None:
-    """Reject an unknown shape, or unknown names of lengths.
+    """Raise an error for an unknown shape or for wrong names of lengths.
 
     Args:
         shape: one of ``SHAPES``.
@@ -58,7 +58,7 @@ def shape_surface(shape: str, lengths: Mapping[str, float]) -> Surface:
         lengths: lengths [m] by name.
 
     Returns:
-        The surface; the corners of its facets are on the exact shape.
+        The surface; the corners of its facets lie on the exact shape.
 
     Raises:
         BadInput: the shape or a length is invalid.
@@ -67,7 +67,7 @@ def shape_surface(shape: str, lengths: Mapping[str, float]) -> Surface:
     L = lengths["length"]
     if shape in {"rectangle", "box"}:
         corner = np.array([[1, -1], [1, 1], [-1, 1], [-1, -1]]) / 2
-        # the height is along y, which is ``up`` of a beam along z
+        # the height is along y, because ``up`` of a beam along z is y by default
         sides = np.array([lengths["width"], lengths["height"]])
         hole = corner * (sides - 2 * lengths["wall"]) if shape == "box" else None
         return _prism(corner * sides, corner * sides, L, shape, hole)
@@ -88,7 +88,7 @@ def _prism(
     name: str,
     hole: NDArray | None = None,
 ) -> Surface:
-    """Return surface between two outlines, closed by fans, or by rings at a hole."""
+    """Return the surface between two outlines, closed by fans or by rings."""
     count = len(base)
     inner = np.zeros((1, 2)) if hole is None else hole
     layers = [base, tip, inner, inner]
@@ -111,7 +111,7 @@ def _prism(
 
 
 def shape_beam(shape: str, lengths: Mapping[str, float], nu: float) -> list[Piece]:
-    """Return the shape as a beam along z, with its height along y.
+    """Return the beam that corresponds to a shape, along z with its height along y.
 
     Args:
         shape: one of ``SHAPES``.
@@ -119,7 +119,7 @@ def shape_beam(shape: str, lengths: Mapping[str, float], nu: float) -> list[Piec
         nu: [-] Poisson's ratio, on which shear factors depend.
 
     Returns:
-        The only piece of the beam.
+        A list with the single piece of the beam.
 
     Raises:
         BadInput: the shape or a length is invalid.

@@ -1,9 +1,9 @@
-"""A surface with fewer triangles for the mesher, whose time depends on their number.
+"""Reduction of the number of triangles of a surface, on which meshing time depends.
 
-Long thin triangles, which CAD programs make for bars and bores, cost pytetwild much
-time, because it cuts its first tetrahedra along all of them.  Corners of the mesh are
-later projected onto the part's exact shapes, so the surface for the mesher may be
-coarser.
+CAD programs make long thin triangles for bars and bores.  These cost pytetwild much
+time, because it cuts its first tetrahedra along all triangles.  The corners of the mesh
+are later projected onto the exact shapes of the part, so the surface that the mesher
+reads may be coarser.
 """
 
 import numpy as np
@@ -12,22 +12,22 @@ from numpy.typing import NDArray
 from forcefit.stiffness.surface.surface import Surface, directed_edges, signed_volume
 
 _VOLUME = 0.01  # accepted relative difference of the enclosed volumes
-# shares of the number of triangles, tried in this order
+# numbers of triangles that are tried, relative to the original number, in this order
 _PARTS = 0.01 * 1.4 ** np.arange(13)
 
 
 def coarser_surface(surface: Surface, tolerance: float) -> tuple[NDArray, NDArray]:
-    """Return the coarsest surface within a tolerance that a dozen attempts find.
+    """Return a coarser surface within a tolerance, the best of a dozen attempts.
 
     Args:
         surface: closed surface.
         tolerance: [m] largest distance between both surfaces, evaluated at the corners
-            of the given surface, and at the corners, edge middles and centres of the
-            coarser one.
+            of the given surface, and at the corners, edge midpoints and centres of the
+            coarser surface.
 
     Returns:
         Points (n, 3) [m] and triangles (m, 3) of a closed surface with the same genus
-        and a volume within 1 %; those of the given surface if no attempt succeeds.
+        and the same volume within 1 %; the given surface if no attempt succeeds.
 
     Sources:
         Garland & Heckbert (1997) for the quadric decimation, as implemented in VTK.
@@ -60,7 +60,7 @@ def coarser_surface(surface: Surface, tolerance: float) -> tuple[NDArray, NDArra
 
 
 def _distance(mesh: object, points: NDArray) -> float:
-    """Return the [m] distance of the point that is farthest from a mesh."""
+    """Return the distance [m] from a mesh of the point that is farthest from it."""
     _, near = mesh.find_closest_cell(points, return_closest_point=True)  # type: ignore[attr-defined]
     return float(np.linalg.norm(near - points, axis=1).max())
 
@@ -72,13 +72,13 @@ def _closed(triangles: NDArray) -> bool:
 
 
 def euler_characteristic(triangles: NDArray) -> int:
-    """Return corners minus edges plus triangles: 2 - 2 genus for each closed shell.
+    """Return vertices minus edges plus triangles: 2 - 2 genus for each closed shell.
 
     Args:
         triangles: (m, 3) corners.
 
     Returns:
-        The characteristic, summed over all shells.
+        The Euler characteristic, summed over all shells.
     """
     edges = np.sort(directed_edges(triangles), axis=1)
     corners = len(np.unique(triangles))

@@ -1,9 +1,10 @@
 """A curved patch of unknown shape, smoothed by Phong tessellation.
 
-Between its corners a facet is lifted by half of the mean of the projections onto the
-tangent planes of the corners (Boubekeur & Alexa 2008, Phong tessellation).  Along each
-edge the smaller of the two projections is used.  On an arc of half-angle a, the error
-is a^4 of the radius, while it is a^2 for a flat facet.
+A point of a facet is projected onto the tangent planes at the three corners.  The facet
+is lifted there by half of the weighted mean of these projections (Boubekeur & Alexa
+2008, Phong tessellation).  Along each edge the smaller of the two projections is used.
+For an arc of half-angle a, the error is about a^4 times the radius; for flat facets it
+is about a^2 times the radius.
 """
 
 from dataclasses import dataclass, field
@@ -17,10 +18,10 @@ from forcefit.stiffness.surface.surface import area_vectors
 
 @dataclass(frozen=True, eq=False)
 class Facets:
-    """A patch of lifted triangles.
+    """A patch of triangles that are lifted to approximate a smooth surface.
 
     Attributes:
-        points: (n, 3) [m].
+        points: (n, 3) [m] corners of the triangles.
         triangles: (m, 3) indices of points, in outward orientation.
         normals: (n, 3) unit normals at the points, computed from this patch only.
     """
@@ -38,7 +39,7 @@ class Facets:
         object.__setattr__(self, "normals", self._corner_normals())
 
     def _corner_normals(self) -> NDArray:
-        """Return normals at corners: the mean of facet normals, weighted by angles."""
+        """Return the normals at corners: means of facet normals weighted by angle."""
         facing = area_vectors(self.points, self.triangles)
         facing /= np.maximum(np.linalg.norm(facing, axis=1), 1e-300)[:, None]
         corners = self.points[self.triangles]
@@ -52,12 +53,12 @@ class Facets:
         return total / np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None]
 
     def edge_lifts(self, edges: NDArray) -> NDArray:
-        """Return (e,) [m] lifts at the middles of edges (e, 2), from end planes."""
+        """Return (e,) [m] lifts at the midpoints of edges (e, 2), from end planes."""
         rises = _rises(self.points[edges], self.normals[edges], limited=False)
         return np.asarray(np.linalg.norm(rises, axis=1) / 4)
 
     def lifts(self) -> NDArray:
-        """Return (m,) [m] largest lift of each facet at the middles of its edges."""
+        """Return (m,) [m] largest lift of each facet at the midpoints of edges."""
         sides = [self.edge_lifts(self.triangles[:, [k, k - 1]]) for k in range(3)]
         return np.asarray(np.max(sides, axis=0))
 
@@ -84,9 +85,9 @@ class Facets:
 
 
 def _rises(corners: NDArray, normals: NDArray, limited: bool) -> NDArray:
-    """Return (e, 3) [m] 4 times the lifts at edge middles, from corner planes."""
-    # limited to the smaller lift if the planes at both ends differ, and to zero if the
-    # lifts have different signs, which occurs where a flat side meets a fillet
+    """Return (e, 3) [m] four times the lifts at the midpoints of edges."""
+    # If the tangent planes at both ends differ, the smaller lift is used.  If the lifts
+    # have different signs, as where a flat side meets a fillet, the lift is zero.
     along = corners[:, 0] - corners[:, 1]
     heights = np.stack([
         np.einsum("ei,ei->e", sign * along, normals[:, k])

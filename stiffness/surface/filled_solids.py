@@ -15,7 +15,7 @@ class FilledSolids:
         names: names of the solids.
         points: (n, 3) [m] corners.
         triangles: (m, 3) indices of points; solids that touch share triangles.
-        sides: (m, 2) index in ``names`` of the solid on each side; -1 outside.
+        sides: (m, 2) index in ``names`` of the solid on each side; -1 if there is none.
         overlaps: descriptions of pairs of solids that overlap.
     """
 
@@ -32,8 +32,8 @@ class FilledSolids:
             members: names of the solids.
 
         Returns:
-            (k, 3) triangles around them, and (k,) bool, True for a triangle inside the
-            link.
+            (k, 3) triangles of their boundary, and (k,) bool, True for a triangle
+            inside the link.
         """
         chosen = [number for number, name in enumerate(self.names) if name in members]
         one, other = (np.isin(side, chosen) for side in self.sides.T)

@@ -12,7 +12,7 @@ from forcefit.inputs.table import BadInput, describe, nearest
 from forcefit.stiffness.beam.beam import unit_vector
 from forcefit.stiffness.screws import UNIT_VECTORS
 
-# [m] largest accepted coordinate or radius, so that squares do not overflow
+# [m] largest accepted coordinate or radius, so that squares of lengths do not overflow
 _FARTHEST = 1e6
 _EXPECTED = '"z=0.452", "bore=px,py,pz/ax,ay,az/r", a table {plane, radius} or {bore}'
 
@@ -22,8 +22,9 @@ class Interface:
     """The part of a link's surface that a joint holds, in the mesh's axes.
 
     Attributes:
-        kind: ``"plane"`` for the whole surface on a plane; ``"disc"`` for the part of
-            the plane within a radius of the point; ``"bore"`` for a cylindrical seat.
+        kind: ``"plane"`` for the part of the surface on a plane; ``"disc"`` for the
+            part of the plane within a radius of the point; ``"bore"`` for a cylindrical
+            seat.
         point: (3,) [m] point on the plane; centre of the disc; or the point on the axis
             of the bore at which screws are read.
         direction: (3,) unit normal of the plane, or axis of the bore.
@@ -58,7 +59,7 @@ class Interface:
         return f"{self.kind}={p}/{d}{radius}"
 
     def distance(self, points: ArrayLike) -> NDArray:
-        """Return the distance of points from the plane or cylinder of the interface.
+        """Return the distance of points from the interface's plane or cylinder.
 
         Args:
             points: (..., 3) [m] points.
@@ -75,13 +76,13 @@ class Interface:
 
 
 def parse_interface(text: object, place: str = "interface") -> Interface:
-    """Return an interface from text in the form of the command line or a robot file.
+    """Parse an interface from the form used on the command line or in a robot file.
 
     Args:
         text: ``"z=0.452"`` (also x, y), ``"bore=px,py,pz/ax,ay,az/r"``,
             ``"disc=px,py,pz/nx,ny,nz/r"``, ``"plane=px,py,pz/nx,ny,nz"``, or a table
             ``{plane = {point, normal}, radius}`` or ``{bore = {point, axis, radius}}``.
-            All lengths are in metres, in the mesh's axes.
+            All lengths are in metres, in the axes of the mesh.
         place: name of the option or key, for messages.
 
     Returns:
@@ -101,7 +102,7 @@ def parse_interface(text: object, place: str = "interface") -> Interface:
 
 
 def _from_text(text: str) -> Interface:
-    """Return an interface from text."""
+    """Parse an interface from a text."""
     kind, equals, value = (part.strip() for part in text.partition("="))
     parts = [comma_numbers(part) for part in value.split("/")]
     lengths = [len(part) for part in parts]
@@ -116,7 +117,7 @@ def _from_text(text: str) -> Interface:
 
 
 def _from_table(table: Mapping) -> Interface:
-    """Return an interface from a table of a robot file."""
+    """Parse an interface from a table of a robot file."""
     kind = "bore" if "bore" in table else "plane"
     known = {"bore"} if kind == "bore" else {"plane", "radius"}
     _refuse_unknown(table, known, "")
@@ -137,7 +138,7 @@ def _from_table(table: Mapping) -> Interface:
 
 
 def _refuse_unknown(table: Mapping, known: set[str], place: str) -> None:
-    """Reject a table with an unknown key."""
+    """Raise an error for an unknown key of a table."""
     for key in table:
         if key not in known:
             raise BadInput(f'{place}unknown key "{key}"{nearest(str(key), known)}')

@@ -5,15 +5,15 @@ from numpy.typing import NDArray
 
 
 def crossing_triangles(points: NDArray, triangles: NDArray) -> NDArray:
-    """Return the pairs of intersecting triangles that have no common vertex.
+    """Find the pairs of intersecting triangles that have no common vertex.
 
     Args:
         points: (n, 3) [m] corners.
         triangles: (m, 3) indices of points.
 
     Returns:
-        (k, 2) indices of triangles: an edge of one passes through the inside of the
-        other. Triangles that only touch are not listed.
+        (k, 2) indices of triangles.  An edge of one triangle passes through the inside
+        of the other. Triangles that only touch are not included.
     """
     pairs = _near_pairs(points, triangles)
     shared = (
@@ -26,7 +26,7 @@ def crossing_triangles(points: NDArray, triangles: NDArray) -> NDArray:
 
 
 def _near_pairs(points: NDArray, triangles: NDArray) -> NDArray:
-    """Return pairs (i, j) of triangles with overlapping bounding boxes, by a sweep."""
+    """Return the pairs (i, j) of triangles whose bounding boxes overlap."""
     corners = points[triangles]
     low, high = corners.min(axis=1), corners.max(axis=1)
     axis = int(np.argmax(np.ptp(points, axis=0)))
@@ -57,7 +57,7 @@ def _edge_through(points: NDArray, triangles: NDArray, pairs: NDArray) -> NDArra
     for k in range(3):
         p = points[triangles[pairs[:, 0], k]]
         q = points[triangles[pairs[:, 0], (k + 1) % 3]]
-        # signed volumes give the side of the plane, and of each edge, on which the line
+        # signed volumes tell on which side of the plane, and of each edge, a line
         # passes
         dp = np.einsum("ij,ij->i", normal, p - a)
         dq = np.einsum("ij,ij->i", normal, q - a)

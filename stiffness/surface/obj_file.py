@@ -1,7 +1,7 @@
 """Reader of Wavefront OBJ files: points and polygons.
 
-Texture coordinates, normals, groups and materials do not define the shape and are not
-read, so faces may refer to absent ones.
+Texture coordinates, normals, groups and materials do not define the shape.  They are
+not read, so faces may refer to texture coordinates and normals that are absent.
 """
 
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ from forcefit.inputs.table import BadInput, describe
 
 
 def read_obj(path: Path) -> tuple[NDArray, list[list[int]]]:
-    """Return the points and polygons of an OBJ file.
+    """Read the points and polygons of an OBJ file.
 
     Args:
         path: path of an existing file.
@@ -67,6 +67,6 @@ def _statements(path: Path) -> Iterator[tuple[int, list[str]]]:
 
 
 def _corner(word: str, points: int) -> int:
-    """Return the index of a corner, stated from 1 or, if negative, from the end."""
+    """Return the index of a corner, given from 1 or, if negative, from the end."""
     index = int(word.partition("/")[0])
     return index - 1 if index >= 0 else points + index

@@ -1,4 +1,4 @@
-"""Segmentation of a surface into smooth patches with their exact shapes."""
+"""Division of a surface into smooth patches with their exact shapes."""
 
 from dataclasses import dataclass
 
@@ -16,12 +16,13 @@ from forcefit.stiffness.surface.triangle_graph import SHARP, TriangleGraph
 
 @dataclass(frozen=True, eq=False)
 class Patches:
-    """The patch of each triangle of a surface, and their shapes.
+    """Patches of a surface: the patch of each triangle and the shape of each patch.
 
     Attributes:
         patch: (m,) patch number of each triangle; 0 is the base interface, 1 the tip.
-        shapes: shape of each patch; lifted facets where no simpler shape is known.
-        outlines: outlines of the interfaces at which the surface continues smoothly.
+        shapes: shape of each patch; lifted facets if no simpler shape was recognised.
+        outlines: parts of the interface outlines at which the surface continues
+            smoothly.
     """
 
     patch: NDArray
@@ -30,7 +31,7 @@ class Patches:
 
 
 def find_patches(surface: Surface, base: Interface, tip: Interface) -> Patches:
-    """Divide a surface at its sharp edges, and recognise the shapes.
+    """Divide a surface at its sharp edges, and recognise the shapes of the patches.
 
     Args:
         surface: surface of the link.
@@ -63,7 +64,7 @@ def find_patches(surface: Surface, base: Interface, tip: Interface) -> Patches:
 def _outlines(
     graph: TriangleGraph, patch: NDArray, shapes: list[Shape]
 ) -> list[SmoothOutline]:
-    """Return the outlines at which an interface meets another patch smoothly."""
+    """Return the outlines where an interface continues smoothly into another patch."""
     one, other = patch[graph.left], patch[graph.right]
     smooth = (graph.cosine > SHARP) & (one != other)
     found = []
@@ -95,7 +96,7 @@ def interface_shape(interface: Interface) -> Shape:
 
 
 def refuse_common_edges(surface: Surface, base: Interface, tip: Interface) -> None:
-    """Reject rigid interfaces that share an edge, where the stiffness is infinite.
+    """Raise an error if interfaces share an edge: the stiffness would be infinite.
 
     Args:
         surface: surface of the link.
@@ -123,7 +124,7 @@ def refuse_common_edges(surface: Surface, base: Interface, tip: Interface) -> No
 
 
 def triangles_on(surface: Surface, interface: Interface, name: str) -> NDArray:
-    """Return the triangles of a surface that lie on an interface.
+    """Find the triangles of a surface that lie on an interface.
 
     Args:
         surface: surface of the link.
@@ -134,7 +135,7 @@ def triangles_on(surface: Surface, interface: Interface, name: str) -> NDArray:
         (k,) indices of triangles.
 
     Raises:
-        BadInput: there are no such triangles, or the outline of a disc crosses
+        BadInput: no triangle lies on the interface, or the outline of a disc crosses
             triangles.
     """
     near = 1e-5 * surface.diagonal

@@ -1,11 +1,10 @@
 """Smooth shapes that are recognised in the patches of a surface.
 
-A faceted surface is thinner than the part that it approximates, while its vertices are
-on the true surface.  So a patch whose vertices are all on a plane, a cone (or
-cylinder), a sphere or a torus is replaced by this shape, and the nodes of the mesh are
-moved onto it.
+The vertices of a faceted surface lie on the true surface, but its convex sides lie
+inside.  Therefore, a patch whose vertices all lie on a plane, cone (or cylinder),
+sphere or torus is replaced by this shape, and the nodes of the mesh are moved onto it.
 
-Every shape has ``signed(points)``, which returns signed distances (n,) [m] and their
+The method ``signed(points)`` of every shape returns signed distances (n,) [m] and their
 gradients (n, 3).
 """
 
@@ -17,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 S = TypeVar("S", bound="Shape")
-# largest number of residual evaluations of a fit, and of a fit that may still succeed
+# largest numbers of residual evaluations: of a fit, and of a fit that may still succeed
 _CALLS = (25, 100)
-# relative to the points' size: largest residual of a fit that may still succeed
+# largest residual of a fit that may still succeed, relative to the size of the points
 _MAY_FIT = 0.02
-_FITS = 1e-9  # relative to the points' size: largest residual of a shape that fits
-_TINY = 1e-300  # avoids a division by zero on the axis of a shape
+_FITS = 1e-9  # largest residual of a shape that fits, relative to size
+_TINY = 1e-300  # prevents division by zero on the axis of a shape
 
 
 class Shape(Protocol):
@@ -48,7 +47,7 @@ class Plane:
 
 @dataclass(frozen=True, eq=False)
 class Cone:
-    """Cone of radius + slope * t at position t along an axis."""
+    """Cone with the radius ``radius + slope * t`` at position t along its axis."""
 
     point: NDArray
     axis: NDArray
@@ -69,7 +68,7 @@ class Cone:
 
 @dataclass(frozen=True, eq=False)
 class Sphere:
-    """Sphere: all points at one distance from a centre."""
+    """Sphere: all points at a constant distance from a centre."""
 
     point: NDArray
     radius: float
@@ -83,7 +82,7 @@ class Sphere:
 
 @dataclass(frozen=True, eq=False)
 class Torus:
-    """Torus: all points at one distance (``tube``) from a circle about an axis."""
+    """Torus: all points at a constant distance (``tube``) from a circle."""
 
     point: NDArray
     axis: NDArray
@@ -102,23 +101,23 @@ class Torus:
 
 
 def project(points: NDArray, shapes: tuple[Shape, ...]) -> NDArray:
-    """Return points projected onto one shape, or onto the intersection of several.
+    """Project points onto a shape, or onto the intersection of several shapes.
 
     Args:
         points: (n, 3) [m] near the shapes.
         shapes: one to three shapes, or more if they share a point.
 
     Returns:
-        (n, 3) [m] points, by Newton's method; each step is the shortest that removes
-        all distances to first order.
+        (n, 3) [m] projected points, from Newton's method; each step is the shortest one
+        that removes all distances to first order.
     """
     points = points.copy()
     for _ in range(12):
         pairs = [shape.signed(points) for shape in shapes]
         distances = np.stack([d for d, _ in pairs], axis=1)
         gradients = np.stack([g for _, g in pairs], axis=1)
-        # for tangent shapes the cutoff removes directions in which they are
-        # inconsistent
+        # for tangent shapes, small singular values are cut off, because the equations
+        # are inconsistent in these directions
         inverse = np.linalg.pinv(gradients, rcond=0.05)
         step = np.einsum("nij,nj->ni", inverse, distances)
         points -= step
@@ -128,10 +127,10 @@ def project(points: NDArray, shapes: tuple[Shape, ...]) -> NDArray:
 
 
 def fit_plane(points: NDArray, normals: NDArray) -> Plane:
-    """Return the plane nearest to points.
+    """Fit a plane to points.
 
     Args:
-        points: (n, 3) [m].
+        points: (n, 3) [m] points.
         normals: (k, 3) facet normals; they orient the plane.
 
     Returns:
@@ -144,10 +143,10 @@ def fit_plane(points: NDArray, normals: NDArray) -> Plane:
 
 
 def fit_sphere(points: NDArray, normals: NDArray) -> Sphere:
-    """Return the sphere nearest to points.
+    """Fit a sphere to points.
 
     Args:
-        points: (n, 3) [m].
+        points: (n, 3) [m] points.
         normals: not used.
 
     Returns:
@@ -159,8 +158,8 @@ def fit_sphere(points: NDArray, normals: NDArray) -> Sphere:
 
 
 def _circle(points: NDArray) -> tuple[NDArray, float]:
-    """Return centre and radius of the circle or sphere nearest to points."""
-    # |x|^2 = 2 x . c + (r^2 - |c|^2) is linear in c and in the bracket
+    """Return centre and radius of the circle or sphere fitted to points."""
+    # |x|^2 = 2 x . c + (r^2 - |c|^2) is linear in c and in the term in parentheses
     system = np.column_stack([2 * points, np.ones(len(points))])
     squares = np.sum(points**2, axis=1)
     center = np.linalg.lstsq(system, squares, rcond=None)[0][:-1]
@@ -168,11 +167,11 @@ def _circle(points: NDArray) -> tuple[NDArray, float]:
 
 
 def fit_cone(points: NDArray, normals: NDArray) -> Cone:
-    """Return the cone or cylinder nearest to points.
+    """Fit a cone or cylinder to points.
 
     Args:
-        points: (n, 3) [m].
-        normals: (k, 3) facet normals, which give the first estimate of the axis.
+        points: (n, 3) [m] points.
+        normals: (k, 3) facet normals, from which the axis is first estimated.
 
     Returns:
         The cone.
@@ -192,14 +191,14 @@ def fit_cone(points: NDArray, normals: NDArray) -> Cone:
 
 
 def fit_torus(points: NDArray, normals: NDArray) -> Torus:
-    """Return the torus nearest to points on a part of it.
+    """Fit a torus to points on a part of its surface.
 
     Args:
-        points: (n, 3) [m].
-        normals: (k, 3) facet normals, used for the orientation only.
+        points: (n, 3) [m] points.
+        normals: (k, 3) facet normals, which determine only the orientation.
 
     Returns:
-        The torus with the smallest residual among three first estimates of its axis.
+        The torus with the smallest residual of three fits with different initial axes.
     """
     center = points.mean(axis=0)
     size = float(np.ptp(points, axis=0).max())
@@ -227,7 +226,7 @@ def fit_torus(points: NDArray, normals: NDArray) -> Torus:
 def _refined_fit(
     shape: Callable[[NDArray], S], start: NDArray, points: NDArray, size: float
 ) -> S:
-    """Return the shape of least squared residuals, by nonlinear least squares."""
+    """Return the shape with the least squared residuals, by nonlinear least squares."""
     from scipy.optimize import least_squares
 
     if len(points) < len(start):

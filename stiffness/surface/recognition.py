@@ -1,9 +1,9 @@
 """Recognition of planes, cones, spheres and tori in a faceted surface.
 
-A part between sharp edges is one shape, or several shapes that meet tangentially.
-Candidates are fitted to a few facets around a seed.  A candidate is accepted if
-connected facets are on it and are facets of a curved shape.  The second condition is
-needed because corners of a few flat faces of different widths may be on a circle too.
+The surface between sharp edges is one shape, or several shapes that meet tangentially.
+Candidate shapes are fitted to a few facets around a seed facet.  A candidate is
+accepted if connected facets lie on it and if these are facets of a curved shape.  The
+second condition is needed because corners of a few flat faces may also lie on a circle.
 """
 
 from collections.abc import Callable
@@ -22,35 +22,35 @@ from forcefit.stiffness.surface.primitives import (
 )
 from forcefit.stiffness.surface.triangle_graph import SHARP, TriangleGraph
 
-# largest number of seeds of a part that may fail: for shapes from strips, for any shape
+# largest numbers of seeds that may fail in a part: for shapes of strips, for any shape
 _MISSES = (60, 20)
-# accepted relative difference of facets' areas, and of their evenness
+# accepted relative difference of the areas of facets
 _CONGRUENT = 1e-6
 _CONE = 10  # smallest number of points that identify a cone
-# slope below which a cone is a cylinder, for which seven points are sufficient
+# slope below which a cone counts as a cylinder, for which seven points are sufficient
 _CYLINDER = 1e-4
 _FEW = 12  # smallest number of flat faces of a faceted curve
-_STEP = 2e-3  # [rad] smallest difference of two angles that count as different
-_MANY = 5  # number of different angles from which on points are on a circle
-# smallest width, relative to the widest facet, of a facet that counts as equally wide
+_STEP = 2e-3  # [rad] smallest difference at which two angles count as different
+_MANY = 5  # number of different angles at which points count as on a circle
+# smallest width, relative to the widest facet, at which a facet counts as equally wide
 _EVEN = 0.75
-# lift relative to a part's median lift, above which a face or edge is straight
+# lift relative to the part's median, above which a face or edge counts as straight
 _LIFT = 4.0
-# relative to the median lift: above it an edge is a ruling, not a curved edge
+# lift relative to the median, above which an edge counts as a ruling, not as curved
 _RULING = 2.0
-_NO_LIFT = 0.01  # relative to the median lift: below it an edge is straight as well
+_NO_LIFT = 0.01  # lift relative to the median, below which an edge is straight
 
 
 def recognise(graph: TriangleGraph, part: NDArray) -> list[tuple[NDArray, Shape]]:
-    """Return the shapes of a smooth part.
+    """Recognise the shapes of a smooth part of a surface.
 
     Args:
         graph: triangle graph of the surface.
         part: (k,) triangles of the part between sharp edges.
 
     Returns:
-        Triangles and shape of each patch.  There is one shape for the whole part, or
-        several recognised shapes; the remaining triangles are flat, or lifted facets.
+        Triangles and shape of each patch: one shape for the whole part, or several
+        shapes.  Triangles outside recognised shapes are flat faces or lifted facets.
     """
     shape = fitted_shape(graph, part)
     if shape is not None and graph.fits(shape, part).all():
@@ -72,7 +72,7 @@ def recognise(graph: TriangleGraph, part: NDArray) -> list[tuple[NDArray, Shape]
 
 
 class _Lifts:
-    """Lifts of the edges of a part as if it were one curved shape."""
+    """Lifts of a part's edges, computed as if the part were one curved shape."""
 
     def __init__(self, graph: TriangleGraph, part: NDArray) -> None:
         self._facets = graph.lifted(part)
@@ -82,25 +82,25 @@ class _Lifts:
         self._usual = max(float(np.median(self._facets.lifts())), 1e-300)
 
     def share(self, edges: NDArray) -> float:
-        """Return median lift of edges (e, 2), relative to the part's median lift."""
+        """Return the median lift of edges (e, 2), relative to that of the part."""
         own = self._facets.edge_lifts(self._place[edges])
         return float(np.median(own)) / self._usual
 
 
 def fitted_shape(graph: TriangleGraph, part: NDArray, kinds: int = 4) -> Shape | None:
-    """Return the simplest shape whose facets a part's corners can be.
+    """Return the simplest shape of which the triangles can be facets, or None.
 
     Args:
         graph: triangle graph of the surface.
         part: (k,) triangles.
-        kinds: number of kinds that are tried, in the order plane, cone, sphere, torus.
+        kinds: number of kinds to try, in the order plane, cone, sphere, torus.
 
     Returns:
-        The shape; None if no shape fits, or there are too few corners to identify one.
+        The shape; None if no shape fits or if the corners are too few to identify one.
     """
     points = graph.points[np.unique(graph.triangles[part])]
     normals = graph.normals[part]
-    # with a few corners it is decided whether a shape is fitted to all of them
+    # a few of the corners decide whether a shape is fitted to all corners
     few = points[:: max(1, len(points) // 50)]
     tries: list[tuple[Callable[[NDArray, NDArray], Shape], int]] = [
         (fit_plane, 3),
@@ -123,14 +123,15 @@ def fitted_shape(graph: TriangleGraph, part: NDArray, kinds: int = 4) -> Shape |
 
 
 def _lies_on(shape: Shape, points: NDArray, graph: TriangleGraph) -> bool:
-    """Return whether points are on a shape, within the tolerance of the surface."""
+    """Return whether points lie on a shape within the tolerance of the surface."""
     return bool(np.abs(shape.signed(points)[0]).max() < graph.tolerance)
 
 
 def _is_faceted(shape: Shape, points: NDArray) -> bool:
     """Return whether points on a shape are corners of facets along its curvature."""
-    # a circle passes through the corners of any two flat faces that meet, and of three
-    # symmetric ones; so three facets as wide as the widest are needed, or many facets
+    # The corners of any two adjacent flat faces, and of three symmetric ones, lie on a
+    # circle.  Therefore three facets as wide as the widest are required, or many
+    # facets.
     if not isinstance(shape, Cone | Torus):
         return True
     offset = points - shape.point
@@ -149,10 +150,10 @@ def _is_faceted(shape: Shape, points: NDArray) -> bool:
 
 
 def _even(angles: NDArray) -> bool:
-    """Return whether there are many different angles, or three equally wide steps."""
+    """Return whether there are many different angles, or three equally wide facets."""
     angles = np.sort(angles)
     gaps = np.diff(np.r_[angles, angles[0] + 2 * np.pi])
-    if gaps[-1] > _STEP:  # the largest gap is outside an arc that is not closed
+    if gaps[-1] > _STEP:  # if the arc is not closed, the largest gap is outside it
         widest = int(np.argmax(gaps))
         outside = gaps[widest] > 1.5 * np.sort(gaps)[-2]
         gaps = np.delete(gaps, widest) if outside else gaps
@@ -165,7 +166,7 @@ def _even(angles: NDArray) -> bool:
 def _pieces(
     graph: TriangleGraph, lifts: _Lifts, part: NDArray, strips: bool, most: int
 ) -> list[tuple[NDArray, Shape]]:
-    """Return pieces of a part that are shapes; for ``strips`` only planes and cones."""
+    """Return a part's pieces that are shapes; ``strips``: only planes and cones."""
     inside = np.zeros(len(graph.triangles), dtype=bool)
     inside[part] = True
     waiting, flat = inside.copy(), graph.flat_faces(part)
@@ -185,7 +186,8 @@ def _pieces(
         if not shapes and not strips:
             missed.append(seed)
             if misses == most and (kinds := _kinds(missed, order, area)) is not None:
-                # facets congruent with failed seeds, as around a shaft, are tried last
+                # facets congruent with failed seeds, for example around a shaft, are
+                # tried last
                 order, misses, missed = np.where(kinds, order - 2.0, order), 0, []
         if shapes:
             best = max(shapes, key=lambda s: float(graph.areas[s[0]].sum()))
@@ -195,7 +197,7 @@ def _pieces(
 
 
 def _kinds(missed: list[int], order: NDArray, area: NDArray) -> NDArray | None:
-    """Return (m,) bool: facets congruent with failed seeds; None if these are many."""
+    """Return (m,) bool, True for facets like failed seeds; None if too many failed."""
     kinds = np.zeros(len(order), dtype=bool)
     count = 0
     for seed in missed:
@@ -210,7 +212,7 @@ def _kinds(missed: list[int], order: NDArray, area: NDArray) -> NDArray | None:
 def _evenness(
     graph: TriangleGraph, inside: NDArray, flat: NDArray, area: NDArray
 ) -> NDArray:
-    """Return the (m,) smallest ratio of a face's area to its neighbours', at most 1."""
+    """Return (m,) the smallest ratio, at most 1, of a face's area to a neighbour's."""
     touch = inside[graph.left] & inside[graph.right] & (graph.cosine > SHARP)
     left, right = graph.left[touch], graph.right[touch]
     ratio = np.minimum(area[left], area[right]) / np.maximum(area[left], area[right])
@@ -226,7 +228,7 @@ def _evenness(
 def _shapes_around(
     graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int, strips: bool
 ) -> list[tuple[NDArray, Shape]]:
-    """Return the shapes of facets around a seed, with the connected facets on them."""
+    """Return the shapes fitted around a seed, each with the connected facets on it."""
     part = np.flatnonzero(inside)
     if strips:
         near = [ring(graph, inside, flat, seed, 0), _chain(graph, inside, flat, seed)]
@@ -247,8 +249,8 @@ def _shapes_around(
 def _is_proper(
     graph: TriangleGraph, lifts: _Lifts, piece: NDArray, shape: Shape
 ) -> bool:
-    """Return whether a piece is a separate shape, not facets of another curved one."""
-    # two coplanar triangles may be a facet
+    """Return whether a piece is a separate shape, not facets of a curved shape."""
+    # two coplanar triangles may form a single facet of another shape
     straight = not isinstance(shape, Cone) or _is_straight(graph, lifts, piece, shape)
     return len(piece) > 2 and straight
 
@@ -257,7 +259,7 @@ def _is_straight(
     graph: TriangleGraph, lifts: _Lifts, piece: NDArray, shape: Cone
 ) -> bool:
     """Return whether a cone's rulings are straight, not facets of a curved shape."""
-    # two rings of corners on any surface of revolution are on a cone
+    # two rings of corners on any surface of revolution lie on a cone
     inside = np.zeros(len(graph.triangles), dtype=bool)
     inside[piece] = True
     both = np.flatnonzero(inside[graph.left] & inside[graph.right])
@@ -275,7 +277,7 @@ def _is_straight(
 def ring(
     graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int, rings: int
 ) -> NDArray:
-    """Return a seed's flat face, with rings of faces that meet it smoothly.
+    """Return a seed's flat face and the rings of faces that meet it smoothly.
 
     Args:
         graph: triangle graph of the surface.
@@ -297,8 +299,9 @@ def ring(
 
 
 def _chain(graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int) -> NDArray:
-    """Return a seed's flat face and two on each side, across the longest edges."""
-    # strips of a cylinder or a cone are adjacent in this way, whatever their ends are
+    """Return a seed's flat face and two faces on each side, across long edges."""
+    # strips of a cylinder or cone are adjacent across long edges, whatever their ends
+    # are
     touch = inside[graph.left] & inside[graph.right] & (graph.cosine > SHARP)
     left, right = flat[graph.left[touch]], flat[graph.right[touch]]
     length = np.linalg.norm(np.diff(graph.points[graph.ends[touch]], axis=1), axis=2)
@@ -318,7 +321,7 @@ def _chain(graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int) -> N
 
 
 def _flat_or_lifted(graph: TriangleGraph, part: NDArray) -> list[tuple[NDArray, Shape]]:
-    """Return a part of unknown shape as single flat faces and lifted facets."""
+    """Divide a part of unknown shape into single flat faces and lifted facets."""
     # facets of a curved surface have similar lifts, because programs that make them
     # keep a tolerance; a facet with a much larger lift is a flat face that meets a
     # fillet

@@ -1,8 +1,8 @@
 """Outline of an interface where the surface continues without a sharp edge.
 
-Where a held face ends in a fillet, both shapes touch along a line that their equations
-do not determine well.  The wall through the outline, normal to the face, determines
-this line, because face and wall meet at a right angle.
+Where a held face continues into a fillet, both shapes touch along a line that their
+equations determine poorly.  The wall is the surface through this line that is normal to
+the face.  It determines the line well, because face and wall meet at a right angle.
 """
 
 from dataclasses import dataclass
@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 from forcefit.stiffness.surface.facets import Facets
 from forcefit.stiffness.surface.primitives import Shape, fit_cone, fit_plane
 
-# cosine of the largest angle of an outline's corner that is smoothed
+# cosine of the largest angle at a corner of an outline that counts as smooth
 _CORNER = np.cos(np.radians(35.0))
-# relative to the outline's size: largest distance of a point on the wall
+# largest distance of a point on the wall, relative to the size of the outline
 _ON_WALL = 1e-5
-_CIRCLE = 10  # smallest number of corners that distinguish a circle from a polygon
+_CIRCLE = 10  # number of corners that distinguishes a circle from a polygon
 
 
 @dataclass(frozen=True, eq=False)
 class SmoothOutline:
-    """Part of an interface's outline at which one other patch continues smoothly.
+    """Part of an interface's outline at which another patch continues smoothly.
 
     Attributes:
         patches: numbers of the interface and of the other patch.
@@ -57,17 +57,17 @@ class SmoothOutline:
 def smooth_outline(
     points: NDArray, edges: NDArray, normals: NDArray, patches: tuple[int, int]
 ) -> SmoothOutline:
-    """Return the outline along given edges, with its wall.
+    """Return the outline that given edges form, with its wall.
 
     Args:
-        points: (n, 3) [m].
+        points: (n, 3) [m] points of the surface.
         edges: (e, 2) indices of points, counterclockwise around the interface.
         normals: (e, 3) unit normals of the interface's triangles at the edges.
         patches: numbers of the interface and of the other patch.
 
     Returns:
-        The outline; its wall is a plane or a cone if one fits, otherwise it has the
-        facets of the outline.
+        The outline.  The wall is a plane or a cone if one fits; otherwise it consists
+        of facets through the edges.
     """
     ends = points[edges]
     along = ends[:, 1] - ends[:, 0]
@@ -83,7 +83,7 @@ def smooth_outline(
 def _wall(points: NDArray, edges: NDArray, normals: NDArray, outward: NDArray) -> Shape:
     """Return the plane, cone or faceted wall through the edges, normal to the face."""
     size = float(np.linalg.norm(np.ptp(points[edges.ravel()], axis=0)))
-    across = size * normals[:, None]  # at both ends of an edge
+    across = size * normals[:, None]  # added at both ends of an edge
     standing = np.concatenate([points[edges] + across, points[edges] - across])
     corners = standing.reshape(-1, 3)
     for fit, least in ((fit_plane, 1), (fit_cone, _CIRCLE)):
@@ -98,7 +98,7 @@ def _wall(points: NDArray, edges: NDArray, normals: NDArray, outward: NDArray) -
 def _faceted_wall(
     ends: NDArray, edges: NDArray, across: NDArray, outward: NDArray
 ) -> Facets:
-    """Return two triangles at each edge; edges do not share points at a corner."""
+    """Return two triangles for each edge; at a corner, edges do not share points."""
     corners = np.concatenate([ends - across, ends + across], axis=1)
     label = np.arange(4 * len(ends)).reshape(-1, 4)
     begins = {int(start): k for k, start in enumerate(edges[:, 0])}

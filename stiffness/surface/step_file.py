@@ -1,4 +1,4 @@
-"""STEP files, read by gmsh: names of solids, and fine triangles.
+"""Reader of STEP files by gmsh: the names of solids, and fine triangles.
 
 A damaged file can crash gmsh and its process, so these functions run in a separate
 process (:mod:`forcefit.stiffness.surface.surface_worker`).
@@ -17,9 +17,9 @@ from forcefit.inputs.packages import naming_packages
 from forcefit.inputs.table import BadInput, nearest, quoted
 
 _FACETS = 48  # number of facets around a full circle
-# relative to a solid's volume: a smaller overlap is rounding in the file
+# overlap, relative to a solid's volume, up to which it counts as rounding in the file
 _TOUCHING = 1e-6
-_ALL, _AND = "*", "+"  # marks in a name: all solids of a file; several solids as one
+_ALL, _AND = "*", "+"  # signs in a name: all solids of a file; several solids as one
 
 
 def read_solids(path: Path) -> tuple[list[str], list[float], list[list[float]]]:
@@ -43,7 +43,7 @@ def read_solids(path: Path) -> tuple[list[str], list[float], list[list[float]]]:
 
 @contextmanager
 def _gmsh_model(path: Path) -> Generator[Any, None, None]:
-    """Provide the gmsh model of a STEP file, in metres."""
+    """Yield the gmsh model of a STEP file, converted to metres."""
     try:
         with naming_packages(f"{path}: STEP", "export the surface as STL"):
             import gmsh
@@ -51,7 +51,7 @@ def _gmsh_model(path: Path) -> Generator[Any, None, None]:
         gmsh.initialize(interruptible=False)
     except BadInput:
         raise
-    except Exception as error:  # the Python file of gmsh may exist without its library
+    except Exception as error:  # gmsh's Python file may exist without its library
         raise BadInput(
             f"{path}: STEP needs the package gmsh, which does not start: {error}"
         ) from None
@@ -61,7 +61,7 @@ def _gmsh_model(path: Path) -> Generator[Any, None, None]:
         gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", _FACETS)
         try:
             gmsh.open(str(path))
-        # gmsh raises only this class for files that it refuses
+        # gmsh raises only this class for files that it cannot read
         except Exception as error:
             raise BadInput(f"{path}: not a readable STEP file") from error
         yield gmsh.model
@@ -71,13 +71,13 @@ def _gmsh_model(path: Path) -> Generator[Any, None, None]:
 
 @dataclass(frozen=True, eq=False)
 class StepTriangles:
-    """Triangles of the chosen solids, which share the triangles between them.
+    """Triangles of selected solids; touching solids share triangles.
 
     Attributes:
         points: (n, 3) [m] corners.
         triangles: (m, 3) indices of points.
-        sides: (m, 2) index in ``names`` of the solid on each side; -1 outside.
-        names: names of the solids; empty if the file's faces belong to no solid.
+        sides: (m, 2) index in ``names`` of the solid on each side; -1 if there is none.
+        names: names of the solids; empty if the faces in the file belong to no solid.
         overlaps: descriptions of pairs of solids that overlap.
     """
 
@@ -89,19 +89,19 @@ class StepTriangles:
 
 
 def read_step(path: Path, solid: str) -> StepTriangles:
-    """Return fine triangles of solids of a STEP file, converted to metres.
+    """Read fine triangles of the solids of a STEP file, converted to metres.
 
     Args:
         path: path of the file.
-        solid: name of a solid, ``one+other`` for several or ``*`` for all as one; it
-            may be empty if the file holds one solid.
+        solid: name of a solid, ``one+other`` for several solids as one, or ``*`` for
+            all solids as one; may be empty if the file contains a single solid.
 
     Returns:
         The triangles, including those between two solids.
 
     Raises:
-        BadInput: the file cannot be read, there is no such solid, solids do not touch,
-            or gmsh is not installed.
+        BadInput: the file cannot be read, the solid does not exist, solids do not
+            touch, or gmsh is not installed.
     """
     with _gmsh_model(path) as model:
         chosen = chosen_solids(model, path, solid)
@@ -142,7 +142,7 @@ def _solids(model: Any) -> dict[str, int]:
 
 
 def chosen_solids(model: Any, path: Path, solid: str) -> dict[str, int]:
-    """Return the chosen solids.
+    """Return the selected solids of a model.
 
     Args:
         model: gmsh model of the file.
@@ -150,10 +150,10 @@ def chosen_solids(model: Any, path: Path, solid: str) -> dict[str, int]:
         solid: see :func:`read_step`; required if the file has several solids.
 
     Returns:
-        Tags of the solids by name; empty if the file's faces belong to no solid.
+        Tags of the solids by name; empty if the faces in the file belong to no solid.
 
     Raises:
-        BadInput: there is no such solid, or none of several is chosen.
+        BadInput: the solid does not exist, or no name is given for several solids.
     """
     solids = _solids(model)
     several = list(solids) if solid == _ALL else solid.split(_AND)
@@ -174,15 +174,15 @@ def chosen_solids(model: Any, path: Path, solid: str) -> dict[str, int]:
 
 
 def sides(model: Any, owners: Mapping[int, int]) -> dict[int, tuple[int, int]]:
-    """Return the faces of solids, and the solids on both sides of each face.
+    """Return the faces of solids, with the solids on both sides of each face.
 
     Args:
         model: gmsh model of the file.
-        owners: number of the solid that each volume belongs to.
+        owners: number of the solid to which each volume belongs.
 
     Returns:
-        By the faces' tags; -1 outside.  All faces of a model if none belongs to a
-        volume.
+        For each face tag the numbers of both solids, -1 if there is none; all faces of
+        the model if no face belongs to a volume.
     """
     found: dict[int, list[int]] = {}
     for volume, owner in owners.items():
@@ -197,7 +197,7 @@ def sides(model: Any, owners: Mapping[int, int]) -> dict[int, tuple[int, int]]:
 def _fragments(
     model: Any, path: Path, chosen: Mapping[str, int]
 ) -> tuple[dict[int, int], tuple[str, ...]]:
-    """Split solids at common faces; return the solid of each volume, and overlaps."""
+    """Split solids at common faces; return each volume's solid, and the overlaps."""
     solids, names = [(3, tag) for tag in chosen.values()], list(chosen)
     volume = [float(model.occ.getMass(*solid)) for solid in solids]
     _, made = model.occ.fragment(solids[:1], solids[1:])
@@ -223,7 +223,7 @@ def _fragments(
 
 
 def _bodies(model: Any, volumes: list[int]) -> int:
-    """Return the number of bodies that volumes form, joined at common faces."""
+    """Return the number of bodies that volumes with common faces form."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

@@ -1,8 +1,8 @@
-"""Reader of STL files in text and binary form, with NumPy only.
+"""Reader of STL files in text and binary form, which needs only NumPy.
 
-The reader accepts what other programs accept: keywords in capitals, a last line that is
-cut or missing, bytes after the last triangle, a count of triangles that was not filled
-in.
+Like other programs, the reader accepts keywords in capitals, a truncated or missing
+last line, bytes after the last triangle, and a placeholder instead of the number of
+triangles.
 """
 
 import re
@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput, describe
 
-_HEAD = 84  # bytes of a binary file before its triangles: header text and count
+_HEAD = 84  # bytes before the triangles of a binary file: header and count
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("tag", "<u2")])
-# counts of triangles that programs write if they do not fill in the count
+# placeholders that programs write instead of the number of triangles
 _UNKNOWN_COUNTS = (0, 2**32 - 1)
 # the name of a solid ends at its first facet or at the end of the line
 _NAME = re.compile(rb"(?im)^[ \t]*(?:end)?solid\b.*?(?=\bfacet\s+normal\b|\r|\n|\Z)")
 
 
 def read_stl(path: Path) -> tuple[NDArray, NDArray]:
-    """Return the points and triangles of an STL file; equal points are not merged.
+    """Read the points and triangles of an STL file; equal points are not merged.
 
     Args:
         path: path of an existing file.
@@ -36,12 +36,12 @@ def read_stl(path: Path) -> tuple[NDArray, NDArray]:
     content = path.read_bytes()
     corners = _text(path, content) if _is_text(content) else _binary(path, content)
     if len(corners) == 0:
-        raise BadInput(f"{path}: holds no triangles, or is not STL")
+        raise BadInput(f"{path}: contains no triangles, or is not STL")
     return corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
 
 
 def _count(content: bytes) -> int:
-    """Return the number of triangles that a binary file states."""
+    """Return the number of triangles stated in a binary file."""
     return int.from_bytes(content[_HEAD - 4 : _HEAD], "little")
 
 
@@ -55,14 +55,14 @@ def _is_text(content: bytes) -> bool:
 
 
 def _binary(path: Path, content: bytes) -> NDArray:
-    """Return the (m, 3, 3) corners of a binary file's triangles."""
+    """Return the (m, 3, 3) corners of the triangles in a binary file."""
     stated, size = _count(content), _TRIANGLE.itemsize
     body = content[_HEAD:]
     if len(content) < _HEAD:
         raise BadInput(f"{path}: not a readable STL file")
     if stated in _UNKNOWN_COUNTS:
         stated = len(body) // size
-    if len(body) < size * stated - 2:  # the last two bytes are an unused tag
+    if len(body) < size * stated - 2:  # the last two bytes are unused
         raise BadInput(
             f"{path}: found {len(body) // size} whole triangles, expected {stated}, "
             "the number in the file's head; the file is cut, or is not STL"
@@ -72,12 +72,12 @@ def _binary(path: Path, content: bytes) -> NDArray:
 
 
 def _text(path: Path, content: bytes) -> NDArray:
-    """Return the (m, 3, 3) corners of a text file's triangles."""
+    """Return the (m, 3, 3) corners of the triangles in a text file."""
     words = _NAME.sub(b" ", content.removeprefix(b"\xef\xbb\xbf")).lower().split()
-    found = np.array(words, dtype=object)  # as text one long word would widen all
+    found = np.array(words, dtype=object)  # saves memory
     facets = np.flatnonzero(found == b"facet")
     vertices = np.flatnonzero(found == b"vertex")
-    owner = np.searchsorted(facets, vertices)  # 0: before the first facet
+    owner = np.searchsorted(facets, vertices)  # 0 means before the first facet
     corners = np.bincount(owner, minlength=len(facets) + 1)
     wrong = np.flatnonzero(corners[1:] != 3)
     if corners[0] or len(wrong):

@@ -1,4 +1,4 @@
-"""A link's surface from a file, after checks and repairs, which are reported."""
+"""Surface of a link, read from a file, checked, and repaired with a report."""
 
 import hashlib
 import math
@@ -34,7 +34,7 @@ class Surface:
         triangles: (m, 3) indices of points.
         name: name of the file, for messages.
         repairs: descriptions of the repairs.
-        solids: solids of a STEP file with several solids; None otherwise.
+        solids: solids of a STEP file that contains several; otherwise None.
     """
 
     points: NDArray
@@ -65,18 +65,18 @@ class Surface:
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
 
     def digest(self) -> str:
-        """Return the digest of the geometry alone, exact to the last bit."""
+        """Return a hash of the coordinates and triangles, with all their digits."""
         content = hashlib.sha256(np.ascontiguousarray(self.points).tobytes())
         content.update(np.ascontiguousarray(self.triangles, dtype=np.int64).tobytes())
         return content.hexdigest()
 
 
 def area_vectors(points: NDArray, triangles: NDArray) -> NDArray:
-    """Return the normals of triangles, whose lengths are the areas.
+    """Return the normals of triangles, each with the length of the triangle's area.
 
     Args:
-        points: (n, 3) [m].
-        triangles: (m, 3) indices.
+        points: (n, 3) [m] points.
+        triangles: (m, 3) indices of points.
 
     Returns:
         (m, 3) [m^2] normals.
@@ -86,7 +86,7 @@ def area_vectors(points: NDArray, triangles: NDArray) -> NDArray:
 
 
 def signed_volume(points: NDArray, triangles: NDArray) -> float:
-    """Return the volume inside a closed surface, negative if it is inside out.
+    """Return the volume inside a closed surface; negative if the surface is inside out.
 
     Args:
         points: (n, 3) [m].
@@ -101,7 +101,7 @@ def signed_volume(points: NDArray, triangles: NDArray) -> float:
 
 
 def directed_edges(triangles: NDArray) -> NDArray:
-    """Return the edges of triangles, each in the direction of its triangle.
+    """Return the directed edges of triangles, in the orientation of each triangle.
 
     Args:
         triangles: (m, 3) indices.
@@ -113,19 +113,19 @@ def directed_edges(triangles: NDArray) -> NDArray:
 
 
 def read_surface(path: Path | str, unit: str = "m") -> Surface:
-    """Read a surface; reject one that does not enclose a solid.
+    """Read a surface from a file; raise an error if it does not enclose a solid.
 
     Args:
-        path: STL, OBJ, PLY, VTK, VTP, MSH, or STEP if gmsh is installed;
-            ``part.step#name`` for one of several solids in a STEP file.
-        unit: unit of the file's coordinates: m, cm, mm, um or inch; a STEP file states
-            its own unit, which is used.
+        path: STL, OBJ, PLY, VTK, VTP or MSH file, or STEP file if gmsh is installed;
+            ``part.step#name`` selects one of several solids in a STEP file.
+        unit: unit of length of the file: m, cm, mm, um or inch; a STEP file states its
+            unit, which is used instead.
 
     Returns:
         The surface in metres, closed and oriented outward.
 
     Raises:
-        BadInput: the file cannot be read, or does not hold one closed surface of a
+        BadInput: the file cannot be read, or does not contain a closed surface of
             plausible size.
     """
     if unit not in UNITS:
@@ -142,7 +142,7 @@ def read_surface(path: Path | str, unit: str = "m") -> Surface:
 def _read_triangles(
     path: Path, solid: str
 ) -> tuple[NDArray, NDArray, FilledSolids | None]:
-    """Return the points and triangles of a file in its unit, and its solids."""
+    """Return points and triangles in the unit of the file, and its solids."""
     if path.suffix.lower() not in FORMATS:
         hint = nearest(path.suffix, FORMATS)
         raise BadInput(f"{path}: unknown kind of surface file{hint}")
@@ -158,7 +158,7 @@ def _read_triangles(
 def check_surface(
     points: NDArray, triangles: NDArray, name: str, unit: str = "m"
 ) -> Surface:
-    """Check and repair a surface.
+    """Check and repair a surface given by its triangles.
 
     Args:
         points: (n, 3) [m].
@@ -167,15 +167,16 @@ def check_surface(
         unit: stated unit, for messages.
 
     Returns:
-        The surface: vertices merged, degenerate triangles removed, oriented outward.
+        The surface, with vertices merged, degenerate triangles removed, and normals
+        pointing outward.
 
     Raises:
-        BadInput: the surface is empty, not finite, of an implausible size, open,
-            self-intersecting or of several bodies, or more than two triangles share an
-            edge.
+        BadInput: the surface is empty, open, self-intersecting, not finite or of
+            implausible size; it consists of several bodies; or more than two triangles
+            share an edge.
     """
     if len(triangles) == 0:
-        raise BadInput(f"{name}: holds no triangles")
+        raise BadInput(f"{name}: contains no triangles")
     if triangles.min() < 0 or triangles.max() >= len(points):
         raise BadInput(f"{name}: a triangle has a corner that is not among the points")
     _check_coordinates(points, triangles, name, unit)
@@ -200,14 +201,14 @@ def check_surface(
 
 
 def _place(point: NDArray) -> str:
-    """Return a point as text for a message."""
+    """Return the coordinates of a point as text for a message."""
     return "(" + ", ".join(f"{v:.4g}" for v in point) + ") m"
 
 
 def _check_coordinates(
     points: NDArray, triangles: NDArray, name: str, unit: str
 ) -> None:
-    """Reject coordinates that are not finite, and a size that shows a wrong unit."""
+    """Raise an error for coordinates that are not finite, or a size of a wrong unit."""
     used = points[np.unique(triangles)]
     wrong = ~np.isfinite(used).all(axis=1)
     if wrong.any():
@@ -224,7 +225,7 @@ def _check_coordinates(
 def _merge(
     points: NDArray, triangles: NDArray, name: str
 ) -> tuple[NDArray, NDArray, list[str]]:
-    """Merge coincident vertices, and remove triangles without area."""
+    """Merge coincident vertices and remove triangles without area."""
     repairs = []
     used, triangles = np.unique(triangles, return_inverse=True)
     points, triangles = points[used], triangles.reshape(-1, 3)
@@ -234,7 +235,7 @@ def _merge(
 
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     tree, near = cKDTree(points), 1e-7 * size
-    # there are too many pairs to list them
+    # the pairs would be too many to be listed
     if tree.count_neighbors(tree, near) > _CROWD * len(points):
         raise BadInput(
             f"{name}: most of its {len(points)} vertices are less than "
@@ -260,7 +261,7 @@ def _merge(
 
 
 def _check_closed(points: NDArray, triangles: NDArray, name: str) -> None:
-    """Check that exactly two triangles share every edge."""
+    """Raise an error unless exactly two triangles share every edge."""
     edges = np.sort(directed_edges(triangles), axis=1)
     edges, count = np.unique(edges, axis=0, return_counts=True)
     if (count == 1).any():
@@ -280,7 +281,7 @@ def _check_closed(points: NDArray, triangles: NDArray, name: str) -> None:
 def _orient(
     points: NDArray, triangles: NDArray, name: str
 ) -> tuple[NDArray, list[str]]:
-    """Orient all triangles outward; reject several bodies."""
+    """Orient all triangles outward; raise an error for several bodies."""
     triangles, shell, flipped = orient_shells(triangles)
     repairs = (
         [f"{flipped} triangles reoriented to agree with their neighbours"]
@@ -314,8 +315,8 @@ def orient_shells(triangles: NDArray) -> tuple[NDArray, NDArray, int]:
         triangles: (m, 3) indices of points.
 
     Returns:
-        The triangles, (m,) the shell of each triangle, and the number of reoriented
-        triangles.
+        The triangles, (m,) the shell to which each triangle belongs, and the number of
+        reoriented triangles.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import breadth_first_order, connected_components
@@ -324,9 +325,9 @@ def orient_shells(triangles: NDArray) -> tuple[NDArray, NDArray, int]:
     directed = directed_edges(triangles)
     owner = np.repeat(np.arange(count), 3)
     order = np.lexsort(np.sort(directed, axis=1).T)
-    first, second = order[::2], order[1::2]  # edges of a closed surface come in pairs
+    first, second = order[::2], order[1::2]  # edges of a closed surface occur in pairs
     left, right = owner[first], owner[second]
-    # neighbours with different orientations
+    # neighbouring triangles whose orientations differ
     same = directed[first, 0] == directed[second, 0]
     ends = (np.r_[left, right], np.r_[right, left])
     graph = coo_array((np.r_[same, same] + 1.0, ends), (count, count)).tocsr()
@@ -348,7 +349,7 @@ def orient_shells(triangles: NDArray) -> tuple[NDArray, NDArray, int]:
 
 
 def _inside(point: NDArray, points: NDArray, triangles: NDArray) -> bool:
-    """Return whether a surface encloses a point, at which its solid angle is 4 pi."""
+    """Return whether a surface encloses a point, where its solid angle is 4 pi."""
     a, b, c = np.moveaxis(points[triangles] - point, 1, 0)
     la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
     top = np.einsum("ij,ij->i", a, np.cross(b, c))

@@ -1,8 +1,8 @@
 """Readers of surface files.
 
-STL is read here.  The other kinds need VTK, meshio or gmsh.  A damaged file can crash
-these packages and their process, so they run in a separate process
-(:mod:`forcefit.stiffness.surface.surface_worker`).
+STL files are read by forcefit.  Other formats are read by VTK, meshio or gmsh.  A
+damaged file can crash these packages and their process.  They therefore run in a
+separate process (:mod:`forcefit.stiffness.surface.surface_worker`).
 """
 
 import io
@@ -26,14 +26,14 @@ _TIME_LIMIT = 300.0  # [s] time limit of a reader; gmsh takes 1 s for 35 000 tri
 
 
 def named_solid(path: Path | str) -> tuple[Path, str]:
-    """Return a surface file and the chosen solid of a STEP file.
+    """Split a path into the surface file and the name of a solid in a STEP file.
 
     Args:
         path: path of a file, or ``part.step#name``; ``part.step#one+other`` or
-            ``part.step#*`` for several solids as one.
+            ``part.step#*`` selects several solids as one.
 
     Returns:
-        The file, and the name of the solid; empty if none is given.
+        The file, and the name of the solid, which is empty if the path contains none.
     """
     file, mark, name = str(path).rpartition("#")
     if mark and Path(file).suffix.lower() in STEP:
@@ -44,19 +44,19 @@ def named_solid(path: Path | str) -> tuple[Path, str]:
 def read_triangles(
     path: Path | str, solid: str = ""
 ) -> tuple[NDArray, NDArray, FilledSolids | None]:
-    """Return points and triangles of a surface file in its unit; STEP in metres.
+    """Read the points and triangles of a surface file; a STEP file is read in metres.
 
     Args:
         path: an existing file of a known kind.
         solid: name of one of several solids of a STEP file.
 
     Returns:
-        (n, 3) points and (m, 3) indices of points, and the solids that they bound if a
-        STEP file has several.
+        (n, 3) points and (m, 3) indices of points; and, for several solids of a STEP
+        file, the solids that they bound.
 
     Raises:
-        BadInput: the content does not match the file's suffix, or the package that
-            reads it is not installed.
+        BadInput: the content does not match the suffix of the file, or the package that
+            reads this format is not installed.
     """
     path = Path(path)
     if path.suffix.lower() == ".stl":
@@ -65,7 +65,7 @@ def read_triangles(
     points, faces, solids = read["points"], read["faces"], None
     if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
         kind = path.suffix[1:].upper()
-        raise BadInput(f"{path}: holds no triangles, or is not {kind}")
+        raise BadInput(f"{path}: contains no triangles, or is not {kind}")
     faces = faces.astype(np.int64)
     if len(read.get("names", ())) > 1:
         names, overlaps = (
@@ -103,7 +103,8 @@ def step_solids(path: Path | str) -> list[StepSolid]:
         The solids in the order of the file, converted to metres.
 
     Raises:
-        BadInput: the file cannot be read, it holds no solid, or gmsh is not installed.
+        BadInput: the file cannot be read or contains no solid, or gmsh is not
+            installed.
     """
     read = _in_own_process("solids", Path(path))
     if not len(read["names"]):
@@ -117,11 +118,12 @@ def step_solids(path: Path | str) -> list[StepSolid]:
 
 
 def _in_own_process(wanted: str, path: Path, solid: str = "") -> dict[str, NDArray]:
-    """Return arrays from a reader that may crash, not end, or exhaust the memory."""
+    """Run a reader that may crash, hang or use too much memory; return its arrays."""
     kind = path.suffix[1:].upper()
     with tempfile.TemporaryDirectory(prefix="forcefit-") as folder:
         made = Path(folder, "read.npz")
-        # -P prevents that modules in the current folder replace others of the same name
+        # -P prevents modules in the current folder from replacing others of the same
+        # name
         module = "forcefit.stiffness.surface.surface_worker"
         command = [sys.executable, "-P", "-m", module, wanted, str(path), str(made)]
         search = {"PYTHONPATH": os.pathsep.join(sys.path)}

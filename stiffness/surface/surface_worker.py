@@ -1,10 +1,10 @@
-"""Process in which VTK, meshio and gmsh read a user's file, because they may crash.
+"""Program that reads a user's file with VTK, meshio or gmsh, which may crash.
 
 ``python -m forcefit.stiffness.surface.surface_worker triangles|solids FILE READ.npz
 [SOLID]``
 
-:mod:`forcefit.stiffness.surface.surface_files` runs this module in a separate process,
-so a damaged file ends only that process.
+:mod:`forcefit.stiffness.surface.surface_files` runs this program in a separate process.
+A damaged file can therefore crash only that process.
 """
 
 import sys
@@ -21,7 +21,7 @@ from forcefit.stiffness.surface.step_file import read_solids, read_step
 
 
 def main(wanted: str, path: Path, made: Path, solid: str = "") -> None:
-    """Read a file, and write the requested data or the reason for refusal.
+    """Read a file, and write the requested data or the reason why it was refused.
 
     Args:
         wanted: "triangles", or "solids" for a STEP file.
@@ -43,7 +43,7 @@ def main(wanted: str, path: Path, made: Path, solid: str = "") -> None:
 
 
 def _solids(path: Path) -> dict[str, Any]:
-    """Return the names, volumes and boxes of a STEP file's solids."""
+    """Return the names, volumes and bounding boxes of the solids in a STEP file."""
     names, volumes, boxes = read_solids(path)
     return {
         "names": np.array(names, dtype=str),
@@ -53,7 +53,7 @@ def _solids(path: Path) -> dict[str, Any]:
 
 
 def _triangles(path: Path, solid: str) -> dict[str, Any]:
-    """Return points and triangles, and for STEP the data of the faces."""
+    """Return the points and triangles; for STEP also the solids on both sides."""
     if path.suffix.lower() in {".step", ".stp"}:
         step = read_step(path, solid)
         return {
@@ -69,7 +69,7 @@ def _triangles(path: Path, solid: str) -> dict[str, Any]:
 
 
 def _limit_memory() -> None:
-    """Limit the memory of this process, so that excessive sizes fail here."""
+    """Limit the memory of this process, so that an excessive size causes an error."""
     try:
         import os
         import resource
@@ -79,11 +79,11 @@ def _limit_memory() -> None:
         if hard == resource.RLIM_INFINITY or hard > memory:
             resource.setrlimit(resource.RLIMIT_AS, (memory, hard))
     except (ImportError, ValueError, OSError):
-        return  # this system has no such limit
+        return  # this operating system has no such limit
 
 
 def _with_vtk(path: Path) -> tuple[NDArray, NDArray]:
-    """Return a surface read by VTK: PLY, VTK, VTP."""
+    """Read a surface from a PLY, VTK or VTP file with VTK."""
     import pyvista
     from vtkmodules.vtkCommonCore import vtkObject
 
@@ -92,7 +92,7 @@ def _with_vtk(path: Path) -> tuple[NDArray, NDArray]:
 
 
 def _obj(path: Path) -> tuple[NDArray, NDArray]:
-    """Return an OBJ file's surface; VTK splits polygons into triangles."""
+    """Read a surface from an OBJ file; VTK splits the polygons into triangles."""
     import pyvista
 
     points, faces = read_obj(path)
@@ -103,7 +103,7 @@ def _obj(path: Path) -> tuple[NDArray, NDArray]:
 
 
 def _check_points(path: Path, mesh: Any) -> None:
-    """Reject cells with points that do not exist, which would crash VTK's filters."""
+    """Raise an error if a cell refers to an absent point, which would crash VTK."""
     import pyvista
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
@@ -135,7 +135,7 @@ def _boundary(path: Path, mesh: Any) -> tuple[NDArray, NDArray]:
 
 
 def _msh(path: Path) -> tuple[NDArray, NDArray]:
-    """Return a gmsh MSH 2.2 or 4.1 file: surface elements, or the volume's boundary."""
+    """Read a gmsh MSH file (2.2, 4.1): surface elements, or the volume's boundary."""
     import meshio
     import pyvista
 
@@ -144,7 +144,7 @@ def _msh(path: Path) -> tuple[NDArray, NDArray]:
         b for b in mesh.cells if b.dim == 3
     ]
     if not blocks:
-        raise BadInput(f"{path}: holds neither triangles nor tetrahedra")
+        raise BadInput(f"{path}: contains neither triangles nor tetrahedra")
     cells = [(b.type, b.data) for b in blocks]
     return _boundary(path, pyvista.from_meshio(meshio.Mesh(mesh.points, cells)))
 

@@ -1,7 +1,7 @@
-"""The exact surface that the facets of a file approximate, and a mesh's error.
+"""The exact surface that the facets of a file approximate, and distances from it.
 
-The shape of a patch continues beyond its border where it meets the next patch smoothly.
-A point on the boundary of a mesh is compared with the patch of the nearest facet.
+Where two patches meet smoothly, the shape of each patch is extended beyond its border.
+A point on the boundary of a mesh is compared with the shape of the nearest facet.
 """
 
 from functools import cached_property
@@ -15,8 +15,8 @@ from forcefit.stiffness.surface.patches import Patches
 from forcefit.stiffness.surface.surface import Surface
 from forcefit.stiffness.surface.triangle_graph import SHARP, TriangleGraph
 
-_UNSURE = 0.3  # uncertain share of the lift of facets of unknown shape
-# coordinates of six points on a triangle, exact to degree 4 (Dunavant 1985)
+_UNSURE = 0.3  # relative uncertainty of the lift of facets of unknown shape
+# barycentric coordinates of six points on a triangle, exact to degree 4 (Dunavant 1985)
 _NEAR, _FAR = 0.445948490915965, 0.091576213509771
 _PLACES = np.concatenate([np.full((3, 3), a) + (1 - 3 * a) * np.eye(3)
                           for a in (_NEAR, _FAR)])  # fmt: skip
@@ -24,12 +24,12 @@ _WEIGHTS = np.repeat([0.223381589678011, 0.109951743655322], 3)
 
 
 class TrueSurface:
-    """Facets with their recognised shapes.
+    """Facets of a surface together with the recognised shapes.
 
     Attributes:
         volume: [m^3] volume inside the shapes.
-        unsure_volume: [m^3] part of the volume that depends on the smoothing of facets
-            of unknown shape.
+        unsure_volume: [m^3] volume that depends on the smoothing of facets of unknown
+            shape.
     """
 
     def __init__(self, surface: Surface, patches: Patches) -> None:
@@ -57,14 +57,14 @@ class TrueSurface:
         return pyvista.PolyData.from_regular_faces(surface.points, surface.triangles)
 
     def outside(self, points: NDArray, normals: NDArray) -> NDArray:
-        """Return distances of points of a mesh's boundary from the surface.
+        """Return the distances of points on a mesh's boundary from the exact surface.
 
         Args:
             points: (n, 3) [m].
             normals: (n, 3) outward normals of the mesh at these points.
 
         Returns:
-            (n,) [m] distances, negative inside.
+            (n,) [m] distances; negative for points inside the surface.
         """
         cell = np.atleast_1d(self._mesh.find_closest_cell(points))
         patch = self._patches.patch[cell]
@@ -77,7 +77,7 @@ class TrueSurface:
         return away
 
     def _volumes_between(self) -> NDArray:
-        """Return (p,) [m^3] volumes between the facets and the shape of each patch."""
+        """Return (p,) [m^3] the volume between facets and shape of each patch."""
         surface, patches = self._surface, self._patches
         areas = surface.normals()
         volumes = np.zeros(len(patches.shapes))
@@ -87,8 +87,8 @@ class TrueSurface:
             places = np.einsum("qk,mkx->mqx", _PLACES, corners)
             distance, slope = shape.signed(places.reshape(-1, 3))
             slope = slope.reshape(places.shape)
-            # along the facet's normal: distance times the normal component of the
-            # gradient
+            # distance along the facet's normal: distance times the component of the
+            # gradient along this normal
             flux = np.einsum("mqx,mx->mq", slope, areas[members])
             gap = -distance.reshape(flux.shape) * flux
             volumes[number] = float((gap @ _WEIGHTS).sum())

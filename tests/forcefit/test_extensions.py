@@ -128,7 +128,7 @@ def written(tmp_path, text):
     return path
 
 
-def test_link_model_of_a_cone_has_the_compliance_of_handbooks(example, tmp_path):
+def test_link_model_of_a_cone_has_the_compliance_of_the_handbook(example, tmp_path):
     """F L^3/(3 E I) R/r, F L/(E pi R r), and torsion; I and J of the base."""
     robot = ff.load_robot(written(tmp_path, CONE))
     C = ff.platform_stiffness(ff.place_robot(robot)).compliance
@@ -165,7 +165,7 @@ def _home(tmp_path):
     return path
 
 
-def test_link_model_of_a_drawn_body_lies_between_its_joints(example, tmp_path):
+def test_link_model_of_a_drawn_body_connects_its_joints(example, tmp_path):
     """The same cone in a file of bodies: a pin at its start, the platform's point."""
     drawn = f"""
 format = 2
@@ -207,7 +207,7 @@ def test_effect_turns_a_drive_by_its_gain(example, tmp_path, run):
 def test_unknown_parameter_of_an_effect_is_named(example, tmp_path):
     path = written(tmp_path, ARM.replace("joint1 = 1e-3", "joint2 = 1e-3"))
     with pytest.raises(
-        BadInput, match='found "joint2", which is no parameter of drive_g'
+        BadInput, match='found "joint2", which is not a parameter of drive_g'
     ):
         ff.load_robot(path)
 
@@ -328,7 +328,7 @@ def test_fault_within_an_effect_or_a_reader_names_its_distribution(
         assert message in err
 
 
-def test_broken_effect_stops_no_robot_that_does_not_have_it(broken, tmp_path):
+def test_broken_effect_does_not_affect_robots_without_this_effect(broken, tmp_path):
     text = ARM.replace("drive_gain", "encoder_offset")
     robot = ff.load_robot(written(tmp_path, text))
     assert robot.effects == {"encoder_offset": {"joint1": 1e-3}}
@@ -371,7 +371,9 @@ def test_page_of_extensions_shows_the_lines_of_the_example():
 
 
 @pytest.mark.slow
-def test_example_is_found_by_a_new_process(example, packages, tmp_path):
+def test_extension_of_the_example_is_found_by_a_new_process(
+    example, packages, tmp_path
+):
     """Entry points are found where Python starts, not only in this process."""
     path = written(tmp_path, CONE)
     command = "import forcefit as ff, sys; print(ff.load_robot(sys.argv[1]).name)"

@@ -38,7 +38,7 @@ def test_remarks_are_printed_only_where_logging_is_configured(wanted, tmp_path):
     assert line in done.stderr if wanted else not done.stderr
 
 
-def test_point_without_proof_is_logged_with_its_robot(caplog):
+def test_point_without_certificate_is_logged_with_its_robot(caplog):
     caplog.set_level(logging.INFO, "forcefit")
     solve_assembly(beams())
     assert caplog.messages == []
@@ -51,7 +51,7 @@ def test_point_without_proof_is_logged_with_its_robot(caplog):
     ]
 
 
-def test_requested_reference_is_not_logged(caplog):
+def test_requested_use_of_the_reference_method_is_not_logged(caplog):
     caplog.set_level(logging.INFO, "forcefit")
     solve_assembly(rigid(), method="reference")
     solve_assembly([rigid()], method="reference")

@@ -21,7 +21,7 @@ def posture():
 
 
 @pytest.mark.parametrize("old", sorted(ff._RENAMED))
-def test_old_public_name_works_and_warns_with_the_new_one(old):
+def test_old_public_name_works_and_warns_with_the_new_name(old):
     new, *elsewhere = ff._RENAMED[old]
     with pytest.warns(FutureWarning, match=rf"forcefit\.{old} is now forcefit\.{new}"):
         found = getattr(ff, old)

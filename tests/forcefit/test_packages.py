@@ -227,7 +227,7 @@ def test_old_name_of_a_package_leads_to_the_present_module(name, first):
     assert err.splitlines()[0].endswith(warning)
 
 
-def test_new_names_give_no_warning():
+def test_new_names_cause_no_warning():
     assert ran([ROOT], "import forcefit.validation.study.study") == (0, "", "")
 
 

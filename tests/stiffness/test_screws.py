@@ -20,7 +20,7 @@ def test_skew_matrix_times_a_vector_is_the_cross_product(rng):
     )
 
 
-def test_a_turn_about_z_moves_a_point_on_x_along_y():
+def test_rotation_about_z_moves_a_point_on_the_x_axis_along_y():
     """At p = q + x the offset is q - p = -x; t_p = t_q + r x (p - q) = z x x = y."""
     moved = screw_map([-1.0, 0, 0]) @ [0, 0, 1e-3, 0, 0, 0]
     np.testing.assert_allclose(moved, [0, 0, 1e-3, 0, 1e-3, 0], atol=0)
@@ -34,7 +34,7 @@ def test_power_of_a_wrench_does_not_depend_on_the_reference_point(rng):
     assert (A.T @ wrench) @ screw == pytest.approx(wrench @ (A @ screw), rel=1e-13)
 
 
-def test_a_force_has_the_moment_of_its_arm():
+def test_moment_of_a_force_equals_lever_arm_times_force():
     """A force fy at p = x, referred to q = 0: mz = +1 (p is ahead of q along x)."""
     wrench_at_q = screw_map([-1.0, 0, 0]).T @ [0, 0, 0, 0, 1.0, 0]
     np.testing.assert_allclose(wrench_at_q, [0, 0, 1, 0, 1, 0], atol=0)
@@ -78,7 +78,7 @@ def test_rotation_vector_is_exact_for_half_turns_and_the_identity():
 
 
 @pytest.mark.parametrize("shape", [(), (0,), (2, 5)])
-def test_rotation_functions_keep_leading_axes(shape):
+def test_rotation_functions_preserve_leading_axes(shape):
     matrices = rotation_matrix(np.zeros((*shape, 3)))
     assert matrices.shape == (*shape, 3, 3)
     assert rotation_vector(matrices).shape == (*shape, 3)

@@ -1,8 +1,8 @@
-"""The reference, in numpy and Clarabel: problems (21), (22) and (27) at one posture.
+"""Reference method in numpy and Clarabel: problems (21), (22), (27) at one posture.
 
-The reference is slow and covers all cases: loads, rigid closures, ranks in doubt,
-active bounds of passive joints.  It is the method ``"reference"``, and solves points
-that the compiled method does not cover or prove.
+The reference method is slow, but covers all cases: loads, rigid closures, matrices of
+uncertain rank, active bounds of passive joints.  It is the method ``"reference"``, and
+solves the points that the compiled method does not cover or prove.
 
 =========  ==========================================  ===============================
 paper      quantity or problem                         function
@@ -19,8 +19,8 @@ paper      quantity or problem                         function
            farthest                                    ``ReachableSet.farthest``
 =========  ==========================================  ===============================
 
-``closure.py`` and ``assembled.py`` are in the folder above, because the compiled
-methods use them too.  Cone programmes are solved by
-:mod:`forcefit.assembly.solvers.conic`. ``as_printed.py`` solves (21) and (22) again, as
-the paper prints them, in cvxpy.
+``closure.py`` and ``assembled.py`` are in the parent folder, because the compiled
+methods use these modules too.  :mod:`forcefit.assembly.solvers.conic` solves the cone
+programmes.  ``as_printed.py`` solves (21) and (22) a second time in cvxpy, as printed
+in the paper.
 """

@@ -1,12 +1,14 @@
-"""Problems (21) and (22) again, written in cvxpy as the paper prints them.
+"""Problems (21) and (22) written in cvxpy as the paper prints them.
 
-Slow and simple on purpose: every screw of every frame is a variable, every constraint
-an equation of the paper.  Tests compare :mod:`forcefit.assembly.linear.energy` and
-:mod:`forcefit.assembly.linear.zone` with it.  Both use the same robot, bounds c-bar,
-compliances and eqs (13)-(15), but no common code solves the problems.
+The module is deliberately slow and simple: every screw of every frame is a variable,
+and every constraint is an equation of the paper.  Tests compare the results of
+:mod:`forcefit.assembly.linear.energy` and :mod:`forcefit.assembly.linear.zone` with
+those of this module.  All three use the same robot, bounds c-bar, compliances and
+eqs (13)-(15), but share no code that solves the problems.
 
-Two departures from the printed problems: screws are in mrad and mm, to which the
-solver's absolute tolerances fit, and a rigid direction is a screw fixed at zero.
+The problems differ from the printed ones in two details.  The screws are in mrad and
+mm, which suits the solver's absolute tolerances.  In a rigid direction, the screw is
+fixed at zero.
 """
 
 import warnings
@@ -25,21 +27,21 @@ from forcefit.assembly.model.clearance import (
 from forcefit.assembly.model.links import link_compliances, spring_compliances
 
 OPTIMAL = {"optimal", "optimal_inaccurate"}
-_UNIT = 1e-3  # screws are in mrad and mm here
+_UNIT = 1e-3  # the unit of screws in this module is mrad or mm
 
 
 def energy_as_printed(
     posture: Posture, load: ArrayLike | None = None
 ) -> tuple[float, NDArray]:
-    """Return the minimum assembly energy as printed, (22).
+    """Return the minimum assembly energy as printed in (22).
 
     Args:
         posture: the robot's configuration.
-        load: (6,) [N m, N] on the platform at its origin, base axes; energy minus its
-            work is then minimised.
+        load: (6,) [N m, N] wrench on the platform at its origin, base axes; the energy
+            minus the work of the load is then minimised.
 
     Returns:
-        [J] the energy stored, and (6,) [rad, m] the platform's pose error.
+        [J] the elastic energy, and (6,) [rad, m] the platform's pose error.
 
     Raises:
         RuntimeError: cvxpy found no optimum.
@@ -70,8 +72,8 @@ def margin_as_printed(posture: Posture, own_axes_free: bool = False) -> float | 
 
     Args:
         posture: the robot's configuration.
-        own_axes_free: whether compliant joints are free about their own axis; as
-            printed they are rigid.
+        own_axes_free: whether compliant joints turn freely about their own axis; in the
+            printed problem they are rigid.
 
     Returns:
         The factor; None if the problem is infeasible for every factor.
@@ -92,7 +94,7 @@ def margin_as_printed(posture: Posture, own_axes_free: bool = False) -> float | 
 
 
 def _root_of_stiffness(C: NDArray) -> NDArray:
-    """Return (6, 6) R with R^T R the stiffness; zero in rigid directions."""
+    """Return (6, 6) R; R^T R is the stiffness, with zeros in rigid directions."""
     soft = np.flatnonzero(np.diag(C) > 0)
     root = np.zeros_like(C)
     root[np.ix_(soft, soft)] = np.linalg.cholesky(
@@ -123,9 +125,9 @@ def _clearance_constraints(c: Any, bounds: NDArray, factor: NDArray) -> list:
 def _assembly_constraints(
     posture: Posture, x_p: Any, bodies: Any, joints: Any
 ) -> list:  # fmt: skip
-    """Return eqs (16)-(20): every chain's end, and the platform's pose error x_p.
+    """Return eqs (16)-(20): the end of every chain, and the platform's pose error x_p.
 
-    Screws (n, 6) of bodies, and components (n, 6) of joints.
+    The arguments ``bodies`` and ``joints`` are screws (n, 6).
     """
     import cvxpy as cp
 
@@ -149,7 +151,7 @@ def _solve(problem: Any, allowed: set[str]) -> None:
 
     tight = {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
     try:
-        with warnings.catch_warnings():  # the status reports inaccuracy too
+        with warnings.catch_warnings():  # the status also reports inaccurate solutions
             warnings.simplefilter("ignore")
             problem.solve(solver=cp.CLARABEL, **tight)
     except cp.error.SolverError as error:

@@ -1,4 +1,4 @@
-"""Problem (22) by the reference: minimise energy less work with every |u_c| <= 1."""
+"""Problem (22) by the reference method: minimise energy minus work, |u_c| <= 1."""
 
 from dataclasses import replace
 
@@ -23,13 +23,14 @@ from forcefit.assembly.linear.rounding import differs_from_zero, stiffness_sprea
 from forcefit.assembly.model.clearance import has_bounded_motion
 from forcefit.assembly.solvers.conic import ConicSolution, minimise_energy
 
-_RIGID_BESIDE = 1e19  # springs so much stiffer than the softest count as rigid
+_RIGID_BESIDE = 1e19  # stiffness relative to the softest spring that counts as rigid
 
 
 class CannotAssemble(Exception):
-    """No clearance and no elasticity of the model lets the closures hold.
+    """The closures cannot be closed by clearances and elasticity of the model.
 
-    This is a result, not a mistake of the caller: some closure is rigid in a direction.
+    The exception reports a result and not a mistake of the caller: some closure is
+    rigid in a direction.
     """
 
 
@@ -37,23 +38,23 @@ def least_energy(
     posture: Posture, load: NDArray, frame_loads: FrameLoads,
     own_axes_free: bool = False,
 ) -> Assembly:  # fmt: skip
-    """Close a manipulator at least energy, as ``solve_assembly`` does.
+    """Close a manipulator with the least energy, as ``solve_assembly`` does.
 
-    Bounds of passive joints' own motion count where they matter.
+    Bounds of passive joints' motions are included if they are active.
 
     Args:
         posture: the robot's configuration.
         load: (6,) [N m, N] wrench on the platform at its origin, base axes.
-        frame_loads: all loads, this one among them.
+        frame_loads: all loads on every small screw, including ``load``.
         own_axes_free: see :func:`forcefit.assembly.linear.closure.virtual_joints`.
 
     Returns:
         The assembled manipulator.
 
     Raises:
-        CannotAssemble: a closure is open that no clearance and no spring can close.
+        CannotAssemble: no clearance and no spring can close an open closure.
         FreeMotion: a load drives a motion that nothing resists.
-        SolverFailed: the cone solver gave up.
+        SolverFailed: the cone solver did not converge.
     """
     lin, robot = linearise(posture), posture.robot
     try:
@@ -65,7 +66,7 @@ def least_energy(
     else:
         if assembly.clearance_excess(own_axes_free) <= 1e-9:
             return assembly
-    # the bound of a passive joint's own motion was left out, but it is active
+    # the omitted bound of a passive joint's motion is active: solve with the bound
     joints = virtual_joints(robot, True, own_axes_free, bounded_motion=True)
     return solve_with(lin, joints, load, frame_loads)
 
@@ -73,21 +74,21 @@ def least_energy(
 def solve_with(
     lin: Linearisation, joints: VirtualJoints, load: NDArray, frame_loads: FrameLoads
 ) -> Assembly:
-    """Return the assembly of least energy with given virtual joints.
+    """Return the assembly of least energy for given virtual joints.
 
     Args:
         lin: the assembly constraints.
-        joints: virtual joints that may move.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        frame_loads: all loads, this one among them.
+        joints: virtual joints that can move.
+        load: (6,) [N m, N] wrench on the platform at its origin, base axes.
+        frame_loads: all loads on every small screw, including ``load``.
 
     Returns:
         The assembled manipulator.
 
     Raises:
-        CannotAssemble: a closure is open that nothing can close.
+        CannotAssemble: no clearance and no spring can close an open closure.
         FreeMotion: a load drives a motion that nothing resists.
-        SolverFailed: the cone solver gave up.
+        SolverFailed: the cone solver did not converge.
     """
     reduced = reduce_problem(lin, joints, frame_loads)
     least = _minimise(reduced)
@@ -109,14 +110,14 @@ def solve_with(
     residual = assembly.closure_residual() + assembly.rounding
     if frame_loads or differs_from_zero(assembly.stored, 0.0, multipliers, residual):
         return assembly
-    # no energy is needed: springs and wrenches are rounding of zero
+    # no energy is needed: deformations and wrenches are rounding errors
     return replace(
         assembly, elastic=np.zeros_like(y), multipliers=np.zeros_like(multipliers)
     )
 
 
 def _minimise(reduced: Reduction) -> ConicSolution:
-    """Solve a reduced problem; name the open closure if it is infeasible."""
+    """Solve a reduced problem; name the open closure if the problem is infeasible."""
     joints = reduced.joints
     spread = stiffness_spread(joints, reduced.linearisation.size)
     beyond = ""

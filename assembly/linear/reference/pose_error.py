@@ -1,15 +1,16 @@
-"""The set of platform screws that an assumption of problem (27) leaves possible.
+"""Set of platform screws that are possible under an assumption of problem (27).
 
-Clearances v move within their cones, free motions q follow the closures,
+Clearances v move within their cones, and free motions q follow through the closures:
 
     A_q dq + A_v dv = 0,        platform screw = centre + P_v dv + P_q dq.
 
-A free motion that no closure constrains either leaves the platform fixed or makes some
+A free motion that no closure constrains either does not move the platform, or makes
 components of its screw unbounded.
 
-Bounds of passive joints' own motion count.  Most of them are never reached, and a cone
-of 10 rad next to cones of 1e-5 costs digits.  So each is left out until the largest
-possible motion, the sum over the cones of |A_q^+ A_v|, exceeds it.
+The motions of passive joints are bounded.  Most of these bounds are never active, and a
+cone of 10 rad together with cones of 1e-5 reduces the accuracy.  Each bound is
+therefore omitted unless the largest possible motion, the sum over the cones of
+|A_q^+ A_v|, exceeds it.
 """
 
 from collections.abc import Callable
@@ -47,8 +48,8 @@ from forcefit.results.display import html_table, short_repr
 from forcefit.stiffness.screws import skew
 
 ASSUMPTIONS = ("frozen", "free", "budget")
-# accepted excess of squares of cones: solutions are hardly better, and a cone at its
-# bound would otherwise stop the step of all others
+# accepted excess of squared sizes over cones: a smaller value hardly improves
+# solutions, and a cone at its bound would then stop the step of all other cones
 _EXCESS = 1e-8
 
 
@@ -58,9 +59,9 @@ class Support:
 
     Attributes:
         height: certified upper bound of direction . screw over the set.
-        screw: (6,) [rad, m] screw of the set that (nearly) attains it.
-        gradient: (nv,) of the component by v, less the part of the closures'
-            multipliers.
+        screw: (6,) [rad, m] screw of the set that attains the height approximately.
+        gradient: (nv,) derivative of the component with respect to v, minus the
+            contribution of the closures' multipliers.
     """
 
     height: float
@@ -69,12 +70,12 @@ class Support:
 
 
 class MovingCones(NamedTuple):
-    """Unit cones that move, nv columns in all.
+    """Unit cones of moving clearances with nv columns in total.
 
     Attributes:
         closures: (6 closures, nv) columns in the scaled closures.
         platform: (6, nv) [rad, m] columns at the platform.
-        start: (nv,) their start values, within the cones.
+        start: (nv,) start values within the cones.
         group: (nv,) cone of each column.
     """
 
@@ -88,17 +89,17 @@ class MovingCones(NamedTuple):
 class ReachableSet:
     """Platform screws that remain possible: centre + map @ (v - start).
 
-    v runs over unit cones with rows @ (v - start) = 0.  In this homogeneous form an
-    error of the solution of (22) adds no motion.
+    The points v are in unit cones and satisfy rows @ (v - start) = 0.  Because this
+    equation is homogeneous, an error of the solution of (22) adds no motion.
 
     Attributes:
         centre: (6,) [rad, m] the screw at ``start``.
-        map: (6, nv) [rad, m] derivative of the screw by v.
+        map: (6, nv) [rad, m] derivative of the screw with respect to v.
         rows: (p, nv) orthonormal rows of the closures.
         start: (nv,) v at the solution of (22), within its cones.
         group: (nv,) cone of each column.
-        free: (6, k) [rad, m] screws of the platform per unit of motions without
-            resistance and without bound.
+        free: (6, k) [rad, m] screws of the platform per unit of each motion that is
+            neither resisted nor bounded.
     """
 
     centre: NDArray
@@ -111,18 +112,18 @@ class ReachableSet:
     __repr__, _repr_html_ = short_repr, html_table
 
     def unbounded(self, part: int) -> bool:
-        """Return whether the rotation (part 0) or the translation (3) has no bound."""
+        """Return whether a part is unbounded: rotation (0) or translation (3)."""
         free = self.free[part : part + 3]
         return bool(np.abs(free).max(initial=0.0) > UNBOUNDED)
 
     def at_point(self, offset: ArrayLike) -> "ReachableSet":
-        """Return the same set for another point of the platform.
+        """Return the set of screws at another point of the platform.
 
         Args:
             offset: (3,) [m] from the platform's origin to the point, base axes.
 
         Returns:
-            Screws read at the point.
+            The set with translations at that point.
         """
         move = np.eye(6)
         move[3:, :3] = -skew(offset)
@@ -139,11 +140,11 @@ class ReachableSet:
             method: method of :func:`forcefit.assembly.solvers.conic.minimise_energy`.
 
         Returns:
-            The height with the point that attains it; infinite where the platform
-            moves freely in that direction.
+            The height with a screw that attains it; infinite if the platform moves
+            freely in that direction.
 
         Raises:
-            SolverFailed: the cone solver gave up.
+            SolverFailed: the cone solver did not converge.
         """
         direction = np.asarray(direction, dtype=float)
         gradient = self.map.T @ direction
@@ -164,12 +165,12 @@ class ReachableSet:
         return Support(max(height, float(direction @ screw)), screw, reduced)
 
     def _screw_near(self, v: NDArray) -> NDArray:
-        """Return the (6,) [rad, m] screw of a nearby v within rows and cones."""
-        # rows to rounding, cones to 5e-9 of their size
+        """Return the (6,) [rad, m] screw of a nearby v within all rows and cones."""
+        # rows are satisfied to rounding, cones to 5e-9 of their size
         start, group = self.start, self.group
         step = v - start
         step = step - self.rows.T @ (self.rows @ step)
-        # the longest part of the step, from a start inside, that stays in all cones
+        # from a start inside all cones, the longest part of the step that stays inside
         aa, ab, bb = (
             np.bincount(group, one * other)
             for one, other in ((step, step), (start, step), (start, start))
@@ -183,19 +184,20 @@ class ReachableSet:
     def farthest(
         self, part: int, tolerance: float, method: Method = "compiled"
     ) -> tuple[tuple[float, float], NDArray, int]:
-        """Return the bounds of the largest size of half a screw, and a screw.
+        """Return bounds of the largest rotation or translation, and a screw.
 
         Args:
             part: 0 for the rotation, 3 for the translation.
             tolerance: [rad or m] required difference of upper and lower bound.
-            method: ``"compiled"``; or ``"reference"``, numpy and Clarabel alone.
+            method: ``"compiled"``; or ``"reference"``, which uses only numpy and
+                Clarabel.
 
         Returns:
-            (lower, upper); (6,) [rad, m] the screw that attains the lower; number of
-            supports.
+            (lower, upper) bounds; (6,) [rad, m] screw that attains the lower bound; and
+            the number of support functions computed.
 
         Raises:
-            SolverFailed: the cone solver gave up.
+            SolverFailed: the cone solver did not converge.
         """
         if self.unbounded(part):
             return (np.inf, np.inf), self.centre, 0
@@ -215,14 +217,14 @@ class ReachableSet:
 
     @property
     def starts(self) -> NDArray:
-        """(cones + 1,) first column of each cone, and nv."""
+        """(cones + 1,) index of the first column of each cone, then nv."""
         return cone_starts(self.group)
 
 
 def reachable_screws(
     assembly: Assembly, assumption: str, energy_budget: float = 0.05
 ) -> ReachableSet:
-    """Return the set of platform screws that an assumption of (27) leaves possible.
+    """Return the set of platform screws that are possible under an assumption of (27).
 
     Args:
         assembly: assembly of least energy.
@@ -230,7 +232,7 @@ def reachable_screws(
         energy_budget: eta of assumption ``"budget"``, >= 0.
 
     Returns:
-        The set, within all bounds of passive joints' own motion.
+        The set, in which all bounds of passive joints' motions are satisfied.
 
     Raises:
         ValueError: the assumption is unknown, or ``budget`` is used under a load.
@@ -238,12 +240,12 @@ def reachable_screws(
     if assumption not in ASSUMPTIONS:
         raise ValueError(f"assumption is {assumption!r}, expected one of {ASSUMPTIONS}")
     if assumption == "budget" and (assembly.frame_loads or energy_budget < 0):
-        raise ValueError("the budget assumption needs no load and a budget >= 0")
+        raise ValueError("the budget assumption requires no load and a budget >= 0")
     free = assumption == "free"
     loaded = assembly
     if free:
-        # here the own axis turns without energy: a clearance is held only if it stays
-        # loaded without those soft springs
+        # the own axes turn without energy here: a clearance is fixed only if it remains
+        # loaded without the soft springs of these axes
         loaded = least_energy(
             assembly.posture, assembly.load, assembly.frame_loads, own_axes_free=True
         )
@@ -271,17 +273,17 @@ def within_bounds(
     assembly: Assembly, kept: frozenset[int],
     moving: Callable[[VirtualJoints], MovingCones], own_axes_free: bool = False,
 ) -> ReachableSet:  # fmt: skip
-    """Return the platform screws while cones move and free motions follow.
+    """Return the platform screws of moving cones and the free motions that follow.
 
     Args:
-        assembly: the start.
-        kept: frames whose bound of the joint's own motion counts from the first.
-        moving: function of virtual joints that returns the cones that move.
-        own_axes_free: see :func:`forcefit.assembly.linear.closure.virtual_joints`; then
-            no spring acts.
+        assembly: assembly at the start.
+        kept: frames whose bound of the joint's motion is included from the beginning.
+        moving: function of virtual joints that returns the moving cones.
+        own_axes_free: see :func:`forcefit.assembly.linear.closure.virtual_joints`; if
+            True, no spring acts.
 
     Returns:
-        The set, within all bounds.
+        The set, in which all bounds are satisfied.
     """
     kept = kept | assembly.joints.bounded_motion
     while True:
@@ -298,7 +300,7 @@ def within_bounds(
 
 @dataclass(frozen=True, eq=False)
 class _Motion:
-    """Cones that move, and the free motions that follow them."""
+    """Moving cones and the free motions that follow them through the closures."""
 
     assembly: Assembly
     joints: VirtualJoints
@@ -306,7 +308,7 @@ class _Motion:
 
     @cached_property
     def _follow(self) -> tuple[NDArray, NDArray]:
-        """(nq, m) pseudoinverse of A_q; (6, nq) motions without resistance."""
+        """(nq, m) pseudoinverse of A_q; (6, nq) platform motions without resistance."""
         lin = self.assembly.linearisation
         A_q, P_q = lin.rows @ self.joints.free, lin.platform @ self.joints.free
         inverse = np.linalg.pinv(A_q, rcond=self._with_mismatch(RANK))
@@ -315,15 +317,15 @@ class _Motion:
         return inverse, np.where(large, free, 0.0)
 
     def _with_mismatch(self, threshold: float) -> float:
-        """Return [-] a threshold plus the rounding error of the nominal closures."""
+        """Return a threshold [-] plus the rounding error of the nominal closures."""
         return rank_tolerance(self.assembly.posture.mismatch, threshold)
 
     @cached_property
     def passed(self) -> frozenset[int]:
-        """Frames whose own motion may exceed a bound that is left out here."""
+        """Frames whose motion can exceed a bound that is omitted here."""
         inverse, free = self._follow
         row = self.joints.free.argmax(axis=0)
-        # the bound of a joint without a spring counts under every assumption
+        # the bound of a joint without a spring is included under every assumption
         robot, group = self.joints.robot, self.cones.group
         limit = component_bounds(clearance_bounds(robot)).ravel()[row]
         clearance = component_bounds(scales_with_margin(robot)).ravel()[row]
@@ -335,13 +337,13 @@ class _Motion:
         most = np.abs(middle)
         for c in np.unique(group):
             most = most + np.linalg.norm(step[:, group == c], axis=1)
-        # a motion that only its bound resists reaches it
+        # a motion that is resisted only by its bound reaches that bound
         passing = limited & ((most > limit) | free.any(axis=0))
         return frozenset((row[passing] // 6).tolist())
 
     @property
     def reachable(self) -> ReachableSet:
-        """The set of platform screws."""
+        """Set of possible platform screws."""
         lin, A_v = self.assembly.linearisation, self.cones.closures
         inverse, free = self._follow
         Z = complement(lin.rows @ self.joints.free, self._with_mismatch(RANK))
@@ -364,7 +366,7 @@ def clearances_in(assembly: Assembly, joints: VirtualJoints) -> NDArray:
 
 
 def _rows(A: NDArray, noise: float) -> NDArray:
-    """Return the orthonormal rows spanning those of A, up to rounding."""
+    """Return an orthonormal basis of the rows of A, up to rounding."""
     _, S, Vt = svd(A, full_matrices=False)
     return Vt[: rank_of(S, ROWS_RANK, noise)]
 
@@ -374,16 +376,17 @@ def loaded_cones(assembly: Assembly, joints: VirtualJoints) -> NDArray:
 
     Args:
         assembly: assembly of least energy.
-        joints: the virtual joints whose columns are judged.
+        joints: virtual joints whose columns are tested.
 
     Returns:
-        (nu,) bool, the same for all columns of a cone.
+        (nu,) bool, equal for all columns of a cone.
     """
     wrenches = assembly.joint_wrenches.ravel()
     load = cone_sizes(joints.cones.T @ wrenches, joints.group)
     screws = clearance_components(joints.robot, assembly.clearance_screws).ravel()
     u = joints.cones.T @ screws / (joints.cones**2).sum(axis=0)
     slack = np.maximum(0.0, 1.0 - cone_sizes(u, joints.group))
-    # load times slack is about the solver's gap: one of them is nearly zero
+    # the product of load and slack is about the solver's gap: one of them is nearly
+    # zero
     scale = max(assembly.energy, 1e-9 * assembly.energy_without_clearance, 1e-300)
     return ((load > scale * slack) & (load > 1e-9 * scale))[joints.group]

@@ -1,20 +1,21 @@
-"""Problem (22) reduced: free motions and springs eliminated exactly.
+"""Reduction of problem (22): free motions and springs are eliminated exactly.
 
-With the columns of :mod:`forcefit.assembly.linear.closure` the assembly constraints
-read
+With the columns of :mod:`forcefit.assembly.linear.closure`, the assembly constraints
+are
 
     A_q q + A_u u + A_y y = -misfit,      |u_k| <= 1 for each cone k.
 
-Free motions q are projected out (rows orthogonal to A_q), then the springs y: the
-remaining rows split into rows with springs and rows without.  The reduced problem has
-the clearances alone as unknowns,
+First, the free motions q are eliminated by projection on the complement of the columns
+of A_q.  Then the springs y are eliminated: the remaining rows are separated into rows
+with springs and rows without.  The only unknowns of the reduced problem are the
+clearances u,
 
     minimise  |G u + h|^2 / 2 - d.u      subject to  H u = k,  |u_k| <= 1,
 
-where G u + h is the scaled deformation of the springs beyond that under the loads
-alone.  Springs enter by the square roots of their compliances, and ranks are decided on
-those: in a sum of compliances, such as 1 and 1e-8 rad/(N m), the stiff ones would be
-lost to rounding.
+where G u + h is the scaled deformation of the springs in addition to the deformation
+under the loads alone.  Ranks are determined from the square roots of the springs'
+compliances.  In sums of compliances, such as 1 and 1e-8 rad/(N m), rounding would
+remove the contribution of stiff springs.
 
 Sources:
     Golub, Van Loan, Matrix Computations, 4th ed., sections 5.4-5.5 (rank-revealing
@@ -43,9 +44,9 @@ from forcefit.assembly.linear.load import FrameLoads, loads_on_frames
 from forcefit.results.display import html_table, numbers, short_repr
 from forcefit.stiffness.screws import SCREW
 
-_STILL = 1e-6  # relative to the largest motion: smaller ones count as rounding
+_STILL = 1e-6  # relative to the largest motion: smaller motions count as rounding
 _NAMED = 4  # largest number of joints that a message names
-_LOAD_ROUNDING = 1e-13  # of the largest load: smaller ones count as rounding
+_LOAD_ROUNDING = 1e-13  # relative to the largest load: smaller ones count as rounding
 
 
 class FreeMotion(ValueError):
@@ -54,26 +55,26 @@ class FreeMotion(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Reduction:
-    """The reduced problem, and the map back to the full one.
+    """Reduced problem, and the data to compute the full solution from its solution.
 
     Attributes:
         linearisation: the assembly constraints.
-        joints: the virtual joints: columns eliminated and kept.
+        joints: the virtual joints, whose columns are eliminated or retained.
         G: (r, nu) [sqrt(2 J)] sensitivity of the scaled strains to the clearances.
         h: (r,) [sqrt(2 J)] scaled strains with zero clearances and no loads.
-        d: (nu,) [J] work of the load along the clearances.
+        d: (nu,) [J] work of the loads per unit of each clearance.
         H: (p, nu) rows without springs.
         k: (p,) right sides of the rows H.
         inconsistent: [-] scaled closure error that no motion can close; 0 if none.
         frame_loads: loads on every small screw.
         load_multipliers: (6 closures,) multipliers that balance the loads on free
             motions.
-        basis: (6 closures, m) orthonormal, orthogonal to all free motions.
-        rigid: (m, p) rows of ``basis`` combined into those of H.
+        basis: (6 closures, m) orthonormal basis, orthogonal to all free motions.
+        rigid: (m, p) combinations of the columns of ``basis`` that form the rows H.
         elastic_inverse: (ny, m) pseudoinverse of the springs' columns.
-        spread: (ny, r) orthonormal map from the reduced problem's springs to all
+        spread: (ny, r) orthonormal map from the springs of the reduced problem to all
             springs.
-        ranks: numbers of rows: free, elastic, rigid, redundant.
+        ranks: numbers of free, elastic, rigid and redundant rows.
     """
 
     linearisation: Linearisation
@@ -95,31 +96,31 @@ class Reduction:
     __repr__, _repr_html_ = short_repr, html_table
 
     def springs(self, u: NDArray) -> NDArray:
-        """Return the (ny,) [sqrt(2 J)] scaled deformations of all springs at u."""
+        """Return the (ny,) [sqrt(2 J)] scaled deformations of all springs for u."""
         return self.spread @ (self.G @ u + self.h) + self.load_springs
 
     @property
     def load_springs(self) -> NDArray:
-        """(ny,) [sqrt(2 J)] scaled deformation that the loads alone would cause."""
+        """(ny,) [sqrt(2 J)] scaled deformation that only the loads would cause."""
         return spring_deformations(
             self.linearisation, self.joints, self.frame_loads, self.load_multipliers
         )
 
     @property
     def energy_without_clearance(self) -> float:
-        """[J] energy stored if every bounded clearance stayed at zero."""
+        """[J] elastic energy if every bounded clearance remained zero."""
         bent, h = self.load_springs, self.h
         return float(h @ h + 2 * (self.spread @ h) @ bent + bent @ bent) / 2
 
     def motions(self, u: NDArray, y: NDArray) -> NDArray:
-        """Return the (nq,) least free motions that fit clearances and springs."""
+        """Return the (nq,) smallest free motions that fit clearances and springs."""
         A = self.linearisation.rows
         moved = self.joints.cones @ u + self.joints.elastic @ y
         right = -self.linearisation.misfit - A @ moved
         return np.linalg.lstsq(A @ self.joints.free, right, rcond=RANK)[0]
 
     def multipliers(self, springs: NDArray, rigid_multipliers: NDArray) -> NDArray:
-        """Return the (6 closures,) scaled closure wrenches, the least if not unique."""
+        """Return the (6 closures,) scaled closure wrenches of least norm."""
         all_springs = self.spread @ springs
         inner = self.elastic_inverse.T @ all_springs + self.rigid @ rigid_multipliers
         return self.load_multipliers + self.basis @ inner
@@ -134,14 +135,14 @@ def reduce_problem(
 
     Args:
         linearisation: the assembly constraints.
-        joints: what may move.
-        frame_loads: on every small screw; zero if absent.
+        joints: virtual joints that can move.
+        frame_loads: loads on every small screw; None for no loads.
 
     Returns:
         The problem in the clearances.
 
     Raises:
-        FreeMotion: a load works along a motion that nothing resists.
+        FreeMotion: a load does work on a motion that nothing resists.
     """
     if frame_loads is None:
         frame_loads = loads_on_frames(linearisation.posture)
@@ -158,7 +159,7 @@ def reduce_problem(
 
     U, S, Vt = svd(A_y, full_matrices=True)
     rank = rank_of(S, tolerance, noise_of(A @ joints.elastic))
-    elastic_rows, rigid_rows = U[:, :rank], U[:, rank:]  # springs enter, none does
+    elastic_rows, rigid_rows = U[:, :rank], U[:, rank:]  # rows with and without springs
     G = -(elastic_rows.T @ A_u) / S[:rank, None]
     h = elastic_rows.T @ right / S[:rank]
     H, k, rigid, inconsistent = _rigid_rows(
@@ -190,14 +191,14 @@ def reduce_problem(
 
 
 def complement(A: NDArray, tolerance: float) -> NDArray:
-    """Return an orthonormal basis of the complement of the columns of A.
+    """Return an orthonormal basis of the orthogonal complement of the columns of A.
 
     Args:
-        A: (m, n).
+        A: (m, n) matrix.
         tolerance: relative size below which a column counts as dependent.
 
     Returns:
-        (m, m - rank).
+        (m, m - rank) basis.
     """
     Q, R, _ = qr(A, pivoting=True)
     return Q[:, rank_of(np.abs(np.diag(R)), tolerance) :]
@@ -209,16 +210,16 @@ def spring_deformations(
     frame_loads: FrameLoads,
     multipliers: NDArray,
 ) -> NDArray:
-    """Return the deformations of the springs in balance with closures and loads.
+    """Return the deformations of the springs in equilibrium with closures and loads.
 
     Args:
         lin: the assembly constraints.
-        joints: whose springs are computed.
+        joints: virtual joints with the springs.
         frame_loads: loads on every small screw.
-        multipliers: (6 closures,) of the scaled closures.
+        multipliers: (6 closures,) multipliers of the scaled closures.
 
     Returns:
-        (ny,) [sqrt(2 J)] scaled.
+        (ny,) [sqrt(2 J)] scaled deformations.
     """
     closing = lin.rows.T @ multipliers
     of_links = joints.elastic.T @ (closing + frame_loads.body)
@@ -232,7 +233,7 @@ def _load_multipliers(
     """Return the multipliers that balance the loads along every free motion."""
     A_q, drive = lin.rows @ joints.free, joints.free.T @ frame_loads.joint
     multipliers = np.linalg.lstsq(A_q.T, -drive, rcond=RANK)[0]
-    # the residual is orthogonal to A_q's rows: a free motion, which the load drives
+    # the residual, orthogonal to the rows of A_q, is a free motion that the load drives
     left = A_q.T @ multipliers + drive
     most = np.maximum(
         1e-8 * np.abs(drive).max(initial=1e-300),
@@ -249,15 +250,15 @@ def _load_multipliers(
 def _load_rounding(
     lin: Linearisation, joints: VirtualJoints, frame_loads: FrameLoads
 ) -> NDArray:
-    """Return (free motions,) bounds of the rounding of the loads along them."""
-    lengths = in_reference_lengths(lin.size)  # of a screw; of a wrench its inverse
+    """Return (nq,) the rounding errors of the loads' work on the free motions."""
+    lengths = in_reference_lengths(lin.size)  # factors for screws; wrenches: inverse
     largest = np.abs(frame_loads.joint.reshape(-1, 6) / lengths).max(initial=0.0)
     sizes = np.tile(lengths, len(joints.free) // 6) @ np.abs(joints.free)
     return np.asarray(_LOAD_ROUNDING * largest * sizes)
 
 
 def _motion_text(lin: Linearisation, screws: NDArray) -> str:
-    """Return a free motion in words: its joints and the platform's unit screw."""
+    """Return a text on a free motion: its joints and the platform's unit screw."""
     robot = lin.posture.robot
     sizes = np.abs(screws.reshape(-1, 6) * in_reference_lengths(lin.size))
     moved = sizes.max(axis=1)
@@ -285,15 +286,15 @@ def _rigid_rows(
     tolerance: float,
     noise: float,
 ) -> tuple[NDArray, NDArray, NDArray, float]:
-    """Return independent rows that only clearances satisfy, and the error left."""
+    """Return independent rows that only clearances can satisfy, and their residual."""
     rows, wanted = rigid_rows.T @ A_u, rigid_rows.T @ right
     U, S, _ = svd(rows, full_matrices=True)
-    # rank relative to the clearances' size, which is small
+    # the clearances are small: the rank is determined relative to their size
     rank = rank_of(S, ROWS_RANK, noise)
     errors = np.abs(lin.rows * lin.posture.robot.errors.ravel()).max(initial=0.0)
     unclosed = np.abs(U[:, rank:].T @ wanted).max(initial=0.0)
-    # rows count as rigid by a tolerance, so a share of the load's deformation is in
-    # them
+    # rows count as rigid within a tolerance, so they contain a small part of the
+    # deformation under loads
     bent = np.abs(right).max(initial=0.0)
     allowed = 1e-12 + 10 * tolerance * max(errors, bent)
     independent = U[:, :rank]

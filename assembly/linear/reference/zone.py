@@ -1,4 +1,4 @@
-"""Problem (21) by the reference: the least t with every |u_c| <= t."""
+"""Problem (21) by the reference method: the least t with every |u_c| <= t."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,13 +27,13 @@ def least_margin(posture: Posture, own_axes_free: bool) -> tuple[float, float]:
 
     Args:
         posture: the robot's configuration.
-        own_axes_free: whether compliant joints are free about their own axis.
+        own_axes_free: whether compliant joints turn freely about their own axis.
 
     Returns:
         The margin and its certified lower bound; inf for both if no factor suffices.
 
     Raises:
-        SolverFailed: the cone solver gave up.
+        SolverFailed: the cone solver did not converge.
     """
     lin, robot = linearise(posture), posture.robot
     joints = virtual_joints(robot, False, own_axes_free)
@@ -41,7 +41,7 @@ def least_margin(posture: Posture, own_axes_free: bool) -> tuple[float, float]:
     bounds = clearance_bounds(robot, own_axes_free)
     ranges = np.where(scales_with_margin(robot), np.inf, bounds)
     if clearance_excess(clearance_components(robot, screws), ranges) > 1e-9:
-        # the range of a passive joint's motion was left out, but it is active
+        # the omitted bound of a passive joint's motion is active: solve with the bound
         joints = virtual_joints(robot, False, own_axes_free, bounded_motion=True)
         margin, bound, _ = margin_with(lin, joints)
     return margin, bound
@@ -50,18 +50,18 @@ def least_margin(posture: Posture, own_axes_free: bool) -> tuple[float, float]:
 def margin_with(
     lin: Linearisation, joints: VirtualJoints
 ) -> tuple[float, float, NDArray]:
-    """Return the margin with given virtual joints.
+    """Return the margin for given virtual joints.
 
     Args:
         lin: the assembly constraints.
-        joints: virtual joints that may move, without springs.
+        joints: virtual joints that can move, without springs.
 
     Returns:
-        The margin and its certified lower bound, inf if no factor suffices; the (n, 6)
-        [rad, m] clearance screws that attain it.
+        The margin and its certified lower bound, inf if no factor suffices; and the
+        (n, 6) [rad, m] clearance screws that attain the margin.
 
     Raises:
-        SolverFailed: the cone solver gave up.
+        SolverFailed: the cone solver did not converge.
     """
     reduced = reduce_problem(lin, joints)
     margin, bound, u = _margin_of(reduced)
@@ -80,7 +80,7 @@ def _margin_of(reduced: Reduction) -> tuple[float, float, NDArray]:
         return np.inf, np.inf, u
     if not np.any(reduced.k):
         return 0.0, 0.0, u
-    # orthonormal rows make the result independent of the closures' units
+    # orthonormal rows make the result independent of the units of the closures
     U, S, B = svd(reduced.H, full_matrices=False)
     right = U.T @ reduced.k / S
     t, u, y = least_factor(B, right, joints.group, joints.scaled)
@@ -92,7 +92,7 @@ def _margin_of(reduced: Reduction) -> tuple[float, float, NDArray]:
 def _margin_bound(
     B: NDArray, right: NDArray, joints: VirtualJoints, y: NDArray
 ) -> float:
-    """Return the certified lower bound: t sum_k |B_k^T y| >= y.right for every y."""
+    """Return the certified lower bound max(0, y.right / sum_k |B_k^T y|)."""
     sizes = cone_sizes(B.T @ y, joints.group)
     scaled = joints.scaled[cone_starts(joints.group)[:-1]]
     work = float(y @ right) - float(sizes[~scaled].sum())

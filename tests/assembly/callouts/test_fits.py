@@ -23,7 +23,9 @@ from forcefit.inputs.table import BadInput
         ("25 H7/p6", (0, 21), (22, 35), (-35, -1), "interference"),
     ],
 )
-def test_fit_has_the_limits_of_the_worked_table(text, hole, shaft, clearance, kind):
+def test_limits_of_a_fit_equal_the_table_of_examples(
+    text, hole, shaft, clearance, kind
+):
     fit = parse_fit(text)
     um = 1e6
     assert np.multiply(fit.hole, um) == pytest.approx(hole)
@@ -52,7 +54,7 @@ def test_sizes_at_the_end_of_a_step_belong_to_it():
     assert limits_of(30.01, "H", 7).upper == pytest.approx(25e-6)
 
 
-def test_width_of_a_grade_is_within_rounding_of_its_tolerance_unit():
+def test_width_of_a_tolerance_grade_equals_its_tolerance_units_up_to_rounding():
     """IT7 = 16 i, i = 0.45 D^(1/3) + 0.001 D at the geometric mean of the step; the
     standard rounds, so the plain formula may miss by one tenth."""
     for low, high in [(6, 10), (18, 30), (50, 80), (120, 180), (250, 315)]:
@@ -62,7 +64,7 @@ def test_width_of_a_grade_is_within_rounding_of_its_tolerance_unit():
         assert width == pytest.approx(16 * unit, rel=0.05)
 
 
-def test_clearance_of_12_h7_g6_has_the_worked_spread():
+def test_clearance_of_fit_12_h7_g6_has_the_spread_computed_by_hand():
     """Uniform sizes: sqrt(18^2/12 + 11^2/12) = 6.09 um diametral; normal at Cp = 1: a
     sixth of the widths, 3.52 um.  Quantiles 0.135, 50, 99.865 % of the radius."""
     fit = parse_fit("12 H7/g6")
@@ -82,7 +84,7 @@ def test_transition_fit_interferes_in_31_percent_of_normal_pairs():
     assert np.mean(fit.draw(numbers, "normal") == 0.0) == pytest.approx(0.31, abs=0.005)
 
 
-def test_hole_at_maximum_material_has_the_worked_sizes():
+def test_hole_at_maximum_material_has_the_sizes_computed_by_hand():
     """12 H7 grows by 18 um; with a position of 0.05 mm (M) a pin of 11.95 mm, the
     virtual size, always fits."""
     size, limits = parse_hole("12 H7")
@@ -109,7 +111,7 @@ TABLE = """
 
 
 @pytest.mark.parametrize("row", TABLE.split("\n")[1:-1])
-def test_table_has_the_195_values_of_the_transcription(row):
+def test_tolerance_table_has_the_195_values_of_the_transcribed_standard(row):
     step, *values = row.split()
     size, values = float(step.split("-")[1]), [float(value) for value in values]
     for grade, width in zip(range(5, 12), values[:7], strict=True):
@@ -134,7 +136,7 @@ def test_table_has_the_195_values_of_the_transcription(row):
         ("1 HJ7/g6", '"HJ7"'),
     ],
 )
-def test_fit_that_cannot_be_used_is_refused_in_one_line(text, message):
+def test_invalid_fit_is_refused_with_a_message_of_one_line(text, message):
     with pytest.raises(BadInput) as error:
         clearance_fit(text)
     assert message in str(error.value)

@@ -17,7 +17,7 @@ from forcefit.inputs.table import BadInput
     [(3, "m", 0.1), (6, "f", 0.05), (6.1, "f", 0.1), (30, "m", 0.2), (120, "m", 0.3),
      (452, "m", 0.8), (2000, "c", 3.0), (4000, "v", 8.0), (400, "f", 0.2)],
 )  # fmt: skip
-def test_length_has_the_tolerance_of_its_class(mm, kind, tolerance):
+def test_general_tolerance_of_a_length_follows_from_its_class(mm, kind, tolerance):
     assert linear_tolerance(mm * 1e-3, kind) == pytest.approx(tolerance * 1e-3)
 
 
@@ -35,7 +35,7 @@ LENGTHS = """
 
 
 @pytest.mark.parametrize("row", LENGTHS.split("\n")[1:-1])
-def test_lengths_have_the_transcribed_tolerances(row):
+def test_general_tolerances_of_lengths_equal_the_transcribed_standard(row):
     length, *values = row.split()
     for kind, value in zip("fmcv", values, strict=True):
         if value != "-":
@@ -43,14 +43,14 @@ def test_lengths_have_the_transcribed_tolerances(row):
             assert found == pytest.approx(float(value) * 1e-3)
 
 
-def test_coarser_class_and_longer_length_are_never_tighter():
+def test_general_tolerance_never_decreases_with_a_coarser_class_or_a_longer_length():
     lengths = np.array([2.9, 5, 20, 100, 300, 900, 1500]) * 1e-3
     table = [[linear_tolerance(x, k) for x in lengths] for k in "fmc"]
     assert (np.diff(table, axis=0) > 0).all()
     assert (np.diff(table, axis=1) >= 0).all()
 
 
-def test_perpendicularity_has_the_width_of_its_class():
+def test_general_tolerance_of_perpendicularity_follows_from_its_class():
     worked = {"H": (0.2, 0.3, 0.4, 0.5), "K": (0.4, 0.6, 0.8, 1.0)}
     for kind, widths in worked.items():
         sides = (0.1, 0.3, 1.0, 3.0)
@@ -68,7 +68,7 @@ def test_length_without_a_value_is_refused(mm, kind):
         linear_tolerance(mm * 1e-3, kind)
 
 
-def test_texts_of_tolerances_are_read():
+def test_texts_of_general_tolerances_are_parsed():
     assert parse_general("ISO 2768-mK") == ("m", "K")
     assert parse_general("ISO 2768 - f") == ("f", "")
     assert parse_length("452 +- 0.1 mm") == pytest.approx((0.452, 1e-4))
@@ -79,7 +79,7 @@ def test_texts_of_tolerances_are_read():
 
 
 @pytest.mark.parametrize("value", ["0.05", "-1 mm", 0, True, [1], "0 mm", "1e9 m"])
-def test_width_that_is_none_is_refused(value):
+def test_text_that_is_not_a_tolerance_width_is_refused(value):
     with pytest.raises(BadInput, match=r"expected a width > 0 such as \"0.05 mm\""):
         parse_width(value)
 
@@ -95,6 +95,6 @@ def test_general_tolerance_of_another_standard_is_refused():
         parse_general("DIN 7168-m")
 
 
-def test_huge_whole_number_is_no_width():
+def test_integer_beyond_the_range_of_floats_is_refused_as_a_width():
     with pytest.raises(BadInput, match="expected a width > 0"):
         parse_width(10**400)

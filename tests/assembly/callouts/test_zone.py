@@ -44,17 +44,19 @@ def reach(zone, height):
 @pytest.mark.parametrize(
     ("height", "um"), [(0, 25), (0.010, 25), (0.050, 125), (0.200, 500)]
 )
-def test_bore_position_reaches_max_of_radius_and_2hr_over_length(height, um):
+def test_bore_position_allows_the_larger_shift_of_radius_and_2hr_over_length(
+    height, um
+):
     assert reach(POSITION, height) == pytest.approx(um * 1e-6, rel=1e-12)
 
 
-def test_bore_position_tilts_at_most_its_width_over_its_length():
+def test_bore_position_limits_the_tilt_to_its_width_over_its_length():
     assert POSITION.support(np.eye(6)[0]) == pytest.approx(2.5e-3, rel=1e-12)
     assert POSITION.support(np.eye(6)[2]) == 0.0
     assert POSITION.support(np.eye(6)[5]) == 0.0
 
 
-def test_perpendicularity_cuts_the_reach_of_a_bore():
+def test_perpendicularity_reduces_the_largest_shift_of_a_bore():
     """Tilt t/L = 1 mrad; reach R + (h - L/2) t/L = 25 + 190 = 215 um at 200 mm."""
     assert BOTH.support(np.eye(6)[1]) == pytest.approx(1e-3, rel=1e-7)
     assert reach(BOTH, 0.200) == pytest.approx(215e-6, rel=1e-7)
@@ -71,7 +73,7 @@ def test_farthest_screw_attains_the_support():
             assert max(sizes) <= 1 + 1e-9
 
 
-def test_uniform_bore_ends_have_the_worked_shift_and_tilt():
+def test_uniform_bore_ends_have_the_shift_and_tilt_computed_by_hand():
     """Ends uniform in their discs: shift R/(2 sqrt 2) = 8.84 um, tilt R/(sqrt 2 L) =
     0.884 mrad, at 50 mm R sqrt(1/8 + (h/L)^2/2) = 45.1 um; closed form and draws."""
     C = POSITION.covariance()
@@ -90,7 +92,7 @@ def test_sizes_of_shift_and_tilt_of_a_bore_are_correlated():
     assert np.corrcoef(tilt, shift)[0, 1] == pytest.approx(-0.52, abs=0.01)
 
 
-def test_perpendicularity_keeps_43_percent_and_raises_the_shift():
+def test_perpendicularity_accepts_43_percent_of_draws_and_increases_their_shift():
     all_screws = drawn(POSITION)
     kept = np.linalg.norm(all_screws[:, :2], axis=1) <= 1e-3
     assert kept.mean() == pytest.approx(0.43, abs=0.005)
@@ -101,7 +103,7 @@ def test_perpendicularity_keeps_43_percent_and_raises_the_shift():
     assert screws[:, 3].std() == pytest.approx(all_screws[kept, 3].std(), rel=0.01)
 
 
-def test_draw_of_one_part_does_not_depend_on_the_others():
+def test_draw_of_one_part_does_not_depend_on_other_parts():
     few = BOTH.draw(lambda a: numbers_of(BOTH, 200)(a)[:50])
     many = BOTH.draw(numbers_of(BOTH, 200))
     assert np.array_equal(few, many[:50])
@@ -115,7 +117,7 @@ def test_uniform_disc_has_half_the_radius_as_deviation():
     assert 1 - disc.inside(square).mean() == pytest.approx(0.215, abs=0.003)
 
 
-def test_normal_position_has_0_27_percent_outside():
+def test_normal_distribution_of_a_position_has_0_27_percent_outside_the_zone():
     """Rayleigh: exp(-R^2/2 s^2) = 0.0027 for s = 0.2908 R = 7.27 um; s = R/3 leaves
     exp(-4.5) = 1.11 % outside."""
     disc = Zone((np.array([[0, 0, 0, 1.0, 0, 0], [0, 0, 0, 0, 1.0, 0]]) / 25e-6,))
@@ -128,7 +130,7 @@ def test_normal_position_has_0_27_percent_outside():
 
 
 @pytest.mark.parametrize("cp", [1.0, 1.33])
-def test_normal_interval_has_three_cp_deviations_to_its_limit(cp):
+def test_limit_of_a_normal_interval_is_three_cp_standard_deviations_from_its_centre(cp):
     assert shift_along(1e-4, [1, 0, 0]).deviation(cp) == pytest.approx(1 / (3 * cp))
 
 
@@ -137,7 +139,7 @@ def test_normal_interval_has_three_cp_deviations_to_its_limit(cp):
     pytest.param(round_plane_position(4e-5, 0.04), marks=pytest.mark.slow),
     pytest.param(plane_position(4e-5, 0.04, 0.03), marks=pytest.mark.slow),
 ])  # fmt: skip
-def test_truncated_draws_stay_in_the_zone_and_have_its_covariance(zone):
+def test_truncated_draws_are_inside_the_zone_and_have_its_covariance(zone):
     screws = drawn(zone, "truncated", 0.6)
     sizes = [np.linalg.norm(screws @ b.T, axis=1).max() for b in zone.bounds]
     assert max(sizes) <= 1 + 1e-9
@@ -147,13 +149,15 @@ def test_truncated_draws_stay_in_the_zone_and_have_its_covariance(zone):
 
 
 @pytest.mark.parametrize("zone", [POSITION, BOTH, round_plane_position(4e-5, 0.04)])
-def test_normal_draws_leave_the_zone_as_often_as_one_dimension(zone):
+def test_normal_draws_leave_the_zone_as_often_as_a_normal_variable_in_one_dimension(
+    zone,
+):
     u = zone.draw(numbers_of(zone), "normal", 0.7)
     # 2 Phi(-2.1) = 3.57 %
     assert 1 - zone.inside(u).mean() == pytest.approx(0.0357, abs=0.0015)
 
 
-def test_plane_zone_is_an_octahedron():
+def test_zone_of_a_rectangular_face_is_an_octahedron():
     """Support g max(|w_TZ|, |w_RX|/B, |w_RY|/A); variance of a cross-polytope in three
     dimensions g^2/10 along each of its axes."""
     g, A, B = 20e-6, 0.020, 0.015
@@ -168,7 +172,7 @@ def test_plane_zone_is_an_octahedron():
     assert C[0, 0] == pytest.approx((g / B) ** 2 / 10, rel=0.01)
 
 
-def test_round_face_zone_is_a_double_cone():
+def test_zone_of_a_round_face_is_a_double_cone():
     """Support g max(|w_TZ|, |(w_RX, w_RY)|/r).  Sections at a height are discs of
     radius (g - |TZ|)/r, so the variances are g^2/10 and 3 (g/r)^2/20."""
     g, r = 20e-6, 0.020
@@ -207,7 +211,7 @@ def test_parallelism_cuts_the_double_cone_of_a_round_face():
 
 
 @pytest.mark.parametrize("size", [0.0, 0.4, 1.0])
-def test_position_in_a_zone_that_grows_depends_on_the_size_alone(size):
+def test_position_in_a_growing_zone_depends_only_on_the_size(size):
     """A size is drawn first, then the position in the zone of that size: uniform in
     the part of the tilts that perpendicularity allows."""
     zone = intersection([
@@ -245,7 +249,7 @@ def test_support_of_a_polyhedron_agrees_with_a_linear_programme():
         assert zone.support(full) == pytest.approx(-found.fun, rel=1e-7)
 
 
-def test_position_in_one_direction_leaves_the_other_exact():
+def test_position_tolerance_in_one_direction_allows_no_error_in_the_other_direction():
     zone = axis_position_along(WIDTH, LENGTH, np.array([1.0, 0.0]))
     assert zone.support(np.eye(6)[3]) == pytest.approx(25e-6)
     assert zone.support(np.eye(6)[1]) == pytest.approx(2.5e-3)
@@ -270,7 +274,7 @@ def test_orientation_in_one_direction_is_an_interval():
     assert zone.support(np.eye(6)[0]) == pytest.approx(0, abs=1e-15)
 
 
-def test_independent_uniform_coordinates_are_no_position_zone():
+def test_independent_uniform_coordinates_do_not_fill_a_round_position_zone():
     """Uniform along x and y: deviation R / sqrt 3 = 14.4 um against 12.5 um in the
     disc, which the largest square around the zone exceeds in 21.5 %."""
     square = intersection([
@@ -318,7 +322,7 @@ def test_zone_at_maximum_material_grows_with_the_hole():
     assert zone.covariance()[3, 3] == pytest.approx(screws[:, 3].var(), rel=0.01)
 
 
-def test_shift_along_a_direction_has_no_part_across_it():
+def test_shift_tolerance_along_a_direction_has_no_component_across_it():
     along = np.array([0.5, np.sqrt(0.75), 0.0])
     zone = shift_along(1e-4, along)
     across = np.concatenate([np.zeros(3), [-along[1], along[0], 0]])
@@ -328,7 +332,7 @@ def test_shift_along_a_direction_has_no_part_across_it():
     assert both.support(across) == pytest.approx(0, abs=1e-18)
 
 
-def test_draws_of_a_wide_zone_within_a_narrow_one_are_those_of_the_narrow_one():
+def test_draws_of_a_wide_zone_that_lie_in_a_narrow_zone_are_distributed_as_its_draws():
     """Position 20 mm within position 0.05 mm on the same bore: the tighter holds."""
     narrow = axis_position(WIDTH, LENGTH)
     zone = intersection([axis_position(20e-3, LENGTH), narrow])

@@ -88,7 +88,7 @@ def test_robot_converted_to_bodies_and_joints_is_equal_elsewhere(robots):
     compare(*(place_robot(robot, joints=step) for robot in robots))
 
 
-def test_balls_and_crosses_are_joints_of_several_freedoms(tmp_path):
+def test_ball_and_universal_joints_are_written_as_joints_of_several_freedoms(tmp_path):
     """The 6-UPS has a universal, a prismatic and a spherical joint in each leg."""
     convert("hexapod", tmp_path / "drawn.toml", version=2)
     text = (tmp_path / "drawn.toml").read_text()
@@ -107,7 +107,7 @@ def test_drawn_robots_are_equal_after_conversion_to_frames_and_back(name, tmp_pa
     compare(*(home_posture(load_robot(path)) for path in files))
 
 
-def test_screw_converted_to_bodies_and_joints_keeps_its_pitch_and_names(tmp_path):
+def test_conversion_of_a_screw_to_bodies_and_joints_keeps_its_pitch_and_names(tmp_path):
     """A turn of the drive lowers the table by the pitch of 5 mm."""
     source = LITERATURE.with_name("robots_drawn") / "screw.toml"
     if not source.exists():
@@ -122,7 +122,7 @@ def test_screw_converted_to_bodies_and_joints_keeps_its_pitch_and_names(tmp_path
     assert turned.pose()["tz"] == pytest.approx(0.4 - 0.005, abs=1e-12)
 
 
-def test_what_bodies_and_joints_cannot_hold_is_reported(run, tmp_path):
+def test_data_that_a_drawing_cannot_represent_are_reported(run, tmp_path):
     """Axes of the platform that are not the base's, as of a flange."""
     status, out, err = run(
         "convert", "arm6", "-o", tmp_path / "arm.toml", "--format", "2", "--json",
@@ -145,7 +145,7 @@ def test_what_bodies_and_joints_cannot_hold_is_reported(run, tmp_path):
      'kind = "geometric_error"\ncomponents = ["TX"]\nform = "constant"\n'
      "parameters = { a = 1e-4 }\n", "effect"),
 ])  # fmt: skip
-def test_robot_that_format_2_cannot_hold_is_refused_in_one_line(
+def test_robot_that_format_2_cannot_describe_is_refused_in_one_line(
     run, tmp_path, monkeypatch, words, text, message
 ):
     monkeypatch.chdir(tmp_path)
@@ -182,7 +182,7 @@ def test_missing_output_folder_is_refused_before_anything_is_written(tmp_path):
     ('between = ["tube", "rod"]', 'between = ["tube", "rood"]',
      'joint "slide".between: found "rood", expected a body or "base"'),
     ("axis2 = [0, 1, 0]", "axis2 = [-90, 0, -32]",
-     'joint "upper".axis2: found it parallel to "axis"'),
+     'joint "upper".axis2: found a direction parallel to "axis"'),
     ('type = "prismatic"', 'type = "helical"\npitch = 0', 'pitch: found 0'),
     ("[[leg]]", '[[body]]\nname = "lost"\n\n[[leg]]', 'body "lost": found no joint'),
 ])  # fmt: skip
@@ -204,7 +204,7 @@ def test_mistake_in_a_drawing_writes_nothing(
     assert [path.name for path in tmp_path.iterdir()] == ["bad.toml"]
 
 
-def test_masses_and_moments_of_inertia_of_one_body_are_joined(tmp_path):
+def test_masses_and_moments_of_inertia_of_one_body_are_added(tmp_path):
     """A rigid body has the frequencies of its parts, which do not move against it."""
     (tmp_path / "heavy.toml").write_text(
         ALONE.replace(
@@ -227,7 +227,7 @@ def test_masses_and_moments_of_inertia_of_one_body_are_joined(tmp_path):
     np.testing.assert_allclose(found, expected, rtol=1e-10)
 
 
-def test_directions_of_a_mesh_are_kept(tmp_path):
+def test_directions_of_a_mesh_are_unchanged_by_conversion(tmp_path):
     """From base to tip, and of its height, in the axes of the base at home."""
     mesh = Path(__file__).parents[3] / "meshes" / "distal_plain.stl"
     (tmp_path / "mesh.toml").write_text(
@@ -297,7 +297,7 @@ frames = ["rod", "plate"]
 
 
 @pytest.mark.parametrize("text", [BALL_ON_A_TABLE, ROD_TO_THE_PLATE_AND_FLAG])
-def test_names_of_bodies_and_joints_stay_different_in_conversions(text, tmp_path):
+def test_names_of_bodies_and_joints_remain_unique_after_conversion(text, tmp_path):
     """A ball with an error of its last frame, and a body that joins another."""
     (tmp_path / "given.toml").write_text(text)
     convert(tmp_path / "given.toml", tmp_path / "frames.toml", version=1)

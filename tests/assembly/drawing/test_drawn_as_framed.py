@@ -66,7 +66,7 @@ def postures(pair):
         yield place_robot(drawn, pose), place_robot(expected, pose)
 
 
-def test_drawn_robots_stand_where_framed_ones_do(pair):
+def test_robots_of_both_formats_have_the_same_poses(pair):
     """The platform's origin, and its rotation from home: axes there are the base's."""
     home = home_posture(pair[1]).platform[:3, :3]
     for drawn, expected in postures(pair):
@@ -75,7 +75,7 @@ def test_drawn_robots_stand_where_framed_ones_do(pair):
         assert np.abs(drawn.platform - reference).max() < SAME
 
 
-def test_drawn_robots_are_as_stiff_as_framed_ones(pair):
+def test_drawn_robots_have_the_same_stiffness_as_robots_defined_by_frames(pair):
     """Entries divided by the root of the diagonal's, so that rad and m weigh alike."""
     for drawn, expected in postures(pair):
         C = platform_stiffness(drawn).compliance
@@ -84,7 +84,7 @@ def test_drawn_robots_are_as_stiff_as_framed_ones(pair):
         assert np.abs((C - reference) / np.outer(size, size)).max() < SAME
 
 
-def test_drawn_robots_have_the_energy_of_framed_ones(pair):
+def test_drawn_robots_have_the_same_energy_as_robots_defined_by_frames(pair):
     """Under a load and weight, clearances at their bounds."""
     drawn, expected = (home_posture(robot) for robot in pair[:2])
     found = solve_assembly(drawn, LOAD, gravity=GRAVITY)
@@ -92,7 +92,7 @@ def test_drawn_robots_have_the_energy_of_framed_ones(pair):
     assert found.energy == pytest.approx(reference.energy, rel=SAME)
 
 
-def test_drawn_robots_move_as_framed_ones(pair):
+def test_drawn_robots_have_the_same_motions_as_robots_defined_by_frames(pair):
     drawn, expected = (mobility(home_posture(robot)) for robot in pair[:2])
     assert drawn.freedoms == expected.freedoms
     assert drawn.platform_freedoms == expected.platform_freedoms
@@ -100,7 +100,7 @@ def test_drawn_robots_move_as_framed_ones(pair):
 
 
 @pytest.mark.parametrize("place", ["left.drive", "left.elbow", "right.elbow", "pin"])
-def test_an_error_of_a_drawn_joint_is_that_of_its_frame(place, tmp_path):
+def test_error_of_a_drawn_joint_equals_the_error_of_its_frame(place, tmp_path):
     """In the joint's axes, before its motion; five_bar's pin is of its left arm."""
     error = [1e-4, -2e-4, 3e-4, 1e-5, 2e-5, -3e-5]
     path = tmp_path / "drawn.toml"

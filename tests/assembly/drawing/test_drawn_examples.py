@@ -22,7 +22,7 @@ EXAMPLES = {
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_examples_are_short(name):
+def test_files_of_drawn_example_robots_are_short(name):
     most = EXAMPLES[name][0]
     assert len((DRAWN / f"{name}.toml").read_text().splitlines()) <= most
 
@@ -43,7 +43,7 @@ def test_the_tricept_is_as_stiff_along_z_as_its_drives():
     assert K[5, 5] == pytest.approx(3 * 1.5e8 * 81 / 85, rel=1e-12)
 
 
-def test_the_tricept_turns_only_as_its_tube_does():
+def test_tricept_platform_rotates_with_its_tube():
     """Its flange is at right angles to the line from the cross."""
     robot = load_robot(DRAWN / "tricept.toml")
     at = place_robot(robot, {"tx": 0.1, "ty": -0.05, "tz": -0.9}).platform
@@ -59,7 +59,7 @@ def test_the_agile_eye_turns_about_its_centre():
 
 
 @pytest.mark.parametrize("ending", ["toml", "xml", "urdf"])
-def test_drawn_robots_convert_to_other_files(ending, tmp_path):
+def test_drawn_robots_are_converted_to_files_of_other_programs(ending, tmp_path):
     """What is written is read again, and its bodies compared."""
     found = convert(DRAWN / "three_upu.toml", tmp_path / f"upu.{ending}")
     assert found.difference < 1e-12
@@ -68,7 +68,7 @@ def test_drawn_robots_convert_to_other_files(ending, tmp_path):
     assert np.abs(home_posture(back).platform[:3, 3] - expected[:3, 3]).max() < 1e-12
 
 
-def test_numbers_of_a_drawn_robot_can_be_varied():
+def test_numbers_of_a_drawn_robot_can_be_varied_in_a_sweep():
     """Those of its frames, in every leg at once: k along z of a 3-UPU is 3 k cos^2."""
     design = load_design(DRAWN / "three_upu.toml")
     values = {"slide.joint_stiffness.tz": 1e3}

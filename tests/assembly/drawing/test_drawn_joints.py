@@ -56,7 +56,7 @@ def axes():
 
 
 @pytest.mark.parametrize("kind", [*FREE, "universal"])
-def test_a_joint_leaves_its_free_screws(kind):
+def test_relative_motion_of_a_joint_is_spanned_by_its_free_screws(kind):
     """The screws of its frames span those of the table, at the base's origin."""
     drawn = robot(joint(kind))
     screws = motion_screws(drawn, home_posture(drawn).transforms)[mobile(drawn)]
@@ -75,7 +75,7 @@ def test_a_joint_leaves_its_free_screws(kind):
     ("revolute", [*(0.3 * AXIS)]), ("prismatic", [*(0.3 * AXIS)]),
 ])  # fmt: skip
 @pytest.mark.parametrize("reverse", [False, True])
-def test_a_coordinate_moves_the_second_body_along_the_axis(kind, step, reverse):
+def test_joint_coordinate_moves_the_second_body_along_the_axis(kind, step, reverse):
     """Relative to the first; so it does from the second body to the first."""
     ends = ("table", "base") if reverse else ("base", "table")
     drawn = robot(joint(kind, *ends, actuated=True, position=0.2))
@@ -100,7 +100,7 @@ def numbers(rng, free):
 
 
 @pytest.mark.parametrize("kind", ["revolute", "prismatic", "helical"])
-def test_a_joint_written_the_other_way_is_the_same(kind):
+def test_joint_with_exchanged_bodies_describes_the_same_robot(kind):
     """Bodies exchanged, z turned round: rows y and z of its numbers change sign."""
     rng = np.random.default_rng(5)
     given = numbers(rng, 5 if kind == "prismatic" else 2)
@@ -127,7 +127,7 @@ def test_a_joint_written_the_other_way_is_the_same(kind):
 
 
 @pytest.mark.parametrize("kind", FREE)
-def test_an_error_of_a_joint_is_in_its_axes(kind):
+def test_error_of_a_joint_is_expressed_in_the_axes_of_the_joint(kind):
     """Whatever frames it is made of: the screw moves the table as the joint's does."""
     error = np.array([1e-4, -2e-4, 3e-4, 1e-5, -2e-5, 3e-5])
     drawn = robot(
@@ -141,7 +141,7 @@ def test_an_error_of_a_joint_is_in_its_axes(kind):
     assert [sorted(size) for size in sizes] == [sorted(2 * abs(error))]
 
 
-def test_an_error_of_a_bearing_is_in_its_axes():
+def test_error_of_a_bearing_is_expressed_in_the_axes_of_the_bearing():
     """Of a cross: z is the bearing's axis, x the part of the other one across it."""
     errors = np.diag(np.arange(1, 7) * 1e-5)[[0, 5]]
     both = tuple(JointNumbers(error=error) for error in errors)
@@ -157,7 +157,7 @@ def test_an_error_of_a_bearing_is_in_its_axes():
 
 
 @pytest.mark.parametrize("kind", ["spherical", "cylindrical", "planar"])
-def test_springs_of_a_joint_act_once(kind):
+def test_springs_of_a_joint_of_several_frames_act_only_once(kind):
     """A table held by one joint with springs, and drives in its free motions' place."""
     K = np.array([2e3, 3e3, 5e3, 2e6, 3e6, 5e6])
     free = {"spherical": [0, 1, 2], "cylindrical": [2, 5], "planar": [2, 3, 4]}[kind]
@@ -170,7 +170,7 @@ def test_springs_of_a_joint_act_once(kind):
     assert np.abs((found.stiffness - stiff) / np.outer(size, size)).max() < 1e-12
 
 
-def test_a_link_is_the_same_from_either_end():
+def test_link_has_the_same_stiffness_from_either_end():
     """A stiffness read at one joint, and the same link read at the other."""
     rng = np.random.default_rng(3)
     root = rng.normal(size=(6, 6))

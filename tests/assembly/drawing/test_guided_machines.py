@@ -68,7 +68,7 @@ def sprung_slide(drawn, clearance=SLIDE, mass=""):
     )  # fmt: skip
 
 
-def test_a_force_presses_the_block_flat_and_frees_two_motions(drawn):
+def test_force_presses_a_block_flat_onto_its_pad_and_leaves_two_free_motions(drawn):
     """FX holds TX, RY and RZ at four contacts; TY and RX keep their clearance."""
     posture = home_posture(sprung_slide(drawn))
     found = platform_stiffness(posture, "contact", load=[0, 0, 0, 50.0, 0, 0])
@@ -100,7 +100,7 @@ def test_loads_press_the_block_against_the_sides_of_its_guide(load, expected, dr
     assert found.energy == pytest.approx((np.array(load) ** 2 / K).sum() / 2, rel=1e-7)
 
 
-def test_measured_rows_of_a_guided_arm_rest_on_the_sides_of_the_guide(drawn):
+def test_predicted_readings_of_a_guided_arm_rest_on_the_sides_of_the_guide(drawn):
     """Readings under two loads, and again with the clearances held where they rest."""
     loads = np.array([[0, 0, 0, 100.0, 40.0, 0], [0, 0, 0, -100.0, 40.0, 0]])
     posture = home_posture(sprung_slide(drawn))
@@ -139,7 +139,7 @@ def mounted(drawn, error):
 ERROR = [5e-4, -8e-4, 9e-4, 3e-5, -4e-5, 0.0]
 
 
-def test_closing_a_guided_loop_in_a_step_needs_the_assembly_energy(drawn):
+def test_step_that_closes_a_guided_loop_does_work_equal_to_the_assembly_energy(drawn):
     """The contacts of a guide hold from the beginning; a step closes the loop."""
     posture = mounted(drawn, ERROR)
     (pair,) = loops(posture.robot)
@@ -150,7 +150,7 @@ def test_closing_a_guided_loop_in_a_step_needs_the_assembly_energy(drawn):
     assert found.energy == pytest.approx(energy, rel=1e-6)
 
 
-def test_the_paper_s_problem_as_printed_has_the_energy_of_a_guide(drawn):
+def test_energy_of_a_guide_equals_that_of_the_problem_printed_in_the_paper(drawn):
     """All screws kept in cvxpy, no elimination: frames and closures are the same."""
     posture = mounted(drawn, ERROR)
     printed, _ = energy_as_printed(posture)
@@ -179,7 +179,7 @@ def test_worst_case_of_a_guided_arm_is_the_farthest_corner(drawn):
         assert sum(size for _, size in found.shares) == pytest.approx(most, rel=1e-6)
 
 
-def test_positions_in_contact_are_corners_of_the_slabs(drawn):
+def test_positions_in_contact_are_at_corners_of_the_clearance_set_of_a_guide(drawn):
     """Pressed by any wrench the block rests at a corner: at five of the eight slabs."""
     posture = home_posture(drawn(
         body("table"), joint("slide", "prismatic", "base", "table", Z, SLIDE, DRIVEN)
@@ -193,7 +193,7 @@ def test_positions_in_contact_are_corners_of_the_slabs(drawn):
     assert (touching[:, 3:] > 1 - 1e-6).all()
 
 
-def test_a_sweep_of_a_guided_robot_has_the_energies_by_hand(drawn):
+def test_energies_in_a_sweep_of_a_guided_robot_equal_hand_calculation(drawn):
     """FX at the table, q from the spring: F^2 / 2 K_TX + (q F)^2 / 2 K_RY."""
     found = sweep(
         sprung_slide(drawn), grid="q.slide=0:0.04:0.02", assumption="none",
@@ -208,7 +208,9 @@ def test_a_sweep_of_a_guided_robot_has_the_energies_by_hand(drawn):
     ("prismatic", GUIDE), ("planar", PAD)
 ])  # fmt: skip
 @pytest.mark.parametrize("reverse", [False, True])
-def test_errors_of_either_body_need_no_clearance(kind, clearance, reverse, drawn):
+def test_errors_of_either_body_of_a_contact_are_accepted_without_clearance(
+    kind, clearance, reverse, drawn
+):
     """In a serial arm errors before and after the contacts move the platform alone."""
     ends = ("table", "base") if reverse else ("base", "table")
     robot = drawn(
@@ -220,7 +222,7 @@ def test_errors_of_either_body_need_no_clearance(kind, clearance, reverse, drawn
     assert zone_margin(home_posture(robot.with_errors(errors))).margin == 0.0
 
 
-def test_closures_between_contacts_are_no_loops_of_other_programs(drawn, tmp_path):
+def test_closures_between_contacts_are_not_exported_as_loops(drawn, tmp_path):
     """MJCF has one weld for the loop of two guides, and results name one closure."""
     posture = mounted(drawn, ERROR)
     assert contact_closures(posture.robot).sum() == 1
@@ -232,7 +234,7 @@ def test_closures_between_contacts_are_no_loops_of_other_programs(drawn, tmp_pat
     assert [tuple(one["frames"]) for one in closures] == list(loops(posture.robot))
 
 
-def test_chains_of_bounded_clearances_are_a_loop_of_the_mechanism():
+def test_chain_of_bounded_clearances_is_counted_as_a_loop_of_the_mechanism():
     """Two shafts in bores between the same bodies: six over-constraints, counted."""
     bore = Clearance(radial=1e-5, tilt=1e-4)
     frames = (
@@ -265,7 +267,7 @@ def test_only_a_fixed_joint_may_have_an_unbounded_clearance(tmp_path):
 
 
 @pytest.mark.exudyn
-def test_a_simulated_arm_without_clearance_takes_errors_of_every_frame(drawn, rng):
+def test_simulated_arm_without_clearance_accepts_errors_of_every_frame(drawn, rng):
     """Tight contacts are one rigid guide: only the load bends the spring, F^2 / 2 K."""
     robot = without_clearance(sprung_slide(drawn))
     robot = robot.with_errors(1e-4 * rng.uniform(-1, 1, size=(len(robot.frames), 6)))

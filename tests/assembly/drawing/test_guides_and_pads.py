@@ -24,6 +24,7 @@ from forcefit.assembly.linear.energy import solve_assembly
 from forcefit.assembly.linear.pose_error import bound_pose_error
 from forcefit.assembly.linear.reference.pose_error import reachable_screws
 from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.model.joint_names import joint_of
 from forcefit.assembly.statistics.clearance_positions import position_clearances
 from forcefit.assembly.statistics.linear_response import linear_response
 from forcefit.validation.crosscheck.crosscheck import crosscheck
@@ -138,7 +139,7 @@ def errors_of(seed):
     ("prismatic", GUIDE, guide_slabs(), [5]), ("planar", PAD, pad_slabs(), [2, 3, 4])
 ])  # fmt: skip
 @pytest.mark.parametrize("seed", range(3))
-def test_the_energy_of_a_forced_guide_equals_that_of_its_slabs_in_cvxpy(
+def test_energy_of_a_forced_guide_equals_that_of_its_inequalities_solved_by_cvxpy(
     seed, kind, clearance, slabs, free, drawn
 ):
     """Least v K v / 2 of a spring's screw v; v + clearance + error close the loop."""
@@ -181,7 +182,7 @@ def two_guide_slabs():
 
 
 @pytest.mark.parametrize("method", ["compiled", "reference"])
-def test_the_margin_of_two_rigid_guides_is_that_of_a_linear_programme(
+def test_margin_of_two_rigid_guides_equals_that_of_a_linear_programme(
     method, drawn, rng
 ):
     """Least t with abs(slabs (x - error of the guide)) <= t on both guides."""
@@ -200,7 +201,7 @@ def test_the_margin_of_two_rigid_guides_is_that_of_a_linear_programme(
         assert found.margin == pytest.approx(least.fun, rel=1e-6)
 
 
-def test_pose_errors_of_two_rigid_guides_are_those_of_a_linear_programme(drawn, rng):
+def test_pose_errors_of_two_rigid_guides_equal_those_of_a_linear_programme(drawn, rng):
     """The table may be where both guides allow it: support function and reach."""
     posture = on_two_guides(drawn, np.zeros(6), passive=False)
     slabs = two_guide_slabs()
@@ -227,7 +228,7 @@ def test_pose_errors_of_two_rigid_guides_are_those_of_a_linear_programme(drawn, 
         assert reach >= low * (1 - 0.02)
 
 
-def test_two_guides_on_springs_have_the_energy_of_their_slabs(drawn, rng):
+def test_energy_of_two_guides_on_springs_equals_that_of_their_inequalities(drawn, rng):
     """An over-constrained pair: spring of the second guide, errors beyond the gaps."""
     import cvxpy as cp
 
@@ -268,7 +269,7 @@ def test_both_exact_methods_agree_on_a_forced_guide(kind, clearance, drawn):
 @pytest.mark.parametrize(("kind", "clearance"), [
     ("prismatic", GUIDE), ("planar", PAD)
 ])  # fmt: skip
-def test_finite_motions_of_a_guide_differ_from_small_ones_by_the_square(
+def test_finite_motions_of_a_guide_differ_from_small_ones_by_second_order(
     kind, clearance, drawn
 ):
     """Errors and clearances times s = 1, 1/2, 1/4: energies, s^2, differ by s^3."""
@@ -299,7 +300,7 @@ def test_uniform_positions_on_a_pad_fill_the_octahedron_evenly(drawn):
     np.testing.assert_allclose((screws**2).mean(axis=0), 0.1, atol=4 * 0.0036)
 
 
-def test_uniform_positions_in_a_guide_are_those_of_rejection(drawn, rng):
+def test_uniform_positions_in_a_guide_agree_with_rejection_sampling(drawn, rng):
     """Mean squares of the five small motions, against samples of the slabs."""
     found = uniform_screws(one_joint(drawn, "prismatic", GUIDE), 1500)[:, :5]
     box = np.array([2.5e-4, 2.5e-4, 5e-4, C, C])
@@ -319,7 +320,7 @@ def uniform_screws(posture, count):
 
 
 @pytest.mark.parametrize("version", [1, 2])
-def test_a_guide_is_the_same_in_a_file_of_either_format(version, drawn, tmp_path):
+def test_guide_has_the_same_clearance_in_both_file_formats(version, drawn, tmp_path):
     posture = on_two_guides(drawn, [3e-4, 2e-4, 1e-4, 4e-5, -4e-5, 0], passive=False)
     write_robot(posture.robot, tmp_path / "frames.toml")
     convert(tmp_path / "frames.toml", tmp_path / "again.toml", version=version)
@@ -327,3 +328,13 @@ def test_a_guide_is_the_same_in_a_file_of_either_format(version, drawn, tmp_path
     one, other = (zone_margin(own).margin for own in (posture, again))
     assert other == pytest.approx(one, rel=1e-9)
     assert mobility(again).overconstraint == mobility(posture).overconstraint == 5
+
+
+@pytest.mark.parametrize(("kind", "clearance"), [("prismatic", GUIDE), ("planar", PAD)])
+@pytest.mark.parametrize("reverse", [False, True])
+def test_every_frame_of_a_contact_belongs_to_the_drawn_joint(
+    drawn, kind, clearance, reverse
+):
+    robot = one_joint(drawn, kind, clearance, reverse).robot
+    names = {joint_of(robot, row) for row in range(len(robot.frames))}
+    assert names == {"j", "table"}

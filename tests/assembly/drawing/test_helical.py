@@ -42,7 +42,7 @@ def test_screw_lift_has_one_freedom_and_three_redundant_constraints(read):
     assert (found.freedoms_drives_locked, found.redundant_constraints) == (0, 3)
 
 
-def test_turn_of_the_screw_moves_the_table_by_the_pitch(read):
+def test_one_turn_of_the_screw_moves_the_table_by_its_lead(read):
     """Down if a right-hand screw turns about +z, up if a left-hand one does."""
     for text, step in ((LIFT, -0.005), (LIFT.replace('"5 mm"', '"-5 mm"'), 0.005)):
         pose = place_robot(read(text), joints={"bearing": 2 * np.pi}).pose()
@@ -50,7 +50,7 @@ def test_turn_of_the_screw_moves_the_table_by_the_pitch(read):
         assert list(pose.values()) == pytest.approx(expected, abs=1e-14)
 
 
-def test_height_of_the_table_needs_eighty_turns_of_the_screw(read):
+def test_full_height_of_the_table_requires_eighty_turns_of_the_screw(read):
     at = place_robot(read(), pose={"tz": 0.8})
     angle = at.coordinates[at.robot.index("bearing")]
     assert angle == pytest.approx(-80 * 2 * np.pi, rel=1e-12)
@@ -66,7 +66,7 @@ def test_compliance_of_the_table_is_lead_squared_over_drive_stiffness(method, re
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_energy_under_a_load_is_that_of_the_drive_spring(method, read):
+def test_energy_under_a_load_equals_that_of_the_drive_spring(method, read):
     """F^2 lead^2 / 2 k, with finite motions too: the table moves straight."""
     at, load = home_posture(read()), [0, 0, 0, 0, 0, 1000.0]
     found = solve_assembly(at, load, method=method)
@@ -84,7 +84,7 @@ def test_weight_of_the_table_turns_the_drive_by_its_moment(read):
     assert turn == pytest.approx(8 * 9.81 * LEAD / 200, rel=1e-12)
 
 
-def test_frequency_of_the_table_is_that_of_its_mass_on_the_screw(read):
+def test_frequency_of_the_table_equals_that_of_its_mass_on_the_screw(read):
     found = natural_modes(home_posture(read()))
     expected = np.sqrt(200 / LEAD**2 / 8) / (2 * np.pi)
     assert found.frequencies == pytest.approx([expected], rel=1e-9)
@@ -102,7 +102,7 @@ def test_rotation_error_of_the_screw_lowers_the_table_by_its_lead(read):
     np.testing.assert_allclose(drawn.platform_screw[:, 5], [-0.3 * LEAD, 0.3 * LEAD])
 
 
-def test_sweep_of_heights_has_the_error_of_the_pitch_everywhere(read):
+def test_sweep_of_heights_has_the_error_of_the_pitch_at_every_height(read):
     robot, errors = read(), np.zeros((6, 6))
     errors[robot.index("bearing"), 2] = 1e-3
     data = sweep_poses(robot.with_errors(errors), {"tz": np.array([0.3, 0.4, 0.5])})
@@ -122,7 +122,9 @@ def test_differential_screw_moves_by_the_difference_of_its_pitches(read):
 @pytest.mark.parametrize(("guide", "row", "most"), [
     ("revolute", 2, 25e-6 / 0.004 * 2 * np.pi), ("prismatic", 5, 25e-6),
 ])  # fmt: skip
-def test_nut_clearance_is_axial_or_a_rotation_by_the_thread(guide, row, most, read):
+def test_clearance_of_a_nut_allows_an_axial_motion_or_a_rotation_along_the_thread(
+    guide, row, most, read
+):
     """Tr 16 x 4, 50 um from flank to flank: 25 um, or 39.3 mrad with TZ held."""
     robot = read(NUT.replace('"revolute"', f'"{guide}"'))
     bound = bound_pose_error(solve_assembly(home_posture(robot)))
@@ -162,7 +164,7 @@ def test_compiled_reference_and_printed_energies_of_a_loaded_lift_agree(seed, re
     assert expected.energy > 1e-3
 
 
-def test_readings_of_lifts_that_differ_in_pitch_are_those_of_their_own(read):
+def test_lifts_of_different_pitch_have_readings_by_their_own_pitch(read):
     """At the same frames, an error of 1 mrad moves the tables by their own lead."""
     for pitch in (0.005, 0.009):
         robot = read(LIFT.replace('"5 mm"', str(pitch)))

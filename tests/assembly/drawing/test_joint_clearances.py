@@ -72,7 +72,9 @@ def heights(posture, directions):
 @pytest.mark.parametrize(("height", "expected"), [
     (0.0, 10e-6), (0.02, 10e-6), (0.1, 50e-6), (-0.1, 50e-6)
 ])  # fmt: skip
-def test_a_shaft_in_a_bore_reaches_as_its_ends_allow(kind, height, expected, one_joint):
+def test_motion_of_a_shaft_in_a_bore_is_limited_by_the_clearance_at_its_ends(
+    kind, height, expected, one_joint
+):
     """c max(1, 2 |h| / L), on the axis; a cylindrical joint slides beside it."""
     posture = one_joint(kind, BORE, [0, 0, height])
     if kind == "revolute":
@@ -90,7 +92,7 @@ def bore_support(w, c=C, length=L):
 
 
 @pytest.mark.parametrize("reverse", [False, True])
-def test_the_set_of_a_bore_is_exactly_that_of_its_two_ends(reverse, one_joint, rng):
+def test_small_screws_of_a_bore_equal_those_of_its_two_ends(reverse, one_joint, rng):
     """By its support function, its volume, and members drawn without the program."""
     wrenches = rng.normal(size=(40, 6)) * [1 / L, 1 / L, 0, 1, 1, 0]
     posture = one_joint("revolute", BORE, reverse=reverse)
@@ -113,7 +115,7 @@ def test_the_set_of_a_bore_is_exactly_that_of_its_two_ends(reverse, one_joint, r
     assert ((screws @ wrenches.T) <= found * (1 + 1e-7)).all()
 
 
-def test_the_reach_of_a_bore_is_that_of_finite_shafts(one_joint):
+def test_largest_motion_of_a_shaft_in_a_bore_equals_that_of_finite_geometry(one_joint):
     """Straight lines through points of the two rims; offset of their point at h."""
     angles = np.linspace(0, 2 * np.pi, 61)
     rim = C * np.stack([np.cos(angles), np.sin(angles)], axis=1)
@@ -135,7 +137,9 @@ BEARINGS = (
 
 
 @pytest.mark.parametrize("reverse", [False, True])
-def test_two_bearings_bound_the_axis_at_their_places(reverse, one_joint):
+def test_two_bearings_limit_the_motion_of_the_axis_at_their_positions(
+    reverse, one_joint
+):
     """e(h) is linear between e(-20 mm) <= 10 um and e(60 mm) <= 5 um."""
     for h, expected in ((-0.02, 10e-6), (0.06, 5e-6), (0.14, 20e-6), (-0.1, 25e-6)):
         posture = one_joint("cylindrical", BEARINGS, [0, 0, h], reverse=reverse)
@@ -144,14 +148,14 @@ def test_two_bearings_bound_the_axis_at_their_places(reverse, one_joint):
             assert found == pytest.approx(expected, rel=1e-7)
 
 
-def test_axial_and_spin_of_a_bore_stay_bounds_of_their_own(one_joint):
+def test_axial_motion_and_spin_in_a_bore_have_separate_bounds(one_joint):
     posture = one_joint("revolute", BORE + ', axial = "5 um", spin = "1 mrad"')
     along, turn = heights(posture, [[0, 0, 0, 0, 0, 1], [0, 0, 1, 0, 0, 0]])
     assert along == pytest.approx(5e-6, rel=1e-7)
     assert turn == pytest.approx(1e-3, rel=1e-7)
 
 
-def test_a_round_guide_slides_and_its_key_bounds_its_roll(one_joint):
+def test_round_guide_is_free_to_slide_and_its_key_bounds_its_roll(one_joint):
     """Key with a gap of 20 um at a radius of 20 mm: 1 mrad."""
     posture = one_joint("prismatic", BORE + ", spin = 1e-3")
     turn, aside = heights(posture, [[0, 0, 1, 0, 0, 0], [0, 0, 0, 0.6, 0.8, 0]])
@@ -161,7 +165,7 @@ def test_a_round_guide_slides_and_its_key_bounds_its_roll(one_joint):
 
 
 @pytest.mark.parametrize("driven", [False, True])
-def test_a_nut_has_the_bore_of_its_length_and_a_backlash_along_its_thread(
+def test_nut_has_the_clearance_of_a_bore_and_a_backlash_along_its_thread(
     driven, one_joint
 ):
     """Tr 16 x 4, 50 um from flank to flank: |TZ - h RZ| <= 25 um, h = 4 mm / 2 pi."""
@@ -175,7 +179,7 @@ def test_a_nut_has_the_bore_of_its_length_and_a_backlash_along_its_thread(
     assert mobility(posture).drives == driven
 
 
-def test_only_the_own_frame_of_a_driven_joint_is_its_drive(one_joint):
+def test_only_the_main_frame_of_a_driven_joint_is_its_drive(one_joint):
     keys = "axis = [0, 0, 1]\nactuated = true\nposition = 0.1\nlimits = [0, 1]"
     for text in (BORE, GUIDE):
         posture = one_joint("prismatic", text, keys=keys)
@@ -204,7 +208,9 @@ def test_a_cross_adds_the_clearances_of_its_two_bearings(axis2, one_joint):
         assert found == pytest.approx(expected, rel=1e-7)
 
 
-def test_a_ball_joint_reaches_its_gap_and_turns_freely(one_joint, rng):
+def test_ball_joint_moves_up_to_its_gap_in_every_direction_and_turns_freely(
+    one_joint, rng
+):
     posture = one_joint("spherical", 'ball = "10 um"', keys="")
     assert reach(posture) == pytest.approx(C, abs=1e-9)
     directions = rng.normal(size=(10, 3))
@@ -213,7 +219,7 @@ def test_a_ball_joint_reaches_its_gap_and_turns_freely(one_joint, rng):
     assert mobility(posture).freedoms == 3
 
 
-def test_a_guide_reaches_its_largest_motions_one_by_one(one_joint):
+def test_guide_reaches_the_largest_motion_of_each_component_separately(one_joint):
     """10 um, 80 by 40 by 30 mm: yaw and pitch 2 c / L, roll 2 c / w."""
     posture = one_joint("prismatic", GUIDE)
     expected = [0.25e-3, 0.25e-3, 0.5e-3, 1e-5, 1e-5]
@@ -237,7 +243,7 @@ def test_a_guide_may_have_different_gaps_and_axes(one_joint):
     ("spherical", 'ball = "10 um"'), ("prismatic", GUIDE), ("planar", PAD),
     ("revolute", BEARINGS),
 ])  # fmt: skip
-def test_contacts_change_no_count_of_mobility(kind, clearance, one_joint, tmp_path):
+def test_contacts_do_not_change_the_mobility(kind, clearance, one_joint, tmp_path):
     """And they are the same in the frames that are written."""
     keys = "axis = [0, 0, 1]\naxis2 = [0, 1, 0]"
     bare, own = (mobility(one_joint(kind, text, keys=keys)) for text in ("", clearance))
@@ -294,7 +300,9 @@ STIFFNESS = [2e3, 3e3, 1e3, 2e6, 1e6, 4e6]
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_the_energy_of_a_forced_bore_equals_that_of_its_ends_in_cvxpy(seed, held_shaft):
+def test_energy_of_a_forced_bore_equals_that_of_its_two_ends_solved_by_cvxpy(
+    seed, held_shaft
+):
     """Least v K v / 2 of a spring's screw v; v + clearance + error close the loop."""
     import cvxpy as cp
 
@@ -314,7 +322,7 @@ def test_the_energy_of_a_forced_bore_equals_that_of_its_ends_in_cvxpy(seed, held
     assert found.energy == pytest.approx(problem.value * 1e-6, rel=1e-6)
 
 
-def test_a_bore_has_the_energy_of_a_pin_in_two_bushes(held_shaft, rng):
+def test_energy_of_a_bore_equals_that_of_a_pin_in_two_bushes(held_shaft, rng):
     """Bushes at +-20 mm: radial 10 um, tilt 10 um / 20 mm, as one pair of discs."""
     for _ in range(4):
         error = rng.normal(size=6) * [1e-3, 1e-3, 1e-3, 2e-5, 2e-5, 2e-5]
@@ -342,7 +350,7 @@ def test_both_exact_methods_agree_with_contacts(clearance, held_shaft):
 
 
 @pytest.mark.parametrize("clearance", [BORE, 'ball = "10 um"'])
-def test_the_exact_model_differs_from_the_linear_one_by_the_square(
+def test_exact_model_differs_from_the_linear_model_by_second_order(
     clearance, held_shaft
 ):
     """Errors and clearances times 1, 1/2, 1/4: platform screws differ by 1/4, 1/16."""

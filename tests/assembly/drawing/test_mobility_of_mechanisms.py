@@ -214,19 +214,19 @@ def test_the_seoul_robot_has_three_freedoms_away_from_home():
     assert mobility(at).overconstraint == 0
 
 
-def test_tsais_robot_keeps_its_freedoms_away_from_home():
+def test_tsais_robot_has_the_same_freedoms_away_from_home():
     at = place_robot(three_upu(Y), {"tx": 0.05, "ty": 0.02, "tz": 0.5})
     assert counts(at) == (3, 3, 0, 0, 0)
     rotation = [at.pose()[key] for key in ("rx", "ry", "rz")]
     assert rotation == pytest.approx([0.0] * 3, abs=1e-9)
 
 
-def test_other_lengths_than_bennetts_are_rigid():
+def test_four_bar_with_lengths_that_violate_bennetts_condition_is_rigid():
     """An axis turned by 0.1 rad changes two twists."""
     assert counts(home_posture(bennett(0.1)))[0] == 0
 
 
-def test_crosses_with_an_axis_along_their_leg_let_it_turn_at_home():
+def test_universal_joints_with_an_axis_along_their_leg_let_the_leg_turn_at_home():
     """9 freedoms and 3 redundant constraints there; 6 and none at a pose nearby."""
     robot = gough("universal", axis_along=True)
     home = home_posture(robot)

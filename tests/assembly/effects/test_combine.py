@@ -65,7 +65,9 @@ def standing():
 
 
 @pytest.mark.parametrize("name", IN_TURN)
-def test_combined_effect_predicts_the_same_reading_as_both_in_turn(name, standing):
+def test_combined_effect_predicts_the_same_reading_as_both_effects_applied_in_turn(
+    name, standing
+):
     declared, found = ({name: values} for values in IN_TURN[name])
     in_turn = predict(apply_effects(apply_effects(standing, declared), found)).deviation
     once = predict(apply_effects(standing, combined(declared, found))).deviation
@@ -86,7 +88,7 @@ def test_combined_joint_clearances_are_their_sums():
     assert both["joint_clearance"] == pytest.approx({"a.radial": 3e-5, "a.tilt": 1e-4})
 
 
-def test_different_effects_are_combined_without_change():
+def test_effects_at_different_places_are_combined_without_change():
     declared = {"drift": {"amplitude.tz": 1e-5, "time_constant": 60.0}}
     found = {"encoder_offset": {"a": 1e-4}}
     assert combined(declared, found) == declared | found

@@ -162,7 +162,7 @@ def test_modulus_scale_divides_the_bending_deflection():
     assert seen[4] == pytest.approx(bent * (1 / factor - 1), rel=1e-6)
 
 
-def test_joint_clearance_is_taken_up_in_the_direction_of_the_load():
+def test_load_moves_a_joint_to_the_bound_of_its_clearance():
     """A disc of radius c and a cone of angle t, in the direction of the load."""
     values = {"drive.radial": 2e-5, "drive.axial": 1e-5, "drive.tilt": 3e-5}
     # force along y and z at the tip: moment (0, -Fz L, Fy L) at the drive

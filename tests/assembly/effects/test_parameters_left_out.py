@@ -64,7 +64,7 @@ def test_friction_is_zero_without_an_approach_direction():
         assert seen[2] == pytest.approx(part * 2.0 / K, rel=1e-9, abs=1e-18)
 
 
-def test_robot_with_two_base_frames_gets_a_foundation_frame():
+def test_robot_with_two_base_frames_is_written_with_a_foundation_frame():
     robot = standing()
     both = replace(robot, frames=(*robot.frames, Frame("other")))
     found = on_foundation(as_declared(place_robot(both), np.zeros(6))).robot

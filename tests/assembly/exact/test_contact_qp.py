@@ -62,7 +62,7 @@ def unbalanced(p, step):
 
 @given(seeds, st.integers(0, 2))
 @settings(max_examples=15, deadline=None)
-def test_convex_clearance_step_has_the_least_energy_of_scipy_slsqp(seed, rows):
+def test_energy_after_a_convex_clearance_step_equals_that_of_scipy_slsqp(seed, rows):
     p = problem(np.random.default_rng(seed), rows)
     step = clearance_step(p, near=False)
     assert unbalanced(p, step) < 1e-5

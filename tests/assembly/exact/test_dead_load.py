@@ -153,7 +153,7 @@ def test_rotating_robot_and_gravity_together_rotates_the_solution(seed):
     assert there.platform_screw == pytest.approx(both @ here.platform_screw, abs=1e-9)
 
 
-def test_a_start_under_other_loads_is_refused():
+def test_start_from_a_solution_under_other_loads_is_refused():
     posture = on_a_hinge(10.0, Frame("arm", "hinge", [0.5, 0, 0], mass=1.0))
     start = solve_assembly(posture, gravity=[0, -G, 0])
     assert solve_exact(posture, start=start, gravity=[0, -G, 0]).energy > 0

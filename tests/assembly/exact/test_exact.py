@@ -102,7 +102,7 @@ def bar_force(e, longer):
 
 
 @pytest.mark.parametrize("longer", [0.05, 0.12])
-def test_elastic_bar_takes_its_share_of_the_energy(longer):
+def test_energy_of_an_elastic_bar_equals_its_share_in_closed_form(longer):
     """One scalar equation; differences of 1e-6 leave 1e-10 of the force."""
     e = brentq(bar_force, -longer, longer, args=(longer,), xtol=1e-15)
     one, two = triangle(B + longer + e)
@@ -237,7 +237,7 @@ def test_moment_turns_a_pendulum_by_moment_over_stiffness():
     assert answer.platform_screw[:3] == pytest.approx([0, 0, 0.8], abs=1e-12)
 
 
-def test_unstable_equilibrium_has_negative_least_curvature():
+def test_unstable_equilibrium_has_a_negative_smallest_curvature():
     """Upright under P L = 15 N m with k = 10 N m/rad: curvature k - P L = -5."""
     answer = solve_exact(pendulum(10.0, 0.5), [0, 0, 0, -30.0, 0, 0])
     assert answer.joint_screws[0, 2] == 0.0
@@ -255,14 +255,16 @@ def test_rigid_parts_that_cannot_close_are_refused():
 
 
 @pytest.mark.parametrize("load", [None, [0, 0, 0, 1, 0, 0]])
-def test_a_start_of_another_problem_is_refused(load):
+def test_start_from_the_solution_of_another_problem_is_refused(load):
     posture = two_bars(0.01)
     start = solve_assembly(posture if load else two_bars(0.02))
     with pytest.raises(ValueError, match="start: found the linear solution of another"):
         solve_exact(posture, load, start)
 
 
-def test_too_few_steps_raise_not_converged_with_both_residuals(monkeypatch):
+def test_too_few_steps_raise_an_error_of_no_convergence_with_both_residuals(
+    monkeypatch,
+):
     monkeypatch.setattr(exact, "_STEPS", 1)
     posture = place_robot(irsbot2_with(CASES["literal"]), pose={"tz": -0.5})
     message = (

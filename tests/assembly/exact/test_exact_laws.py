@@ -130,7 +130,7 @@ def test_beam_in_pieces_bends_from_its_displaced_position():
             assert other[:, part] == pytest.approx(one[:, part], abs=2e-2 * size)
 
 
-def test_start_from_a_nearby_solution_gives_the_same_equilibrium():
+def test_start_from_a_nearby_solution_leads_to_the_same_equilibrium():
     """The load is 1 % larger; the solution of another robot is not used as a start."""
     posture = loaded_arm().posture
     load = np.array([1.0, -2.0, 0.5, 20.0, 30.0, -40.0])

@@ -133,7 +133,7 @@ def test_both_methods_satisfy_the_equilibrium_conditions(name):
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_both_methods_give_the_same_deflection_curve_through_contact(state):
+def test_both_methods_compute_the_same_deflection_curve_through_contact(state):
     one, other = (
         deflection_curve(beams(), 4, LOADS, state=state, method=method)
         for method in METHODS

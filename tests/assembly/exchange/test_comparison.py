@@ -22,7 +22,7 @@ def path(tmp_path):
 @pytest.mark.parametrize(
     ("worker", "reason"),
     [
-        ("import os; os.abort()", "MuJoCo ended without an answer"),
+        ("import os; os.abort()", "MuJoCo terminated without a result"),
         ("import time; time.sleep(60)", "MuJoCo took longer than 0.5 s"),
     ],
 )
@@ -55,5 +55,5 @@ def test_convert_command_exits_with_1_if_mujoco_differs(
     monkeypatch.setattr("forcefit.assembly.exchange.foreign.compare", lambda *_: other)
     status, out, _ = run("convert", path, "-o", tmp_path / "robot.toml")
     assert status == 1
-    assert "MuJoCo reads robot.xml otherwise: body a differs by 0.3" in out
+    assert "MuJoCo reads robot.xml differently: body a differs by 0.3" in out
     assert (tmp_path / "robot.toml").is_file()

@@ -74,7 +74,7 @@ def bent_loop(folder, types):
 
 
 @pytest.mark.parametrize("types", ["", "type: ['6d']\n"])
-def test_loop_of_a_default_type_closes_as_a_point(types, tmp_path):
+def test_loop_of_the_default_type_is_closed_in_a_point(types, tmp_path):
     path = bent_loop(tmp_path, types)
     answer = convert(path, tmp_path / "robot.toml")
     assert answer.open_after < 1e-9
@@ -85,7 +85,7 @@ def test_loop_of_a_default_type_closes_as_a_point(types, tmp_path):
         convert(path, tmp_path / "robot.toml", points=())
 
 
-def test_points_option_accepts_only_loops_of_the_file(run, tmp_path):
+def test_points_option_accepts_only_names_of_loops_in_the_file(run, tmp_path):
     path = bent_loop(tmp_path, "type: ['3d']\n")
     target = tmp_path / "robot.toml"
     status, _, error = run("convert", path, "-o", target, "--points", "gaol")
@@ -111,7 +111,7 @@ QUICK = {"hexapod": "urdf", "delta": "xml", "orthoglide": "", "irsbot2": ""}
                   else pytest.mark.slow)
      for name in BUILT_IN for ending in ("urdf", "xml")],
 )  # fmt: skip
-def test_built_in_robots_keep_their_frames_after_conversion_and_back(
+def test_frames_of_built_in_robots_are_equal_after_conversion_and_back(
     name, ending, tmp_path
 ):
     """Drives, platform, and every frame by its name, in the home pose and elsewhere."""
@@ -155,7 +155,9 @@ def test_masses_are_equal_after_conversion_and_back(ending, tmp_path):
 
 
 @pytest.mark.parametrize("ending", ["urdf", "xml"])
-def test_conversion_builds_calibrated_lengths_into_the_geometry(ending, tmp_path):
+def test_conversion_includes_declared_errors_of_lengths_in_the_geometry(
+    ending, tmp_path
+):
     """A four-bar with a longer crank and a longer rocker, which must close again."""
     robot = BUILT_IN["four_bar"]()
     source = tmp_path / "robot.toml"

@@ -39,7 +39,7 @@ def test_urdf_ranges_become_limits(tmp_path):
     assert found == {"turn": (-1.5, 2.0), "slide": (-0.1, 0.3)}
 
 
-def test_infinite_or_missing_urdf_ranges_give_no_limits(tmp_path):
+def test_infinite_or_missing_urdf_ranges_set_no_limits(tmp_path):
     text = URDF.format(turn="", slide='lower="-1e16" upper="inf"')
     assert limits(tmp_path, "arm.urdf", text) == {"turn": None, "slide": None}
 

@@ -154,7 +154,7 @@ def test_comparison_names_the_first_difference_from_mujoco(tmp_path):
         assert answer.where == where
 
 
-def test_attached_model_keeps_its_angle_units_and_names(tmp_path):
+def test_attached_mjcf_model_keeps_its_angle_units_and_names(tmp_path):
     file_of(tmp_path, """<compiler angle="radian" eulerseq="zyx"/><default>
         <joint axis="1 0 0"/><default class="d"><site pos="1 1 1"/></default></default>
         <worldbody><body name="x" pos="0 0 1" euler="0.5 0 0.1"><geom size="0.1"/>
@@ -178,7 +178,7 @@ def test_attached_model_keeps_its_angle_units_and_names(tmp_path):
     assert drives == ["L_k", "R_k"]
 
 
-def test_copies_of_an_attached_model_keep_their_loops_and_drives(tmp_path):
+def test_copies_of_an_attached_model_have_its_loops_and_drives(tmp_path):
     file_of(tmp_path, """<worldbody><body name="x" pos="0 0 1"><geom size="0.1"/>
         <joint name="j"/><body name="y" pos="0 1 0"><geom size="0.1"/><joint name="k"/>
         </body></body></worldbody><equality><connect name="c" body1="y" body2="x"
@@ -197,7 +197,7 @@ def test_copies_of_an_attached_model_keep_their_loops_and_drives(tmp_path):
     assert drives == ["p_k-0", "p_k-1"]
 
 
-def test_included_files_are_read_and_missing_or_recursive_ones_refused(tmp_path):
+def test_included_files_are_read_and_missing_or_recursive_files_are_refused(tmp_path):
     (tmp_path / "parts").mkdir()
     inner = '<mujocoinclude><body name="b" pos="0 1 0"><joint/><geom size="0.1"/>'
     (tmp_path / "parts" / "b.xml").write_text(f"{inner}</body></mujocoinclude>")
@@ -312,7 +312,7 @@ def test_driven_joint_of_a_coupled_pair_becomes_the_leader(tmp_path):
     assert robot.frame("a").position == pytest.approx(0.2, abs=1e-12)
 
 
-def test_tendons_and_their_actuators_are_reported_as_left_out(run, tmp_path):
+def test_tendons_and_their_actuators_are_reported_as_omitted(run, tmp_path):
     path = file_of(tmp_path, TWO + """<tendon><spatial name="cable"><site site="s"/>
         <site site="t"/></spatial></tendon><actuator><motor tendon="cable"/><motor
         joint="j"/></actuator><equality><tendon tendon1="cable"/><connect name="off"

@@ -88,7 +88,7 @@ SHAPES = {  # principal moments of 1 kg, textbooks
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_automatic_moments_of_a_shape_are_those_of_the_textbook(shape, tmp_path):
+def test_automatic_moments_of_inertia_of_a_shape_equal_the_textbook(shape, tmp_path):
     """Of 5 kg, turned by a quarter about x: y and z are exchanged."""
     pose = f"<pose>0.2 0 0 {np.pi / 2} 0 0</pose>"
     text = f"""<sdf version="1.12"><model name="m"><link name="a"><inertial auto="true">
@@ -101,7 +101,7 @@ def test_automatic_moments_of_a_shape_are_those_of_the_textbook(shape, tmp_path)
     np.testing.assert_allclose(body.inertia, expected, atol=1e-15)
 
 
-def test_moments_that_no_body_has_are_left_out_and_named(tmp_path):
+def test_impossible_moments_of_inertia_are_omitted_and_reported(tmp_path):
     text = URDF.replace('izz="0.04"', 'izz="0.4"')
     answer = convert(file_of(tmp_path, text, "r.urdf"), tmp_path / "r.toml")
     assert "moments of inertia that no body has: 1 (b)" in answer.left_out
@@ -170,7 +170,7 @@ def test_written_moments_of_inertia_are_read_back(ending, tmp_path):
     np.testing.assert_allclose(theirs, ours, rtol=1e-8)
 
 
-def test_difference_of_moments_from_mujoco_is_named(tmp_path):
+def test_difference_of_moments_of_inertia_from_mujoco_is_reported(tmp_path):
     pytest.importorskip("mujoco", reason="MuJoCo is not installed")
     from forcefit.assembly.exchange.mujoco_reading import compare_here
 

@@ -27,7 +27,7 @@ FOUR_BAR = """<compiler angle="radian"/><default><geom type="capsule" size="0.01
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
-def test_compiled_model_moves_as_mujoco_moves_it(kind, tmp_path):
+def test_motions_of_a_compiled_mujoco_model_equal_those_in_mujoco(kind, tmp_path):
     """The poses and masses of MuJoCo's own reading of the original file."""
     path = file_of(tmp_path, KINDS[kind])
     model = mujoco.MjModel.from_xml_path(str(path))
@@ -38,7 +38,7 @@ def test_compiled_model_moves_as_mujoco_moves_it(kind, tmp_path):
     assert answer.bodies == model.nbody - 1
 
 
-def test_model_of_a_written_robot_keeps_its_platform(tmp_path):
+def test_mujoco_model_of_a_written_robot_has_the_same_platform(tmp_path):
     """A written MJCF names the platform in a custom text."""
     path = tmp_path / "delta.xml"
     ff.write_robot(ff.load_robot("delta"), path)
@@ -52,7 +52,7 @@ def test_model_of_a_written_robot_keeps_its_platform(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["MjModel", "MjSpec"])
-def test_robot_of_a_model_is_that_of_its_file(kind, tmp_path):
+def test_robot_from_a_mujoco_model_equals_the_robot_from_its_file(kind, tmp_path):
     path = file_of(tmp_path, FOUR_BAR, "four_bar.xml")
     model = getattr(mujoco, kind)
     model = model.from_xml_path(str(path)) if kind == "MjModel" else model.from_file(
@@ -75,7 +75,7 @@ def test_robot_of_a_model_is_that_of_its_file(kind, tmp_path):
     assert np.hypot(pin[0] - 0.3, pin[1]) == pytest.approx(0.3)
 
 
-def test_model_changed_in_memory_gives_the_changed_robot(tmp_path):
+def test_mujoco_model_changed_in_memory_is_read_with_its_changes(tmp_path):
     """A crank twice as long, which no file has."""
     model = mujoco.MjModel.from_xml_string(f"<mujoco>{FOUR_BAR}</mujoco>")
     model.body_pos[mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "coupler")] *= 2
@@ -84,7 +84,7 @@ def test_model_changed_in_memory_gives_the_changed_robot(tmp_path):
     assert np.linalg.norm(elbow) == pytest.approx(0.2)
 
 
-def test_model_with_a_tendon_says_that_it_is_left_out():
+def test_tendon_of_a_model_is_reported_as_omitted():
     model = mujoco.MjModel.from_xml_string("""<mujoco><worldbody><body name="a">
         <joint name="j"/><geom size="0.1"/></body></worldbody><tendon><fixed name="t">
         <joint joint="j" coef="1"/></fixed></tendon><actuator><motor tendon="t"/>
@@ -96,7 +96,7 @@ def test_model_with_a_tendon_says_that_it_is_left_out():
     assert "actuator of a tendon" in remarks
 
 
-def test_other_objects_are_refused():
+def test_object_that_is_not_a_mujoco_model_is_refused():
     with pytest.raises(
         BadInput, match=r"load_robot: found 3\.0 .* an MjModel, MjSpec or pinocchio"
     ):

@@ -49,7 +49,7 @@ def installed(tmp_path, monkeypatch):
     sys.modules.pop("their_reader", None)
 
 
-def test_file_of_an_installed_reader_is_a_robot_everywhere(installed, run, tmp_path):
+def test_every_command_accepts_a_file_of_an_installed_reader(installed, run, tmp_path):
     """The chain lies along x: its end is at the sum of the lengths."""
     installed("their-robots", chain="their_reader:read")
     path = tmp_path / "arm.CHAIN"
@@ -65,7 +65,7 @@ def test_file_of_an_installed_reader_is_a_robot_everywhere(installed, run, tmp_p
     assert np.all(swept.energy.values == 0.0)
 
 
-def test_message_of_a_reader_is_the_users_message(installed, run, tmp_path):
+def test_message_of_an_installed_reader_is_shown_to_the_user(installed, run, tmp_path):
     installed("their-robots", chain="their_reader:read")
     (tmp_path / "arm.chain").write_text("")
     status, out, err = run("assembly", "solve", tmp_path / "arm.chain")
@@ -81,14 +81,16 @@ def test_message_of_a_reader_is_the_users_message(installed, run, tmp_path):
         ("no_such_module:read", "of their-robots cannot be imported: No module named"),
     ],
 )
-def test_unusable_reader_is_named(reader, message, installed, tmp_path):
+def test_message_about_an_unusable_reader_names_the_reader(
+    reader, message, installed, tmp_path
+):
     installed("their-robots", chain=reader)
     (tmp_path / "arm.chain").write_text("1")
     with pytest.raises(BadInput, match=message):
         ff.load_robot(tmp_path / "arm.chain")
 
 
-def test_two_readers_of_one_ending_are_named(installed, tmp_path):
+def test_message_about_two_readers_of_one_file_ending_names_both(installed, tmp_path):
     for name in ("theirs", "others"):
         installed(name, chain="their_reader:read")
     (tmp_path / "arm.chain").write_text("1")
@@ -96,7 +98,9 @@ def test_two_readers_of_one_ending_are_named(installed, tmp_path):
         ff.load_robot(tmp_path / "arm.chain")
 
 
-def test_endings_that_forcefit_reads_cannot_be_taken(installed, tmp_path):
+def test_installed_reader_cannot_replace_a_file_ending_that_forcefit_reads(
+    installed, tmp_path
+):
     installed("theirs", toml="their_reader:wrong", urdf="their_reader:wrong")
     ff.write_robot(ff.load_robot("arm6"), tmp_path / "arm.toml")
     ff.write_robot(ff.load_robot("arm6"), tmp_path / "arm.urdf")

@@ -50,7 +50,7 @@ def read(model, folder):
 @pytest.mark.parametrize(
     "make", [every_kind, lambda: pinocchio.buildSampleModelManipulator()]
 )
-def test_bodies_are_where_pinocchio_places_them(make, tmp_path):
+def test_poses_of_bodies_equal_those_of_pinocchio(make, tmp_path):
     model, rng = make(), np.random.default_rng(1)
     mechanism, data = read(model, tmp_path), model.createData()
     row = {joint.name: k for k, joint in enumerate(mechanism.joints)}
@@ -70,7 +70,7 @@ def test_bodies_are_where_pinocchio_places_them(make, tmp_path):
             )
 
 
-def test_masses_and_limits_are_those_of_the_model(tmp_path):
+def test_masses_and_joint_limits_equal_those_of_the_pinocchio_model(tmp_path):
     mechanism = read(every_kind(), tmp_path)
     model = every_kind()
     for number in range(6):
@@ -83,7 +83,7 @@ def test_masses_and_limits_are_those_of_the_model(tmp_path):
     assert limits["j4"] is None  # turns without bounds
 
 
-def test_arm_of_a_model_is_that_of_its_urdf(tmp_path):
+def test_arm_from_a_pinocchio_model_equals_the_arm_from_its_urdf(tmp_path):
     ff.write_robot(ff.load_robot("arm6"), tmp_path / "arm6.urdf")
     by_file = ff.load_robot(tmp_path / "arm6.urdf")
     model = pinocchio.buildModelFromUrdf(str(tmp_path / "arm6.urdf"))
@@ -97,7 +97,7 @@ def test_arm_of_a_model_is_that_of_its_urdf(tmp_path):
     )  # fmt: skip
 
 
-def test_joint_of_several_freedoms_is_named():
+def test_message_about_a_joint_of_several_freedoms_names_the_joint():
     model = pinocchio.Model()
     planar = pinocchio.JointModelPlanar()
     model.addJoint(0, planar, pinocchio.SE3.Identity(), "slab")

@@ -61,7 +61,7 @@ REFUSED = {
     ("urdf", "two roots"): (urdf(links='<link name="c"/>'),
         'found as root link "a" and "c", expected exactly one link'),
     ("urdf", "a link twice"): (urdf(links='<link name="b"/>'),
-        'link "b".name: found it twice; expected names that differ'),
+        'link "b".name: found this name twice; expected unique names'),
     ("urdf", "two numbers for three"): (urdf(more='<origin xyz="0 0"/>'),
         "origin.xyz: found '0 0', expected 3 finite numbers [m]"),
     ("urdf", "nan"): (urdf(more='<origin xyz="0 0 nan"/>'),
@@ -195,7 +195,7 @@ REFUSED = {
     ("sdf", "an include of no file"): (sdf("<include><uri>model://x</uri></include>"),
         'include.uri: found "model://x", expected a file or folder next to this'),
     ("sdf", "a link twice"): (sdf('<link name="base"/>'),
-        'link "base".name: found it twice; expected names that differ'),
+        'link "base".name: found this name twice; expected unique names'),
     ("sdf", "two models"): (four_bar().replace("</model>", '</model><model name="b"/>'),
         "found 2 models, expected exactly one"),
     ("sdf", "an axis of zero"): (

@@ -31,7 +31,9 @@ def test_write_robot_refuses_to_overwrite_an_existing_user_file(tmp_path, name, 
     assert (tmp_path / name).read_text() == text
 
 
-def test_command_with_a_urdf_gives_the_result_of_the_converted_file(run, tmp_path):
+def test_command_with_a_urdf_has_the_same_result_as_with_the_converted_file(
+    run, tmp_path
+):
     """Mobility and zone margin are equal."""
     source = example("5bar_linkage")
     ff.convert(source, tmp_path / "robot.toml")

@@ -106,7 +106,7 @@ RIGHT = "<screw_thread_pitch>0.01</screw_thread_pitch>"  # [m per turn]
     (f"<thread_pitch>5</thread_pitch>{RIGHT}", 0.01),
 ])  # fmt: skip
 @pytest.mark.parametrize("backwards", [False, True])
-def test_right_hand_thread_of_an_sdf_lowers_the_nut(
+def test_right_hand_thread_of_an_sdf_file_lowers_the_nut(
     tmp_path, pitch, expected, backwards
 ):
     """A nut that does not turn sinks by the pitch when its spindle turns by +360 deg.
@@ -133,7 +133,7 @@ def test_home_of_a_screw_that_follows_its_slide_is_solved(tmp_path):
     assert found == pytest.approx(-0.02 / (1 + lead), abs=1e-9)
 
 
-def test_range_and_spring_of_a_screw_are_left_out_by_name(tmp_path):
+def test_range_and_spring_of_a_screw_joint_are_reported_as_omitted(tmp_path):
     nut = "<limit><lower>-1</lower><upper>1</upper></limit>"
     nut += "<dynamics><spring_stiffness>3</spring_stiffness></dynamics>"
     answer, robot = press(tmp_path, spindle(RIGHT, nut=nut))

@@ -81,7 +81,7 @@ def test_poses_are_resolved_through_nested_models_and_frames(tmp_path):
     assert mechanism.root == WORLD
 
 
-def test_included_model_keeps_its_own_sdf_version(tmp_path):
+def test_included_model_is_read_by_its_own_sdf_version(tmp_path):
     """A hand of version 1.4, whose axis is given in the hand, turned by 90 degrees
     about x; the same robot written out, in which the axis says so itself."""
     hand = (
@@ -117,7 +117,7 @@ def test_model_pose_is_resolved_in_a_frame_of_the_world(tmp_path):
     assert poses["arm"][:3, 3] == pytest.approx([1, 0, 0.7])
 
 
-def test_static_models_of_a_world_are_reported_as_left_out(tmp_path):
+def test_static_models_of_a_world_are_reported_as_omitted(tmp_path):
     path = tmp_path / "robot.sdf"
     ground = '<model name="ground"><static>true</static><link name="plane"/></model>'
     arm = joint("j", "base", "arm")
@@ -130,7 +130,7 @@ def test_static_models_of_a_world_are_reported_as_left_out(tmp_path):
     assert "model of the world: 1 (ground)" in mechanism.left_out
 
 
-def test_joint_with_the_name_of_a_link_is_renamed(tmp_path):
+def test_joint_that_has_the_name_of_a_link_is_renamed(tmp_path):
     mechanism = model(
         tmp_path, joint("arm", "base", "arm") + ARM + '<link name="arm"/>'
     )
@@ -192,7 +192,7 @@ def test_automatic_inertia_equals_volume_times_density(shape, tmp_path):
     assert bodies["two"].centre[0] == pytest.approx(0.2 * mass / (mass + ball))
 
 
-def test_missing_masses_have_the_default_of_the_format(tmp_path):
+def test_missing_masses_have_the_default_value_of_the_format(tmp_path):
     """The default is 1 kg; a mass with auto is kept, with the centre of the shapes."""
     text = (
         ARM

@@ -49,7 +49,7 @@ def test_urdf_variants_that_other_readers_accept_are_read(
 
 
 @pytest.mark.parametrize("name", ["base", "base.joint", "b", "world"])
-def test_joint_named_base_gets_a_frame_of_another_name(name, tmp_path):
+def test_joint_named_base_is_renamed(name, tmp_path):
     """The frame has the name of the joint, except "base", which is the fixed frame."""
     text = joint("base", "a", "b", '<origin xyz="0 0 0.1"/>' + Z)
     text += joint("base.joint", "b", "c", '<origin xyz="0 0 0.2"/>' + Z)

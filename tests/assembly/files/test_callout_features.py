@@ -83,7 +83,7 @@ def largest(one, row):
     return one.zone.support(row @ np.linalg.pinv(one.zone.columns))
 
 
-def test_file_of_frames_keeps_round_faces_and_shifting_datums(tmp_path):
+def test_file_of_frames_contains_round_faces_and_shifting_datums(tmp_path):
     robot = read(tmp_path, BRACKET)
     write_robot(robot, tmp_path / "frames.toml")
     again = read_robot(tmp_path / "frames.toml")
@@ -94,7 +94,7 @@ def test_file_of_frames_keeps_round_faces_and_shifting_datums(tmp_path):
         assert one.errors == pytest.approx(other.errors, abs=1e-15)
 
 
-def test_round_face_has_the_double_cone_of_its_diameter(tmp_path):
+def test_zone_of_a_round_face_is_a_double_cone_of_its_diameter(tmp_path):
     """Profile 0.06: 30 um along the normal, 30 um / 20 mm of tilt; parallelism 0.04
     leaves 20 um / 20 mm = 1 mrad."""
     robot = read(tmp_path, BRACKET)
@@ -124,7 +124,7 @@ def test_shift_of_a_datum_uses_the_hole_of_its_fit(tmp_path):
     assert shift.max() > 8
 
 
-def test_length_of_a_face_with_envelope_limits_its_tilt(tmp_path):
+def test_envelope_requirement_limits_the_tilt_of_a_face_by_its_length(tmp_path):
     """30 +- 0.05 mm: 50 um along the normal for both; with (E) over a diameter of
     40 mm a tilt of at most 50 um / 20 mm."""
     zones = 'profile = "0.06 mm"\nparallelism = "0.04 mm"'
@@ -172,7 +172,7 @@ def test_length_of_a_face_with_envelope_limits_its_tilt(tmp_path):
          'length = "30 +- 0.05 mm (E)"', "extent: missing; expected two sizes"),
     ],
 )  # fmt: skip
-def test_mistake_is_reported_in_one_line(tmp_path, old, new, message):
+def test_mistake_in_a_callout_is_reported_in_one_line(tmp_path, old, new, message):
     assert old in BRACKET
     with pytest.raises(BadInput, match=re.escape(message)) as error:
         read(tmp_path, BRACKET.replace(old, new, 1))

@@ -103,7 +103,7 @@ def test_file_of_frames_written_from_bodies_has_the_same_callouts(
         assert one.errors == pytest.approx(other.errors, abs=1e-15)
 
 
-def test_copies_of_a_leg_have_callouts_turned_with_them(tmp_path, without_circle):
+def test_callouts_of_a_copied_leg_are_rotated_with_the_leg(tmp_path, without_circle):
     robot = read(tmp_path, without_circle)
     first, second = placed(robot)[2:]
     one = first.errors[robot.index("leg1.pad.slide_x")]
@@ -112,7 +112,7 @@ def test_copies_of_a_leg_have_callouts_turned_with_them(tmp_path, without_circle
     assert one == pytest.approx(other, abs=1e-15)
 
 
-def test_normal_of_a_planar_joint_is_the_normal_of_the_face(tmp_path, without_circle):
+def test_normal_of_a_face_is_the_normal_of_its_planar_joint(tmp_path, without_circle):
     """Profile 0.1: TZ within 50 um along the normal, which is the first frame's y;
     perpendicularity 0.02 over 40 by 30 mm: 0.5 mrad about the joint's y."""
     robot = read(tmp_path, without_circle)
@@ -127,7 +127,7 @@ def test_normal_of_a_planar_joint_is_the_normal_of_the_face(tmp_path, without_ci
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("", "", 'tolerance of "leg1.pad on rod": found circular datums'),
+        ("", "", 'tolerance of "leg1.pad on rod": found datums that depend'),
         ('datums = ["foot"]', 'datums = ["foots"]',
          '"pad" on "rod".datums: found "foots", expected a joint of "rod"; did you '
          'mean "foot"'),
@@ -139,8 +139,8 @@ def test_normal_of_a_planar_joint_is_the_normal_of_the_face(tmp_path, without_ci
         ('perpendicularity = "0.02 mm"', 'perpendicularity = "0.2 mm"',
          "found 0.2 mm, expected less than that of the location, 0.1 mm"),
         ('profile = "0.04 mm"', 'coaxiality = "0.04 mm"',
-         "found one of a feature that is a plane"),
-        ('hole = "12 H7"', "", 'found (M), expected it with the position of a bore'),
+         "found for a feature that is a plane"),
+        ('hole = "12 H7"', "", 'found (M), expected only for the position of a bore'),
         ('hole = "12 H7"', 'hole = "12 H4"', '"H4", expected a grade from 5 to 11'),
         ('position = "0.1 mm"\nextent = "10 mm"', "",
          "found no tolerance, expected one of position | coaxiality"),
@@ -152,7 +152,7 @@ def test_normal_of_a_planar_joint_is_the_normal_of_the_face(tmp_path, without_ci
          "found a length of 590 mm, expected that at home, 600 mm"),
     ],
 )  # fmt: skip
-def test_mistake_is_reported_in_one_line(tmp_path, old, new, message):
+def test_mistake_in_a_callout_is_reported_in_one_line(tmp_path, old, new, message):
     assert old in FILE
     with pytest.raises(BadInput, match=re.escape(message)) as error:
         read(tmp_path, FILE.replace(old, new, 1))
@@ -193,10 +193,10 @@ length = "400 +- 0.05 mm"
         ('datums = ["a"]', 'datums = [{ frame = "a", shape = "cone" }]',
          "found 'cone', expected \"axis\" | \"plane\""),
         ('datums = ["a"]', 'datums = ["a"]\ndirection = [0, 0, 1]',
-         "not at right angles to the axis"),
+         "not perpendicular to the axis"),
     ],
 )  # fmt: skip
-def test_mistake_in_a_file_of_frames_is_reported_in_one_line(
+def test_mistake_in_a_callout_of_a_file_of_frames_is_reported_in_one_line(
     tmp_path, old, new, message
 ):
     with pytest.raises(BadInput, match=re.escape(message)):
@@ -225,7 +225,7 @@ def test_contacts_of_a_joint_do_not_move_its_feature(tmp_path):
 FIT = FRAMES.replace('name = "b"', 'name = "b"\nclearance = { fit = "12 H7/g6" }')
 
 
-def test_fit_of_a_drawn_joint_is_that_of_its_frame(tmp_path, without_circle):
+def test_fit_of_a_drawn_joint_equals_the_fit_of_its_frame(tmp_path, without_circle):
     joint = 'name = "foot"\ntype = "revolute"'
     text = without_circle.replace(joint, joint + '\nclearance = { fit = "12 H7/g6" }')
     robot = read(tmp_path, text)
@@ -240,7 +240,7 @@ def test_fit_of_a_drawn_joint_is_that_of_its_frame(tmp_path, without_circle):
             'clearance.fit: found "25 H7/p6", an interference fit',
         ),
         ('{ fit = "12 H7/z6" }', 'clearance.fit: found "z6", expected one of the let'),
-        ('{ fit = "12 H7/g6", radial = 1e-5 }', 'radial: found it together with "fit"'),
+        ('{ fit = "12 H7/g6", radial = 1e-5 }', 'radial: found together with "fit"'),
         ("{ fit = 12 }", "clearance.fit: found 12, expected a fit such as"),
     ],
 )

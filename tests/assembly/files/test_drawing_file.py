@@ -74,7 +74,7 @@ def read(tmp_path):
     return robot
 
 
-def test_the_stiffness_of_tsais_robot_is_that_of_another_program(read):
+def test_stiffness_of_tsais_robot_equals_that_of_another_program(read):
     """K_C of a model of bodies' twists, printed to 6 digits."""
     found = platform_stiffness(home_posture(read(TSAI))).stiffness
     expected = np.diag([162410, 162410, 35817, 3.16338e6, 3.16338e6, 5.00457e7])
@@ -84,7 +84,7 @@ def test_the_stiffness_of_tsais_robot_is_that_of_another_program(read):
     assert np.abs((found - expected) / np.outer(size, size)).max() < 1e-5
 
 
-def test_names_of_the_user_are_those_of_frames(read):
+def test_names_of_joints_in_the_drawing_become_names_of_frames(read):
     robot = read(TSAI)
     leg = ["lower.first", "lower.second", "slide", "rod", "upper.first", "upper.second"]
     names = [f"leg{k}.{name}" for k in (1, 2, 3) for name in leg]
@@ -93,14 +93,14 @@ def test_names_of_the_user_are_those_of_frames(read):
     assert robot.platform == "platform"
 
 
-def test_remarks_name_the_joints_after_which_loops_close(read):
+def test_remarks_name_the_joints_at_which_loops_are_closed(read):
     (cut,) = read(TSAI).remarks
     assert cut == (
         'loops close after "leg2.upper" (at "platform"), "leg3.upper" (at "platform")'
     )
 
 
-def test_a_remark_says_between_which_of_many_joints_a_link_is(read):
+def test_remark_states_between_which_of_many_joints_a_link_is_placed(read):
     """Of the platform, which has one in each leg; none where a key says it."""
     link = "link = { beam = { radius = 0.01 }, young = 7e10, poisson = 0.3 }"
     text = TSAI.replace("mass = 3.0", f"mass = 3.0\n{link}")
@@ -110,7 +110,7 @@ def test_a_remark_says_between_which_of_many_joints_a_link_is(read):
     assert remark not in read(text).remarks
 
 
-def test_the_first_copy_of_a_leg_is_the_leg_as_written(read):
+def test_first_copy_of_a_leg_equals_the_leg_as_written(read):
     robot = read(TSAI)
     home = home_posture(robot).transforms
     first, second = (home[robot.index(f"leg{k}.slide"), :3, 3] for k in (1, 2))
@@ -210,7 +210,7 @@ at = [0.6, 0, 0]
 """
 
 
-def test_a_drawn_arm_has_its_frames_at_home(read):
+def test_frames_of_a_drawn_arm_are_at_their_positions_at_home(read):
     """The drive's spring, the link from joint to joint, and the mass of the hand."""
     robot = read(ARM)
     turn, arm, hand = (robot.frame(name) for name in ("turn", "arm", "hand"))
@@ -222,7 +222,7 @@ def test_a_drawn_arm_has_its_frames_at_home(read):
 
 
 @pytest.mark.parametrize(("up", "soft"), [("", "TY"), (", up = [0, 1, 0]", "TZ")])
-def test_the_height_of_a_beam_is_along_the_bases_z(up, soft, read):
+def test_height_of_a_beam_section_is_along_the_z_axis_of_the_base(up, soft, read):
     """A cantilever deflects by F L^3 / 3 E I: less where it is higher."""
     text = ARM.replace('height = "30 mm"', f'height = "30 mm", theory = "euler"{up}')
     text = text.replace("drive_stiffness = 1e4\n", "")
@@ -279,7 +279,7 @@ def test_an_arc_of_a_quarter_turn_has_the_deflection_of_castigliano(read):
     assert C[5, 5] == pytest.approx(bending + shear, rel=1e-10)
 
 
-def test_an_arc_has_the_mass_and_the_centre_of_a_quarter_circle(read):
+def test_arc_has_the_mass_and_centre_of_mass_of_a_quarter_circle(read):
     robot = read(ARC)
     arc = robot.frame("leg1.arc")
     mass = 7800 * np.pi * 0.005**2 * np.pi / 2 * 0.1
@@ -302,11 +302,11 @@ def test_copies_of_an_arc_are_turned_with_their_leg(read):
 
 
 @pytest.mark.parametrize(("old", "new", "message"), [
-    ('"90 deg"]', '"80 deg"]', "link.curve: found that it ends 0.0174 m"),
+    ('"90 deg"]', '"80 deg"]', "link.curve: found the end "),
     ('section = {', 'sektion = {', "section"),
-    ("poisson = 0.3", "poisson = 0.3\nbeam = { radius = 0.1 }", "link.beam: found it "),
+    ("poisson = 0.3", "poisson = 0.3\nbeam = { radius = 0.1 }", "link.beam: found "),
 ])  # fmt: skip
-def test_a_mistake_in_a_curve_is_one_line(old, new, message, read):
+def test_mistake_in_a_curve_is_reported_in_one_line(old, new, message, read):
     with pytest.raises(BadInput) as caught:
         read(ARC.replace(old, new))
     assert message in str(caught.value)
@@ -330,7 +330,9 @@ def held_by(kind, keys):
 
 @pytest.mark.parametrize("full", [False, True], ids=["diagonal", "rows"])
 @pytest.mark.parametrize("kind", SEVERAL)
-def test_springs_of_a_joint_of_several_freedoms_are_across_them(kind, full, read):
+def test_springs_of_a_joint_of_several_freedoms_resist_only_the_other_directions(
+    kind, full, read
+):
     """Zero along the free motions; a number there is refused."""
     free = SEVERAL[kind][0]
     K = [0.0 if row in free else value for row, value in enumerate(STIFF)]
@@ -352,7 +354,9 @@ def test_springs_of_a_joint_of_several_freedoms_are_across_them(kind, full, read
 
 @pytest.mark.parametrize("bound", ["radial", "axial", "tilt", "spin"])
 @pytest.mark.parametrize("kind", SEVERAL)
-def test_bounds_of_a_joint_of_several_freedoms_are_across_them(kind, bound, read):
+def test_clearances_of_a_joint_of_several_freedoms_bound_only_the_other_directions(
+    kind, bound, read
+):
     text = held_by(kind, f"clearance = {{ {bound} = 1e-5 }}")
     if bound in SEVERAL[kind][1]:
         frames = [f for f in read(text).frames if f.name.startswith("bolts")]
@@ -378,7 +382,7 @@ def test_a_link_of_a_platform_with_one_joint_ends_at_its_point(read):
     assert C[5, 5] == pytest.approx(0.5**3 / (3 * 7e10 * I), rel=1e-12)
 
 
-def test_a_rod_may_have_no_inertia_about_itself(read):
+def test_rod_may_have_zero_moment_of_inertia_about_its_axis(read):
     text = TSAI.replace("inertia = [0.01, 0.01, 0.02,", "inertia = [0, 0.01, 0.01,")
     expected = np.diag([0, 0.01, 0.01])
     np.testing.assert_array_equal(read(text).frame("platform").inertia, expected)
@@ -434,14 +438,14 @@ def test_a_file_of_bodies_needs_no_format_key(read):
     assert read(TSAI.replace("format = 2\n", "")).platform == "platform"
 
 
-def test_a_bound_along_free_motions_of_a_ball_is_refused(read):
+def test_clearance_along_a_free_motion_of_a_ball_joint_is_refused(read):
     text = TSAI.replace('type = "universal"', 'type = "spherical"')
     text = text.replace("axis2 = [0, 1, 0]", "clearance = { tilt = 1e-4 }")
     with pytest.raises(BadInput, match=r"clearance\.tilt: found a bound of a free "):
         read(text)
 
 
-def test_a_universal_joint_has_numbers_for_each_bearing(read):
+def test_universal_joint_accepts_a_number_for_each_bearing(read):
     """One table for both, or a pair."""
     both = "axis2 = [0, 1, 0]\nclearance = { radial = 1e-5, tilt = 1e-4 }"
     pair = "axis2 = [0, 1, 0]\nclearance = [{ radial = 1e-5 }, { axial = 2e-5 }]"
@@ -475,7 +479,7 @@ REFUSED = {
         'leg "leg".joint "slide".pitch: found 0, expected at least 1e-09'),
     "pitch of another joint": (
         'type = "prismatic"', 'type = "prismatic"\npitch = "5 mm"',
-        'leg "leg".joint "slide".pitch: found one on a prismatic joint, expected none'),
+        'leg "leg".joint "slide".pitch: found a pitch on a prismatic joint'),
     "unknown key": (
         "drive_stiffness", "drive_stifness",
         'leg "leg".joint "slide": unknown key "drive_stifness"; did you mean '),
@@ -486,7 +490,7 @@ REFUSED = {
         "mass = 3.0", "weight = 3.0", 'body "platform": unknown key "weight"'),
     "parallel axes": (
         "axis2 = [0, 1, 0]", "axis2 = [-45, 1e-3, -16]",
-        'leg "leg".joint "upper".axis2: found it parallel to "axis", expected an '),
+        'leg "leg".joint "upper".axis2: found a direction parallel to "axis"'),
     "missing second axis": (
         "axis2 = [0, 1, 0]", "",
         'leg "leg".joint "upper".axis2: missing; expected 3 finite numbers'),
@@ -504,10 +508,10 @@ REFUSED = {
         'joint: found "leg1.slide" twice, expected different names'),
     "base": (
         'name = "tube"', 'name = "base"',
-        'leg "leg".body "base".name: found "base", which stands still; '),
+        'leg "leg".body "base".name: found "base", which is fixed; '),
     "a body with itself": (
         'between = ["tube", "rod"]', 'between = ["rod", "rod"]',
-        'leg "leg".joint "slide".between: found "rod" twice, expected two'),
+        'leg "leg".joint "slide".between: found "rod" twice, expected two bodies'),
     "platform": (
         'platform = "platform"', 'platform = "platfrom"',
         'platform: found "platfrom", expected the name of a body; did you mean '),
@@ -519,16 +523,16 @@ REFUSED = {
         '"80 mm"', '"80 furlong"', "found '80 furlong', expected a number"),
     "drive of a universal joint": (
         "axis2 = [0, 1, 0]", "axis2 = [0, 1, 0]\nactuated = true",
-        'leg "leg".joint "upper".actuated: found one on a universal joint, expected '),
+        'leg "leg".joint "upper".actuated: found on a universal joint, expected '),
     "stiffness of a passive drive": (
         "actuated = true", "",
-        'leg "leg".joint "slide".drive_stiffness: found one without actuated = true'),
+        'leg "leg".joint "slide".drive_stiffness: found a stiffness without actuated'),
     "inertia of no body": (
         "inertia = [0.01, 0.01, 0.02,", "inertia = [0.01, 0.01, 0.03,",
         'body "platform".inertia: found principal moments 0.01, 0.01, 0.03; expected '),
     "negative tolerance": (
         "drive_stiffness = 2e7", "tolerance = [0, 0, 0, -1e-5, 0, 0]",
-        'leg "leg".joint "slide".tolerance: found -1e-05 in it, expected 6 numbers >='),
+        'leg "leg".joint "slide".tolerance: found the number -1e-05, expected 6 '),
     "one body": (
         'between = ["tube", "rod"]', 'between = ["tube"]',
         'leg "leg".joint "slide".between: found [\'tube\'], expected two names'),
@@ -555,7 +559,7 @@ REFUSED = {
         'leg "leg".joint "upper".clearance.length: found the clearance of a sh'),
     "a guide of a cross": (
         "axis2 = [0, 1, 0]", "axis2 = [0, 1, 0]\nclearance = { guide = { gap = 1 } }",
-        'first bearing.clearance.guide: found one on a revolute joint, expected none'),
+        'first bearing.clearance.guide: found on a revolute joint, expected none'),
     "a guide with tilt": (
         "drive_stiffness = 2e7", "clearance = { tilt = 1e-4, guide = { gap = 1e-5 } }",
         'leg "leg".joint "slide".clearance.tilt: found together with "guide", which '),
@@ -576,7 +580,7 @@ REFUSED = {
     "bearings at one place": (
         "drive_stiffness = 2e7",
         "clearance = { bearings = [{ z = 0, radial = 1 }, { z = 0, radial = 1 }] }",
-        'leg "leg".joint "slide".clearance.bearings: found both at z = 0 m, expected '),
+        'leg "leg".joint "slide".clearance.bearings: found both bearings at z = 0 m'),
     "a bearing without gap": (
         "drive_stiffness = 2e7",
         "clearance = { bearings = [{ z = 0, radial = 1 }, { z = 1 }] }",
@@ -586,7 +590,7 @@ REFUSED = {
         'leg "leg".joint "slide".clearance.radial: found together with "bearings", '),
     "a pad on a slide": (
         "drive_stiffness = 2e7", "clearance = { pad = { gap = 1e-5 } }",
-        'leg "leg".joint "slide".clearance.pad: found one on a prismatic joint, exp'),
+        'leg "leg".joint "slide".clearance.pad: found on a prismatic joint, exp'),
     "clearances of three bearings": (
         "axis2 = [0, 1, 0]", "axis2 = [0, 1, 0]\nclearance = [{}, {}, {}]",
         'leg "leg".joint "upper".clearance: found a list of 3, expected one'),
@@ -614,7 +618,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_a_mistake_in_a_drawing_is_one_line(case, read):
+def test_mistake_in_a_drawing_is_reported_in_one_line(case, read):
     old, new, message = REFUSED[case]
     assert old in TSAI
     with pytest.raises(BadInput) as caught:

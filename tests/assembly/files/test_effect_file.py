@@ -57,19 +57,20 @@ REFUSED = {
         '"drift".parameters.time_constant: found 0.0, expected a finite number > 0 '
         "[SI]",
     f'name = "drift"\n{SHIFT} }}':
-        '"drift".parameters: found no "time_constant"; expected it, in s',
-    'name = "drift"': '"drift".parameters: found no "time_constant"; expected it, in s',
+        '"drift".parameters: "time_constant" is missing; expected a time in s',
+    'name = "drift"':
+        '"drift".parameters: "time_constant" is missing; expected a time in s',
     'name = "delayed_expansion"\nparameters = { tool = 1e-5 }':
-        '"delayed_expansion".parameters: found no "tool.time_constant"; expected it, '
-        "in s",
+        '"delayed_expansion".parameters: "tool.time_constant" is missing; expected a '
+        "time in s",
     'name = "self_weight"\nparameters = { "g.w" = 1 }':
-        '"self_weight".parameters: found "g.w", which is no parameter of self_weight '
-        'here; did you mean "g.z"?',
+        '"self_weight".parameters: found "g.w", which is not a parameter of '
+        'self_weight; did you mean "g.z"?',
     'name = "self_weight"\n[[effect]]\nname = "self_weight"':
-        '"self_weight".name: found twice; expected one [[effect]] of each name',
+        '"self_weight".name: found twice; expected one [[effect]] per name',
     'name = "encoder_offset"\nparameters = { tool = 1e-4 }':
-        '"encoder_offset".parameters: found "tool", which is no parameter of '
-        "encoder_offset here; valid: drive",
+        '"encoder_offset".parameters: found "tool", which is not a parameter of '
+        "encoder_offset; valid: drive",
     'name = "encoder_offset"\nparameters = { drive = nan }':
         '"encoder_offset".parameters.drive: found nan, expected a finite number [SI]',
     'name = "encoder_offset"\nparameters = { drive = "0" }':

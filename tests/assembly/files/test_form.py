@@ -65,7 +65,7 @@ def test_cylindricity_of_both_parts_widens_a_fit(tmp_path):
     assert radial.mean() == pytest.approx(15.25e-6, abs=0.3e-6)
 
 
-def test_form_stays_in_a_file_of_frames(tmp_path):
+def test_form_tolerance_is_kept_in_a_file_of_frames(tmp_path):
     robot = read(tmp_path, ARM)
     write_robot(robot, tmp_path / "frames.toml")
     again = read_robot(tmp_path / "frames.toml")
@@ -116,7 +116,9 @@ def test_flatness_widens_the_gap_of_a_pad(tmp_path):
          'found "pn", expected a joint of "rod"; did you mean "pin"'),
     ],
 )  # fmt: skip
-def test_form_that_is_not_modelled_is_refused_in_one_line(tmp_path, old, new, message):
+def test_form_tolerance_that_is_not_modelled_is_refused_in_one_line(
+    tmp_path, old, new, message
+):
     assert old in ARM
     with pytest.raises(BadInput, match=re.escape(message)) as error:
         read(tmp_path, ARM.replace(old, new))
@@ -150,7 +152,9 @@ name = "wheel"
          "parallelism: found 0.05 mm, expected less than that of the location"),
     ],
 )  # fmt: skip
-def test_zones_of_form_orientation_and_location_become_larger(tmp_path, zones, message):
+def test_zones_of_form_orientation_and_location_must_increase_in_this_order(
+    tmp_path, zones, message
+):
     table = f'[[body.tolerance]]\nfeature = "tip"\ndatums = ["pin"]\n{zones}\n'
     text = TWO_PINS.replace("[[joint]]", f'{table}extent = "20 mm"\n[[joint]]', 1)
     with pytest.raises(BadInput, match=re.escape(message)):

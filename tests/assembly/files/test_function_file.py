@@ -67,12 +67,12 @@ REFUSED = {
     "an unknown form": (PUBLIC, '"waves"', '"wave"',
         ".form: found 'wave', expected \"powers\" | \"waves\" | "),
     "an unknown component": (PUBLIC, '"rz"', '"mz"',
-        '.components: found "mz" there; valid: rx, ry, rz, tx, ty, tz'),
+        '.components: found "mz"; valid: rx, ry, rz, tx, ty, tz'),
     "a number of another form": (PUBLIC, '"1.sine"', '"sine"',
-        '.parameters: found "sine", which is no parameter of waves; expected names '
+        '.parameters: found "sine", which is not a parameter of waves; expected names '
         'such as "1.sine" or "period"'),
     "a shape that is missing": (PUBLIC, '"waves"', '"lag"',
-        '.parameters: found "1.sine", which is no parameter of lag; expected names '
+        '.parameters: found "1.sine", which is not a parameter of lag; expected names '
         'such as "gain" or "time_constant"'),
     "a compliance of a reading": (PUBLIC, 'where = "drive"',
         'where = "reading"\nkind = "compliance"',
@@ -84,11 +84,11 @@ REFUSED = {
         '.parameters: "at": found 0, expected > 0'),
     "waves of a load": (PUBLIC, '["q.drive"]\nform = "waves"',
         '["approach", "load.fz"]\nform = "reversal_waves"',
-        '.parameters: "period" is missing; expected it, because the variable is no '
-        "angle in rad"),
+        '.parameters: "period" is missing; expected because the variable is not '
+        "an angle in rad"),
     "a spread of no number": (PUBLIC, "session =",
         'std = { "2.sine" = 1.0 }\nsession =',
-        '.std: found "2.sine", which is no parameter; did you mean "1.sine"?'),
+        '.std: found "2.sine", which is not a parameter; did you mean "1.sine"?'),
     "no formula": (FORMULA, "a*sin(3*q) + b", "a*sin(3*q",
         ".formula: found 'a*sin(3*q', expected a formula such as \"a*sin(q)\""),
     "a call": (FORMULA, "a*sin(3*q) + b", "__import__('os')",

@@ -45,7 +45,7 @@ def worst(robot):
 
 
 @pytest.mark.parametrize(("fit", "um"), [(ONE, (25, 25)), (TWO, (25, 37))])
-def test_largest_gap_of_a_fit_tilts_a_block(tmp_path, fit, um):
+def test_block_tilts_by_the_largest_gap_of_its_fit(tmp_path, fit, um):
     """40 H7/g6: 0/+25 and -25/-9 um, gaps of 4.5 to 25 um; 30 H8/f7: 0/+33 and
     -41/-20 um, 10 to 37 um.  A point at 200 mm moves by c 2 x 200/80 along x and y."""
     robot = read(tmp_path, GUIDE.replace("FIT", fit))
@@ -61,7 +61,7 @@ def test_file_of_frames_keeps_the_fit_of_a_guide(tmp_path):
     assert worst(again) == pytest.approx(worst(robot), rel=1e-9)
 
 
-def test_gaps_of_a_guide_are_drawn_once_along_each_axis(tmp_path):
+def test_one_gap_of_a_guide_is_drawn_along_each_axis(tmp_path):
     robot = read(tmp_path, GUIDE.replace("FIT", TWO))
     sources = sources_of(robot)
     assert [fit.name for fit in sources.fits] == [
@@ -96,13 +96,15 @@ def test_gaps_of_a_guide_are_drawn_once_along_each_axis(tmp_path):
         ('"40 H7/g6", gap = "5 um"', 'guide.gap: found it together with "fit"'),
     ],
 )
-def test_fit_that_a_guide_cannot_have_is_refused_in_one_line(tmp_path, fit, message):
+def test_fit_that_is_not_possible_for_a_guide_is_refused_in_one_line(
+    tmp_path, fit, message
+):
     with pytest.raises(BadInput, match=re.escape(message)) as error:
         read(tmp_path, GUIDE.replace("FIT", fit))
     assert "\n" not in str(error.value)
 
 
-def test_fit_is_stated_in_the_guide(tmp_path):
+def test_fit_of_a_guide_is_declared_in_its_contact(tmp_path):
     text = GUIDE.replace("fit = FIT", 'gap = "5 um"') + 'fit = "40 H7/g6"\n'
     with pytest.raises(BadInput, match='with "guide", expected it in the guide'):
         read(tmp_path, text)

@@ -10,7 +10,7 @@ REFUSED_LINKS = {
     "an asymmetric link": (
         LINK, f"link = {{ stiffness = {rows({(3, 6): 0.1})} }}",
         'frame "coupler".link.stiffness: not symmetric: found [3, 6] = 1.000000e-01 '
-        "but [6, 3] = 0.000000e+00, expected them equal"),
+        "but [6, 3] = 0.000000e+00, expected equal numbers"),
     "a link that is soft in one direction": (
         LINK, f"link = {{ stiffness = {rows({(3, 3): -2.5})} }}",
         'frame "coupler".link.stiffness: not positive definite: found -2.5 as term '
@@ -28,7 +28,7 @@ REFUSED_LINKS = {
         "expected 6 rows of 6 finite numbers [N m/rad .. N/m]"),
     "a link of nothing": (
         LINK, "link = {}",
-        'frame "coupler".link: found none of them, expected exactly one of "beam" | '
+        'frame "coupler".link: found no kind of link, expected exactly one of "beam" | '
         '"stiffness" | "mesh" | "library"'),
     "a link of two kinds": (
         BEAM, f'{BEAM}, library = "x#y"',

@@ -45,7 +45,7 @@ def test_new_robot_has_the_mobility_of_the_literature_and_solves(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_new_robot_fits_the_schema_that_its_first_line_names(
+def test_new_robot_file_follows_the_schema_that_its_first_line_names(
     run, tmp_path, monkeypatch, kind
 ):
     monkeypatch.chdir(tmp_path)
@@ -63,7 +63,9 @@ def test_new_robot_fits_the_schema_that_its_first_line_names(
     # each leg of a 3-UPU holds one turn: two of four hold the third too
     ("UPU", 4, (3, 1, 1)),
 ])  # fmt: skip
-def test_further_legs_are_redundant(run, tmp_path, kind, legs, expected):
+def test_additional_legs_of_a_new_robot_are_redundant(
+    run, tmp_path, kind, legs, expected
+):
     path = tmp_path / "mine.toml"
     assert run("new", path, "--kind", kind, "--legs", legs)[0] == 0
     found = mobility(home_posture(load_robot(path)))

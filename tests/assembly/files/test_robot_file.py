@@ -65,7 +65,9 @@ LOADS = {
 
 
 @pytest.mark.parametrize("change", LOADS.values(), ids=LOADS)
-def test_equivalent_file_forms_give_the_same_robot(change, write_file, tmp_path):
+def test_equivalent_forms_of_a_file_describe_the_same_robot(
+    change, write_file, tmp_path
+):
     expected = read_robot(write_file(FOUR_BAR))
     changed = change(FOUR_BAR)
     assert changed != FOUR_BAR
@@ -85,7 +87,7 @@ def test_frame_order_does_not_change_the_robot(seed, write_file):
     np.testing.assert_allclose(here.platform, there.platform, rtol=0, atol=1e-12)
 
 
-def test_dh_equals_the_product_of_its_four_transforms(write_file):
+def test_transform_by_dh_parameters_equals_the_product_of_its_four_factors(write_file):
     """Rot(z, theta) Trans(z, d) Trans(x, a) Rot(x, alpha), multiplied by hand."""
     text = SLIDER.replace("translation = [0.3, 0.0, 0.2]\n", "").replace(
         "rotation = [0.0, 1.5707963267948966, 0.0]",
@@ -324,12 +326,12 @@ dh = { d = 0.1 }
     assert read_robot(write_file(full)).remarks == ()
 
 
-def test_bearing_stiffness_is_equal_after_writing_and_reading(tmp_path):
+def test_bearing_stiffness_is_unchanged_by_writing_and_reading(tmp_path):
     K = np.diag([2e4, 2e4, 0.0, 1.2e8, 1.2e8, 6e7])
     hub = Frame("hub", joint="revolute", joint_stiffness=K)
     robot = Robot("hub", "tool", (hub, Frame("tool", "hub")))
     write_robot(robot, tmp_path / "hub.toml")
     again = read_robot(tmp_path / "hub.toml").frame("hub")
     assert np.array_equal(again.joint_stiffness, K)
-    with pytest.raises(BadInput, match="found inf along the own motion"):
+    with pytest.raises(BadInput, match="found inf along the motion"):
         replace(hub, joint_stiffness=np.diag([1.0, 1.0, np.inf, 1.0, 1.0, 1.0]))

@@ -29,10 +29,10 @@ def test_unchanged_example_files_are_valid(write_file):
 REFUSED = {
     "negative tolerance": (
         "mass = 1.2", "mass = 1.2\ntolerance = [0, 0, 1e-3, -1e-3, 0, 0]",
-        'frame "coupler".tolerance: found -0.001 in it, expected 6 numbers >= 0 '),
+        'frame "coupler".tolerance: found the number -0.001, expected 6 numbers'),
     "limits the wrong way round": (
         "mass = 1.2", "mass = 1.2\njoint = \"revolute\"\nlimits = [1.0, -1.0]",
-        'frame "coupler".limits: found [1, -1], expected the smaller one first'),
+        'frame "coupler".limits: found [1, -1], expected the smaller number'),
     "limits of a fixed joint": (
         "mass = 1.2", "mass = 1.2\nlimits = [-1.0, 1.0]",
         'frame "coupler".limits: found limits on a fixed joint'),
@@ -111,7 +111,7 @@ REFUSED = {
         'frame "crank".pitch: found 0, expected at least 1e-09 m, or at most minus'),
     "a pitch of another joint": (
         'joint = "revolute"\nactuated', 'joint = "revolute"\npitch = 0.01\nactuated',
-        'frame "crank".pitch: found one on a revolute joint, expected none, or a hel'),
+        'frame "crank".pitch: found a pitch on a revolute joint, expected none, or a '),
     "a number for true": (
         "actuated = true", "actuated = 1",
         'frame "crank".actuated: found 1, expected true or false'),
@@ -128,12 +128,12 @@ REFUSED = {
         'frame "coupler".mass: found -1.2, expected a finite number >= 0 [kg]'),
     "a force of a drive that holds its coordinate": (
         "actuated = true", "actuated = true\ndrive_force = 5.0",
-        'frame "crank".drive_force: found one on a joint that is not passive; expected '
-        'a joint = "revolute" | "prismatic" | "helical" that is not actuated: a drive '
-        "that applies a force holds no coordinate"),
+        'frame "crank".drive_force: found a force on a joint that is not passive; '
+        'expected a joint = "revolute" | "prismatic" | "helical" that is not '
+        "actuated: a drive that applies a force holds no coordinate"),
     "a force without a joint": (
         "mass = 1.2", "mass = 1.2\ndrive_force = 5.0",
-        'frame "coupler".drive_force: found one on a joint that is not passive; '),
+        'frame "coupler".drive_force: found a force on a joint that is not passive; '),
     "a force that is no number": (
         "position = 1.0\njoint_stiffness", "position = 1.0\ndrive_force = nan\n"
         "joint_stiffness",
@@ -183,7 +183,7 @@ REFUSED = {
     "a ball on a slide": (
         'joint = "revolute"\nposition = -1.0\n' + PLAY,
         'joint = "prismatic"\nclearance = { ball = 1e-5 }',
-        'frame "elbow".clearance.ball: found one on a joint that slides, '),
+        'frame "elbow".clearance.ball: found a bound on a sliding joint, '),
     "a number for a clearance": (
         PLAY, "clearance = 1e-5",
         'frame "elbow".clearance: found 1e-05, expected a table'),
@@ -194,11 +194,11 @@ REFUSED = {
         "[N m/rad .. N/m]"),
     "a stiffness of zero": (
         SPRING, "joint_stiffness = [1, 0, 3, 4, 5, 6]",
-        'frame "rocker".joint_stiffness: found 0 in it, expected 6 diagonal terms > 0 '
-        "or inf (number 3 may be 0: free), or 6 rows of 6 [N m/rad .. N/m]"),
+        'frame "rocker".joint_stiffness: found the number 0, expected 6 diagonal terms '
+        "> 0 or inf (number 3 may be 0: free), or 6 rows of 6 [N m/rad .. N/m]"),
     "a locked bearing": (
         SPRING, "joint_stiffness = [inf, inf, inf, 2e8, 2e8, 2e8]",
-        'frame "rocker".joint_stiffness: found inf along the own motion of a passive '
+        'frame "rocker".joint_stiffness: found inf along the motion of a passive '
         "joint, which would lock it; expected 0 (free, as a bearing), a number > 0 (a "
         'spring), or joint = "fixed"'),
     "a free row that is not empty": (
@@ -207,8 +207,8 @@ REFUSED = {
         "[3, 3] of the diagonal, expected > 0"),
     "a stiffness of minus infinity": (
         SPRING, "joint_stiffness = [1, 2, -inf, 4, 5, 6]",
-        'frame "rocker".joint_stiffness: found -inf in it, expected 6 diagonal terms > '
-        "0 or inf (number 3 may be 0: free), or 6 rows of 6 [N m/rad .. N/m]"),
+        'frame "rocker".joint_stiffness: found the number -inf, expected 6 diagonal '
+        "terms > 0 or inf (number 3 may be 0: free), or 6 rows of 6 [N m/rad .. N/m]"),
     "nan in a joint's stiffness": (
         SPRING, f"joint_stiffness = {rows({(2, 3): math.nan})}",
         'frame "rocker".joint_stiffness: found nan as number 3 in row 2, expected 6 '
@@ -217,19 +217,19 @@ REFUSED = {
     "inf off the diagonal": (
         SPRING, f"joint_stiffness = {rows({(1, 2): math.inf, (2, 1): math.inf})}",
         'frame "rocker".joint_stiffness: found inf at [1, 2]; expected inf only on the '
-        "diagonal, the rest of its row and column zero"),
+        "diagonal, with zeros elsewhere in its row and column"),
     "something beside an inf": (
         SPRING, f"joint_stiffness = {rows({(1, 1): math.inf, (2, 1): 1, (1, 2): 1})}",
         'frame "rocker".joint_stiffness: found 1 at [1, 2]; expected inf only on the '
-        "diagonal, the rest of its row and column zero"),
+        "diagonal, with zeros elsewhere in its row and column"),
     "an asymmetric joint": (
         SPRING, f"joint_stiffness = {rows({(1, 2): 0.5})}",
         'frame "rocker".joint_stiffness: not symmetric: found [1, 2] = 5.000000e-01 '
-        "but [2, 1] = 0.000000e+00, expected them equal"),
+        "but [2, 1] = 0.000000e+00, expected equal numbers"),
     "an indefinite joint": (
         SPRING, f"joint_stiffness = {rows({(1, 2): 2, (2, 1): 2})}",
         'frame "rocker".joint_stiffness: not positive definite: found -1.0e+00 as '
-        "smallest eigenvalue once scaled to a unit diagonal, expected > 0"),
+        "smallest eigenvalue when scaled to a unit diagonal, expected > 0"),
     "a closure of one frame": (
         '["coupler", "seat"]', '["coupler", "coupler"]',
         "closure[1].frames: found ['coupler', 'coupler'], expected two different frame "
@@ -282,7 +282,7 @@ def test_invalid_robot_file_is_refused_with_one_message(old, new, message, write
 
 CONTENTS = {
     "nothing": (b"", "platform: missing; expected the name of a frame"),
-    "no frame": (b'platform = "a"', "frame: missing; expected 1 to 2000 [[frame]]"),
+    "no frame": (b'platform = "a"', "frame: missing; expected 1 to 2000 tables"),
     "bytes": (bytes(range(256)) * 9, "byte 128 is not UTF-8"),
     "UTF-16": (FOUR_BAR.encode("utf-16"), "byte 0 is not UTF-8"),
     "a gigantic key": (
@@ -294,7 +294,7 @@ CONTENTS = {
 
 
 @pytest.mark.parametrize(("content", "message"), CONTENTS.values(), ids=CONTENTS)
-def test_message_about_a_file_that_is_no_robot_omits_its_content(
+def test_message_about_a_file_that_is_not_a_robot_file_omits_its_content(
     content, message, write_file
 ):
     path = write_file(content)

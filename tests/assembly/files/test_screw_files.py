@@ -55,7 +55,7 @@ def test_files_of_other_programs_refuse_a_screw(ending, read, tmp_path):
 
 def test_rotation_bound_of_a_nut_is_refused(read):
     text = LIFT.replace("pitch =", "clearance = { spin = 1e-3 }\npitch =")
-    with pytest.raises(BadInput, match="spin: found one on a helical joint, exp"):
+    with pytest.raises(BadInput, match="spin: found a bound on a helical joint"):
         read(text)
 
 

@@ -109,7 +109,7 @@ def test_index_out_of_range_is_refused_with_its_position(name, index):
 
 @pytest.mark.parametrize("name", ["groups", "starts"])
 @pytest.mark.parametrize("at", [0, -1])
-def test_groups_that_do_not_fit_their_rows_are_refused(name, at):
+def test_groups_that_do_not_match_their_rows_are_refused(name, at):
     structure = structure_of(ROBOT)[1]
     wrong = getattr(structure, name).copy()
     wrong[at] = 10**6
@@ -190,7 +190,7 @@ def test_wrong_array_of_other_kernels_is_refused_by_name(call, name, rng):
 
 
 @pytest.mark.parametrize("random", ["rng", "datetime"])
-def test_random_numbers_that_are_no_bit_generator_are_refused(rng, random):
+def test_object_that_is_not_a_bit_generator_is_refused(rng, random):
     """Neither a generator nor the capsule of another library is accepted."""
     given = {"rng": rng, "datetime": datetime.datetime_CAPI}
     with pytest.raises((TypeError, ValueError)):

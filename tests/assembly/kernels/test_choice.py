@@ -63,7 +63,7 @@ def test_every_instruction_level_gives_bit_identical_results(level):
 
 @pytest.mark.skipif(not Path("/proc/cpuinfo").exists(), reason="no list of flags")
 @x86_64
-def test_available_levels_follow_from_the_processor_flags():
+def test_available_instruction_levels_follow_from_the_processor_flags():
     cpuinfo = Path("/proc/cpuinfo").read_text(encoding="utf-8")
     flags = next(line for line in cpuinfo.splitlines() if line.startswith("flags"))
     wanted, expected = set(), []
@@ -75,14 +75,14 @@ def test_available_levels_follow_from_the_processor_flags():
 
 
 @x86_64
-def test_highest_level_is_loaded_by_default(monkeypatch):
+def test_highest_instruction_level_is_loaded_by_default(monkeypatch):
     monkeypatch.delenv("FORCEFIT_MARCH", raising=False)
     assert chosen().__name__.endswith(levels_here()[-1].replace("-", "_"))
 
 
 @x86_64
 @pytest.mark.parametrize("level", ["x86-64-v9", "native", "haswell"])
-def test_unknown_level_is_refused_in_one_line(level):
+def test_unknown_instruction_level_is_refused_in_one_line(level):
     words = [
         "-m",
         "forcefit",
@@ -100,7 +100,7 @@ def test_unknown_level_is_refused_in_one_line(level):
     )
 
 
-def test_level_above_that_of_the_processor_is_refused(monkeypatch):
+def test_instruction_level_above_that_of_the_processor_is_refused(monkeypatch):
     monkeypatch.setattr(choice.platform, "machine", lambda: "x86_64")
     monkeypatch.setattr(choice, "_load", lambda _: SimpleNamespace(level=lambda: 3))
     monkeypatch.setenv("FORCEFIT_MARCH", "x86-64-v4")
@@ -108,7 +108,7 @@ def test_level_above_that_of_the_processor_is_refused(monkeypatch):
         chosen()
 
 
-def test_processor_below_every_level_raises_an_import_error(monkeypatch):
+def test_processor_below_every_instruction_level_raises_an_import_error(monkeypatch):
     monkeypatch.delenv("FORCEFIT_MARCH", raising=False)
     monkeypatch.setattr(choice.platform, "machine", lambda: "x86_64")
     monkeypatch.setattr(choice, "_load", lambda _: SimpleNamespace(level=lambda: 1))
@@ -116,7 +116,7 @@ def test_processor_below_every_level_raises_an_import_error(monkeypatch):
         chosen()
 
 
-def test_other_architecture_loads_the_portable_module(monkeypatch):
+def test_portable_module_is_loaded_on_another_architecture(monkeypatch):
     monkeypatch.setattr(choice.platform, "machine", lambda: "aarch64")
     monkeypatch.setattr(choice, "_load", lambda name: name)
     monkeypatch.delenv("FORCEFIT_MARCH", raising=False)

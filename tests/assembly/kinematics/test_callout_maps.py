@@ -43,7 +43,7 @@ def hole(*datums):
     )  # fmt: skip
 
 
-def test_order_of_datums_moves_a_hole_by_the_worked_amount():
+def test_exchanging_two_datums_moves_a_hole_by_the_amount_computed_by_hand():
     """B out of square to A by 0.05 over 60 mm (0.833 mrad): the hole 80 mm from B
     moves by 66.7 um normal to A in B|A, not at all in A|B."""
     row = PLATE.index("hole")
@@ -69,7 +69,7 @@ def test_side_face_tilts_at_most_its_width_over_its_side():
     )
 
 
-def test_datum_that_an_earlier_one_holds_takes_only_what_is_left():
+def test_datum_restricted_by_an_earlier_datum_fixes_only_the_remaining_freedoms():
     """A (plane) holds RX, RY, TZ.  A bore B along z then holds TX and TY, not RZ."""
     robot = replace(
         PLATE,
@@ -86,7 +86,7 @@ def test_datum_that_an_earlier_one_holds_takes_only_what_is_left():
     assert np.abs(moved[[0, 1, 2, 5]]).max() < 1e-12
 
 
-def test_datum_at_maximum_material_shifts_with_its_hole():
+def test_shift_of_a_datum_at_maximum_material_depends_on_the_size_of_its_hole():
     """Bore 12 H7 after face A: 0 to 18 um larger than its least size, so the datum
     shifts by up to 9 um along x and y; uniform sizes and positions: 9 um / sqrt 12."""
     robot = replace(
@@ -109,7 +109,7 @@ def test_datum_at_maximum_material_shifts_with_its_hole():
     assert shift.name == "shift of datum bore of hole"
 
 
-def test_shifting_second_bore_turns_what_is_measured_from_it():
+def test_shift_of_a_second_bore_rotates_the_features_measured_from_it():
     """Bore A at the origin holds all but the turn.  Bore B, 50 mm from A, shifts by
     9 um: the hole, 80 mm from A, moves by 9 um x 80/50 = 14.4 um around A."""
     robot = replace(
@@ -185,7 +185,7 @@ def _platform(home, errors):
     ("callouts", "message"),
     [
         ([hole(B), replace(hole(Datum("hole")), name="B", feature="B")],
-         "circular datums"),
+         "datums that depend on each other"),
         ([replace(hole(A), datums=(Datum("tip"),))], "another body"),
         ([replace(hole(A), datums=(Datum("hole"),))], "the feature itself"),
         ([hole(A), hole(B)], "found the feature twice"),
@@ -197,7 +197,9 @@ def _platform(home, errors):
          "no frame that its joint"),
     ],
 )  # fmt: skip
-def test_callout_that_does_not_fit_is_refused_in_one_line(callouts, message):
+def test_callout_that_does_not_apply_to_its_feature_is_refused_in_one_line(
+    callouts, message
+):
     with pytest.raises(BadInput, match=message) as error:
         placed(PLATE, *callouts)
     assert "\n" not in str(error.value)

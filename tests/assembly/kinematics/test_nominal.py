@@ -45,7 +45,7 @@ def test_rough_home_coordinates_are_corrected_to_close():
     )
 
 
-def test_message_states_where_a_limited_crank_stops():
+def test_message_states_the_angle_at_which_a_limited_crank_stops():
     """Coupler and rocker of 0.3 m are in line when the crank's end is 0.6 m away."""
     short = 0.3
     robot = Robot(
@@ -81,7 +81,7 @@ def arm(lengths=(0.5, 0.4), angles=(0.3, 0.9)):
 
 
 @pytest.mark.parametrize("x", [0.2, 0.5, 0.85])
-def test_arm_reaches_a_pose_in_the_elbow_mode_of_home(x):
+def test_arm_reaches_a_pose_with_the_elbow_on_the_same_side_as_at_home(x):
     y = 0.2
     posture = place_robot(arm(), pose={"tx": x, "ty": y})
     far = (x**2 + y**2 - 0.5**2 - 0.4**2) / (2 * 0.5 * 0.4)
@@ -89,7 +89,7 @@ def test_arm_reaches_a_pose_in_the_elbow_mode_of_home(x):
     np.testing.assert_allclose(posture.platform[:2, 3], [x, y], rtol=0, atol=EXACT)
 
 
-def test_missing_angle_equals_that_between_the_two_rotations():
+def test_missing_rotation_in_the_message_equals_the_angle_between_the_two_rotations():
     """A hinge about z cannot tilt: SciPy's angle from its last pose to the target."""
     robot = Robot("hinge", "hand", (
         frame("a", **driven(0.3)), frame("hand", "a", (0.4, 0, 0), (0.2, -0.1, 0.3)),
@@ -107,7 +107,7 @@ def test_missing_angle_equals_that_between_the_two_rotations():
     assert float(short) == pytest.approx(between.magnitude(), rel=1e-5)
 
 
-def test_unspecified_pose_components_stay_nearest_to_home():
+def test_unspecified_pose_components_are_chosen_nearest_to_home():
     """Of all elbow angles with the hand at x, the nearest to home."""
     robot = arm()
     home = home_posture(robot)

@@ -119,7 +119,9 @@ def test_joints_after_a_closure_or_the_platform_keep_their_position():
         ({"ry": 0.3, "rz": 0.4}, "0.5 rad"),
     ],
 )  # fmt: skip
-def test_missing_distance_has_the_unit_of_the_requested_component(asked, missing):
+def test_missing_distance_in_the_message_has_the_unit_of_the_requested_component(
+    asked, missing
+):
     """A slide along x neither rises nor tilts at any position."""
     robot = Robot("slide", "car", (
         Frame("rail", rotation=[0, np.pi / 2, 0], joint="prismatic", actuated=True),

@@ -56,7 +56,7 @@ GIVEN = [{"tz": HEIGHT}, {"tx": 0.0, "ty": 0.0, "tz": HEIGHT}, flat()]
 
 
 @pytest.mark.parametrize("pose", GIVEN)
-def test_singular_distances_are_zero_for_every_form_of_the_singular_pose(pose):
+def test_singularity_distances_are_zero_in_every_way_to_give_the_singular_pose(pose):
     robot = three_upu()
     found = find_singularities(robot, place_robot(robot, pose=pose).transforms[None])
     assert found.parallel[0] == 0.0
@@ -74,7 +74,7 @@ def test_pose_from_a_singular_home_is_reached_by_pure_translation():
     assert posture.pose() == pytest.approx(flat(0.002, 0.001), abs=1e-9)
 
 
-def test_drives_from_a_singular_home_keep_the_mode_of_translation():
+def test_drive_coordinates_from_a_singular_home_keep_the_translational_mode():
     """Three spheres meet at x = (L^2 - l^2) / (3 (b - p)), y = 0."""
     robot = three_upu()
     posture = place_robot(robot, joints={"leg1.slide": 0.5})
@@ -87,7 +87,7 @@ def test_drives_from_a_singular_home_keep_the_mode_of_translation():
     assert "pure translation" in remark
 
 
-def test_pose_that_rotates_is_reported_as_another_mode():
+def test_pose_reached_only_by_rotating_the_platform_is_reported_as_another_mode():
     posture = place_robot(three_upu(), pose={"rx": 0.05})
     assert posture.pose()["rx"] == pytest.approx(0.05, abs=1e-9)
     assert "turns" in posture_remarks(posture)[0]

@@ -51,7 +51,7 @@ def five_bar():
     return robot, np.array([p.transforms for p in postures if p is not None])
 
 
-def test_five_bar_distances_equal_the_closed_form_jacobian(five_bar):
+def test_singularity_distances_of_a_five_bar_equal_its_closed_form_jacobian(five_bar):
     """J = A^-1 B with the tip's rotation and translation: tangents of the angles."""
     robot, T = five_bar
     found = find_singularities(robot, T)
@@ -74,7 +74,7 @@ def test_five_bar_distances_equal_the_closed_form_jacobian(five_bar):
         assert found.condition[i] == pytest.approx(tangents[0] / tangents[-1])
 
 
-def test_arms_in_line_are_a_serial_singularity_with_the_drive_named():
+def test_serial_singularity_of_aligned_arms_is_reported_with_the_name_of_the_drive():
     """B_11 = d.(k x a) = 0 where the left arms are one line, 180 mm long.
 
     If they are shorter by e, they are bent by an angle proportional to sqrt(e).
@@ -91,7 +91,7 @@ def test_arms_in_line_are_a_serial_singularity_with_the_drive_named():
 
 
 @pytest.mark.parametrize("angle", [0.3, 1.1, 2.5, 4.0])
-def test_four_bar_distances_equal_the_speed_of_its_closed_form(angle):
+def test_singularity_distances_of_a_four_bar_equal_the_speed_of_its_closed_form(angle):
     """Speed and turn of Hoeken's coupler by differences of its closed form."""
     robot = load_robot("four_bar")
     found = at(robot, joints={"crank": angle})
@@ -142,7 +142,7 @@ def test_arm_with_aligned_wrist_axes_is_serially_singular():
     assert found.names(robot, 0.02)[1].startswith("serial: ")
 
 
-def test_singular_distances_do_not_depend_on_the_unit_of_length(five_bar):
+def test_singularity_distances_do_not_depend_on_the_unit_of_length(five_bar):
     """Every length times 1000 changes no angle: lengths are relative to a body's."""
     robot, T = five_bar
     frames = [replace(f, translation=1000 * f.translation) for f in robot.frames]
@@ -172,7 +172,7 @@ def parallelogram(angle):
     return Robot("parallelogram", "coupler", frames, (("coupler", "rocker_end"),))
 
 
-def test_flat_parallelogram_is_a_closure_singularity_with_its_joint_named():
+def test_closure_singularity_of_a_flat_parallelogram_is_reported_with_its_joint():
     """All four axes meet one line: the distance is proportional to the angle."""
     found = []
     for angle in (0.1, 0.01):
@@ -210,7 +210,7 @@ def way_to(robot, name):
 
 
 @pytest.mark.parametrize("name", ["five_bar", "3rrr", "orthoglide", "arm6", "delta"])
-def test_singular_motions_keep_closures_closed_and_have_unit_size(name):
+def test_singular_motions_satisfy_the_closures_and_have_unit_size(name):
     """Motions have size one; the platform's, or the drives', share is the least.
     Passive joints move with them, and closures stay closed."""
     robot = load_robot(name)

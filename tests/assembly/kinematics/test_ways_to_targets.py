@@ -21,7 +21,7 @@ from tests.linkages_for_tests import five_bar
 EXACT = 1e-9  # closures are solved to 1e-10 of the longest body, all near 1 m here
 
 
-def test_many_poses_equal_those_placed_one_by_one():
+def test_poses_of_many_targets_equal_those_placed_one_by_one():
     robot = five_bar()
     goals = np.full((3, 6), np.nan)
     goals[:, :2] = [[0.1, 0.5], [0.0, 2.0], [-0.1, 0.6]]
@@ -38,7 +38,7 @@ def test_many_poses_equal_those_placed_one_by_one():
 
 
 @pytest.mark.parametrize("name", ["irsbot2", "orthoglide"])
-def test_direct_track_ends_in_the_posture_of_many_short_steps(name):
+def test_direct_track_ends_in_the_same_posture_as_many_short_steps(name):
     """Home's assembly mode: through 40 targets on the line, each from the previous."""
     robot = load_robot(name)
     home = home_posture(robot)
@@ -60,7 +60,7 @@ def test_direct_track_ends_in_the_posture_of_many_short_steps(name):
         np.testing.assert_allclose(posture.coordinates, at, rtol=0, atol=EXACT)
 
 
-def test_ball_joint_near_gimbal_lock_keeps_its_branch():
+def test_ball_joint_near_gimbal_lock_stays_on_the_same_branch_of_angles():
     """Near the lock a long step could end half a turn away about two of its axes."""
     robot = load_robot("hexapod")
     home = home_posture(robot)
@@ -226,7 +226,7 @@ def test_joint_rotation_equals_scipy_for_any_angle(rng):
     np.testing.assert_allclose(track.transforms[:, 1, :3, :3], expected, atol=4e-16)
 
 
-def test_empty_list_of_targets_gives_empty_tracks():
+def test_empty_list_of_targets_has_empty_tracks():
     home = home_posture(BUILT_IN["five_bar"]())
     track = follow(home.robot, home.coordinates, Target(pose=np.zeros((0, 6))))
     assert track.coordinates.shape == (0, len(home.robot.frames))

@@ -55,7 +55,7 @@ def solvable(rng):
             continue
 
 
-def test_any_wrenches_give_a_lower_bound_of_the_energy(rng):
+def test_any_wrenches_imply_a_lower_bound_of_the_energy(rng):
     """Weak duality; the bound is the sum that its docstring defines."""
     some = list(solvable(rng))
     assert len(some) >= 3
@@ -68,7 +68,7 @@ def test_any_wrenches_give_a_lower_bound_of_the_energy(rng):
         assert other.bound == pytest.approx(by_hand, rel=1e-9, abs=1e-9 * scale)
 
 
-def test_combined_points_keep_their_own_certificates():
+def test_joining_solutions_keeps_the_certificate_of_each_point():
     """The bound is the energy less the gap, also above the least energy."""
     robot = coaxial_beams([0, 0, 0, 1e-4, 0, 0])
     best = solve_assembly(home_posture(robot))

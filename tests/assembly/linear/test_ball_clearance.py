@@ -64,7 +64,7 @@ def test_a_ball_reaches_its_radius_in_every_direction(method, width):
 
 
 @pytest.mark.parametrize("gap", [0.5 * C, 1.7 * C, 40 * C])
-def test_energy_beyond_a_ball_is_that_of_its_distance(gap):
+def test_energy_outside_a_ball_equals_that_of_the_distance_to_it(gap):
     """Equal springs of 1e6 N/m each, in series, over the gap less the radius."""
     direction = np.array([1.0, -2.0, 2.0]) / 3
     screw = [0, 0, 0, *(gap * direction)]
@@ -152,7 +152,7 @@ def test_a_pressed_ball_rolls_in_both_directions_along_its_boundary(method):
     np.testing.assert_allclose(C, expected, atol=1e-3 * 50e-6 / 300.0)
 
 
-def test_clearances_of_a_ball_are_named_so():
+def test_clearance_of_a_ball_has_its_own_name_in_results():
     posture, load = pressed([0, 0, 300.0], Clearance(ball=C, tilt=1e-3))
     joints = solve_assembly(posture, load).joints
     marked = np.ones(2, dtype=bool)
@@ -160,8 +160,8 @@ def test_clearances_of_a_ball_are_named_so():
 
 
 @pytest.mark.parametrize("key", ["radial", "axial"])
-def test_a_ball_takes_the_place_of_other_bounds(key):
+def test_clearance_of_a_ball_replaces_the_other_translational_bounds(key):
     with pytest.raises(BadInput, match=f'clearance.{key}: found together with "ball"'):
         Clearance(ball=C, **{key: C})
-    with pytest.raises(BadInput, match=r"clearance\.ball: found one on a joint that"):
+    with pytest.raises(BadInput, match=r"clearance\.ball: found a bound on a sliding"):
         Frame("slide", joint="prismatic", clearance=Clearance(ball=C))

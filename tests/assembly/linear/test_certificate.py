@@ -41,7 +41,7 @@ def assert_proved(answer):
     assert gap <= 1e-8 * answer.energy + 1e-12 * answer.energy_without_clearance
 
 
-def test_nan_and_wrong_values_are_not_certified():
+def test_solutions_with_nan_or_wrong_values_are_not_certified():
     answer = solve_assembly(place_robot(irsbot2_with(NUMBERS["cases"][0])))
     for spoilt_answer in (
         replace(answer, multipliers=answer.multipliers * np.nan),
@@ -73,7 +73,9 @@ def arm_against_wall(young, soft=50.0):
 
 
 @pytest.mark.parametrize("young", [7e10, 1e16, 1e20, 1e22, 1e30, 1e38])
-def test_hinge_rotation_is_within_its_bound_or_refused_as_ill_conditioned(young):
+def test_error_of_a_hinge_rotation_is_within_its_bound_or_refused_as_ill_conditioned(
+    young,
+):
     """By hand: a force F across turns the hinge by F L / K = t and bends the bar by
     F L^3 / (3 E I); together t L + F L^3 / (3 E I) = 0.2 mm.
     """
@@ -91,7 +93,7 @@ def test_hinge_rotation_is_within_its_bound_or_refused_as_ill_conditioned(young)
     assert bound.rotation_error < 1e-8
 
 
-def test_platform_screw_of_cvxpy_is_within_the_bound():
+def test_platform_screw_computed_by_cvxpy_is_within_the_certified_bound():
     """cvxpy's energies are above the least by 1e-8 J, its screws off by the root of it:
     that excess is added to the uncertainty.
     """
@@ -148,7 +150,7 @@ def test_errors_that_cancel_up_to_rounding_store_no_energy():
             assert found == pytest.approx(1e6 * gap**2 / 2, rel=1e-9)
 
 
-def test_wrong_multipliers_give_the_gap_worked_out_by_hand():
+def test_wrong_multipliers_have_the_duality_gap_computed_by_hand():
     """Wrong multipliers and springs open a gap of the size worked out by hand."""
     robot = coaxial_beams(np.array([0, 0, 0, 2e-4, 0, 0]), (1e6, 3e6))
     answer = solve_assembly(home_posture(robot))

@@ -14,7 +14,7 @@ from tests.robots_for_tests import (
 )
 
 
-def test_redundant_free_motions_have_least_norm():
+def test_redundant_free_motions_have_the_least_norm():
     """Two pins on one axis share its rotation: half each, as by the reference."""
     gap = [1e-3, 0, 2e-3, 1e-4, 0, 0]
     frames = (
@@ -35,7 +35,7 @@ def test_redundant_free_motions_have_least_norm():
     assert batch.platform_screw[0, 2] == pytest.approx(1e-3, rel=1e-9)
 
 
-def test_stiff_spring_in_series_with_a_soft_one_keeps_its_energy():
+def test_energy_of_a_stiff_spring_in_series_with_a_soft_one_is_accurate():
     """1 and 1e-8 rad/(N m) about one axis, twice 1e-8 across it."""
     soft = np.diag([1.0, 1e8, 1e8, 1e8, 1e8, 1e8])
     gap = np.array([1e-2, 1e-4, 0, 0, 0, 0])
@@ -56,7 +56,7 @@ def test_stiff_spring_in_series_with_a_soft_one_keeps_its_energy():
     assert batch.energy[0] == pytest.approx(by_hand, rel=1e-12)
 
 
-def test_falsified_solution_is_not_certified(grid):
+def test_solution_with_a_changed_value_is_not_certified(grid):
     """Springs are 1.5e-8 too long, or multipliers 2e-4 too small or NaN."""
     robot, postures = grid
     T = postures[0].transforms[None].copy()

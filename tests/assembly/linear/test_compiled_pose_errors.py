@@ -32,7 +32,9 @@ def assert_overlap(batch, i, one, uncertain=2e-7, width=1e-6):
 
 
 @pytest.mark.parametrize("assumption", ASSUMPTIONS)
-def test_compiled_brackets_overlap_those_of_the_reference_method(assumption, rng):
+def test_compiled_bounds_of_the_pose_error_overlap_those_of_the_reference_method(
+    assumption, rng
+):
     """At a platform offset, with and without motion limits of passive joints."""
     homes = [home_posture(make()) for make in BUILT_IN.values()]
     for seed in range(12):
@@ -57,7 +59,7 @@ def test_compiled_brackets_overlap_those_of_the_reference_method(assumption, rng
     assert compiled
 
 
-def test_pose_error_brackets_have_the_requested_width(grid):
+def test_pose_error_bounds_have_the_requested_difference(grid):
     robot, postures = grid
     errors = np.array([-0.3, 0.1, 0.2])[:, None, None] * robot.errors
     options = {
@@ -107,7 +109,7 @@ def test_motion_limits_of_passive_joints_apply_to_many_points(spin, assumption):
 
 
 @pytest.mark.parametrize("assumption", ASSUMPTIONS)
-def test_only_points_that_reach_a_motion_limit_use_the_reference_method(assumption):
+def test_only_points_at_a_motion_limit_use_the_reference_method(assumption):
     """In every other of six draws the errors are so large that a limit is reached."""
     home = home_posture(hinged_frame(2e-3))
     sizes = 1e-4 * np.array([0, 1, 3, 10, 30, 100])[:, None]

@@ -43,7 +43,7 @@ def _along(k):
 
 @pytest.mark.parametrize("solve", [solve_assembly, solve_exact])
 @pytest.mark.parametrize("method", METHODS)
-def test_force_of_one_of_two_opposing_slides_is_that_of_the_rod(solve, method):
+def test_force_of_one_of_two_opposing_slides_equals_the_force_in_the_rod(solve, method):
     """F = 200 N stretches rod and first drive in series: x = F (1/k_rod + 1/k_1)."""
     F, k_rod, k_1 = 200.0, 4e6, 1e7
     robot = with_drive_forces(opposing_slides(k_rod, k_1, 3e7), {"second": F})
@@ -124,7 +124,7 @@ def test_torque_of_a_redundant_crank_loads_the_coupler_by_its_lever_arm(torque):
     assert solve_exact(posture).platform_screw[3] == pytest.approx(-shorter, rel=1e-3)
 
 
-def test_drive_that_alone_holds_a_motion_cannot_apply_a_force():
+def test_drive_that_is_the_only_support_of_a_motion_cannot_apply_a_given_force():
     robot = crossed_cranks()
     crank = replace(robot.frames[3], actuated=False)
     robot = replace(robot, frames=(*robot.frames[:3], crank, *robot.frames[4:]))
@@ -159,7 +159,7 @@ def test_force_of_a_drive_can_balance_a_weight(solve):
     np.testing.assert_allclose(assembly.platform_screw, np.zeros(6), atol=1e-15)
 
 
-def test_drive_force_turns_clearance_of_other_joints_to_one_side():
+def test_drive_force_presses_clearances_of_other_joints_to_one_side():
     """Axial play of the rod's end +-20 um: the pull takes all of it up."""
     robot = opposing_slides(4e6)
     first = replace(robot.frames[0], clearance=Clearance(axial=2e-5))
@@ -170,7 +170,7 @@ def test_drive_force_turns_clearance_of_other_joints_to_one_side():
         assert screw[3] == pytest.approx(np.sign(F) * 2e-5 + F / 4e6, rel=1e-9)
 
 
-def test_many_postures_and_errors_have_the_forces_of_single_ones():
+def test_forces_for_many_postures_and_errors_equal_those_computed_one_by_one():
     robot = with_drive_forces(crossed_cranks(), {"rocker": 5.0})
     postures = [place_robot(robot, joints={"crank": q}) for q in (0.7, 1.0, 1.2)]
     together = solve_assembly(postures)

@@ -21,7 +21,7 @@ REFUSALS = (CannotAssemble, FreeMotion, SolverFailed)
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_unit_of_length_scales_energies_and_keeps_margins(seed):
+def test_change_of_the_unit_of_length_scales_energies_and_not_margins(seed):
     """Energy in N mm is 1000 times that in N m; margins and angles are the same."""
     robot = random_robot(np.random.default_rng(seed), legs=2)
     small = replace(robot, frames=tuple(
@@ -44,7 +44,7 @@ def test_unit_of_length_scales_energies_and_keeps_margins(seed):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_moving_the_whole_robot_keeps_energy_and_pose_errors(seed):
+def test_moving_the_whole_robot_does_not_change_energy_and_pose_errors(seed):
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, legs=2)
     turn, shift = rng.uniform(-2, 2, 3), rng.uniform(-1, 1, 3)

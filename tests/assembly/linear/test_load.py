@@ -106,7 +106,7 @@ def test_base_reactions_of_a_closed_loop_sum_to_its_weight():
 
 
 @pytest.mark.parametrize("size", [1e6, 1e8])
-def test_large_loads_deflect_by_the_compliance(size):
+def test_large_loads_cause_deflections_by_the_compliance(size):
     """Doubling a load of 1e8 N adds the compliance times the load."""
     posture = home_posture(load_robot("irsbot2"))
     once, twice = (

@@ -35,7 +35,7 @@ def compiled(posture, *loads, **others):
 
 
 @pytest.mark.parametrize("force", [0.5, 50.0, 300.0])
-def test_second_spring_deforms_only_after_the_pin_reaches_its_rim(force):
+def test_second_spring_deforms_only_after_the_pin_touches_its_rim(force):
     """Radial clearance c: only the platform's spring deforms until the rim is reached.
 
     From there on k1 x + k2 (x - c) = w.  Rim and force by hand: k1 = 1e6 N/m,
@@ -51,7 +51,7 @@ def test_second_spring_deforms_only_after_the_pin_reaches_its_rim(force):
     assert many.energy[0] == pytest.approx(stored, rel=2e-8)
 
 
-def test_load_moves_an_open_chain_to_the_rim_of_its_clearance():
+def test_load_moves_an_open_chain_to_the_boundary_of_its_clearance():
     """A spring and a pin in series, in no closure: c + w / k, energy w^2 / 2k."""
     k, c, force = 1e5, 2e-4, 7.0
     frames = (
@@ -97,7 +97,7 @@ def test_all_points_of_the_papers_robot_are_certified(grid, kappa, size):
     assert many.clearance_excess().max() < 1e-14
 
 
-def test_wrenches_give_the_complementary_energy_bound(grid):
+def test_wrenches_imply_the_complementary_energy_bound(grid):
     """The complementary energy in NumPy is independent of the kernels."""
     _, postures = grid
     many = solve_assembly(postures, LOAD, gravity=GRAVITY)
@@ -127,7 +127,9 @@ def cases_at_random():
 
 
 @pytest.mark.parametrize("loaded", [False, True])
-def test_random_robots_equal_the_reference_method_or_its_refusal(loaded):
+def test_results_for_random_robots_equal_the_reference_method_or_are_refused_by_both(
+    loaded,
+):
     """Loads on every body, errors over decades; potentials agree within the gaps."""
     solved = 0
     for number, home in enumerate(cases_at_random()):

@@ -106,7 +106,7 @@ def nearest_by_cvxpy(posture, point, load=None):
 
 @pytest.mark.parametrize("name", ["five_bar", "delta", "hexapod", "four_bar"])
 @pytest.mark.parametrize("seed", [0, 1])
-def test_pose_inside_the_zone_is_the_nearest_to_nominal(name, seed):
+def test_reported_pose_inside_the_zone_is_the_nearest_to_the_nominal_pose(name, seed):
     """Without load the springs are unloaded: a cone programme solved by cvxpy."""
     posture = erring(name, seed)
     here = as_declared(posture, point=POINT)
@@ -127,7 +127,9 @@ def test_pose_inside_the_zone_is_the_nearest_to_nominal(name, seed):
 
 
 @pytest.mark.parametrize(("name", "margin"), [("five_bar", 0.0), ("orthoglide", 0.02)])
-def test_nearest_pose_under_a_load_keeps_the_energy(name, margin):
+def test_choice_of_the_nearest_pose_under_a_load_does_not_change_the_energy(
+    name, margin
+):
     posture = erring(name, 3)
     load = np.array([0, 0, 0, 0, -20.0, 0])
     here = as_declared(posture, load, point=POINT)
@@ -148,7 +150,9 @@ def test_nearest_pose_under_a_load_keeps_the_energy(name, margin):
 
 
 @pytest.mark.parametrize("clearance", [2e-5, 8e-5])
-def test_platform_on_two_pins_is_off_by_its_error_minus_one_clearance(clearance):
+def test_pose_error_of_a_platform_on_two_pins_is_its_error_minus_one_clearance(
+    clearance,
+):
     """Two rigid chains to one platform, 0.1 mm off, their pins with clearance c.
 
     The platform stands where both pins reach it: nearest to nominal it is off by
@@ -170,7 +174,7 @@ def test_platform_on_two_pins_is_off_by_its_error_minus_one_clearance(clearance)
     assert found.deviation[0] == pytest.approx(expected, abs=1e-10)
 
 
-def test_determined_pose_is_not_marked_as_free():
+def test_determined_pose_is_not_reported_as_free():
     """A load presses all clearances, or there is no clearance."""
     tight = home_posture(coaxial_beams(np.array([0, 0, 0, 1e-4, 0, 0])))
     assert predict(as_declared(tight)).undetermined.tolist() == [False]

@@ -173,7 +173,7 @@ def test_screws_of_the_bounds_are_feasible_in_the_closed_chain(spin, rng):
 
 
 @pytest.mark.parametrize("asked", [{}, {"energy_budget": 0.5}])
-def test_energy_budget_of_two_springs_gives_a_ball_of_known_radius(asked):
+def test_energy_budget_of_two_springs_allows_a_ball_of_known_radius(asked):
     """E - E* = (k1 + k2)/2 |x - x*|^2 for every motion of the meeting point."""
     k1, k2, gap, eta = 1e6, 3e6, 2e-4, asked.get("energy_budget", 0.05)
     robot = coaxial_beams(np.array([0, 0, 0, gap, 0, 0]), (k1, k2))
@@ -223,15 +223,13 @@ def test_unknown_assumption_and_budget_under_load_are_refused():
     for answer in (many, many[0]):
         with pytest.raises(ValueError, match="assumption is 'loose', expected one of"):
             bound_pose_error(answer, "loose")
-    with pytest.raises(ValueError, match="budget assumption needs no load"):
+    with pytest.raises(ValueError, match="budget assumption requires no load"):
         bound_pose_error(many[0], "budget")
 
 
 @pytest.mark.parametrize(("case", "point"), CASES)
 @pytest.mark.parametrize(("key", "assumption"), [("rigid", "frozen"), ("free", "free")])
-def test_pose_error_brackets_overlap_the_published_brackets(
-    case, point, key, assumption
-):
+def test_pose_error_bounds_overlap_the_published_bounds(case, point, key, assumption):
     """Both hold the truth, so they overlap; 1e-7 is what the reference's own
     deformations leave uncertain where the energy is nearly zero.
     """

@@ -176,7 +176,7 @@ def test_screw_bound_of_two_springs_equals_its_closed_form():
     assert open_.translation_error == pytest.approx(np.sqrt(2) * expected, rel=1e-4)
 
 
-def test_clearance_outside_the_loop_is_reported_as_open_and_not_as_error():
+def test_clearance_outside_the_loop_is_reported_as_undetermined_and_not_as_error():
     """A hand with radial and axial clearance on two bent beams: disc r, length a."""
     r, a = 3e-5, 2e-5
     beams = coaxial_beams([0, 0, 0, 1e-4, 0, 0], (4e4, 4e4))

@@ -96,7 +96,7 @@ def first_order(robot, position):
     ("x", "y", "shown"),
     [(0.0, 0.0, 45), (0.02, 0.01, 74), (0.05, 0.02, 21.5), (0.1, 0.05, 8.9)],
 )
-def test_finite_rotation_is_at_least_that_of_the_page(x, y, shown):
+def test_finite_rotation_is_at_least_the_value_of_the_example_page(x, y, shown):
     """A search along rays finds less than the largest rotation."""
     found = largest_finite_rotation((x, y, 0.45), RADIAL, TILT)
     assert shown <= 1e3 * found <= 1.04 * shown
@@ -104,7 +104,9 @@ def test_finite_rotation_is_at_least_that_of_the_page(x, y, shown):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("factor", [1e-1, 1e-2])
-def test_first_order_rotation_is_the_limit_of_small_clearances(seoul, factor):
+def test_first_order_rotation_is_the_limit_of_finite_rotations_for_small_clearances(
+    seoul, factor
+):
     """The relative difference is of the order of the rotation over 49 mrad."""
     position = (0.02, 0.01, 0.45)
     bound = first_order(seoul, position)
@@ -113,7 +115,7 @@ def test_first_order_rotation_is_the_limit_of_small_clearances(seoul, factor):
 
 
 @pytest.mark.slow
-def test_first_order_rotation_of_tsais_robot_is_that_of_finite_geometry():
+def test_first_order_rotation_of_tsais_robot_equals_that_of_finite_geometry():
     """Its axes are far from a singular posture: rotations of 3 mrad are small."""
     robot = load_robot(ROOT / "examples" / "drawn" / "three_upu.toml")
     for position in ((0.0, 0.0, 0.45), (0.02, 0.01, 0.45)):

@@ -33,7 +33,7 @@ def rigid_pins(gaps):
     return home_posture(robot), errors
 
 
-def test_points_are_selected_by_mask_slice_and_repeated_indices():
+def test_points_can_be_selected_by_mask_slice_and_repeated_indices():
     """The energy is K (gap - 1e-4)^2 / 2 beyond the clearance, by hand."""
     gaps = np.array([0.5e-4, 2e-4, 3e-4, 1.5e-4])
     home, errors = pins(gaps)
@@ -62,7 +62,7 @@ def test_point_without_solution_keeps_its_status_when_selected():
     assert twice[1].energy == many[0].energy == 0.0
 
 
-def test_solution_of_one_point_has_no_length():
+def test_solution_of_a_single_point_has_no_length():
     home, _ = pins([0.0])
     with pytest.raises(TypeError, match="Assembly of one point has no length"):
         len(solve_assembly(home))

@@ -68,7 +68,7 @@ def test_margin_of_a_nut_is_its_offset_from_the_thread(turned, shifted):
     assert margin_as_printed(at) == pytest.approx(expected, rel=1e-6)
 
 
-def test_energy_of_a_forced_nut_is_that_of_its_offset_beyond_the_clearance():
+def test_energy_of_a_forced_nut_equals_that_of_its_offset_beyond_the_clearance():
     """k (|TZ - h RZ| - b)^2 / 2, finite motions too: all of them share one axis."""
     at = held_nut(-0.1, 2e-5, 1e7)
     over = 2e-5 + 0.1 * 0.004 / (2 * np.pi) - 25e-6

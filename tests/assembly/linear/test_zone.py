@@ -49,7 +49,7 @@ def test_margin_is_infinite_without_clearance_in_the_error_direction():
     assert (zone.margin, zone.bound, zone.assemblable) == (np.inf, np.inf, False)
 
 
-def test_passive_joints_take_up_in_plane_errors_without_clearance():
+def test_passive_joints_compensate_in_plane_errors_without_clearance():
     """A four-bar's pins take up errors in its plane, and none across it."""
     errors = np.zeros((6, 6))
     errors[2] = [0, 0, 1e-3, 1e-4, 2e-4, 0]

@@ -44,7 +44,7 @@ def loaded_rows(name, rng, laws=()):
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_exact_rows_together_equal_single_exact_solutions(name, rng):
+def test_exact_solutions_of_all_rows_together_equal_single_exact_solutions(name, rng):
     """Both converge to 1e-12; nominal closures are rounded to 1e-12 at worst."""
     here = loaded_rows(name, rng)
     screws, found = solve_rows(here, np.zeros((len(here), 0)))
@@ -56,7 +56,7 @@ def test_exact_rows_together_equal_single_exact_solutions(name, rng):
     assert np.abs(predict(here).deviation - linear).max() > 1e-7  # it matters here
 
 
-def test_exact_rows_of_beams_in_pieces_equal_single_exact_solutions(rng):
+def test_exact_solutions_of_rows_with_beams_in_pieces_equal_single_exact_solutions(rng):
     here = loaded_rows("five_bar", rng)
     links = {f.name: replace(f.link, pieces=3) for f in here.robot.frames if f.link}
     cut = replace(here, robot=here.robot.with_links(links))
@@ -101,7 +101,7 @@ def test_contact_without_load_has_zero_deflection():
     np.testing.assert_array_equal(predict(here).deviation, 0.0)
 
 
-def test_rows_that_do_not_converge_are_left_to_the_exact_solver():
+def test_rows_that_do_not_converge_are_solved_by_the_exact_solver():
     """A spring so soft that the bar turns by radians."""
     K = np.diag([np.inf, np.inf, 1.0, np.inf, np.inf, np.inf])
     frames = (replace(BAR.frames[0], joint_stiffness=K), BAR.frames[1])

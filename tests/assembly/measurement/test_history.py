@@ -31,7 +31,9 @@ def by_integration(times, values, time_constant, held):
 
 @pytest.mark.parametrize("held", [False, True])
 @pytest.mark.parametrize("time_constant", [0.5, 20.0, 1e4])
-def test_lag_equals_the_integrated_differential_equation(held, time_constant):
+def test_lag_of_an_effect_equals_the_integrated_differential_equation(
+    held, time_constant
+):
     """Also with two rows at the same time, between which nothing settles."""
     history, row = in_order({"time": TIMES, "u": VALUES}, None)
     assert row.tolist() == [*range(6)]
@@ -43,7 +45,7 @@ def test_lag_equals_the_integrated_differential_equation(held, time_constant):
     )
 
 
-def test_sessions_begin_at_rest_and_rows_may_come_in_any_order(rng):
+def test_history_of_effects_begins_at_rest_in_each_session_for_rows_in_any_order(rng):
     """The state of each row depends on the rows of its own session only."""
     mixed = rng.permutation(12)
     times, values = np.tile(TIMES, 2)[mixed], np.r_[VALUES, 2 * VALUES][mixed]
@@ -72,7 +74,7 @@ def directions_by_hand(values, session, approach):
     return found
 
 
-def test_direction_is_that_of_the_last_step_of_the_session(rng):
+def test_approach_direction_is_that_of_the_last_motion_in_the_session(rng):
     """Sessions that begin anywhere, variables that do not or hardly change."""
     for _ in range(30):
         count = int(rng.integers(1, 9))

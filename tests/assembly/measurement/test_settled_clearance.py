@@ -33,7 +33,7 @@ def pin(**clearance):
 
 
 @pytest.mark.parametrize("unit", [1e-12, 1.0, 1e6])
-def test_load_of_any_size_takes_up_clearance_in_its_direction(unit):
+def test_load_of_any_size_moves_a_joint_to_its_bound_in_the_direction_of_the_load(unit):
     """A pin along x: radially by its clearance, axially by nothing."""
     conditions = at_home(pin(radial=RADIAL), unit * np.array([0, 0, 0, 2.0, 0, 0]))
     settled, undetermined = with_clearances_taken_up(conditions)

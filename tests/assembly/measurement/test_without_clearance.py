@@ -70,7 +70,7 @@ def rigid_four_bar(error):
     return replace(robot, frames=tuple(frames))
 
 
-def test_rigid_four_bar_takes_up_in_plane_errors_as_in_closed_form():
+def test_rigid_four_bar_compensates_in_plane_errors_as_in_closed_form():
     """The closure has rank 3 of 6, which suffices in the plane.
 
     The rocker longer by a: the pin of the coupler, which the locked crank holds, moves

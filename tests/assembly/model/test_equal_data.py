@@ -57,7 +57,7 @@ OTHER_FRAME = {
 }  # fmt: skip
 
 
-def test_robots_made_of_equal_data_are_equal_and_one_key():
+def test_robots_made_of_equal_data_are_equal_and_have_equal_hashes():
     assert made() is not made()
     assert made() == made()
     assert hash(made()) == hash(made())
@@ -65,18 +65,18 @@ def test_robots_made_of_equal_data_are_equal_and_one_key():
     assert made() != "arm"
 
 
-def test_integer_is_the_float_of_its_value():
+def test_integer_and_equal_float_make_equal_robots():
     two = [Frame("a", mass=2, position=0), Frame("a", mass=2.0, position=0.0)]
     assert Robot("r", "a", (two[0],)) == Robot("r", "a", (two[1],))
 
 
 @pytest.mark.parametrize("name", [f.name for f in fields(Robot) if f.name in OTHER])
-def test_robot_that_differs_in_one_field_is_another(name):
+def test_robots_that_differ_in_one_field_are_unequal(name):
     assert made(**{name: OTHER[name]}) != made()
 
 
 @pytest.mark.parametrize("name", sorted(OTHER_FRAME))
-def test_robot_that_differs_in_one_field_of_a_frame_is_another(name):
+def test_robots_that_differ_in_one_field_of_a_frame_are_unequal(name):
     frames = list(made().frames[1:])
     changed = replace(frames[0], **{name: OTHER_FRAME[name]})
     assert changed != frames[0]
@@ -93,7 +93,7 @@ def test_robot_written_and_read_equals_the_written_one(name, tmp_path):
     assert ff.load_robot(name) == robot
 
 
-def test_links_of_other_stiffness_under_one_key_do_not_share_results():
+def test_links_of_different_stiffness_with_equal_keys_do_not_share_results():
     """C = screw of a unit wrench; the library's file was replaced in between."""
     screws = []
     for factor in (1.0, 2.0):
@@ -104,7 +104,7 @@ def test_links_of_other_stiffness_under_one_key_do_not_share_results():
     np.testing.assert_allclose(screws, [1e-5, 2e-5])
 
 
-def test_robot_that_lost_its_solution_in_a_pickle_is_another():
+def test_robot_whose_link_solution_was_lost_in_a_pickle_is_unequal():
     """Tens of megabytes of finite elements are not pickled."""
     solved = SimpleNamespace(link=SimpleNamespace(compliance=np.linalg.inv(K)))
     solution = MeshSolution(solved, 2e11, "abc", np.zeros((12, 12)))
@@ -130,7 +130,7 @@ def test_equal_robots_are_equal_in_another_process(tmp_path):
     subprocess.run([sys.executable, "-c", code, tmp_path / "robot"], check=True)
 
 
-def test_diagonal_of_a_joint_stiffness_is_that_of_the_matrix():
+def test_diagonal_of_a_joint_stiffness_equals_that_of_its_matrix():
     diagonal = [np.inf, np.inf, 10.0, np.inf, np.inf, 2e5]
     short, full = (
         Frame("hinge", joint_stiffness=K) for K in (diagonal, np.diag(diagonal))

@@ -43,7 +43,7 @@ def test_draws_do_not_depend_on_their_division_into_blocks(sources):
     np.testing.assert_array_equal(np.vstack(cut), whole)
 
 
-def test_different_seeds_and_streams_give_different_numbers(sources):
+def test_different_seeds_and_streams_have_different_random_numbers(sources):
     draws = [sources.draw(0, 200, *key) for key in ((1, 0), (2, 0), (1, 1))]
     for a, b in ((0, 1), (0, 2), (1, 2)):
         assert not np.any(draws[a] == draws[b])
@@ -92,7 +92,7 @@ def test_errors_of_random_sign_keep_their_least_absolute_value():
         (('"normal"', '"gauss"'), 'distribution: found "gauss"'),
         (("least = [5e-4", "least = [5e-3"), "least: expected 0 <= least <= most"),
         (('"literal"', '"positive"'), 'signs: found "positive"'),
-        (('"middle"', '"crank_pin"'), 'found "crank_pin.RX" again'),
+        (('"middle"', '"crank_pin"'), 'found "crank_pin.RX" a second time'),
         (("most = [0, 1.5e-3", "most = [0, 0"), "most: expected a bound > 0"),
         (("most = [1e-3, 0", "most = [1e300, 0"), "most: found"),
         (("deviation = [0, 1e-3, 0, 0, 0, 1e-5]", "deviation = [0, -1, 0, 0, 0, 0]"),

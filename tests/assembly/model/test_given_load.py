@@ -42,7 +42,7 @@ def test_moment_and_force_by_name_superpose():
     assert abs(forced.platform_screw[5]) < 1e-9 * abs(TIP)
 
 
-def test_list_by_name_is_a_load_for_each_point():
+def test_list_of_numbers_by_component_name_is_a_load_for_each_point():
     forces = np.array([-50.0, 0.0, 25.0])
     many = ff.solve_assembly(cantilever(), {"fz": forces})
     np.testing.assert_allclose(
@@ -71,7 +71,7 @@ SAME = {
 
 
 @pytest.mark.parametrize("name", sorted(SAME))
-def test_load_by_name_is_the_load_in_order(name):
+def test_load_given_by_component_names_equals_the_load_given_in_order(name):
     by_name, in_order = {"fz": -50, "mx": 1.5}, [1.5, 0, 0, 0, 0, -50]
     np.testing.assert_array_equal(SAME[name](by_name), SAME[name](in_order))
     assert not np.array_equal(SAME[name](by_name), SAME[name]([0.0] * 6))
@@ -92,12 +92,12 @@ def test_command_line_and_python_read_the_same_load():
         ({"fz": [1, 2], "fx": [1, 2, 3]}, "load: found fz 2, fx 3 numbers"),
     ],
 )  # fmt: skip
-def test_load_that_is_none_is_named(load, message):
+def test_message_about_a_value_that_is_not_a_load_names_the_value(load, message):
     with pytest.raises(BadInput) as found:
         ff.solve_assembly(cantilever(), load)
     assert str(found.value).startswith(message)
 
 
-def test_several_loads_where_one_is_expected_are_named():
+def test_message_about_several_loads_where_one_is_expected_states_their_number():
     with pytest.raises(BadInput, match=r"load: found .* expected 6 numbers \[N m, N\]"):
         ff.platform_stiffness(cantilever(), load={"fz": [1.0, 2.0]})

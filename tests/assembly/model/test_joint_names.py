@@ -82,7 +82,7 @@ def legs():
     return np.array(rows).T
 
 
-def test_wrench_of_a_ball_is_the_force_along_its_leg(tmp_path):
+def test_wrench_of_a_ball_joint_is_the_force_along_its_leg(tmp_path):
     """By the platform's equilibrium; a ball passes no moment."""
     load = np.array([3.0, -5.0, 2.0, 40.0, -70.0, -500.0])
     forces = np.linalg.solve(legs(), load)  # of the platform on the legs
@@ -146,7 +146,7 @@ def one_joint(tmp_path, kind, more=""):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_centre_of_a_joint_error_equals_the_declared_error(tmp_path, kind):
+def test_error_at_the_centre_of_a_joint_equals_the_declared_error(tmp_path, kind):
     """In the joint's axes, for both bearings of a universal joint."""
     error = [1e-5, -2e-5, 3e-5, 4e-6, -5e-6, 6e-6]
     declared = read_robot(one_joint(tmp_path, kind, f"geometric_error = {error}"))
@@ -163,7 +163,7 @@ def test_centre_of_a_joint_error_equals_the_declared_error(tmp_path, kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_tolerance_of_a_joint_equals_its_declared_one(tmp_path, kind):
+def test_tolerance_of_a_joint_equals_the_declared_tolerance(tmp_path, kind):
     sizes = [1e-5, 2e-5, 3e-5, 4e-6, 5e-6, 6e-6]
     declared = read_robot(one_joint(tmp_path, kind, f"tolerance = {sizes}"))
     robot = read_robot(one_joint(tmp_path, kind))
@@ -179,14 +179,16 @@ def test_tolerance_of_a_joint_equals_its_declared_one(tmp_path, kind):
     ("cylindrical", "clearance.tilt", "clearance = {{ radial = 1e-5, tilt = {} }}"),
     ("planar", "geometric_error.rx", "geometric_error = [{}, 0, 0, 0, 0, 1e-5]"),
 ])  # fmt: skip
-def test_number_of_a_joint_changes_as_in_its_file(tmp_path, kind, key, more):
+def test_changing_a_number_of_a_joint_equals_changing_it_in_the_file(
+    tmp_path, kind, key, more
+):
     other = read_robot(one_joint(tmp_path, kind, more.format(3e-5)))
     design = load_design(one_joint(tmp_path, kind, more.format(1e-5)))
     changed = design.robot({f"j.{key}": 3e-5})
     assert changed.frames == other.frames
 
 
-def test_compliance_of_a_ball_is_shown_under_its_name(tmp_path):
+def test_compliance_of_a_ball_joint_is_shown_under_the_name_of_the_joint(tmp_path):
     """Of six springs in series with the drives: the shares add up to one."""
     K = "joint_stiffness = [[0,0,0,0,0,0],[0,0,0,0,0,0],[0,0,0,0,0,0],"
     K += "[0,0,0,1e6,0,0],[0,0,0,0,1e6,0],[0,0,0,0,0,1e6]]"
@@ -211,7 +213,7 @@ def test_unknown_joint_is_refused_with_a_similar_name(tmp_path):
         robot.index("leg1.ball")
 
 
-def test_frames_of_different_points_are_no_joint(tmp_path):
+def test_frames_at_different_points_are_not_combined_to_a_joint(tmp_path):
     """Two hinges of a leg that are named as the frames of a joint are."""
     file = tmp_path / "arm.toml"
     file.write_text(
@@ -224,7 +226,7 @@ def test_frames_of_different_points_are_no_joint(tmp_path):
     assert read_robot(file).joints == {}
 
 
-def test_table_of_wrenches_has_one_row_for_a_joint(tmp_path):
+def test_table_of_wrenches_has_one_row_for_each_joint(tmp_path):
     """The force along the leg, in the axes of its ball and of its cross."""
     load = np.array([0.0, 0.0, 0.0, 0.0, 0.0, -600.0])
     posture = home_posture(read_robot(hexapod(tmp_path)))
@@ -249,7 +251,7 @@ BORE = "clearance = { radial = 1e-5, length = 0.04, axial = 1e-5 }"
 @pytest.mark.parametrize(("kind", "loose"), [
     ("universal", []), ("revolute", []), ("cylindrical", []), ("fixed", ['"j"']),
 ])  # fmt: skip
-def test_only_a_fixed_joint_is_reported_as_loose(tmp_path, kind, loose):
+def test_only_fixed_joints_are_reported_as_loose(tmp_path, kind, loose):
     """The frames of a bore are no joints of their own."""
     key = BORE if kind != "cylindrical" else BORE.replace(", axial = 1e-5", "")
     robot = read_robot(one_joint(tmp_path, kind, key))
@@ -263,7 +265,7 @@ def plan_of(tmp_path, text):
     return read_steps(file, read_robot(hexapod(tmp_path)))
 
 
-def test_plan_of_steps_names_joints_of_several_frames(tmp_path):
+def test_plan_of_steps_refers_to_joints_of_several_frames_by_name(tmp_path):
     """A closure by its joint, in either order, and a frame at the joint's point."""
     plan = plan_of(
         tmp_path,

@@ -99,7 +99,7 @@ def stiffness(frame):
 
 
 @pytest.mark.slow
-def test_mesh_axis_below_a_slide_at_zero_gives_the_turned_stiffness(ram):
+def test_stiffness_of_a_mesh_below_a_slide_is_rotated_by_its_axis(ram):
     """Along z the result is that of a translation; along x K in turned axes."""
     spelt = read_robot(ram(more="translation = [0, 0, 0.08]")).frame("tool")
     K = stiffness(spelt).stiffness

@@ -127,7 +127,7 @@ def simulated(stiffness, steps):
 
 @pytest.mark.slow
 @pytest.mark.exudyn
-def test_deflection_approaches_the_dynamic_solution_with_the_square_of_the_period():
+def test_deflection_converges_to_the_dynamic_solution_with_the_square_of_the_period():
     """What the quasi-static answer leaves out falls as 1 / (T f1)^2."""
     table = PathTable(("tx", "ty"), np.array([START, END]))
     path = profiled(table, 101, "seventh", 1.0, duration=DURATION)

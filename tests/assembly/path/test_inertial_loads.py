@@ -135,7 +135,7 @@ def test_beam_in_pieces_deflects_as_the_whole_beam(theory):
         np.testing.assert_allclose(screw, screws[0], atol=1e-9 * size)
 
 
-def test_section_at_a_beams_start_carries_what_the_hub_bears():
+def test_section_at_the_start_of_a_beam_transmits_the_wrench_of_the_hub():
     """Equilibrium of the whole beam: its load and a tool beside its tip."""
     robot, path = spinning_beam(80.0, 3000.0, radius=0.03, axis=(0.3, -0.5, 1))
     tool = Frame(
@@ -159,7 +159,7 @@ def test_section_at_a_beams_start_carries_what_the_hub_bears():
     np.testing.assert_allclose(sections[2, :3], tip[:3] @ R, atol=1e-12)
 
 
-def test_load_at_rest_is_the_weight_of_the_static_solution():
+def test_path_loads_at_rest_equal_the_weight_in_the_static_solution():
     """The uniform weight is the case of equal accelerations."""
     robot, path = spinning_beam(0.0, 0.0, pieces=2, theory="timoshenko")
     found = path_errors(robot, path, gravity=[1.0, -9.0, 2.0])

@@ -101,7 +101,7 @@ def test_arm_given_by_joints_moves_as_its_closed_form():
     )  # fmt: skip
 
 
-def test_drives_that_a_path_of_joints_does_not_name_stay_at_rest():
+def test_drives_that_a_joint_path_does_not_name_remain_at_rest():
     robot = load_robot("arm6")
     path = tuple(np.array([[x, y]]) for x, y in ((0.2, 0.3), (1.0, -2), (3.0, 4)))
     names = ("q.joint2", "q.joint4")
@@ -114,7 +114,7 @@ def test_drives_that_a_path_of_joints_does_not_name_stay_at_rest():
     assert motion.free == 0
 
 
-def test_rotations_beyond_half_a_turn_keep_their_rate():
+def test_rotation_rate_is_correct_for_rotations_beyond_half_a_turn():
     """A turntable whose rotation vector is counted on to 4 rad turns at 2 rad/s."""
     robot = Robot("table", "top", (hinge("drive"), Frame("top", "drive", [0.1, 0, 0])))
     path = tuple(np.array([[x]]) for x in (3.0, 2.0, 5.0))

@@ -94,7 +94,7 @@ def test_power_of_the_drives_is_the_rate_of_the_energy(name):
 
 
 @pytest.mark.parametrize("name", ["hexapod", "five_bar"])
-def test_mass_of_the_platform_alone_deflects_by_the_platform_compliance(name):
+def test_inertia_of_only_the_platform_deflects_by_the_platform_compliance(name):
     """Deflection = C times the d'Alembert wrench of the platform."""
     robot, names = heavy(name, density=0.0), CASES[name]
     tight = without_clearance(robot)
@@ -156,7 +156,7 @@ def test_clearance_adds_to_the_deflection_of_an_accelerated_arm():
     assert upper >= stretch + 1e-5
 
 
-def test_rod_between_balls_spins_by_no_load():
+def test_no_load_makes_a_rod_between_two_ball_joints_spin():
     """Turned about an axis across it, a rod free to spin carries no moment along it."""
     robot = heavy("delta")
     names = CASES["delta"]
@@ -180,7 +180,7 @@ def test_weightless_robot_and_robot_with_effects_are_refused():
         path_errors(Robot("arm", "arm", heavy_arm), path, assumption="frosen")
 
 
-def test_paper_robot_at_20_g_needs_54_ms_for_100_mm():
+def test_robot_of_the_paper_needs_54_ms_for_100_mm_at_20_g():
     """The quintic's peak is 10/sqrt 3 D/T^2: T = 54.2 ms, 3.46 m/s at the middle."""
     robot = heavy("irsbot2")
     table = PathTable(("tx", "tz"), np.array([[-0.05, -0.5], [0.05, -0.5]]))
@@ -196,7 +196,7 @@ def test_paper_robot_at_20_g_needs_54_ms_for_100_mm():
     np.testing.assert_allclose(mirrored, found.inertial, atol=1e-6 * size)
 
 
-def test_falling_pendulum_has_no_deflection_at_rest_to_compare_with():
+def test_falling_pendulum_has_no_equilibrium_at_rest_as_reference_for_its_deflection():
     """A level rod of 2 kg falls with 3 g / 4 at its centre: its hinge holds m g / 4."""
     rail = Frame("rail", rotation=[0.0, np.pi / 2, 0.0], joint="prismatic",
                  actuated=True)  # fmt: skip
@@ -274,7 +274,7 @@ def test_drives_carry_the_platform_where_massless_legs_spin_freely(tmp_path):
     np.testing.assert_allclose(errors.arrays["drive_force"][0], expected, rtol=1e-9)
 
 
-def test_legs_with_masses_on_their_axes_may_spin_without_a_change(tmp_path):
+def test_spin_of_legs_with_masses_on_their_axes_does_not_change_the_result(tmp_path):
     """Balls at the base let them spin, universal joints do not: the same forces."""
     names = ["tx", "ty", "tz", "rx", "ry", "rz"]
     pose, rate, second = [0.05, -0.02, 0.55, 0.1, -0.1, 0.2], [0.5] * 6, [-3.0] * 6
@@ -287,7 +287,7 @@ def test_legs_with_masses_on_their_axes_may_spin_without_a_change(tmp_path):
     np.testing.assert_allclose(forces[0], forces[1], rtol=1e-9)
 
 
-def test_round_legs_between_balls_keep_no_spin(tmp_path):
+def test_spin_of_round_legs_between_ball_joints_is_removed(tmp_path):
     """Free of moments about their axes, they start and stay without spin.
 
     So no force depends on their moment of inertia about the axis.
@@ -303,7 +303,7 @@ def test_round_legs_between_balls_keep_no_spin(tmp_path):
     np.testing.assert_allclose(forces[1], forces[0], rtol=1e-9)
 
 
-def test_thread_turns_the_force_of_a_slide_into_a_torque(tmp_path):
+def test_thread_converts_the_force_of_a_slide_into_a_torque(tmp_path):
     """A leg with its masses on its axis: the torque of its screw is h times the force.
 
     The spindle turns many times, but has no inertia about its axis.

@@ -52,7 +52,7 @@ def test_polynomial_profiles_end_without_acceleration_or_jerk():
 
 
 @pytest.mark.parametrize("profile", PEAKS)
-def test_limits_of_speed_and_acceleration_give_the_shortest_duration(profile):
+def test_limits_of_speed_and_acceleration_determine_the_shortest_duration(profile):
     speed, acceleration = PEAKS[profile]
     path, D = line(0.1, 0.3), 0.2
     by_speed = profiled(path, 11, profile, 1.0, speed=0.5)
@@ -71,7 +71,7 @@ def test_two_rows_with_times_are_the_quintic_profile():
         )
 
 
-def test_moving_ends_reproduce_a_quintic_motion():
+def test_path_with_moving_ends_reproduces_a_quintic_motion():
     """A spline of degree five through samples of t^5 is t^5, at unequal times too."""
     times = np.array([0.0, 0.3, 0.5, 0.9, 1.4, 1.7, 2.0])
     path = timed(line(*times**5, times=times), 41, ends="moving")
@@ -79,7 +79,7 @@ def test_moving_ends_reproduce_a_quintic_motion():
     np.testing.assert_allclose(path.second[:, 0], 20 * path.times**3, atol=1e-9)
 
 
-def test_sampled_cosine_is_approached_with_the_fourth_order_of_acceleration():
+def test_acceleration_of_a_sampled_cosine_converges_with_fourth_order():
     """The second derivative of a quintic spline errs by h^4 away from its ends."""
     errors = []
     for count in (11, 21, 41):
@@ -92,7 +92,7 @@ def test_sampled_cosine_is_approached_with_the_fourth_order_of_acceleration():
     assert (orders > 3.5).all()
 
 
-def test_profile_along_many_rows_turns_without_a_jump():
+def test_motion_profile_over_many_rows_has_no_jump_of_acceleration():
     """The speed along three rows on a line is the profile's; the curve is smooth."""
     path = profiled(line(0.0, 0.1, 0.4), 101, "quintic", 1.0, duration=1.0)
     straight = profiled(line(0.0, 0.4), 101, "quintic", 1.0, duration=1.0)
@@ -127,7 +127,7 @@ def test_profile_along_many_rows_turns_without_a_jump():
         ),
     ],
 )
-def test_path_that_cannot_be_made_is_refused(call, message):
+def test_path_that_cannot_be_computed_is_refused(call, message):
     with pytest.raises(ValueError, match=message):
         call(line(0.0, 0.1))
 
@@ -156,7 +156,7 @@ def test_path_file_that_breaks_a_rule_is_refused(tmp_path, content, message):
     assert str(file) in str(raised.value)
 
 
-def test_path_file_keeps_times_names_and_ids(tmp_path):
+def test_path_file_preserves_times_names_and_ids(tmp_path):
     file = tmp_path / "path.csv"
     file.write_text("id,pose.tx,time,pose.ty\na,0,0.5,0.14\nb,0.01,1.5,0.15\n")
     path = read_path(file, load_robot("five_bar"))
@@ -166,6 +166,6 @@ def test_path_file_keeps_times_names_and_ids(tmp_path):
     np.testing.assert_array_equal(path.values, [[0, 0.14], [0.01, 0.15]])
 
 
-def test_times_that_go_back_are_refused_without_a_file():
+def test_decreasing_times_are_refused_and_no_file_is_written():
     with pytest.raises(ValueError, match="path: row 2, time: found -1 s after 0 s"):
         check_path(line(0, 1, times=np.array([0.0, -1.0])))

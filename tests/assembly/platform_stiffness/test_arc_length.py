@@ -60,7 +60,7 @@ def test_two_bars_on_torsion_springs_have_branch_points_at_both_loads():
         assert event.what.startswith("branch point, buckles")
 
 
-def test_spinning_rods_cause_no_events_on_the_path():
+def test_rods_that_spin_freely_cause_no_events_on_the_path():
     """The delta has six rods; the tangent without load is the classical stiffness."""
     posture = home_posture(load_robot("delta"))
     curve = follow_load(posture, 5, 0.0, -500.0, count=4)

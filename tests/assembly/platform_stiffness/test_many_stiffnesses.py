@@ -76,7 +76,7 @@ def test_spring_along_x_has_infinite_stiffness_across_it():
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_one_of_many_stiffnesses_equals_that_of_its_posture_at_any_point(method):
+def test_stiffness_among_many_equals_that_of_its_single_posture_at_any_point(method):
     """Compliance, stiffness and shares of each posture."""
     robot = load_robot("irsbot2")
     poses = np.full((3, 6), np.nan)
@@ -101,7 +101,7 @@ def test_one_of_many_stiffnesses_equals_that_of_its_posture_at_any_point(method)
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_tangents_of_many_postures_are_bit_identical_to_single_ones(state):
+def test_tangents_of_many_postures_are_bit_identical_to_those_of_single_postures(state):
     """For every property of the result."""
     clearance = Clearance(radial=2e-5, axial=1e-5, tilt=1e-3)
     gap = np.array([0, 0, 0, 1e-4, 0, 0])

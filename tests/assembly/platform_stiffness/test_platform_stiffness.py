@@ -55,7 +55,7 @@ def test_cantilever_compliance_equals_the_textbook():
     assert_same_matrix(C, expected, 1e-12)
 
 
-def test_serial_chain_compliance_is_the_sum_of_its_moved_parts():
+def test_compliance_of_a_serial_chain_is_the_sum_over_its_parts_moved_to_the_tip():
     """C = sum of X C_i X', each part moved to the tip: a serial arm."""
     rng = np.random.default_rng(1)
     frames, expected = [], np.zeros((6, 6))
@@ -184,7 +184,7 @@ def test_compliance_at_another_point_follows_the_screw_transform():
     np.testing.assert_allclose(at_point.centre, at_origin.centre, atol=1e-9)
 
 
-def test_stiffness_centre_is_at_the_spring():
+def test_centre_of_stiffness_is_at_the_position_of_a_single_spring():
     """A diagonal link stiffness, a rigid arm beyond: the centre is at its tip."""
     K = np.diag([20.0, 30.0, 40.0, 1e4, 2e4, 3e4])
     spring = Frame("spring", translation=[0.3, 0.1, 0.2], link=MatrixLink(K))
@@ -204,7 +204,7 @@ def test_eigen_stiffnesses_of_a_diagonal_spring_are_its_diagonal():
     )
 
 
-def test_compliance_shares_sum_to_one_and_a_single_link_has_all():
+def test_compliance_shares_sum_to_one_and_the_share_of_a_single_link_is_one():
     tangent = platform_stiffness(home_posture(load_robot("irsbot2")))
     for row in range(6):
         assert sum(tangent.shares(UNIT[row]).values()) == pytest.approx(1.0, rel=1e-12)
@@ -215,7 +215,7 @@ def test_compliance_shares_sum_to_one_and_a_single_link_has_all():
     assert alone.shares(UNIT[4]) == {Part("beam", "link"): pytest.approx(1.0)}
 
 
-def test_free_motion_is_reported_with_nan_compliance():
+def test_compliance_along_a_free_motion_is_nan_and_the_motion_is_reported():
     """A slide along x on a spring: TX is free, the other entries are the spring's."""
     K = np.diag([20.0, 30.0, 40.0, 1e4, 2e4, 3e4])
     spring = Frame("spring", rotation=[0, np.pi / 2, 0], joint="prismatic",
@@ -262,7 +262,7 @@ def test_tangent_of_a_column_on_a_torsion_spring_vanishes_at_buckling():
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_pressed_pin_is_stiff_across_and_rolls_along_its_rim(state):
+def test_pressed_pin_is_stiff_normal_to_its_rim_and_rolls_along_it(state):
     """Pressed by F with a radial clearance c, its stiffness along the rim is F/c."""
     force, c, k = 30.0, 1e-3, 1e5
     K = np.diag([1e9, 1e9, 1e9, k, k, k])  # so that the arm c turns nothing
@@ -308,7 +308,9 @@ def test_stiffness_at_a_change_of_contact_depends_on_the_side(state):
     assert away.along(UNIT[5])[0] == pytest.approx(1e5)
 
 
-def test_block_pressed_on_a_table_slides_and_is_rigid_across(tmp_path):
+def test_block_pressed_on_a_table_slides_freely_and_is_rigid_normal_to_the_table(
+    tmp_path,
+):
     """Its drives cannot hold it within their clearances, nor can they tilt it."""
     text = """
 format = 2

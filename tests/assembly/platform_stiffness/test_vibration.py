@@ -177,7 +177,7 @@ joint = [
 """  # noqa: E501
 
 
-def test_massless_rods_that_spin_freely_leave_the_frequencies_as_they_are(tmp_path):
+def test_massless_rods_that_spin_freely_do_not_change_the_frequencies(tmp_path):
     """Expected: K and M of all bodies' twists, constraints by their null space."""
     file = tmp_path / "robot.toml"
     file.write_text(SCREWS_AND_RODS)

@@ -53,7 +53,7 @@ def shown(answer, link):
     ]  # fmt: skip
 
 
-def test_text_of_every_object_is_a_few_lines_long(shown):
+def test_text_of_every_result_object_has_a_few_lines(shown):
     """The default text of a robot has 11 000 characters, of an assembly 52 000."""
     for thing in shown:
         text = repr(thing)
@@ -144,5 +144,5 @@ def test_default_text_shortens_long_fields():
     [(None, "None"), (0.1, "0.1"), ({}, "none"), ({"a": 1.0}, "{'a': 1.0}"),
      ([[1], [2]], "list of 2"), (np.zeros((6, 0)), "float64 array (6, 0)")],
 )  # fmt: skip
-def test_any_value_has_a_one_line_text(value, text):
+def test_text_of_any_value_has_one_line(value, text):
     assert brief(value) == text

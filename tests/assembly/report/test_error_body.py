@@ -63,7 +63,7 @@ def test_free_platform_or_unknown_part_has_no_error_body():
         error_body(reach_of(Clearance(radial=1e-5)), "both")
 
 
-def test_slack_is_the_largest_support_height_beyond_the_points():
+def test_reported_deviation_of_an_error_body_is_the_largest_height_beyond_its_points():
     """Four of the corners of a cube: the other corners are 2 / sqrt 3 beyond them."""
     corners = np.array(list(product([-1.0, 1.0], repeat=3)))
     even = corners[corners.prod(axis=1) > 0]

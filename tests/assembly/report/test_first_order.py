@@ -20,7 +20,7 @@ from tests.three_upu_for_tests import HEIGHT, three_upu
 SAID = "singular posture: the first-order analysis is inconclusive; finite motions: 0 J"
 
 
-def test_solution_at_a_singular_posture_gives_the_energy_of_finite_motions():
+def test_solution_at_a_singular_posture_has_the_energy_of_finite_motions():
     """In first order, modes that meet there take up errors without force."""
     results = solution_of(home_posture(three_upu(seed=1)))
     assert results["energy"] > 1e-4

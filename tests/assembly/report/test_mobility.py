@@ -80,7 +80,7 @@ def test_seoul_robot_has_fewer_freedoms_near_its_singular_home():
     assert "near it 3 freedoms" in mobility_lines(found)["singular posture"]
 
 
-def test_three_parallel_axes_in_a_plane_move_at_first_order_only():
+def test_three_coplanar_parallel_axes_allow_only_infinitesimal_motions():
     """Two bars of 0.3 and 0.2 m stretched between hinges 0.5 m apart are rigid."""
     robot = mechanism(
         "one", [0.1, 0, 0],
@@ -102,7 +102,7 @@ def test_regular_home_is_not_singular(name):
     assert "near" not in found
 
 
-def test_ball_joint_turned_by_a_right_angle_keeps_three_freedoms():
+def test_ball_joint_rotated_by_a_right_angle_has_three_freedoms():
     """Whatever three axes it is made of: it turns about every axis."""
     robot = mechanism("ball", [0, 0, 0.2], joint("spherical", "base", "ball", [0] * 3))
     home = home_posture(robot)
@@ -155,7 +155,7 @@ SCREWS = {
 
 @pytest.mark.parametrize("name", SCREWS)
 @pytest.mark.parametrize("size", [1.0, 1e-3])
-def test_pure_motions_of_screw_systems_equal_hand_results(name, size):
+def test_pure_motions_of_screw_systems_equal_hand_calculation(name, size):
     screws, expected = SCREWS[name]
     found = pure_motions(np.array(screws, float), np.zeros(3), size)
     assert [m.kind for m in found] == [kind for kind, _, _ in expected]
@@ -179,7 +179,9 @@ def rounded(digits):
 
 
 @pytest.mark.parametrize("name", [*WORDS, "bennett"])
-def test_counts_of_files_rounded_at_6_digits_are_those_of_exact_ones(name, monkeypatch):
+def test_mobility_of_files_rounded_to_6_digits_equals_that_of_exact_files(
+    name, monkeypatch
+):
     """Of Bennett's linkage they would be 0 if all its singular values counted."""
     make, expected = MECHANISMS[name]
     monkeypatch.setattr(mechanisms, "DrawnJoint", rounded(6))
@@ -192,7 +194,7 @@ def test_counts_of_files_rounded_at_6_digits_are_those_of_exact_ones(name, monke
     assert found["finite_freedoms"] == found["freedoms"] - 2 * (name == "snu")
 
 
-def test_counts_without_a_gap_are_reported_as_not_certain():
+def test_mobility_is_reported_as_uncertain_if_the_singular_values_have_no_gap():
     """Axes tilted by 1e-4 and 2e-5 rad: the equations they add are of those sizes."""
     robot = mechanism(
         "one", [0.1, 0.2, 0],
@@ -208,7 +210,7 @@ def test_counts_without_a_gap_are_reported_as_not_certain():
     assert "differ only by" in mobility_lines(found)["counts not certain"]
 
 
-def test_show_writes_mobility_and_axes_without_a_picture(run):
+def test_show_writes_mobility_and_axes_when_no_picture_is_requested(run):
     status, out, err = run(
         "assembly", "show", DRAWN / "three_upu.toml", "--json", "-"
     )  # fmt: skip

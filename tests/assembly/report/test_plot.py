@@ -68,7 +68,7 @@ def test_picture_shows_the_axes_of_driven_and_passive_joints():
          "--exaggeration: found 1e+300"),
     ],
 )  # fmt: skip
-def test_impossible_picture_is_refused_before_solving(
+def test_picture_that_cannot_be_drawn_is_refused_before_solving(
     run, tmp_path, monkeypatch, words, message
 ):
     import forcefit.assembly.linear.energy

@@ -74,7 +74,9 @@ def test_animation_begins_open_and_ends_as_the_picture_of_the_assembly(
          "--closing: five_bar has no open closure; expected geometric errors"),
     ],
 )  # fmt: skip
-def test_impossible_animation_is_refused(run, tmp_path, monkeypatch, words, message):
+def test_animation_that_cannot_be_drawn_is_refused(
+    run, tmp_path, monkeypatch, words, message
+):
     monkeypatch.chdir(tmp_path)
     status, _, err = run("assembly", "show", "five_bar", *words)
     assert status == 2

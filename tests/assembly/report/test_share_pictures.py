@@ -16,7 +16,7 @@ def shares(parts):
 
 
 @pytest.mark.parametrize(("parts", "others"), [(5, 0), (20, 8)])
-def test_sum_of_the_other_parts_is_grey_and_the_shares_add_up(parts, others):
+def test_sum_of_other_parts_is_shown_in_grey_and_shares_add_up_to_one(parts, others):
     (spec,) = parse(share_chart(shares(parts), "")).figures
     heights = {t["name"]: t["y"] for t in spec["traces"]}
     np.testing.assert_allclose(sum(np.array(v) for v in heights.values()), 1.0)
@@ -25,7 +25,7 @@ def test_sum_of_the_other_parts_is_grey_and_the_shares_add_up(parts, others):
     assert all(one["y"] == pytest.approx([others / parts] * 6) for one in grey)
 
 
-def test_plot_has_the_sum_of_the_other_parts_in_grey():
+def test_plot_shows_the_sum_of_the_other_parts_in_grey():
     figure = plot_shares({"robot": "r", "shares": shares(20)})
     bars = {c.get_label(): c.patches[0] for c in figure.axes[0].containers}
     spread = {name: np.ptp(p.get_facecolor()[:3]) for name, p in bars.items()}

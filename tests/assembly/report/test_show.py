@@ -120,7 +120,7 @@ def test_pyplot_can_open_a_window_of_the_figure():
     assert cantilever().show() in map(pyplot.figure, pyplot.get_fignums())
 
 
-def test_bars_show_springs_in_series_by_their_compliance():
+def test_bar_chart_shows_springs_in_series_in_proportion_to_their_compliance():
     """Of k and 2 k in series the first has two thirds of the compliance."""
     soft = MatrixLink(np.diag([1e3, 1e3, 1e3, 1e5, 1e5, 1e5]))
     stiff = MatrixLink(np.diag([2e3, 2e3, 2e3, 2e5, 2e5, 2e5]))
@@ -141,7 +141,7 @@ def slack():
     return solve_assembly(home_posture(Robot("slack", "tip", (joint, tip))))
 
 
-def test_errors_within_a_clearance_are_in_both_kinds_of_picture():
+def test_errors_within_a_clearance_are_shown_in_both_kinds_of_picture():
     figure = slack().plot(errors="translation", assumption="frozen")
     assert any(isinstance(c, Poly3DCollection) for c in figure.axes[0].collections)
     page = slack().plot(errors="translation", interactive=True)
@@ -151,7 +151,7 @@ def test_errors_within_a_clearance_are_in_both_kinds_of_picture():
     assert largest == pytest.approx(np.hypot(2e-4, 1e-4), rel=0.03)
 
 
-def test_notebook_gets_the_interactive_scene(monkeypatch):
+def test_interactive_scene_is_shown_in_a_notebook(monkeypatch):
     """``get_ipython()`` has a kernel in a notebook, and none in a console."""
     shell = SimpleNamespace()
     module = SimpleNamespace(get_ipython=lambda: shell)
@@ -192,7 +192,7 @@ def test_notebook_shows_the_maps_of_a_sweep_as_the_result_of_a_cell(monkeypatch)
     assert functions[type(figure)](figure).startswith(b"\x89PNG")
 
 
-def test_format_of_figures_that_the_user_chose_is_kept(monkeypatch):
+def test_figure_format_chosen_by_the_user_is_not_changed(monkeypatch):
     pytest.importorskip("xarray")
     _, functions = maps(monkeypatch, {pyplot.Figure: str})
     assert not functions
@@ -207,13 +207,13 @@ def test_format_of_figures_that_the_user_chose_is_kept(monkeypatch):
         (slack, {"errors": "translaton"}, "translation"),
     ],
 )
-def test_what_cannot_be_shown_is_named(thing, options, message):
+def test_object_that_cannot_be_shown_is_named(thing, options, message):
     with pytest.raises(BadInput, match=message):
         ff.show(thing(), **options)
 
 
 @pytest.mark.slow
-def test_browser_draws_a_nominal_robot_in_its_frame(tmp_path):
+def test_browser_draws_a_nominal_robot_inside_its_frame(tmp_path):
     frame = ff.load_robot("hexapod").show(interactive=True)._repr_html_()
     (tmp_path / "cell.html").write_text(f"<meta charset=utf-8>{frame}", "utf-8")
     tab = browser()

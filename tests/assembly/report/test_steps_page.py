@@ -34,7 +34,7 @@ def four_bar(rng):
     return home_posture(replace(robot, frames=frames).with_errors(errors))
 
 
-def test_assembled_machine_has_the_bodies_and_wrenches_of_solve_assembly(four_bar):
+def test_assembled_machine_has_the_pose_and_wrenches_of_solve_assembly(four_bar):
     results, machine, states = pinned(four_bar)
     found, expected = assembly_of(machine, states[-1]), solve_assembly(four_bar)
     assert results["energy"] == pytest.approx(expected.energy, rel=1e-9)
@@ -48,7 +48,7 @@ def test_assembled_machine_has_the_bodies_and_wrenches_of_solve_assembly(four_ba
     )
 
 
-def test_page_has_the_numbers_of_every_step(four_bar):
+def test_report_page_contains_the_numbers_of_every_step(four_bar):
     results, machine, states = pinned(four_bar)
     page = parse(steps_page(results, machine, states, Provenance()))
     assert page.fetched == []
@@ -59,7 +59,9 @@ def test_page_has_the_numbers_of_every_step(four_bar):
     assert np.shape(scene["closing"])[0] == len(results["steps"])
 
 
-def test_interrupted_draws_have_the_quantiles_of_the_machines_so_far(four_bar, rng):
+def test_interrupted_draws_have_the_quantiles_of_the_machines_computed_so_far(
+    four_bar, rng
+):
     """Blocks of 10000 machines: the second one is interrupted."""
     plan = Plan(tuple(Join(" - ".join(c), c) for c in four_bar.robot.closures))
     errors = rng.normal(size=(20_001, *four_bar.robot.errors.shape)) * 1e-5

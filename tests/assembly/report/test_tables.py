@@ -105,7 +105,7 @@ def small_stiffness():
     return ff.place_robot(ff.Robot("bar", "tip", (tip,)))
 
 
-def test_stiffness_data_set_of_a_bar_has_the_handbook_values():
+def test_stiffness_data_set_of_a_bar_equals_handbook_values():
     """Axial force: E A / L; lateral force: 3 E I / L^3; one part has all of it."""
     tangent = ff.platform_stiffness(small_stiffness())
     data, table = tangent.to_xarray(), tangent.to_pandas()

@@ -54,7 +54,7 @@ def test_frame_poses_equal_the_reference(robot, point):
     assert turned + home == pytest.approx(point["q_leg1"], abs=1e-12)
 
 
-def test_irsbot2_has_two_freedoms_and_overconstraint_eight(robot):
+def test_irsbot2_has_two_freedoms_and_an_overconstraint_of_eight(robot):
     for x, z in [(0, -0.5), (0.4, -0.45), (-0.3, -0.2), (0.0, -0.7)]:
         found = mobility(place_robot(robot, pose={"tx": x, "tz": z}))
         assert (found.freedoms, found.locked_freedoms) == (2, 0)
@@ -102,7 +102,7 @@ def test_zone_margin_equals_the_reference_for_rigid_and_free_joints(case, point)
         assert zone.assemblable == (expected <= 1)
 
 
-def test_printed_equation_23_counts_the_wrench_twice():
+def test_equation_23_as_printed_counts_the_wrench_twice():
     """The paper adds w_E and w_B, which both equal the wrench: twice the truth."""
     point = NUMBERS["cases"][0]["points"][0]
     answer = solve_assembly(
@@ -130,7 +130,7 @@ def test_euler_and_timoshenko_links_store_the_same_energy():
     assert energies[1] == pytest.approx(point["energy_timoshenko"], rel=1e-10)
 
 
-def test_seed_1_draws_the_reference_errors(robot):
+def test_errors_drawn_with_seed_1_equal_the_reference_errors(robot):
     frames = frames_named(robot, ERROR_FRAMES)
     draw = ErrorDraw(frames, ERROR_LEAST, ERROR_MOST, seed=1)
     expected = irsbot2_with(NUMBERS["cases"][0]).errors
@@ -154,5 +154,5 @@ def test_grid_points_are_reached_exactly_within_the_reach_of_the_links(robot):
 
 
 def test_home_pose_out_of_reach_is_refused_with_the_reach():
-    with pytest.raises(BadInput, match=r"needs a reach of 0.9\d* m, the links give"):
+    with pytest.raises(BadInput, match=r"requires a reach of 0.9\d* m, the links"):
         irsbot2(z=-0.9)

@@ -92,7 +92,7 @@ def half_angle_solutions(foot, tip, near, far):
     return [2 * math.atan2(y + s * root, x + e) for s in (1, -1)]
 
 
-def test_3rrr_drives_equal_gosselin_and_angeles(rng):
+def test_drive_angles_of_the_3rrr_robot_equal_those_of_gosselin_and_angeles(rng):
     robot = BUILT_IN["3rrr"]()
     angles = np.radians([90, 210, 330])
     corners = np.column_stack([np.cos(angles), np.sin(angles)])
@@ -117,7 +117,7 @@ def only_radial(robot):
     return replace(robot, frames=tuple(bare))
 
 
-def test_3rrr_pose_error_is_the_farthest_corner_of_a_prism(rng):
+def test_pose_error_of_the_3rrr_robot_is_the_farthest_corner_of_a_prism(rng):
     """(27) in closed form: 3 lines with a clearance of 2c each, 8 corners."""
     robot = only_radial(BUILT_IN["3rrr"]())
     posture = place_robot(robot, pose=random_pose("3rrr", rng))
@@ -148,7 +148,7 @@ def arm_lines(posture):
     return np.array(lines)
 
 
-def test_3rrr_displacement_under_load_equals_its_pin_clearances(rng):
+def test_displacement_of_the_3rrr_robot_under_load_equals_its_pin_clearances(rng):
     """The support of the reachable errors, w.x <= sum of |f| 2c over the legs.
 
     A leg's second arm passes a force f along itself; its two pins give by c each.
@@ -166,5 +166,5 @@ def test_3rrr_displacement_under_load_equals_its_pin_clearances(rng):
 
 
 def test_planar_legs_out_of_reach_are_refused_with_the_reach():
-    with pytest.raises(BadInput, match=r"5r: the home pose needs a reach of 3 m"):
+    with pytest.raises(BadInput, match=r"5r: the home pose requires a reach of 3 m"):
         arm_angle("5r", [0, 0], [3, 0], 1.0, 1.0, 1)

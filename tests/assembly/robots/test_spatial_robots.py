@@ -88,7 +88,7 @@ def assert_pose_error_is_of_64_corners(posture, lines, joints):
         assert high - low <= 1e-6
 
 
-def test_hexapod_pose_error_is_the_farthest_of_64_corners(rng):
+def test_pose_error_of_the_hexapod_is_the_farthest_of_64_corners(rng):
     posture = place_robot(BUILT_IN["hexapod"](), pose=random_pose("hexapod", rng))
     lines, _ = strut_lines(posture)
     joints = [(f"leg{k}.cardan_2", f"leg{k}.ball_3") for k in range(1, 7)]
@@ -102,7 +102,9 @@ def test_hexapod_pose_error_is_the_farthest_of_64_corners(rng):
         ((0.3, 0.5, -1.1), (47.5, -11.6, 21.4)),
     ],
 )
-def test_delta_drives_equal_williams_examples(position, degrees):
+def test_drive_angles_of_the_delta_robot_equal_the_examples_of_williams(
+    position, degrees
+):
     """Printed to a tenth of a degree."""
     pose = dict(zip(POSE, position, strict=False))
     posture = place_robot(BUILT_IN["delta"](), pose=pose)
@@ -137,7 +139,7 @@ def lower_meeting_point(centres, radius):
     return centres[0] + middle + math.sqrt(radius**2 - middle @ middle) * down
 
 
-def test_delta_platform_keeps_its_orientation_and_its_rods_stay_parallel(rng):
+def test_delta_platform_has_constant_orientation_and_parallel_rods(rng):
     robot = BUILT_IN["delta"]()
     for _ in range(5):
         posture = place_robot(robot, pose=random_pose("delta", rng))
@@ -164,11 +166,11 @@ def test_delta_without_the_spins_of_its_rods_has_three_freedoms():
 
 
 def test_delta_out_of_reach_is_refused_with_the_reach():
-    with pytest.raises(BadInput, match=r"delta: a leg needs a reach of 2\.0\d* m"):
+    with pytest.raises(BadInput, match=r"delta: a leg requires a reach of 2\.0\d* m"):
         drive_angle(DeltaParameters(), 0.0, np.array([0.0, 0.0, -2.0]))
 
 
-def test_delta_pose_error_is_the_farthest_of_64_corners(rng):
+def test_pose_error_of_the_delta_robot_is_the_farthest_of_64_corners(rng):
     """Its six rods constrain the platform as six struts do."""
     posture = place_robot(BUILT_IN["delta"](), pose=random_pose("delta", rng))
     T, index = posture.transforms, posture.robot.index
@@ -182,7 +184,7 @@ def test_delta_pose_error_is_the_farthest_of_64_corners(rng):
     assert_pose_error_is_of_64_corners(posture, np.array(lines), joints)
 
 
-def test_orthoglide_legs_keep_their_length(rng):
+def test_lengths_of_orthoglide_legs_are_constant(rng):
     robot = BUILT_IN["orthoglide"]()
     for _ in range(5):
         posture = place_robot(robot, pose=random_pose("orthoglide", rng))

@@ -50,7 +50,7 @@ def reflected(starts, M, u, speed, left):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_billiard_trajectory_equals_reflections_by_hand(seed, rng):
+def test_billiard_trajectory_equals_reflections_computed_by_hand(seed, rng):
     """In the coordinates of Dikin's ellipsoid, for any axes; also for a thin one."""
     starts = [0, 2, 3, 5]
     for M in (np.eye(5), rng.normal(size=(5, 5)), rng.normal(size=(5, 3))):
@@ -63,7 +63,7 @@ def test_billiard_trajectory_equals_reflections_by_hand(seed, rng):
         assert max(sizes(starts, u)) <= 1 + 1e-9
 
 
-def test_cone_that_does_not_move_does_not_bound_the_walk(rng):
+def test_cone_of_coordinates_that_do_not_move_does_not_bound_the_random_walk(rng):
     """Also if it is on its bound: the other cones determine the range of the starts."""
     starts, centre = np.array([0, 2, 3]), np.array([0.6, 0.8, 0.5])
     M, walks = np.array([[0.0], [0.0], [0.3]]), np.empty((8, 3))
@@ -77,7 +77,7 @@ def test_cone_that_does_not_move_does_not_bound_the_walk(rng):
     np.testing.assert_array_equal(still, centre)
 
 
-def test_walk_from_a_point_outside_by_rounding_returns_inside():
+def test_random_walk_from_a_point_that_is_outside_by_rounding_returns_inside():
     starts, outside = [0, 1], [1 + 1e-15]
     for seed in range(6):
         u, _, _ = walked(starts, [[0.5]], outside, seed=seed)

@@ -15,7 +15,7 @@ def rng():
     return np.random.default_rng(3)
 
 
-def test_least_energy_without_gap_is_zero_and_without_clearance_is_full(rng):
+def test_least_energy_is_zero_without_a_gap_and_largest_without_clearance(rng):
     G, H, h = rng.normal(size=(2, 5)), rng.normal(size=(1, 5)), np.array([3.0, 4.0])
     none = minimise_energy(G, 0 * h, np.zeros(5), H, np.zeros(1), GROUP)
     assert (none.value, none.bound, none.feasible) == (0.0, 0.0, True)
@@ -67,7 +67,7 @@ def test_multipliers_prove_the_least_factor(rng, row, fixed):
 
 
 @pytest.mark.parametrize("reach", [1.2, 1.9, 30.0])
-def test_unreachable_row_without_scaled_cones_has_no_factor(reach):
+def test_unreachable_row_without_scaled_cones_has_no_finite_factor(reach):
     """The first row contains only the interval that is not scaled."""
     B = np.array([[3.0, 0.0], [50.0, 0.02]])
     right = np.array([3.0 * reach, 0.01])

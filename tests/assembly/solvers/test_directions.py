@@ -25,7 +25,7 @@ def found(rows, group, d, right, tolerance=1e-9):
     )
 
 
-def test_farthest_point_without_rows_is_on_the_rim_of_each_cone(rng):
+def test_farthest_point_without_constraint_rows_is_on_the_boundary_of_each_cone(rng):
     d = directions_of(rng, 20)
     points, multipliers, solved = found(
         np.zeros((0, 6)), GROUP, d, np.zeros((20, 0)), 1e-12

@@ -19,7 +19,7 @@ GROUPS = {
 @pytest.mark.parametrize("group", GROUPS.values(), ids=GROUPS.keys())
 @pytest.mark.parametrize("loads", [0.0, 1.0])
 @pytest.mark.parametrize("rigid", [0, 2])
-def test_many_programmes_have_the_energies_of_clarabel(rng, group, loads, rigid):
+def test_energies_of_many_programmes_equal_those_of_clarabel(rng, group, loads, rigid):
     """Both prove a gap of 1e-9 of the energy.
 
     Clarabel, which solves the few that are not proved, closes rows to 2e-10.
@@ -56,7 +56,7 @@ def unloaded(u):
     return Minima(u, np.zeros((len(u), 0)), np.ones(len(u), dtype=bool))
 
 
-def test_closest_positions_are_those_by_hand():
+def test_closest_positions_equal_hand_calculation():
     """On a disc with x held at 0.6, y within +-0.8; on two intervals with held sum."""
     disc, start = np.zeros(2, dtype=int), [[0.6, 0.0]] * 3
     last = np.array([[0.0, 2.0], [0.0, 0.3], [5.0, -1.0]])
@@ -72,7 +72,7 @@ def test_closest_positions_are_those_by_hand():
     assert found == pytest.approx(np.array([[0.5, 0.5], [1.0, 0.0], [1.0, 0.0]]))
 
 
-def test_a_loaded_disc_keeps_its_position_while_others_stay_where_they_were():
+def test_solving_for_a_loaded_disc_does_not_move_other_discs():
     """The energy (u_x - 3)^2 / 2 presses the disc to (1, 0); the interval is free."""
     G, h = np.array([[1.0, 0.0, 0.0]]), np.array([[-3.0]])
     group, d, H = np.array([0, 0, 1]), np.zeros((1, 3)), np.zeros((0, 3))
@@ -82,7 +82,7 @@ def test_a_loaded_disc_keeps_its_position_while_others_stay_where_they_were():
     assert found == pytest.approx(np.array([[1.0, 0.0, 0.4]]), abs=1e-9)
 
 
-def test_a_programme_does_not_depend_on_the_others(rng):
+def test_solution_of_a_programme_does_not_depend_on_other_programmes(rng):
     """Lanes are independent; the right sides are multiplied in another order."""
     group = GROUPS["discs and intervals"]
     G, H = rng.normal(size=(3, 9)), np.zeros((0, 9))

@@ -65,7 +65,9 @@ def interior_point(p, tolerance):
 @pytest.mark.parametrize("rows", [0, 1, 2])
 @pytest.mark.parametrize("widest", [2, 7])
 @pytest.mark.parametrize("seed", range(3))
-def test_interior_point_value_equals_clarabel_and_is_proved(seed, widest, rows):
+def test_value_of_the_interior_point_method_equals_clarabel_and_is_certified(
+    seed, widest, rows
+):
     group = GROUP if widest == 2 else random_cones(np.random.default_rng(seed), widest)
     p = programme(seed, min(rows, len(group) - 1), group=group)
     u, n = interior_point(p, 1e-9)
@@ -79,7 +81,7 @@ def test_interior_point_value_equals_clarabel_and_is_proved(seed, widest, rows):
 
 @pytest.mark.parametrize("widest", [1, 2, 3, 20])
 @pytest.mark.parametrize("springs", [0, 5])
-def test_least_energies_of_both_methods_lie_above_both_bounds(rng, widest, springs):
+def test_least_energies_of_both_methods_are_above_both_bounds(rng, widest, springs):
     """The certified bound of each method is at most the other's value."""
     for _ in range(6):
         group = random_cones(rng, widest)

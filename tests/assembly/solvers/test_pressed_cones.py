@@ -9,7 +9,7 @@ NONE = np.zeros((0, 2))
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-3, 1e-2])
-def test_pressed_disc_ends_at_the_point_nearest_to_the_target(off):
+def test_pressed_disc_moves_to_the_point_nearest_to_the_target(off):
     """The least |u - a| with |u| <= 1 is at a / |a|, pressed by |a| - 1 = 12."""
     a = np.array([5.0, 12.0])
     guess = (1.0 - off) * np.array([np.cos(1.17 + off), np.sin(1.17 + off)])

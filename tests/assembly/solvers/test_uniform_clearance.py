@@ -47,7 +47,7 @@ def test_chain_diagnosis_equals_the_textbook_formulas(length, correlation, rng):
     np.testing.assert_allclose(diagnose(1e-6 * x + 1e-3), diagnose(x), rtol=1e-6)
 
 
-def test_chains_are_mixed_only_if_every_varying_component_is(rng):
+def test_chains_are_reported_as_mixed_only_if_every_varying_component_is_mixed(rng):
     """Chains of correlated points and chains about different means are not mixed."""
     apart = np.array([-1.5, -0.5, 0.5, 1.5])[:, None]
     slow = rng.normal(size=(4, 64))
@@ -83,7 +83,7 @@ def test_dikin_ellipsoid_of_a_box_is_a_ball_about_its_middle(dimensions, start):
     np.testing.assert_allclose(M @ M.T, np.eye(dimensions) / 2, atol=1e-4)
 
 
-def test_point_without_freedom_is_mixed_and_does_not_move():
+def test_point_without_freedom_does_not_move_and_counts_as_mixed():
     u, to_screw = np.array([0.3, 0.4]), np.eye(6)[:, :2].copy()
     rng = draw_generator(1, 0, 9)
     assert sample_uniform_position(np.zeros((2, 0)), np.array([0, 2]), to_screw, u, rng)

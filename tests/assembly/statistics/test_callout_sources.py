@@ -34,7 +34,7 @@ def experiment(four_bar):
     )
 
 
-def test_coupler_turns_as_much_as_by_hand(experiment):
+def test_rotation_of_a_coupler_equals_hand_calculation(experiment):
     """Deviation of the angle: 20 um / sqrt 3 times the root of the sum of squares."""
     data = run_draws(experiment, 20_000)
     root = np.sqrt(sum(c**2 for c in COEFFICIENTS.values()))
@@ -43,7 +43,7 @@ def test_coupler_turns_as_much_as_by_hand(experiment):
     assert turned.std() == pytest.approx(expected, rel=0.01)
 
 
-def test_importance_by_callout_is_the_share_by_hand(experiment):
+def test_importance_of_each_callout_equals_the_share_computed_by_hand(experiment):
     sources = experiment.sources
     slopes = experiment.energies.screws[2, -6 * len(sources.robot.frames) :]
     shares = linear_importance(
@@ -57,7 +57,7 @@ def test_importance_by_callout_is_the_share_by_hand(experiment):
         assert share == pytest.approx(COEFFICIENTS[body] ** 2 / total, abs=1e-3)
 
 
-def test_draw_is_the_same_in_any_division(four_bar):
+def test_draw_does_not_depend_on_the_division_into_blocks(four_bar):
     sources = sources_of(four_bar)
     whole = sources.draw(0, 100, 5)
     assert np.array_equal(sources.draw(37, 20, 5), whole[37:57])
@@ -100,7 +100,7 @@ translation = [0.4, 0, 0]
 """
 
 
-def test_fit_gives_every_draw_a_clearance_of_its_own(tmp_path):
+def test_clearance_of_a_fit_differs_between_draws(tmp_path):
     """The tip of an exact arm on one pin moves as far as its radial clearance: 6 to 35
     um of diameter, on average 20.5 um, with a deviation of 6.09 um."""
     path = tmp_path / "arm.toml"
@@ -121,7 +121,7 @@ def test_fit_gives_every_draw_a_clearance_of_its_own(tmp_path):
     assert source_groups(sources, "source")[0][0] == "fit 12 H7/g6 of shoulder"
 
 
-def test_worst_case_has_the_largest_clearance_of_a_fit(tmp_path):
+def test_worst_case_uses_the_largest_clearance_of_a_fit(tmp_path):
     path = tmp_path / "arm.toml"
     path.write_text(ARM)
     robot = read_robot(path)
@@ -180,7 +180,7 @@ def test_larger_hole_has_a_larger_zone_and_a_larger_clearance(tmp_path):
     assert sorted(groups[name]) == list(range(5))
 
 
-def test_hole_at_maximum_material_is_that_of_the_fit(tmp_path):
+def test_hole_at_maximum_material_has_the_size_given_by_its_fit(tmp_path):
     path = tmp_path / "arm.toml"
     path.write_text(LOOSE.replace('hole = "12 H7"', 'hole = "12 H8"'))
     expected = 'found the hole "12 H8", expected that of the fit "12 H7/g6"'
@@ -212,7 +212,7 @@ def test_command_reports_the_importance_by_callout(tmp_path):
     assert sum(turned["shares"].values()) == pytest.approx(0.1903e-3, abs=5e-8)
     shares = results["importance"]["quantities"]["translation"]["total_index"]
     name = max(shares, key=lambda group: shares[group][0])
-    value, low, high = (round(100 * share) for share in shares[name])
+    value, low, high = (round(100 * min(share, 1.0)) for share in shares[name])
     sentence = f"{name}: {value} % of the variance of the translation ({low} to {high}"
     assert sentence in result.output
     page = (tmp_path / "page.html").read_text()
@@ -228,7 +228,7 @@ def test_command_reports_the_importance_by_callout(tmp_path):
     assert "certified bound" in (tmp_path / "page.html").read_text()
 
 
-def test_position_in_one_direction_at_maximum_material_shares_its_hole(tmp_path):
+def test_position_in_one_direction_uses_the_drawn_size_of_its_hole(tmp_path):
     """Ends within 25 um + s/2 along x alone; the diametral clearance is s + 6 at least
     for a hole s above its least size."""
     path = tmp_path / "arm.toml"

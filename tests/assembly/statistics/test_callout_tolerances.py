@@ -59,7 +59,7 @@ def allotted(tmp_path, robot, text):
     return allocate([home_posture(robot)], plan, 0)
 
 
-def test_lengths_are_allotted_as_independent_errors_along_them(tmp_path):
+def test_lengths_are_allocated_tolerances_as_independent_errors_along_them(tmp_path):
     """The draws of an interval are those of an independent uniform error, so both
     plans must have the same tolerances, whatever the robot file states."""
     callouts = allotted(tmp_path, ARM, PLAN.format(**OF_CALLOUTS))
@@ -111,7 +111,7 @@ def test_width_of_a_position_meets_its_yield_in_finite_geometry(tmp_path):
             "found 1 with callouts",
         ),
         (PLAN.format(**OF_CALLOUTS).replace('["hand"]', '["hnd"]'), 'found "hnd"; did'),
-        (PLAN.format(**OF_CALLOUTS).replace('["hand"]', '["arm"]'), '"arm" again'),
+        (PLAN.format(**OF_CALLOUTS).replace('["hand"]', '["arm"]'), '"arm" twice'),
         (PLAN.format(**OF_CALLOUTS).replace('["hand"]', "[]"), "at least one"),
         (PLAN.format(**OF_CALLOUTS).replace('["hand"]', "[1]"), "a list of names"),
     ],
@@ -122,7 +122,7 @@ def test_mistake_in_a_plan_of_callouts_is_reported_in_one_line(tmp_path, text, m
     assert "\n" not in str(error.value)
 
 
-def test_command_allots_widths_of_callouts(tmp_path):
+def test_command_allocates_widths_of_callouts(tmp_path):
     from typer.testing import CliRunner
 
     from forcefit.commands.app import app

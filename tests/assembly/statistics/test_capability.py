@@ -27,17 +27,19 @@ from forcefit.assembly.statistics.estimates import proportion
         (2.0, 0.00197, 5e-6),
     ],
 )
-def test_share_outside_of_a_centred_process_is_the_known_ppm(cpk, ppm, tol):
+def test_fraction_outside_the_limits_of_a_centred_process_equals_the_known_ppm(
+    cpk, ppm, tol
+):
     assert share_outside(cpk, cpk) * 1e6 == pytest.approx(ppm, abs=tol)
 
 
-def test_intervals_of_fifty_values_at_1_33_are_the_worked_ones():
+def test_intervals_of_cpk_1_33_from_fifty_values_equal_hand_calculation():
     assert cpk_interval(1.33, 50) == pytest.approx((1.051, 1.609), abs=5e-4)
     assert cpk_interval_one_sided(1.33, 50) == pytest.approx((1.051, 1.607), abs=5e-4)
     assert cp_interval(1.33, 50) == pytest.approx((1.067, 1.592), abs=5e-4)
 
 
-def test_intervals_cover_the_true_index_as_often_as_stated():
+def test_intervals_cover_the_true_capability_index_at_the_stated_rate():
     """2000 samples of 30: a share of 0.95 has a standard error of 0.5 %."""
     rng = np.random.default_rng(1)
     found = [capability(x, -4.0, 4.0) for x in rng.normal(size=(2000, 30))]
@@ -51,7 +53,7 @@ def test_capability_without_spread_is_refused():
         capability([1.0, 1.0], 0.0, 2.0)
 
 
-def test_parts_per_million_have_the_worked_intervals():
+def test_intervals_of_parts_per_million_equal_hand_calculation():
     """270 of 1e5: 2388 to 3041 ppm; none of 1e6: at most 3.7 ppm, one-sided 3.0."""
     share = proportion(270, 100_000)
     assert share["lower"] * 1e6 == pytest.approx(2388, abs=1)
@@ -60,7 +62,7 @@ def test_parts_per_million_have_the_worked_intervals():
     assert proportion(0, 10**6, 0.9)["upper"] * 1e6 == pytest.approx(3.0, abs=0.01)
 
 
-def test_cpk_by_quantiles_of_a_disc_is_that_of_its_radius():
+def test_cpk_by_quantiles_of_a_uniform_disc_equals_that_of_its_radius():
     """Rayleigh: median s sqrt(2 ln 2), 99.865 % quantile s sqrt(-2 ln 0.00135)."""
     x = np.random.default_rng(2).normal(size=(400_000, 2))
     middle, tail = np.sqrt(2 * np.log(2)), np.sqrt(-2 * np.log(0.00135))
@@ -69,7 +71,7 @@ def test_cpk_by_quantiles_of_a_disc_is_that_of_its_radius():
     assert lower < value < upper
 
 
-def test_cp_by_quantiles_of_a_disc_is_that_of_its_radius():
+def test_cp_by_quantiles_of_a_uniform_disc_equals_that_of_its_radius():
     """Rayleigh: quantiles s sqrt(-2 ln(1 - p)) of 0.135 % and 99.865 %; limit 4 s."""
     x = np.random.default_rng(3).normal(size=(400_000, 2))
     low, tail = np.sqrt(-2 * np.log(0.99865)), np.sqrt(-2 * np.log(0.00135))

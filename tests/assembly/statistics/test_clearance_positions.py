@@ -154,7 +154,7 @@ def drawn():
 
 
 @pytest.mark.parametrize("play", ["uniform", "contact"])
-def test_unloaded_clearances_move_the_platform_by_finite_screws(drawn, play):
+def test_unloaded_clearances_cause_finite_displacements_of_the_platform(drawn, play):
     """Clearances are loaded only in draws that store energy."""
     one, found = drawn
     loaded = loaded_clearances(one, found)
@@ -180,7 +180,7 @@ def test_contact_position_is_at_least_as_far_along_its_force_as_uniform(drawn):
     assert reach.min() > -1e-9
 
 
-def test_least_clearance_positions_are_those_of_the_solution(drawn):
+def test_clearance_positions_of_least_energy_equal_those_of_the_solution(drawn):
     one, found = drawn
     screws, mixed = position_clearances(one, found, "least", [])
     np.testing.assert_array_equal(screws, found.platform_screw)

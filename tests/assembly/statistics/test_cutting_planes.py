@@ -47,7 +47,7 @@ class Sums:
 ROWS = {"a": np.array([10.0, 20, 5]), "b": np.array([0.0, 0, 40])}
 
 
-def test_limit_exceeded_by_perfect_parts_is_refused():
+def test_limit_that_perfect_parts_exceed_is_refused():
     requirement = Sums(ROWS, {"a": 2.0, "b": 1e9}, constant=2.1)
     with pytest.raises(BadInput, match="^even perfect parts exceed a limit of 2$"):
         cut_planes(requirement, silent)

@@ -92,7 +92,7 @@ def test_draws_that_cannot_be_assembled_have_a_status_and_nan_results():
     assert "margin" not in rows.dtype.names
 
 
-def test_drawn_stress_equals_single_solutions_and_can_be_left_out(rng):
+def test_stress_of_draws_equals_single_solutions_and_is_optional(rng):
     posture = place_robot(load_robot("irsbot2"), {"tx": 0.1, "tz": -0.5})
     robot = posture.robot
     sources = tolerance_sources(robot, [0, 0, 0, 2e-3, 0, 0])

@@ -55,14 +55,14 @@ def drawn_rotations(robot):
     return run_draws(experiment, 400)["rotation"].values
 
 
-def test_bore_with_a_fit_is_worst_at_its_largest_clearance(tmp_path):
+def test_worst_case_of_a_bore_with_a_fit_is_at_its_largest_clearance(tmp_path):
     """2 c / L and, 200 mm above the middle, 2 c h / L with c = 17.5 um."""
     robot = spindle(tmp_path, BORE)
     assert worst(robot, "rotation").attained == pytest.approx(875e-6, rel=1e-6)
     assert worst(robot, "translation").attained == pytest.approx(175e-6, rel=1e-6)
 
 
-def test_commands_with_one_clearance_use_the_mean_of_a_bore(tmp_path):
+def test_commands_that_use_one_clearance_take_the_mean_clearance_of_a_bore(tmp_path):
     fitted = spindle(tmp_path, BORE)
     stated = spindle(tmp_path, 'clearance = { radial = "10.25 um", length = "40 mm" }')
     assert [f.name for f in fitted.frames] == [f.name for f in stated.frames]
@@ -73,7 +73,7 @@ def test_commands_with_one_clearance_use_the_mean_of_a_bore(tmp_path):
     assert '"bore" 12 H7/g6, 10.25 um of 3 to 17.5' in remark
 
 
-def test_both_ends_of_a_bore_have_the_clearance_of_one_draw(tmp_path):
+def test_both_ends_of_a_bore_have_the_same_drawn_clearance(tmp_path):
     """Rotation 2 c / L has the deviation of c; independent ends would have 0.71 of it.
 
     Three standard errors of 400 draws are 4.5 % of the mean and 11 % of the deviation.
@@ -97,7 +97,7 @@ def test_two_bearings_have_independent_clearances_of_their_fits(tmp_path):
     ]  # fmt: skip
 
 
-def test_two_bearings_with_fits_are_worst_as_by_hand(tmp_path):
+def test_worst_case_of_two_bearings_with_fits_equals_hand_calculation(tmp_path):
     """Offsets 17.5 um at -20 mm and -18.5 um at 30 mm: 141.1 um at 200 mm."""
     robot = spindle(tmp_path, BEARINGS)
     slope = (17.5e-6 + 18.5e-6) / 0.05
@@ -106,7 +106,7 @@ def test_two_bearings_with_fits_are_worst_as_by_hand(tmp_path):
     assert worst(robot, "translation").attained == pytest.approx(reach, rel=1e-6)
 
 
-def test_bearing_with_a_stated_gap_stays_as_it_is_in_every_draw(tmp_path):
+def test_bearing_with_a_given_gap_has_the_same_gap_in_every_draw(tmp_path):
     clearance = BEARINGS.replace('fit = "8 H8/h7"', 'radial = "5 um"')
     found = drawn_rotations(spindle(tmp_path, clearance)) * 0.05
     assert found.mean() == pytest.approx(15.25e-6, rel=0.045)
@@ -149,7 +149,7 @@ def test_fitted_contacts_are_kept_in_a_file_of_frames(tmp_path, clearance):
     ("clearance", "message"),
     [
         ('{ fit = "25 H7/p6", length = "40 mm" }', 'fit: found "25 H7/p6", an int'),
-        ('{ fit = "12 H7/g6", radial = 1e-5, length = 0.04 }', "radial: found it to"),
+        ('{ fit = "12 H7/g6", radial = 1e-5, length = 0.04 }', "radial: found to"),
         ('{ fit = "12 H7/g6", tilt = 1e-3, length = 0.04 }', "tilt: found together"),
         ('{ fit = "12 H7/g6", length = 0 }', "length: found 0, expected"),
         (
@@ -160,7 +160,7 @@ def test_fitted_contacts_are_kept_in_a_file_of_frames(tmp_path, clearance):
         (
             '{ bearings = [{ z = 0, fit = "12 H7/g6", radial = 0 }, '
             "{ z = 0.1, radial = 0 }] }",
-            'bearings[1].radial: found it together with "fit"',
+            'bearings[1].radial: found together with "fit"',
         ),
         (
             '{ bearings = [{ z = 0, fit = "12 H7/z6" }, { z = 0.1, radial = 0 }] }',
@@ -204,7 +204,7 @@ length = "100 +- 0.03 mm"
 """
 
 
-def test_bolted_slot_with_a_fit_assembles_where_its_clearance_reaches(tmp_path):
+def test_bolted_slot_with_a_fit_assembles_if_its_clearance_covers_the_error(tmp_path):
     """A rigid plate closes only if the clearance c exceeds the error e of the length:
     e is uniform to 30 um, so the share is the mean of c over 30 um, 0.342.
 
@@ -254,7 +254,7 @@ clearance = { fit = "12 H7/g6", length = 0.04, parts = "pin" }
     [
         (', parts = "pin"', "", "clearance.parts: missing"),
         ('fit = "12 H7/g6", ', "", "clearance.fit: missing"),
-        ("length", "tilt = 1e-3, length", 'clearance.tilt: found it together with "le'),
+        ("length", "tilt = 1e-3, length", 'clearance.tilt: found together with "le'),
         ("12 H7/g6", "12 H7/h6", 'clearance.fit: found "12 H7/g6" of the parts "pin"'),
         ("length = 0.04", "length = -1", "clearance.length: found -1"),
     ],

@@ -250,7 +250,7 @@ def read(tmp_path, text):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_worst_case_of_a_drawing_is_that_by_hand(tmp_path, name):
+def test_worst_case_of_a_drawing_equals_hand_calculation(tmp_path, name):
     text, expected, _ = CASES[name]
     robot = read(tmp_path, text)
     prepared = linear_response(home_posture(robot))
@@ -262,7 +262,7 @@ def test_worst_case_of_a_drawing_is_that_by_hand(tmp_path, name):
 @pytest.mark.parametrize(
     "name", [n for n, case in CASES.items() if case[2] is not None]
 )
-def test_deviations_of_a_drawing_are_those_by_hand(tmp_path, name):
+def test_standard_deviations_of_a_drawing_equal_hand_calculation(tmp_path, name):
     """200 000 draws have a deviation within 0.3 % of the true one."""
     text, _, expected = CASES[name]
     moved = translations(read(tmp_path, text))
@@ -276,7 +276,9 @@ def translations(robot):
     return errors @ prepared.platform[3:].T
 
 
-def test_bracket_has_the_variance_of_its_bore_and_of_the_shift_of_its_datum(tmp_path):
+def test_variance_of_a_bracket_is_that_of_its_bore_plus_that_of_its_datum_shift(
+    tmp_path,
+):
     """Perpendicularity 0.02 in position 0.04 on 20 mm: an own sample of both ends in
     their discs.  The tilt moves a point 200 mm away along z; the datum's shift of up
     to 9 um adds 81/12 um^2 along x and y."""
@@ -294,7 +296,7 @@ def test_bracket_has_the_variance_of_its_bore_and_of_the_shift_of_its_datum(tmp_
     )
 
 
-def test_callout_at_maximum_material_is_not_allotted(tmp_path):
+def test_callout_at_maximum_material_is_not_allocated(tmp_path):
     robot = read(tmp_path, PLATE)
     plan = tmp_path / "plan.toml"
     plan.write_text(

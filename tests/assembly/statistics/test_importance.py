@@ -56,7 +56,7 @@ def additive(scale=1.0, shift=0.0):
     return design, scale * (x @ [3.0, 2.0, 1.0])[:, None] + shift
 
 
-def test_result_that_varies_by_rounding_only_has_nan_indices():
+def test_sobol_indices_of_a_result_that_varies_only_by_rounding_are_nan():
     design, results = additive()
     rounded = 1e6 + 1e-8 * np.sign(results)
     found = sobol_indices(design, np.hstack([results, rounded, np.nan * results]))
@@ -103,7 +103,7 @@ def three(stream, k):
 THREE = [(str(i), np.array([i])) for i in range(3)]
 
 
-def test_few_failed_draws_are_left_out_and_counted():
+def test_few_failed_draws_are_omitted_and_counted():
     """For 4 a + b, shares 4/5 and 1/5, a draw of A, B or the mixed one fails."""
     found = sobol_importance(lambda x: failing(x, 0.01), three, THREE, 8000)
     np.testing.assert_allclose(found.first[0, :, 0], [0.8, 0.2, 0.0], atol=0.05)

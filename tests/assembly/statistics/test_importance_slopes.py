@@ -20,7 +20,7 @@ from tests.tolerances_for_tests import arm
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_gain_of_a_rotation_error_is_its_lever_arm(seed):
+def test_gain_of_a_rotation_error_equals_its_lever_arm(seed):
     """A turn of the pin moves a tip 0.4 m away by 0.4 um for each urad, along y or z.
 
     Along x the tip stays, so the gain of RX is 0 in translation and 1 in rotation.

@@ -62,7 +62,7 @@ def test_platform_that_follows_each_error_has_gains_of_one():
     assert [total[name][0] for name in NAMES] == pytest.approx([1, 0, 0], abs=0.15)
 
 
-def test_group_of_angles_and_lengths_has_parts_and_no_gain():
+def test_group_of_angles_and_lengths_has_a_standard_deviation_but_no_gain():
     """The part of a frame is the root sum of squares of its errors' parts."""
     data, report = solved("frame")
     (one,) = report["platform"].values()
@@ -150,7 +150,7 @@ def test_importance_table_has_um_per_um_for_lengths_and_um_per_mrad_for_angles()
     assert len(set(ends)) == 1
 
 
-def test_importance_table_reports_left_out_draws_and_further_groups():
+def test_importance_table_reports_omitted_draws_and_further_groups():
     lines = told(["m"] * 18, left_out=0.015)
     assert "energy: up to 1.5% of the draws have no solution and are left out" in lines
     assert lines[-1] == "and 3 more, see --json"

@@ -133,7 +133,7 @@ def test_load_and_error_together_move_a_joint_to_its_limit():
     assert (found.duality_gap() < 1e-8 * found.energy).all()
 
 
-def test_load_resisted_only_by_a_limit_holds_every_draw_at_the_limit():
+def test_load_resisted_only_by_a_motion_limit_moves_every_draw_to_the_limit():
     """A link of stiffness K on a pin with motion L turns by L and M / K."""
     L, K, M = 1e-3, 2e4, 20.0
     robot = Robot("pin", "end", (

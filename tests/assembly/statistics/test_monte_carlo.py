@@ -49,7 +49,9 @@ def experiment():
 
 
 @pytest.mark.parametrize("at", [60, 200])
-def test_killed_run_resumes_to_the_same_file(experiment, monkeypatch, tmp_path, at):
+def test_killed_run_resumes_and_writes_the_same_file(
+    experiment, monkeypatch, tmp_path, at
+):
     """Killed among its 100 draws, and during the importance."""
     monkeypatch.setattr(monte_carlo, "BLOCK", 64)
     groups = ImportanceOptions(16, "kind")
@@ -72,7 +74,7 @@ def test_killed_run_resumes_to_the_same_file(experiment, monkeypatch, tmp_path, 
 
 
 @pytest.mark.slow
-def test_repeatedly_killed_command_resumes_to_the_same_file(tmp_path):
+def test_repeatedly_killed_command_resumes_and_writes_the_same_file(tmp_path):
     """SIGKILL at growing times; finished results are never computed again."""
     limits = "margin_free = 2.0\ntranslation = 8e-4"
     plan = "yield = 0.9\ndraws = 200\n" + PLAN.replace("margin_free = 1.0", limits)

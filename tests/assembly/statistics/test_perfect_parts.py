@@ -41,7 +41,7 @@ def test_clearance_shares_of_a_pin_sum_to_the_largest_error():
     assert parts["rotation"]["clearances"] == pytest.approx({"pin.tilt": TILT})
 
 
-def test_a_ball_adds_to_the_tilt_of_its_pin():
+def test_clearance_of_a_ball_adds_to_the_tilt_of_its_pin():
     """Both in the same direction: shares b and L t."""
     translation = perfect_parts(experiment(arm(ball=RADIAL, tilt=TILT)))["translation"]
     by_kind = translation["clearances"]
@@ -72,7 +72,7 @@ def test_perfect_parts_include_the_displacement_by_the_load():
 
 
 @pytest.mark.parametrize("limit", [5e-4, 2e-3])
-def test_advice_names_the_clearances_if_they_alone_exceed_the_limit(
+def test_advice_names_the_clearances_if_perfect_parts_exceed_the_limit(
     tmp_path, run, limit
 ):
     """Clearances alone move the tip by 0.806 mm; the errors are of 1 um."""
@@ -126,7 +126,7 @@ def test_free_platform_is_reported_without_a_bound(tmp_path, run):
     assert "perfect parts reach a translation without bound, limit 0.001 m" in text
 
 
-def test_limited_motion_of_a_passive_joint_has_its_own_share():
+def test_limited_motion_of_a_passive_joint_has_a_separate_share():
     """A hinge within 1e-3 rad on the arm: 0.4 mm of it, and 0.1 mm of the radius."""
     parts = perfect_parts(experiment(arm(passive=True, radial=RADIAL, spin=1e-3)))
     by_kind = parts["translation"]["clearances"]

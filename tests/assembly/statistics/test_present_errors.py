@@ -79,7 +79,7 @@ def test_present_errors_within_clearance_have_zero_energy_and_rigid_parts_nan():
     assert np.isnan(found["slopes"][0]["energy_slope"])
 
 
-def test_grid_of_postures_contains_only_reached_ones():
+def test_grid_of_postures_contains_only_reachable_postures():
     robot = load_robot("irsbot2")
     postures, _ = grid_postures(robot, "tx=-0.1:0.1:0.1,tz=-9.5:-0.5:9")
     places = [(p.pose()["tx"], p.pose()["tz"]) for p in postures]
@@ -112,7 +112,7 @@ def test_allocation_identity_changes_with_every_input():
     assert len(told) == len(others) + 1
 
 
-def test_singular_postures_of_a_grid_are_left_out_and_counted():
+def test_singular_postures_of_a_grid_are_omitted_and_counted():
     """Above the centre of a 3-UPU the locked platform turns; elsewhere it does not."""
     postures, left_out = grid_postures(
         three_upu(seed=1), "tx=-0.02:0.02:0.02,ty=0,tz=0.45"

@@ -14,7 +14,7 @@ def test_limit_is_read_with_and_without_spaces(name):
 
 
 @pytest.mark.parametrize("number", ["0", "-1e-9", "inf", "nan", "", "2 J", "1=2"])
-def test_limit_that_is_no_positive_number_is_refused_with_its_text(number):
+def test_limit_that_is_not_a_positive_number_is_refused_with_its_text(number):
     with pytest.raises(BadInput) as error:
         parse_limit(f"force={number}")
     expected = f'--limit force: found "{number}", expected a number > 0'

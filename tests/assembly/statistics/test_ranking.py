@@ -24,7 +24,7 @@ def test_overlapping_intervals_share_ranks():
     assert [rank_text(ranks[k]) for k in "abd"] == ["1-2", "1-3", "4"]
 
 
-def test_unknown_shares_have_no_rank():
+def test_shares_that_could_not_be_computed_have_no_rank():
     nan = float("nan")
     ranks = possible_ranks(shares(a=(0.5, 0.7)) | {"b": (nan, nan, nan)})
     assert ranks == {"a": (1, 1)}
@@ -32,7 +32,7 @@ def test_unknown_shares_have_no_rank():
     assert possible_ranks({}) == {}
 
 
-def test_undistinguished_legs_are_named_as_all_legs():
+def test_legs_with_equal_shares_are_reported_as_all_legs():
     every = [f"leg{i}.hinge.{c}" for i in (1, 2, 3) for c in ("RX", "RY")]
     some = ["leg3.hinge.RX", "leg1.hinge.RX", "leg2.hinge.RX"]
     assert named_together(some, every) == ["hinge.RX of all legs"]
@@ -44,7 +44,7 @@ def test_undistinguished_legs_are_named_as_all_legs():
     ]
 
 
-def test_one_error_of_a_robot_without_legs_keeps_its_name():
+def test_error_of_a_robot_without_legs_is_reported_by_its_name():
     assert named_together(["tip.RX"], ["tip.RX", "tip.RY"]) == ["tip.RX"]
     assert kind_of("tip.RX") == "tip.RX"
     assert kind_of("leg1.upper.pin.TZ") == "upper.pin.TZ"

@@ -27,7 +27,7 @@ def run(path, values, computed, stop=None, whose="mine"):
 
 
 @pytest.mark.parametrize("changed", [None, 1])
-def test_stored_results_are_reused_for_equal_arguments_only(changed, tmp_path):
+def test_stored_results_are_reused_only_for_equal_arguments(changed, tmp_path):
     path, values = tmp_path / "out.nc", [3.0, 4.0, 5.0]
     first, second = [], []
     with pytest.raises(Killed):
@@ -44,7 +44,7 @@ def test_stored_results_are_reused_for_equal_arguments_only(changed, tmp_path):
     assert not journal_path(path).exists()
 
 
-def test_results_without_a_file_are_computed_every_time():
+def test_results_are_computed_every_time_if_no_file_is_given():
     computed = []
     assert len(run(None, [1.0, 1.0], computed)) == 2
     assert computed == [1.0, 1.0]

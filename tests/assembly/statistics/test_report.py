@@ -114,7 +114,7 @@ def test_report_with_a_wrong_ending_is_refused_before_solving(tmp_path, run, com
     assert 'found the ending ".txt", expected an HTML page' in err
 
 
-def test_report_robot_has_the_platform_displacement_of_its_draw():
+def test_robot_in_the_report_has_the_platform_displacement_of_its_draw():
     """The draw nearest to the 95 % quantile, solved as a single assembly."""
     posture = place_robot(load_robot("hexapod"))
     experiment = Experiment(

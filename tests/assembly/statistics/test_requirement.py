@@ -54,7 +54,7 @@ def test_limit_without_a_computed_quantity_is_refused_before_solving():
         ({"energy": 1.0}, True, False),
     ],
 )
-def test_limit_within_the_clearances_of_perfect_parts_is_refused(
+def test_limit_below_the_pose_error_from_clearances_alone_is_refused(
     limits, worst_play, refused
 ):
     """The posture with more clearance is named; only for the worst clearance."""
@@ -84,7 +84,7 @@ def test_limit_within_the_clearances_of_perfect_parts_is_refused(
         ("energy", [("two", 4)], "two.TY"),
     ],
 )
-def test_error_that_no_clearance_or_spring_takes_up_is_refused_by_name(
+def test_error_that_no_clearance_or_spring_can_close_is_refused_by_name(
     limit, places, named
 ):
     """Clearance in x and y takes up no error along z, and stores no energy.

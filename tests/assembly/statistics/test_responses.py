@@ -76,7 +76,7 @@ def test_slopes_of_the_largest_error_of_an_arm_equal_its_closed_form():
 
 @pytest.mark.parametrize("play", ["least", "contact", "uniform"])
 @pytest.mark.parametrize("key", ["rotation", "translation"])
-def test_response_has_the_random_clearances_of_the_experiment(play, key):
+def test_sampled_response_uses_the_random_clearances_of_the_experiment(play, key):
     """For each draw; the slopes are the direction of the platform's error."""
     posture, sources = tip()
     values = sources.draw(0, 12, seed=1)
@@ -92,7 +92,9 @@ def test_response_has_the_random_clearances_of_the_experiment(play, key):
 
 
 @pytest.mark.parametrize("component", [3, 4])
-def test_platform_beyond_a_pin_follows_the_part_closed_with_it(component):
+def test_platform_attached_to_a_pin_follows_the_part_that_is_closed_with_the_pin(
+    component,
+):
     """Rigid parts: the pin's clearance takes up the errors of the part below it."""
     robot = rigid_pair(radial=PLAY)
     widths = np.zeros(6)

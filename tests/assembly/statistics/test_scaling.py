@@ -30,7 +30,7 @@ ONE = Samples(np.ones((1, 1)), 0)
 
 @pytest.mark.parametrize("power", [0.4, 1.0, 2.0, 8.0])
 @pytest.mark.parametrize("start", [0.2, 1.0, 5.0])
-def test_scaling_of_a_power_law_meets_its_limit(power, start):
+def test_scaled_errors_of_a_power_law_reach_the_limit_exactly(power, start):
     """(t / 3)^power is 1 at 3."""
     known = Known(lambda size: (size / 3.0) ** power)
     (found,) = scale_uniformly(known, ONE, np.array([start]))
@@ -48,7 +48,7 @@ def test_scaling_approaches_a_jump_from_the_admissible_side(start, within, beyon
         assert 3.0 * (1 - precision) <= found <= 3.0
 
 
-def test_scaling_keeps_proportions_within_the_bounds_of_the_plan():
+def test_scaling_preserves_proportions_within_the_bounds_of_the_plan():
     """Samples (1, 1) of tolerances 1 to 4; tolerances at their loosest stay there."""
     known = Known(lambda size: size / 6.0, least=0.5, most=8.0, tolerances=3)
     found = scale_uniformly(known, Samples(np.ones((1, 3)), 0), np.array([1.0, 2, 4]))
@@ -61,7 +61,7 @@ def test_scaling_keeps_proportions_within_the_bounds_of_the_plan():
 
 
 @pytest.mark.parametrize("allowed", [0, 1, 300])
-def test_scaling_lets_at_most_the_allowed_samples_fail(allowed):
+def test_scaling_allows_at_most_the_permitted_number_of_samples_to_fail(allowed):
     """Sizes 1 to 1000 and a limit 6: the largest that must fit is 1000 - allowed."""
     values = np.random.default_rng(1).permutation(np.arange(1.0, 1001.0))[:, None]
     known = Known(lambda size: size / 6.0)
@@ -80,7 +80,7 @@ def test_limits_that_no_scale_meets_are_refused(least):
 
 
 @pytest.mark.parametrize(("draws", "allowed"), [(59, 0), (92, 0), (93, 1), (124, 2)])
-def test_allowed_failures_for_a_yield_equal_wilks_numbers(draws, allowed):
+def test_number_of_allowed_failures_for_a_yield_equals_wilks_numbers(draws, allowed):
     """Wilks (1942): 59, 93, 124 draws show 95 % at 95 % with 0, 1, 2 failures."""
     plan = SimpleNamespace(
         asked_yield=0.95, draws=draws, draws_of=lambda stream, count: (stream, count)

@@ -74,7 +74,7 @@ def test_drawn_stiffness_equals_that_of_the_robot_with_its_errors(state):
     assert np.ptp(data["stiffness"].values, axis=0).min() > 0.0
 
 
-def test_stiffness_report_separates_free_draws_from_stiff_ones():
+def test_stiffness_report_separates_draws_with_free_motions_from_other_draws():
     values = np.full((10, 6), 2e6)
     values[:4, 5], values[4, 5] = 0.0, np.nan
     motions = np.full((10, 6, 6), np.nan)
@@ -122,7 +122,7 @@ def test_small_stiffness_is_not_reported_as_a_free_motion():
     assert about_z["quantiles"]["0.5"]["value"] == pytest.approx(0.02)
 
 
-def test_stiffness_of_a_platform_that_does_not_yield_is_reported_as_rigid():
+def test_stiffness_of_a_platform_without_compliance_is_reported_as_rigid():
     """Along fx all draws are rigid, along fy one of four; without draws, no shares."""
     stiffnesses = np.full((4, 6), 2.0)
     stiffnesses[:, 3], stiffnesses[0, 4], stiffnesses[:, 5] = np.inf, np.inf, np.nan

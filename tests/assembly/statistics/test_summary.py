@@ -79,7 +79,7 @@ def test_draw_with_bounds_that_enclose_a_limit_is_undecided():
     )
 
 
-def test_strength_is_the_stress_limit_unless_a_limit_is_given():
+def test_yield_strength_is_the_stress_limit_unless_another_limit_is_given():
     """Safety is the strength over the largest stress of a link, or infinite."""
     data = draws(stress=[[1e6, 0.0], [4e6, 0.0], [9e6, 0.0]], status=[0, 0, 1])
     said = summarise(data, strength=2e6)
@@ -104,7 +104,7 @@ def test_quantity_is_described_by_draws_with_finite_values():
 
 
 @pytest.mark.parametrize(("zeros", "mode"), [(50, 7.0), (51, 0.0)])
-def test_zero_is_the_mode_if_more_than_half_are_zero(zeros, mode):
+def test_mode_is_zero_if_more_than_half_of_the_draws_are_zero(zeros, mode):
     """The other values are about 7; 1e-19 of the largest is rounding, 1e-17 is not."""
     energy = np.r_[
         np.zeros(zeros - 2), 9e-19, -7e-18, np.linspace(6.9, 7.1, 100 - zeros)

@@ -40,7 +40,7 @@ class Coin:
         return share, share
 
 
-def test_repeated_verification_keeps_its_error_probability(monkeypatch):
+def test_repeated_verification_does_not_exceed_its_error_probability(monkeypatch):
     """The last interval misses the truth in at most 5 % of all verifications.
 
     The yield is just so low that most looks contradict it and another follows; with
@@ -91,7 +91,7 @@ def test_tolerance_file_is_read_with_groups_costs_and_limits(write_file):
 
 
 @pytest.mark.parametrize("cost", ["logarithm", "reciprocal"])
-def test_price_follows_its_cost_function(cost, write_file):
+def test_price_of_tolerances_follows_the_cost_function(cost, write_file):
     """Tolerances of costs 2 and 1, multiplied by e or by 2, together and separately."""
     plan = read_plan(write_file(FILE.replace("logarithm", cost)), load_robot("irsbot2"))
     t = np.array([3e-4, 2e-2])
@@ -162,11 +162,11 @@ REFUSED = {
         "tolerance[2].components: expected components that are all angles or all "
         "lengths, at least one"),
     "an error twice in a table": ('"TX"', '"TX", "TX"',
-        'tolerance[1]: found "leg1.link_a.TX" again, first in this table'),
+        'tolerance[1]: found "leg1.link_a.TX" twice, first in this table'),
     "an error in two tables": (
         '["leg1.tip"]\ncomponents = ["RX", "RY"]',
         '["leg2.link_a"]\ncomponents = ["TX"]',
-        'tolerance[2]: found "leg2.link_a.TX" again, first in "length"'),
+        'tolerance[2]: found "leg2.link_a.TX" twice, first in "length"'),
     "a name twice": ('["RX", "RY"]', '["TX"]\nname = "length"',
         "tolerance: found two tolerances of the same name, expected different names"),
     "no table": (FILE, "yield = 0.9",

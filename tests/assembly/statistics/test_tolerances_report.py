@@ -76,7 +76,7 @@ def test_advice_omits_tolerances_at_their_loosest():
     assert tiles(none)["Tolerance to tighten"][0] == "nothing"
 
 
-def test_report_without_a_proof_states_so_and_has_no_empty_table():
+def test_report_without_a_proof_says_so_and_has_no_empty_table():
     page = shown([1e-3, 1e-4], [1.0, 1.0])
     assert "not proved" in page
     assert "at least none" not in page
@@ -113,7 +113,7 @@ def test_report_states_requirements_and_the_share_of_clearances(tmp_path, run):
     assert asked["yield"].text == "1: every robot within tolerance"
 
 
-def test_advice_for_errors_that_fit_everywhere_is_nothing():
+def test_no_advice_is_given_for_errors_that_fit_at_every_posture():
     """A margin of 0.5: the errors could be twice as large."""
     present = {
         "postures": 2, "assemblable_share": 1.0, "factor_on_errors": 2.0,

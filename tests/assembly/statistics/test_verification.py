@@ -26,7 +26,9 @@ def springs(stiffnesses, limits, clearance=None):
 
 
 @pytest.mark.parametrize(("limit", "scale"), [(0.01, 0.2), (0.25, 1.0), (1.0, 1.0)])
-def test_proven_energy_of_springs_scales_with_the_square_of_tolerances(limit, scale):
+def test_certified_energy_of_springs_scales_with_the_square_of_the_tolerances(
+    limit, scale
+):
     """k (t1 + t2)^2 / 4 at the stiffer of three postures; 0.25 J of 1e6 N/m."""
     requirement = springs([4e5, 4e6, 1e6], {"energy": limit})
     k = 4e6
@@ -38,7 +40,7 @@ def test_proven_energy_of_springs_scales_with_the_square_of_tolerances(limit, sc
 
 
 @pytest.mark.parametrize(("limit", "scale"), [(1.0, 0.2), (4.0, 0.8), (6.0, 1.0)])
-def test_proven_margin_scales_with_the_tolerances(limit, scale):
+def test_certified_margin_scales_with_the_tolerances(limit, scale):
     """(t1 + t2) / p = 5, for any springs."""
     requirement = springs([1e6, 1e5], {"margin": limit}, PLAY)
     worst, found = prove_worst(requirement, T, silent)
@@ -46,7 +48,7 @@ def test_proven_margin_scales_with_the_tolerances(limit, scale):
     assert found == pytest.approx(scale, rel=1e-5)
 
 
-def test_tightest_limit_decides_the_scale_and_a_force_is_not_proven():
+def test_scale_is_set_by_the_tightest_limit_and_not_certified_for_a_force():
     """Half of k (t1 + t2) is found; there is no bound for it, hence no scale."""
     requirement = springs([1e6], {"energy": 0.01, "force": 60.0})
     worst, found = prove_worst(requirement, T, silent)

@@ -56,7 +56,7 @@ def test_worst_margin_and_its_bound_equal_sums_along_each_axis():
     assert bound_margin(zone, sources, t * [1, 1, 0, 0]) == pytest.approx(5.0, rel=1e-6)
 
 
-def test_worst_energy_and_margin_of_a_ball_are_below_their_bounds():
+def test_worst_energy_and_margin_of_a_ball_are_within_their_bounds():
     """Gaps of 3, 2 and 4 balls along x, y, z: their distance; the bounds, their sum."""
     robot = coaxial_beams(np.zeros(6), (K, K), clearance=Clearance(ball=PLAY))
     posture, t = home_posture(robot), np.array([3.0, 2.0, 4.0]) * PLAY
@@ -98,7 +98,7 @@ def test_margin_bound_distributes_errors_over_several_clearances():
         assert found == pytest.approx(expected, rel=1e-6)
 
 
-def test_error_that_no_clearance_takes_up_has_an_infinite_bound():
+def test_error_that_no_clearance_can_close_has_an_infinite_bound():
     """Along z of a pin; a tolerance of zero has no effect, 1e-14 m is rounding."""
     robot = rigid_pair(radial=PLAY)
     posture = home_posture(robot)

@@ -77,7 +77,7 @@ def cheapest(bend, limit):
     return np.array([a, ratio * a])
 
 
-def test_lengths_of_an_arm_have_the_least_price_in_closed_form(tmp_path):
+def test_least_price_of_the_lengths_of_an_arm_equals_its_closed_form(tmp_path):
     found = allotted(tmp_path, [arm()], OF_ARM, fresh=500)
     best = cheapest(0.8, LIMIT)
     assert found.price == pytest.approx(1 / best[0] + 4 / best[1], rel=2e-3)
@@ -90,7 +90,7 @@ def test_lengths_of_an_arm_have_the_least_price_in_closed_form(tmp_path):
     assert "no tolerances cost less than" in allocation_text(allocation_of(found))
 
 
-def test_all_corners_in_finite_geometry_meet_the_limit(tmp_path):
+def test_all_corners_of_the_tolerances_meet_the_limit_in_finite_geometry(tmp_path):
     a, b = allotted(tmp_path, [arm()], OF_ARM).tolerances
 
     def tip(first, second):
@@ -105,7 +105,7 @@ def test_all_corners_in_finite_geometry_meet_the_limit(tmp_path):
     assert 0.998 * LIMIT < largest <= LIMIT * (1 + 1e-9)
 
 
-def test_fit_takes_its_largest_clearance_from_the_limit(tmp_path):
+def test_largest_clearance_of_a_fit_follows_from_its_limits(tmp_path):
     """A disc of 17.5 um adds to every direction of the plane."""
     clearance = {"clearance": Clearance(radial=10.25e-6)}
     robot = replace(arm(**clearance), fits={"elbow": "12 H7/g6"})
@@ -114,14 +114,16 @@ def test_fit_takes_its_largest_clearance_from_the_limit(tmp_path):
     assert found.price == pytest.approx(1 / best[0] + 4 / best[1], rel=2e-3)
 
 
-def test_posture_of_the_larger_error_decides(tmp_path):
+def test_posture_of_the_larger_error_determines_the_tolerances(tmp_path):
     """The errors add most where the arm is straightest."""
     found = allotted(tmp_path, [arm(1.2), arm(0.8)], OF_ARM)
     alone = allotted(tmp_path, [arm(0.8)], OF_ARM)
     assert found.price == pytest.approx(alone.price, rel=1e-6)
 
 
-def test_lengths_of_a_four_bar_share_its_rotation_as_by_hand(tmp_path):
+def test_shares_of_the_lengths_in_the_rotation_of_a_four_bar_equal_hand_calculation(
+    tmp_path,
+):
     """Least 1/a + 4/b with (ca a + cb b)/lever <= limit: a, b as sqrt(cost/c)."""
     path = tmp_path / "four_bar.toml"
     path.write_text(four_bar_file())
@@ -143,7 +145,7 @@ def test_lengths_of_a_four_bar_share_its_rotation_as_by_hand(tmp_path):
         ("translation = 1e-5", "limit translation: "),
     ],
 )
-def test_worst_case_that_cannot_be_allotted_is_refused(tmp_path, limit, message):
+def test_worst_case_that_cannot_be_allocated_is_refused(tmp_path, limit, message):
     clearance = {"clearance": Clearance(radial=10.25e-6)}
     robot = replace(arm(**clearance), fits={"elbow": "12 H7/g6"})
     text = PLAN.format(limit=limit, first="arm", second="hand")
@@ -166,7 +168,7 @@ def test_over_constrained_parts_with_clearance_are_refused(tmp_path):
         allotted(tmp_path, [robot], plan)
 
 
-def test_command_allots_the_worst_case_of_callouts(tmp_path):
+def test_command_allocates_callouts_for_the_worst_case(tmp_path):
     write_robot(arm(), tmp_path / "arm.toml")
     (tmp_path / "plan.toml").write_text(OF_ARM)
     words = ["assembly", "tolerances", str(tmp_path / "arm.toml"), "--plan",

@@ -55,7 +55,7 @@ def test_screws_of_the_worst_clearance_attain_its_bounds(rng):
     "share", [0.02, pytest.param(0.3, marks=pytest.mark.slow), 1.0]
 )
 @pytest.mark.parametrize("play", ["least", "uniform", "contact"])
-def test_no_clearance_model_exceeds_the_worst_in_any_draw(share, play):
+def test_no_clearance_model_exceeds_the_certified_worst_case_in_any_draw(share, play):
     """Inside the zone, at its edge and outside; 1e-9: two solutions of (22)."""
     worst, other = papers(share), papers(share, clearance=play)
     values = worst.sources.draw(0, 60, seed=1)
@@ -87,7 +87,7 @@ def test_yield_falls_to_zero_with_the_worst_clearance():
     assert share["worst"] < share["contact"] < share["uniform"] < share["least"]
 
 
-def test_worst_clearance_adds_nothing_if_a_load_takes_up_all_clearance():
+def test_worst_clearance_adds_no_error_if_a_load_closes_all_clearances():
     """A load presses the pin to one side of its disc, so it cannot move sideways."""
     robot = arm(radial=RADIAL)
     sources, load = tip_errors(robot, 1e-4), (0, 0, 0, 10.0, 0, 0)

@@ -43,7 +43,7 @@ def of_serial(robot=SERIAL):
     return linear_response(home_posture(robot)), sources_of(robot, angles)
 
 
-def test_serial_arm_has_the_worst_case_of_all_corners_in_finite_geometry():
+def test_worst_case_of_a_serial_arm_equals_the_worst_corner_in_finite_geometry():
     """156.18 um in direction 9.8 deg, lengths + and angles -; discs add 10 um each."""
     found = worst_pose(*of_serial(), "translation")
     assert found.reading == "linear"
@@ -66,7 +66,7 @@ def test_serial_arm_has_the_worst_case_of_all_corners_in_finite_geometry():
     assert " 156.2 um" in repr(found)
 
 
-def test_columns_of_the_serial_arm_are_the_worked_ones():
+def test_sensitivity_columns_of_a_serial_arm_equal_hand_calculation():
     """Columns of the largest errors in um.  Their sums along x and y, 154.2 and 143.5,
     would be 210.6 um together, which no machine reaches: the worst case is 156.18."""
     prepared, sources = of_serial()
@@ -83,7 +83,7 @@ def test_columns_of_the_serial_arm_are_the_worked_ones():
     assert np.hypot(*sums) == pytest.approx(210.6, abs=0.1)
 
 
-def test_balls_at_two_joints_have_the_sum_of_their_radii():
+def test_worst_case_of_two_ball_clearances_is_the_sum_of_their_radii():
     """Every direction is a worst one: 20 and 15 um, both values and bounds."""
     balls = tuple(
         Callout(name, feature, (Datum(datum, "point"),), shape="point",
@@ -101,7 +101,7 @@ def test_balls_at_two_joints_have_the_sum_of_their_radii():
     assert found.bound == pytest.approx(35e-6, rel=1e-9)
 
 
-def test_uniform_draws_of_the_serial_arm_have_the_worked_radius():
+def test_uniform_draws_of_a_serial_arm_have_the_radius_computed_by_hand():
     """rms 58.9 um of uniform errors and uniform discs: the sum of the variances."""
     prepared, sources = of_serial()
     draws = prepared.solve(sources.errors(sources.draw(0, 50_000, 1)))
@@ -132,7 +132,9 @@ def four_bar(tmp_path, clearance):
 @pytest.mark.parametrize(
     ("clearance", "mrad"), [("", 0.1903), ("radial = 10e-6", 0.3595)]
 )
-def test_four_bar_coupler_turns_at_most_as_by_hand(tmp_path, clearance, mrad):
+def test_largest_rotation_of_a_four_bar_coupler_equals_hand_calculation(
+    tmp_path, clearance, mrad
+):
     """0.1903 mrad by errors and 0.1692 by clearances."""
     found = worst_pose(*four_bar(tmp_path, clearance), "rotation")
     assert found.attained * 1e3 == pytest.approx(mrad, abs=5e-5)
@@ -140,7 +142,9 @@ def test_four_bar_coupler_turns_at_most_as_by_hand(tmp_path, clearance, mrad):
 
 
 @pytest.mark.parametrize(("clearance", "um"), [("", 38.4), ("radial = 10e-6", 67.35)])
-def test_four_bar_point_moves_at_most_as_by_hand(tmp_path, clearance, um):
+def test_largest_displacement_of_a_four_bar_point_equals_hand_calculation(
+    tmp_path, clearance, um
+):
     """The point is half way between the coupler's bores, so half of the coupler's
     length error moves it."""
     prepared, sources = four_bar(tmp_path, clearance)
@@ -229,7 +233,7 @@ def _pose(frames):
     return rotation_vector(R)
 
 
-def test_four_springs_have_three_different_readings():
+def test_worst_cases_of_four_springs_differ_between_the_three_definitions():
     """At s = -0.3, -0.1, 0.1, 0.3 m, errors +-50 um, clearances +-20 um: rigid 233,
     equilibrium 240 (errors -,-,+,+), clearances as errors 280 urad."""
     robot, sources = on_springs((-0.3, -0.1, 0.1, 0.3), 20e-6)
@@ -240,7 +244,7 @@ def test_four_springs_have_three_different_readings():
     assert found.bound * 1e6 == pytest.approx(280, abs=0.5)
 
 
-def test_equilibrium_is_not_below_its_corners_and_inner_points():
+def test_worst_equilibrium_is_at_least_that_of_corners_and_inner_points():
     """All 16 corners and 500 inner points; each pose error is known to 1e-9 rad."""
     robot, sources = on_springs((-0.3, -0.1, 0.1, 0.3), 20e-6)
     prepared = linear_response(home_posture(robot))
@@ -253,7 +257,7 @@ def test_equilibrium_is_not_below_its_corners_and_inner_points():
     assert sizes.max() <= found.attained + 1e-9
 
 
-def test_springs_without_clearance_are_a_linear_response():
+def test_response_of_springs_without_clearance_is_linear():
     """Rotation sum s d / sum s^2: 50 um * 0.8 / 0.2 m = 200 urad."""
     robot, sources = on_springs((-0.3, -0.1, 0.1, 0.3), 0.0)
     found = worst_pose(linear_response(home_posture(robot)), sources, "rotation")
@@ -262,7 +266,7 @@ def test_springs_without_clearance_are_a_linear_response():
     assert found.bound == pytest.approx(200e-6, rel=1e-3)
 
 
-def test_rigid_legs_take_only_errors_that_close():
+def test_rigid_legs_accept_only_errors_for_which_the_loop_closes():
     """Two rigid legs are not over-constrained: 2 * 70 um / 0.6 m = 233.3 urad.  A third
     one in the middle, 20 um of clearance, does not limit it; nor does the reading."""
     for positions, reading in [((-0.3, 0.3), "linear"), ((-0.3, 0.0, 0.3), "rigid")]:

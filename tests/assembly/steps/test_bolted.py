@@ -160,7 +160,7 @@ def energy_by_cvxpy(robot, posture, errors, locked=None):
 
 
 @pytest.mark.parametrize("angle", [0.4, 1.2, 2.0])
-def test_energy_over_the_stroke_is_that_of_the_stand_bolted_at_one_pose(
+def test_energy_over_the_stroke_includes_the_wrenches_from_bolting_at_one_pose(
     tmp_path, angle
 ):
     """The screw locked in is compared through the energies that it causes."""
@@ -232,7 +232,7 @@ def test_robot_with_a_bolted_joint_is_written_as_it_was_read(tmp_path):
         ("{ pose = { tx = 5.0 } }", "locked_at"),
     ],
 )
-def test_bad_pose_of_a_bolt_is_one_line(tmp_path, key, text):
+def test_invalid_pose_of_a_bolt_is_reported_in_one_line(tmp_path, key, text):
     with pytest.raises(BadInput) as caught:
         load_robot(four_bar(tmp_path, key))
     assert text in str(caught.value)
@@ -240,7 +240,7 @@ def test_bad_pose_of_a_bolt_is_one_line(tmp_path, key, text):
     assert "\n" not in str(caught.value)
 
 
-def test_bolt_of_a_joint_without_clearance_is_refused(tmp_path):
+def test_bolting_of_a_joint_without_clearance_is_refused(tmp_path):
     path = tmp_path / "robot.toml"
     text = FOUR_BAR.replace("LOCKED", "").replace(
         'name = "end"', 'name = "end"\nlocked_at = "home"'
@@ -299,7 +299,7 @@ def test_tolerances_of_a_bolted_robot_use_its_slot(tmp_path):
     assert np.isnan(found.price_bound)
 
 
-def test_slopes_of_a_bolted_robot_are_those_of_its_errors(tmp_path):
+def test_slopes_of_a_bolted_robot_equal_central_differences(tmp_path):
     """Central differences of the four-bar's energy at another pose than the bolt's."""
     robot = load_robot(four_bar(tmp_path, at_angle(0.4)))
     response = linear_response(place_robot(robot, joints={"crank": 1.6}))
@@ -373,7 +373,7 @@ def test_solve_notes_where_a_joint_is_bolted(tmp_path, run):
     assert out.count('joint "stand" is bolted at') == 1
 
 
-def test_conversion_to_bodies_and_joints_keeps_the_bolt(tmp_path, run):
+def test_conversion_to_bodies_and_joints_keeps_bolted_joints(tmp_path, run):
     path, drawn = four_bar(tmp_path, at_angle(0.4)), tmp_path / "bodies.toml"
     status, _, err = run("convert", path, "--format", "2", "-o", drawn)
     assert status == 0, err

@@ -30,7 +30,7 @@ def after(posture, *done, run=()):
 
 
 @pytest.mark.parametrize(("place", "expected"), [(0.3, 3.75e-7), (0.6, 0.0)])
-def test_influence_of_a_pin_on_a_slot_is_that_of_two_springs(place, expected):
+def test_influence_of_a_pin_on_a_slot_equals_that_of_two_springs(place, expected):
     """Platform on springs k at 0 and L: C = ((1 - a/L)(1 - s/L) + a s / L^2) / k."""
     by_hand = ((1 - 0.1 / 0.4) * (1 - place / 0.4) + 0.1 * place / 0.16) / 1e6
     assert by_hand == pytest.approx(expected, abs=1e-20)
@@ -64,7 +64,7 @@ def test_order_changes_the_end_only_where_an_influence_is_not_zero(places, rng):
     assert zero == (places[1] == 0.6)
 
 
-def test_remark_names_the_joins_that_move_a_slot():
+def test_remark_names_the_joining_steps_that_move_a_slot():
     slot, pins = join(4, Z), (join(1), join(2))
     still = planar_platform([0.0, 0.4, 0.1, 0.6], [0, 0, 40e-6, 0])
     moved = planar_platform([0.0, 0.4, 0.1, 0.3], [0, 0, 40e-6, 0])

@@ -52,7 +52,7 @@ def platform_of_two_pins(radius, distance):
     return Robot("two pins", "platform", tuple(frames), closures)
 
 
-def test_disc_of_an_open_slot_is_filled_evenly():
+def test_drawn_positions_in_an_open_slot_are_uniform_over_its_disc():
     """The squared radius of a uniform disc is uniform; so is the axial clearance."""
     frames = pin("slot", {"radial": 1e-3, "axial": 2e-4}, np.zeros(6), **UNIFORM)
     screws = bolted(Robot("slot", "slot.end", frames, ()))[:, 0]
@@ -62,7 +62,7 @@ def test_disc_of_an_open_slot_is_filled_evenly():
     assert not screws[:, :3].any()
 
 
-def test_two_round_pins_leave_the_platform_anywhere_in_the_lens(rng):
+def test_drawn_positions_of_a_platform_on_two_round_pins_fill_the_lens_uniformly(rng):
     """Uniform in the lens of two discs, drawn here by rejection."""
     robot = platform_of_two_pins({"radial": 1e-4}, 1e-4)
     left = bolted(robot)[:, 4, 3:5] / 1e-4
@@ -75,7 +75,7 @@ def test_two_round_pins_leave_the_platform_anywhere_in_the_lens(rng):
         assert found.pvalue > 1e-3
 
 
-def test_pins_that_must_be_forced_are_left_where_the_energy_is_least():
+def test_pins_apart_by_two_radii_are_left_where_both_touch():
     """A single position closes: apart by two radii, both pins touch."""
     robot = platform_of_two_pins({"radial": 1e-4}, 2e-4)
     screws = bolted(robot, 20)
@@ -83,7 +83,7 @@ def test_pins_that_must_be_forced_are_left_where_the_energy_is_least():
     assert screws[:, 4, 4] == pytest.approx(np.zeros(20), abs=1e-6)
 
 
-def test_pin_pressed_to_its_bound_leaves_the_other_clearance_anywhere():
+def test_pressed_pin_leaves_the_position_in_the_other_clearance_random():
     """Apart by 50 um with +- 20 um, both pins press a leg; its slot across is free."""
     frames = [Frame("guide", "base", joint="prismatic"), Frame("platform", "guide")]
     frames += pin("left", {"axial": 20e-6}, np.zeros(6), **UNIFORM)
@@ -105,7 +105,7 @@ def experiment_of(robot):
     return Experiment(posture, sources, 7, "least", margins=False, stress=False)
 
 
-def test_draw_has_the_same_position_whatever_else_is_drawn(tmp_path):
+def test_position_of_a_draw_does_not_depend_on_other_drawn_quantities(tmp_path):
     key = '{ joints = { crank = 0.4 }, left = "uniform" }'
     robot = load_robot(four_bar(tmp_path, key))
     experiment = experiment_of(robot)
@@ -117,7 +117,7 @@ def test_draw_has_the_same_position_whatever_else_is_drawn(tmp_path):
     assert not np.allclose(rows["energy"], least.solve(0, 6)["energy"], rtol=1e-3)
 
 
-def test_position_left_anywhere_needs_no_more_energy_where_it_is_bolted(tmp_path):
+def test_bolting_at_a_random_free_position_requires_no_additional_energy(tmp_path):
     """The walk keeps the strains at the pose of the bolt."""
     key = '{ joints = { crank = 0.4 }, left = "uniform" }'
     robot = load_robot(four_bar(tmp_path, key))
@@ -132,7 +132,7 @@ def test_position_left_anywhere_needs_no_more_energy_where_it_is_bolted(tmp_path
     assert there["energy"] == pytest.approx(least["energy"], rel=1e-5, abs=1e-9)
 
 
-def test_sweep_and_statistics_leave_a_draw_at_the_same_position(tmp_path):
+def test_sweep_and_statistics_bolt_a_draw_at_the_same_position(tmp_path):
     key = '{ joints = { crank = 0.4 }, left = "uniform" }'
     path = four_bar(tmp_path, key)
     errors = tmp_path / "errors.toml"
@@ -146,7 +146,7 @@ def test_sweep_and_statistics_leave_a_draw_at_the_same_position(tmp_path):
     assert energies == pytest.approx(own.solve(0, 3)["energy"], rel=1e-6, abs=1e-12)
 
 
-def test_rule_of_a_bolt_is_written_as_it_was_read(tmp_path):
+def test_rule_for_the_bolting_position_is_equal_after_reading_and_writing(tmp_path):
     robot = load_robot(four_bar(tmp_path, '{ left = "uniform" }'))
     write_robot(robot, tmp_path / "again.toml")
     bolt = load_robot(tmp_path / "again.toml").frame("stand").locked_at
@@ -156,14 +156,14 @@ def test_rule_of_a_bolt_is_written_as_it_was_read(tmp_path):
 
 
 @pytest.mark.parametrize("key", ['{ left = "normal" }', "{ left = 3 }"])
-def test_unknown_rule_of_a_bolt_is_refused_in_one_line(tmp_path, key):
+def test_unknown_rule_for_the_bolting_position_is_refused_in_one_line(tmp_path, key):
     with pytest.raises(BadInput) as caught:
         load_robot(four_bar(tmp_path, key))
     assert "locked_at.left: found" in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
-def test_robot_that_is_not_drawn_is_bolted_at_the_least_sum_of_squares():
+def test_single_robot_is_bolted_at_the_position_with_the_least_sum_of_squares():
     frames = pin("slot", {"radial": 1e-3}, np.zeros(6), **UNIFORM)
     robot = bolt_joints(Robot("slot", "slot.end", frames, ()))
     assert not robot.frame("slot").locked_at.screw.any()

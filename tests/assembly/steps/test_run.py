@@ -46,7 +46,7 @@ def join_leg(i, **more):
     return Join(f"join {i}", LEG[i], **more)
 
 
-def test_two_bars_and_a_gap_store_and_lose_what_the_springs_say():
+def test_two_bars_and_a_gap_store_and_dissipate_the_energy_of_the_springs():
     """F = g k1 k2 / (k1 + k2), E = F g / 2; a wall removed loses all of it."""
     bolt = Join("bolt", ("wall", "bar2"))
     plan = Plan((bolt, Release("wall removed", ("bolt",))))
@@ -60,7 +60,7 @@ def test_two_bars_and_a_gap_store_and_lose_what_the_springs_say():
     assert abs(released.spring_back[0, 5]) == pytest.approx(2e-4)
 
 
-def test_a_bolt_of_limited_force_leaves_the_opening_that_the_springs_say():
+def test_joint_closed_by_limited_force_stays_open_as_computed_with_springs():
     """90 N of 150 N close 120 um of 200 um: 80 um open, E = 0.36 * 15 mJ."""
     bolt = Join("bolt", ("wall", "bar2"), force_limit=90.0, leave_open=True)
     (closed,) = assemble_in_steps(Plan((bolt,)), two_bars(2e-4))
@@ -70,7 +70,7 @@ def test_a_bolt_of_limited_force_leaves_the_opening_that_the_springs_say():
     assert closed.energy == pytest.approx(5.4e-3)
 
 
-def test_a_force_limit_without_leave_open_is_reported_only():
+def test_force_limit_without_leave_open_is_only_reported():
     bolt = Join("bolt", ("wall", "bar2"), force_limit=90.0)
     (closed,) = assemble_in_steps(Plan((bolt,)), two_bars(2e-4))
     assert closed.exceeded.all()
@@ -87,7 +87,7 @@ def test_pinned_legs_end_in_the_same_state_in_every_order(order):
     assert forces == pytest.approx([6.666667, 86.666667, 80.0], rel=1e-6)
 
 
-def test_each_pinned_leg_needs_the_closing_force_of_the_springs_so_far():
+def test_closing_force_of_each_pinned_leg_follows_from_the_springs_joined_so_far():
     results = assemble_in_steps(
         Plan(tuple(join_leg(i) for i in (1, 2, 3))), three_legs()
     )
@@ -105,7 +105,9 @@ def test_each_pinned_leg_needs_the_closing_force_of_the_springs_so_far():
     ("last", "x", "energy"),
     [(1, 22.0e-6, 2.94e-3), (2, 45.0e-6, 0.15e-3), (3, -10e-6 / 3, 0.8333333e-3)],
 )
-def test_last_leg_bolted_as_it_lies_leaves_the_pose_of_the_two_others(last, x, energy):
+def test_last_leg_bolted_without_force_keeps_the_pose_given_by_the_other_legs(
+    last, x, energy
+):
     first = [i for i in (1, 2, 3) if i != last]
     steps = (*(join_leg(i) for i in first), join_leg(last, locked=Z))
     result = assemble_in_steps(Plan(steps), three_legs())[-1]
@@ -133,7 +135,7 @@ def test_leg_bolted_while_the_platform_is_clamped_springs_back_by_its_share():
         (0.3, (4, 3), 18.0e-6, -40.0e-6, 0.52e-3),
     ],
 )
-def test_slot_before_the_pin_differs_where_the_pin_moves_the_slot(
+def test_result_of_bolting_the_slot_first_differs_if_the_pin_moves_the_slot(
     place, order, z, turn, energy
 ):
     """Legs at 0 and 0.4 m, 40 um pinned at 0.1 m, a slot at 0.3 m; read at 0 m."""
@@ -150,7 +152,7 @@ def test_slot_before_the_pin_differs_where_the_pin_moves_the_slot(
     assert result.platform_screw[0, 5] == pytest.approx(z)
 
 
-def test_portal_welded_to_a_bent_base_keeps_its_share_of_the_rotation():
+def test_portal_welded_to_a_bent_base_retains_its_share_of_the_rotation():
     """k_base = 2 EI / L and the portal's own stiffness against turned feet."""
     E = 2.1e11
     I_b, I_c = 0.06 * 0.03**3 / 12, 0.03**4 / 12
@@ -207,7 +209,7 @@ def legs_with_pins(places, bounds, k=(None, None, 2e6)):
 
 
 @pytest.mark.parametrize("order", [(1, 2), (2, 1)])
-def test_two_pins_with_clearance_leave_the_platform_where_both_reach(order):
+def test_platform_on_two_pins_with_clearance_is_at_a_position_that_both_allow(order):
     """0 +- 20 um and 30 +- 20 um: the platform lies in [10, 20] um."""
     posture = legs_with_pins((0.0, 30e-6), (20e-6, 20e-6))
     results = assemble_in_steps(Plan(tuple(join_leg(i) for i in order)), posture)
@@ -219,9 +221,7 @@ def test_two_pins_with_clearance_leave_the_platform_where_both_reach(order):
 @pytest.mark.parametrize(
     ("at", "force"), [(-20e-6, 60.0), (0.0, 20.0), (10e-6, 0.0), (15e-6, 0.0)]
 )
-def test_slot_bolted_after_one_pin_costs_what_its_place_in_the_clearance_says(
-    at, force
-):
+def test_energy_of_a_slot_bolted_after_one_pin_follows_from_its_position(at, force):
     """Pin 2 then forces the platform to 10 um against a leg of 2e6 N/m at x3."""
     posture = legs_with_pins((0.0, 30e-6, 0.0), (20e-6, 20e-6, None))
     steps = (
@@ -233,7 +233,7 @@ def test_slot_bolted_after_one_pin_costs_what_its_place_in_the_clearance_says(
     assert last.energy == pytest.approx(force**2 / 4e6, abs=1e-7)
 
 
-def test_a_joint_with_clearance_that_is_bolted_keeps_its_place():
+def test_bolted_joint_with_clearance_retains_its_position():
     """Pin 1 bolted at -20 um acts as a rigid pin there."""
     posture = legs_with_pins((0.0, 30e-6), (20e-6, None), k=(1e6, None))
     down = np.array([0, 0, 0, 0, 0, -5.0])
@@ -314,7 +314,7 @@ def test_gough_platform_moves_by_the_inverse_jacobian_without_force():
     ("components", "change", "left"),
     [(("TZ",), -40.0e-6, 6.6e-6), (("TX", "TY", "TZ"), -34.1e-6, 5.4e-6)],
 )
-def test_one_adjustable_leg_brings_one_reading_to_zero_and_not_the_pose(
+def test_one_adjustable_leg_corrects_one_reading_but_not_the_whole_pose(
     components, change, left
 ):
     reading = Measure("pose", "platform", components)
@@ -363,14 +363,14 @@ def test_seventh_leg_cut_to_the_measured_length_is_free_of_force():
         ((Join("bolt", "leg1"),), "no clearance and no motion to bolt"),
     ],
 )
-def test_a_plan_that_does_not_fit_is_refused_in_one_line(steps, text):
+def test_plan_that_does_not_match_the_robot_is_refused_in_one_line(steps, text):
     with pytest.raises(BadInput, match="step") as caught:
         assemble_in_steps(Plan(steps), three_legs())
     assert text in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
-def test_influence_coefficients_give_the_spring_back_of_clamped_parts():
+def test_spring_back_of_clamped_parts_follows_from_influence_coefficients():
     """U = K_assembly^-1 (sum of K_part V), two parts clamped to nominal."""
     k, V = np.array([1e6, 2e6]), np.array([30e-6, -20e-6])
     steps = (
@@ -420,7 +420,7 @@ def test_weight_bends_the_leg_before_the_slot_is_bolted():
         assert results[1].platform_screw[0, 5] == pytest.approx(expected)
 
 
-def test_preload_on_a_part_that_nothing_holds_is_refused():
+def test_preload_on_a_part_without_support_is_refused():
     press = Preload("press", "platform", np.array([0, 0, 0, 0, 0, -10.0]))
     with pytest.raises(FreeMotion, match="nothing resists"):
         assemble_in_steps(Plan((press,)), legs_open())
@@ -432,7 +432,7 @@ def legs_open():
     return replace(posture, robot=replace(posture.robot, closures=()))
 
 
-def test_legs_cut_to_increments_leave_the_rounding_of_their_lengths(rng):
+def test_legs_cut_to_increments_have_errors_equal_to_the_rounding_of_their_lengths(rng):
     """All six legs cut to 10 um: x = J r, |r| <= 5 um; at most 11.9, 12.4, 6.1 um."""
     cuts = tuple(
         Adjust(
@@ -461,7 +461,7 @@ def test_legs_cut_to_increments_leave_the_rounding_of_their_lengths(rng):
 
 
 @pytest.mark.parametrize(("increment", "change"), [(0.0, -50e-6), (40e-6, -40e-6)])
-def test_shim_closes_without_force_where_the_clearance_lies(increment, change):
+def test_shim_closes_without_force_at_the_position_of_the_clearance(increment, change):
     """Pin 1 lies in the middle of +- 20 um: leg 2, 50 um long, is cut to it; rounded
     to 40 um, the clearance takes up the 10 um left."""
     posture = legs_with_pins((0.0, 50e-6), (20e-6, None), k=(1e6, 1e6))
@@ -477,7 +477,7 @@ def test_shim_closes_without_force_where_the_clearance_lies(increment, change):
 @pytest.mark.parametrize(
     ("name", "component"), [("four_bar", "TZ"), ("3rrr", "RX"), ("four_bar", "TX")]
 )
-def test_shim_of_a_robot_with_clearances_needs_the_least_energy_of_all(
+def test_shim_of_a_robot_with_clearances_has_the_least_energy_of_all_shims(
     name, component, rng
 ):
     """Against a scan of the shim, each length closed with loose clearances."""
@@ -517,7 +517,7 @@ def test_shim_under_a_weight_shares_it_by_stiffness(stiffness, weight):
     assert results[3].energy[0] == pytest.approx(expected, rel=1e-6)
 
 
-def test_shim_under_a_platform_that_rests_on_a_pin_brings_it_to_its_height():
+def test_shim_under_a_platform_that_rests_on_a_pin_restores_its_height():
     """10 N press leg 1 by 10 um and pin 1 to -20 um: 30 um are missing at 0 um."""
     posture = legs_with_pins((0.0, 50e-6), (20e-6, None), k=(1e6, 1e6))
     load = Preload("weight", "platform", np.array([0, 0, 0, 0, 0, -10.0]))
@@ -527,7 +527,7 @@ def test_shim_under_a_platform_that_rests_on_a_pin_brings_it_to_its_height():
     assert results[2].platform_screw[0, 5] == pytest.approx(0.0, abs=1e-11)
 
 
-def test_shims_of_many_machines_under_a_weight_are_found_together(rng):
+def test_shims_of_many_machines_under_a_weight_are_computed_together(rng):
     """Leg 2 is cut to the end of pin 1 in every machine, whatever their lengths."""
     posture = legs_with_pins((0.0, 0.0), (20e-6, None), k=(1e6, 2e6))
     load = Preload("weight", "platform", np.array([0, 0, 0, 0, 0, -10.0]))
@@ -541,7 +541,7 @@ def test_shims_of_many_machines_under_a_weight_are_found_together(rng):
     assert found == pytest.approx(lengths[:, 0] - 20e-6 - lengths[:, 1], abs=1e-10)
 
 
-def test_shim_of_a_loaded_robot_with_clearances_needs_the_least_energy_nearby(rng):
+def test_shim_of_a_loaded_robot_has_the_least_energy_among_nearby_shims(rng):
     """Against a scan of the shim of a four-bar under a force in its plane."""
     robot = load_robot("four_bar")
     errors = rng.normal(size=robot.errors.shape) * np.repeat([3e-3, 3e-4], 3)
@@ -577,7 +577,7 @@ def test_shim_in_a_bolted_joint_among_loose_clearances_is_refused():
         assemble_in_steps(Plan(steps), posture)
 
 
-def test_adjustment_is_possible_once_every_clearance_is_bolted():
+def test_adjustment_is_possible_once_every_joint_with_clearance_is_bolted():
     """Pin 1 bolted in the middle of its clearance: leg 2 is cut to it."""
     posture = legs_with_pins((10e-6, 30e-6), (20e-6, None), k=(1e6, 1e6))
     cut = Adjust("cut", "leg2", ("TZ",), Measure("gap", LEG[2]))
@@ -588,7 +588,7 @@ def test_adjustment_is_possible_once_every_clearance_is_bolted():
 
 
 @pytest.mark.parametrize("name", ["four_bar", "five_bar", "3rrr", "irsbot2", "delta"])
-def test_pinned_robots_with_clearances_store_what_solve_assembly_says(name, rng):
+def test_pinned_robots_with_clearances_store_the_energy_of_solve_assembly(name, rng):
     """The compiled solver has an elimination of its own; any order ends there."""
     robot = load_robot(name)
     errors = rng.normal(size=robot.errors.shape) * np.repeat([3e-3, 3e-4], 3)

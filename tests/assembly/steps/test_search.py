@@ -29,7 +29,7 @@ def outcome(plan, posture, objective):
     return np.linalg.norm(results[-1].platform_screw[0, 3:])
 
 
-def test_least_peak_force_of_three_legs_is_that_of_the_springs():
+def test_least_peak_force_of_three_legs_equals_hand_calculation_with_springs():
     """Closing forces by hand: the last leg needs 6.7, 86.7 or 80 N; before it two legs
     close with k_i k_j / (k_i + k_j) |d_i - d_j|."""
     steps = tuple(Join(f"{i}", LEG[i]) for i in (1, 2, 3))
@@ -49,7 +49,7 @@ def test_least_peak_force_of_three_legs_is_that_of_the_springs():
 
 @pytest.mark.parametrize("objective", OBJECTIVES)
 @pytest.mark.parametrize("slots", [(), (2, 5)])
-def test_best_order_is_the_best_of_all_orders(objective, slots, rng):
+def test_order_found_by_the_search_is_the_best_of_all_orders(objective, slots, rng):
     errors = rng.normal(size=5) * 40e-6
     posture = planar_platform([0.0, 0.4, 0.1, 0.3, 0.25], errors)
     locked = {i: ("TZ",) if i in slots else () for i in range(1, 6)}
@@ -64,7 +64,7 @@ def test_best_order_is_the_best_of_all_orders(objective, slots, rng):
     )
 
 
-def test_only_joining_steps_between_other_steps_change_places():
+def test_search_changes_the_order_only_of_joining_steps_between_other_steps():
     steps = (
         Join("1", LEG[1]), Fix("clamp", "platform", None), Join("3", LEG[3]),
         Join("2", LEG[2]), Release("free", ("clamp",)),
@@ -75,7 +75,7 @@ def test_only_joining_steps_between_other_steps_change_places():
     assert sorted(names[2:4]) == ["2", "3"]
 
 
-def test_adjustments_change_places_with_joins_to_reduce_the_error():
+def test_search_exchanges_adjustments_and_joining_steps_to_reduce_the_error():
     """Two legs of 1e6 N/m, a shim at leg 0 to read 0 at the platform.
 
     With leg 0 alone the shim brings the platform to 0, and leg 1, which is 60 um long,
@@ -91,7 +91,7 @@ def test_adjustments_change_places_with_joins_to_reduce_the_error():
     assert [step.name for step in found.plan.steps].index("shim") == 2
 
 
-def test_least_error_changes_the_adjustments_too():
+def test_search_for_the_least_error_also_changes_the_adjustments():
     """Leg 6 of the Gough platform: -34.1 um leave 5.4 um, where -40 um make TZ zero."""
     shim = Adjust("shim", "leg6", ("TZ",), Measure("z", "platform", ("TZ",)))
     found = best_order(Plan((shim,)), gough(LENGTHS), "error")
@@ -116,7 +116,7 @@ def test_least_energy_changes_the_adjustments_within_their_increments():
         assert found.value == pytest.approx(energy, rel=1e-6, abs=1e-12)
 
 
-def test_adjustment_to_a_closure_stays_before_the_step_that_joins_it():
+def test_adjustment_for_a_closure_is_never_moved_after_the_step_that_joins_it():
     """Closing costs no force once leg 1 is cut to what leg 0 leaves open."""
     posture = legs_on_a_guide((10e-6, 60e-6))
     gap = Measure("gap", ("platform", "leg1"))
@@ -140,7 +140,7 @@ def test_least_error_of_many_joins_ends_early_without_a_bound(rng):
 
 @pytest.mark.parametrize("objective", ["force", "energy"])
 @pytest.mark.parametrize("most", [20, 60])
-def test_search_that_ends_early_brackets_the_best_order(objective, most, rng):
+def test_search_that_ends_early_bounds_the_best_value(objective, most, rng):
     errors = rng.normal(size=5) * 40e-6
     posture = planar_platform([0.0, 0.4, 0.1, 0.3, 0.25], errors)
     steps = tuple(join(i, locked=("TZ",) if i in (2, 5) else ()) for i in range(1, 6))
@@ -190,7 +190,9 @@ def least_peak(k, d):
     return best[-1]
 
 
-def test_least_peak_force_of_twelve_pinned_legs_is_that_of_all_their_sets(rng):
+def test_least_peak_force_of_twelve_pinned_legs_equals_the_minimum_over_all_subsets(
+    rng,
+):
     posture, plan, k, d = legs_along_z(rng, 12)
     found = best_order(plan, posture, "force")
     assert found.value == pytest.approx(least_peak(k, d), rel=1e-9)
@@ -199,7 +201,7 @@ def test_least_peak_force_of_twelve_pinned_legs_is_that_of_all_their_sets(rng):
 
 
 @pytest.mark.parametrize("most", [12, 20, 40])
-def test_search_over_sets_that_ends_early_brackets_the_least_peak_force(most, rng):
+def test_search_over_subsets_that_ends_early_bounds_the_least_peak_force(most, rng):
     posture, plan, k, d = legs_along_z(rng, 9)
     found = best_order(plan, posture, "force", most=most)
     least = least_peak(k, d)
@@ -208,7 +210,7 @@ def test_search_over_sets_that_ends_early_brackets_the_least_peak_force(most, rn
     assert outcome(found.plan, posture, "force") == pytest.approx(found.value)
 
 
-def test_interrupted_search_over_sets_brackets_the_least_peak_force(rng):
+def test_interrupted_search_over_subsets_bounds_the_least_peak_force(rng):
     posture, plan, k, d = legs_along_z(rng, 9)
 
     def stop(done):
@@ -232,7 +234,7 @@ def test_interrupted_search_returns_the_best_order_so_far():
     assert found.bound <= found.value <= found.given
 
 
-def test_slot_last_or_first_decides_the_error_of_nine_legs():
+def test_bolting_the_slot_first_or_last_determines_the_error_of_nine_legs():
     """Beyond 8 joins the least energy is searched with bounds: zero, slots first."""
     errors = np.array([0, 0, 10, 20, -10, 5, 15, -5, 25]) * 1e-6
     posture = planar_platform(np.linspace(0, 0.4, 9), errors)

@@ -39,7 +39,7 @@ def left(robot, rule):
     return replace(robot, frames=tuple(frames))
 
 
-def test_slot_with_an_arm_reaches_its_corner():
+def test_worst_position_of_a_slot_with_an_arm_is_at_its_corner():
     """Tilt of 2 mrad on an arm of 0.3 m adds to the radius of 1 mm."""
     gaps = Clearance(radial=1e-3, axial=2e-4, tilt=2e-3)
     slot = Frame("slot", "base", locked_at=LockedAt(gaps, **WORST))
@@ -51,7 +51,7 @@ def test_slot_with_an_arm_reaches_its_corner():
     assert_bracket(worst.translation, np.hypot(1e-3 + 0.3 * 2e-3, 2e-4))
 
 
-def test_platform_on_two_pins_is_left_at_the_far_end():
+def test_worst_bolted_position_of_a_platform_on_two_pins_is_at_the_far_end():
     """0 +- 20 um and 30 +- 20 um: the platform may be in [10, 20] um."""
     frames = [Frame("guide", "base", joint="prismatic"), Frame("platform", "guide")]
     for name, error in (("left", 0.0), ("right", 30e-6)):
@@ -66,7 +66,7 @@ def test_platform_on_two_pins_is_left_at_the_far_end():
 
 
 @pytest.mark.parametrize("distance", [1e-4, 1.6e-4])
-def test_platform_on_two_round_pins_reaches_the_edge_of_the_lens(distance):
+def test_worst_bolted_position_on_two_round_pins_is_at_the_edge_of_the_lens(distance):
     """The lens of two discs of 0.1 mm, one about the nominal place, ends at 0.1 mm."""
     robot = left(platform_of_two_pins({"radial": 1e-4}, distance), "worst")
     worst = worst_left(home_posture(bolt_joints(robot)))
@@ -75,7 +75,7 @@ def test_platform_on_two_round_pins_reaches_the_edge_of_the_lens(distance):
 
 
 @pytest.mark.parametrize("angle", [0.4, 1.6])
-def test_bracket_of_a_four_bar_holds_all_sampled_positions(tmp_path, angle):
+def test_bounds_of_a_four_bar_contain_all_sampled_positions(tmp_path, angle):
     """Pins with clearance between springs: no position drawn is beyond the bound."""
     key = '{ joints = { crank = 1.2 }, left = "worst" }'
     robot = load_robot(str(four_bar(tmp_path, key)))
@@ -94,7 +94,7 @@ def test_bracket_of_a_four_bar_holds_all_sampled_positions(tmp_path, angle):
         assert 0.98 * largest <= low <= high
 
 
-def test_command_error_bounds_the_worst_bolt(tmp_path, run):
+def test_command_error_bounds_the_worst_bolted_position(tmp_path, run):
     """The values of the command are those of the function."""
     key = '{ joints = { crank = 1.2 }, left = "worst" }'
     path = four_bar(tmp_path, key)

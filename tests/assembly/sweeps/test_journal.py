@@ -142,7 +142,7 @@ def test_block_changed_during_the_sweep_is_refused_with_one_message(whole, tmp_p
     assert path.read_bytes() == expected
 
 
-def test_second_run_into_the_same_file_is_refused(whole, tmp_path):
+def test_second_simultaneous_run_into_the_same_file_is_refused(whole, tmp_path):
     """The second run starts during the first, and does not disturb it."""
     sweep, expected, _ = whole
     path, said = tmp_path / "map.nc", []
@@ -196,7 +196,7 @@ def test_journal_of_different_sources_is_refused(whole, tmp_path, monkeypatch):
     "change", [{"under": {"temperature": 6.0}}, {"near": 0.03}, {"seed": 5},
                {"varied": ("elbow.link.young",)}, {"load": (0, 0, 0, 1.0, 0, 0)}]
 )  # fmt: skip
-def test_every_option_changes_the_question_hash(change):
+def test_every_option_changes_the_hash_of_the_requested_computation(change):
     asked = small_sweep().question
     assert question_hash(asked) == question_hash(small_sweep().question)
     assert question_hash(replace(asked, **change)) != question_hash(asked)
@@ -230,7 +230,7 @@ def test_journal_of_another_sweep_is_refused(whole, tmp_path, other, message):
     assert path.read_bytes() == kept[8]
 
 
-def test_file_that_is_no_journal_is_refused_and_kept(tmp_path):
+def test_file_that_is_not_a_journal_is_refused_and_unchanged(tmp_path):
     path = journal_path(tmp_path / "map.nc")
     path.write_text("notes\n")
     with pytest.raises(BadInput, match="found a file that is not a journal of a sweep"):
@@ -253,7 +253,7 @@ def test_block_size_does_not_change_the_results():
 
 
 @pytest.mark.slow
-def test_commands_killed_at_random_times_resume_to_the_same_file():
+def test_commands_killed_at_random_times_resume_and_write_the_same_file():
     """Twenty kills here; the benchmark does hundreds."""
     kills = [sys.executable, ROOT / "benchmarks" / "kills.py", "20"]
     run = [*kills, "--seed", "5"]

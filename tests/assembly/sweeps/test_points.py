@@ -76,7 +76,7 @@ def test_swept_bounds_and_finite_motions_equal_those_of_one_posture(robot, data)
     assert float(there.linearisation_energy) == pytest.approx(gap.relative_energy)
 
 
-def test_error_by_clearances_alone_has_the_symmetry_of_the_robot(data):
+def test_error_due_to_clearances_without_errors_has_the_robot_symmetry(data):
     """Without errors x and -x are equal, to the bounds' gap of 1e-6."""
     for name in ("rotation_error_clearance", "translation_error_clearance"):
         values = data[name].sel(bound="upper").values
@@ -116,7 +116,7 @@ def test_swept_draws_are_bit_identical_to_robots_with_those_errors(tmp_path):
             assert np.array_equal(there[name], one[name], equal_nan=True), name
 
 
-def test_list_and_grid_of_the_same_postures_give_equal_energies(robot, tmp_path):
+def test_list_and_grid_of_the_same_postures_have_equal_energies(robot, tmp_path):
     write_robot(robot, tmp_path / "robot.toml")
     grid = sweep_poses(robot, parse_grid(GRID))
     x, z = np.meshgrid(grid.tx.values, grid.tz.values, indexing="ij")
@@ -185,7 +185,7 @@ def test_point_with_a_linear_algebra_error_has_its_own_status(robot, monkeypatch
          "--vary link_a.link.beam.radius: found the same value twice"),
         ({"grid": "tx=0", "vary": ["link_a.link.beam.radius=0.03",
                                    "leg1.link_a.link.beam.radius=0.04"]},
-         "leg1.link_a.link.beam.radius varies already"),
+         "leg1.link_a.link.beam.radius is varied twice"),
         ({"grid": "tx=0", "draws": 3}, "sweep: found only one of --errors and --draws"),
         ({"grid": "tx=0", "wrench_of": ["leg1.link_q"]}, 'no frame "leg1.link_q"'),
         ({"grid": "tx=0", "near": -1.0}, "--near: found -1, expected a number from 0"),
@@ -199,7 +199,7 @@ def test_invalid_sweep_options_are_refused_with_one_message(options, message):
     assert message in str(error.value)
 
 
-def test_figures_are_drawn_from_the_data_set_alone(tmp_path):
+def test_figures_need_only_the_data_set(tmp_path):
     path = tmp_path / "errors.toml"
     path.write_text(ERRORS)
     grid = "tx=-0.02:0.02:0.02,ty=0.12:0.14:0.02"
@@ -270,7 +270,7 @@ def test_sweep_marks_postures_beyond_joint_limits():
     assert str(data["reason"].values.ravel()[0]).startswith("x.slide at ")
 
 
-def test_point_changed_by_finite_motions_is_marked_as_singular():
+def test_singular_point_where_finite_motions_change_the_energy_is_marked():
     """A short rod near its dead centre stores energy only by finite motions."""
     rod = BeamLink({"radius": 0.01}, 70e9, 0.33)
     robot = slider_crank(0.3, rod, error=-2e-4)

@@ -14,7 +14,7 @@ from forcefit.assembly.sweeps.stiffness_slopes import CannotChange, stiffness_sl
 POSE = {"tx": 0.1, "tz": -0.5}
 
 
-def test_slope_by_the_modulus_is_minus_the_share_of_the_links():
+def test_derivative_by_the_modulus_equals_minus_the_share_of_the_links():
     """dC/dE = -C_links / E, both links of each leg summed (Castigliano)."""
     path = "link_a.link.young"
     slope = stiffness_slopes(load_design("irsbot2"), [path], POSE)[path]
@@ -32,7 +32,7 @@ def test_slope_by_the_modulus_is_minus_the_share_of_the_links():
     np.testing.assert_allclose(slope * young / size, -sum(links) / size, atol=1e-6)
 
 
-def test_slope_by_the_length_of_a_bar_equals_the_textbook(tmp_path):
+def test_derivative_by_the_length_of_a_bar_equals_the_textbook(tmp_path):
     """d(L/EA)/dL = 1/EA, d(L^2/2EI)/dL = L/EI of a single arm."""
     path = tmp_path / "bar.toml"
     path.write_text("""
@@ -51,7 +51,7 @@ link = { beam = { radius = 0.01 }, young = 7e10, poisson = 0.3 }
     assert slope[2, 4] == pytest.approx(0.5 / (7e10 * inertia), rel=1e-6)
 
 
-def test_stiffness_command_gives_slopes_at_the_exact_equilibrium(run):
+def test_stiffness_command_computes_derivatives_at_the_exact_equilibrium(run):
     """They include the stiffness due to the load, unlike those without load."""
     slopes = {}
     for words in ([], ["--state", "exact", "--load", "fx=-300"]):

@@ -76,7 +76,9 @@ def test_solve_reports_the_linearisation_error_under_gravity(run):
     )
 
 
-def test_error_under_a_load_is_the_sag_plus_the_error_of_clearances(run, tmp_path):
+def test_pose_error_under_a_load_is_the_sag_plus_the_error_from_clearances(
+    run, tmp_path
+):
     """A pin with clearance on an elastic post under a downward load.
 
     The load closes the axial clearance, so that only the radial one remains; the post
@@ -130,7 +132,7 @@ parent = "hinge"
 """
 
 
-def test_each_assumption_and_component_has_its_own_answer(run, tmp_path):
+def test_each_assumption_and_component_has_a_separate_result(run, tmp_path):
     """A moment that the hinge's own spring carries:
     by hand M / k, and the clearance."""
     file = tmp_path / "hinge.toml"
@@ -328,7 +330,9 @@ def test_rest_option_bends_the_named_link_by_the_closure_gap(run, tmp_path):
     [(["solve", "five_bar", "--rest", "ankle"], '--rest: no frame "ankle"'),
      (["solve", "five_bar", "--mismatch", "glue"], '--mismatch: found "glue"')],
 )  # fmt: skip
-def test_rest_and_mismatch_options_refuse_what_they_cannot_use(run, words, message):
+def test_rest_and_mismatch_options_refuse_unusable_links_and_drives(
+    run, words, message
+):
     status, out, err = run("assembly", *words)
     assert (status, out) == (2, "")
     assert message in err

@@ -160,7 +160,9 @@ def test_wrong_cells_of_a_campaign_are_reported_row_by_row(tmp_path):
     assert [m.partition(": found")[0] for m in messages] == places
 
 
-def test_wrong_unit_of_a_whole_column_ends_at_the_most_messages(tmp_path, run):
+def test_messages_about_a_wrong_unit_of_a_whole_column_stop_at_the_maximum_number(
+    tmp_path, run
+):
     text = (EXAMPLES / "campaign/measurements.csv").read_text("utf-8")
     file = written(tmp_path, "campaign", [])
     header, *rows = text.strip().split("\n")
@@ -195,13 +197,13 @@ def test_mistake_without_a_place_in_the_file_has_one_message(
     assert len(out.splitlines()) == 1
 
 
-def test_open_closure_is_not_reported_after_a_mended_length(tmp_path):
+def test_open_closure_is_not_reported_after_a_length_was_replaced(tmp_path):
     sound, wrong = KINDS["robot of frames"][3][0]
     file = written(tmp_path, "robot of frames", [(sound, wrong)])
     assert len(all_messages(lambda: load_robot(file))) == 1
 
 
-def test_reader_after_a_check_reads_the_file_as_it_is(tmp_path):
+def test_reader_reads_the_unmodified_file_after_a_check(tmp_path):
     file = written(tmp_path, "robot of frames", KINDS["robot of frames"][3][:1])
     before = first_message(load_robot, file)
     all_messages(lambda: load_robot(file))
@@ -226,7 +228,7 @@ OTHERS = [
         ([EXAMPLES / "hexapod_errors.toml"], ("--robot", "hexapod")),
     ],
 )
-def test_every_example_is_ok(run, files, options):
+def test_check_finds_no_mistake_in_any_example(run, files, options):
     status, out, err = run("check", *files, *options)
     assert (status, err) == (0, "")
     assert [line.split(": ")[:2] for line in out.splitlines()] == [
@@ -278,7 +280,9 @@ def stopped_by(read, file):
 
 @pytest.mark.parametrize("kind", ["robot of frames", "robot of bodies", "study",
                                   "tolerance plan", "errors"])  # fmt: skip
-def test_any_damage_begins_with_the_message_of_the_reader(tmp_path, rng, kind):
+def test_first_message_about_any_damaged_file_is_that_of_the_reader(
+    tmp_path, rng, kind
+):
     text, _, read, _ = KINDS[kind]
     content = tomllib.loads(text)
     file = tmp_path / "file.toml"

@@ -88,7 +88,7 @@ def test_robot_that_cannot_assemble_has_exit_status_1(run, tmp_path):
     assert found["zone"]["assemblable"] is False
 
 
-def test_error_writes_the_public_keys(run, robot_file, tmp_path):
+def test_error_command_writes_the_public_keys(run, robot_file, tmp_path):
     status, out, _ = run("assembly", "error", robot_file, "--pose", "tx=0,tz=-0.5",
                          "--json", tmp_path / "e.json")  # fmt: skip
     found = json.loads((tmp_path / "e.json").read_text())["error"]
@@ -225,7 +225,7 @@ def test_show_refuses_an_exaggeration_of_a_page_with_a_slider(run, tmp_path):
         (["validation", "crosscheck", "irsbot2", "--scale", "1"], "--scale: found"),
     ],
 )  # fmt: skip
-def test_bad_input_gives_one_message_and_exit_status_2(
+def test_invalid_input_is_reported_by_one_message_and_exit_status_2(
     run, tmp_path, monkeypatch, words, message
 ):
     monkeypatch.chdir(tmp_path)
@@ -260,7 +260,7 @@ GROUPS = [w for w, own in EVERY_COMMAND.items() if hasattr(own, "commands")]
 
 
 @pytest.mark.parametrize("group", GROUPS, ids=" ".join)
-def test_a_group_without_a_command_prints_its_help_line_by_line(run, group):
+def test_group_without_a_command_prints_its_help(run, group):
     status, out, err = run(*group)
     _, expected, _ = run(*group, "--help")
     assert (status, out) == (2, "")
@@ -309,7 +309,7 @@ def test_shell_completion_offers_commands_options_and_robots(typed, offered):
     assert done.stdout.split() == [offered]
 
 
-def test_letters_outside_the_encoding_of_the_output_are_printed_escaped(tmp_path):
+def test_characters_outside_the_encoding_of_the_output_are_printed_escaped(tmp_path):
     """As in a file or a pipe on Windows."""
     robot = replace(coaxial_beams([0, 0, 0, 1e-4, 0, 0]), name="Ω-4")
     write_robot(robot, tmp_path / "omega.toml")

@@ -26,7 +26,7 @@ def test_deflection_curve_passes_the_clearance_and_then_rises_like_a_spring(
     assert picture.stat().st_size > 1000
 
 
-def test_deflection_curve_without_losses_returns_on_itself(run):
+def test_deflection_curve_without_losses_returns_along_the_same_path(run):
     status, out, _ = run(
         "assembly", "deflection", "four_bar", "--along", "fx=100:300:100", "--back",
         "--state", "exact", "--json", "-",
@@ -75,7 +75,7 @@ def test_follow_option_is_refused_together_with_back(run):
         ("fz=0:1e9:1", "expected at most 10000"),
     ],
 )
-def test_wrong_path_of_loads_is_refused(run, along, message):
+def test_invalid_sequence_of_loads_is_refused(run, along, message):
     status, out, err = run("assembly", "deflection", "four_bar", "--along", along)
     assert status == 2
     assert out == ""

@@ -23,7 +23,9 @@ def path(tmp_path):
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_solve_gives_the_force_that_a_drive_causes_and_names_it(run, path, state):
+def test_solve_reports_the_forces_due_to_a_drive_force_and_names_the_drive(
+    run, path, state
+):
     words = ["solve", path, "--drive-force", "rocker=12", "--state", state]
     status, out, _ = run("assembly", *words, "--json", "-")
     answer = json.loads(out)
@@ -69,7 +71,7 @@ def test_deflection_starts_at_the_shift_due_to_the_drive(run, path):
          "--by: found together with --drive-force"),
     ],
 )  # fmt: skip
-def test_wrong_forces_of_drives_are_refused_in_one_line(run, path, words, message):
+def test_invalid_drive_forces_are_refused_in_one_line(run, path, words, message):
     command, *options = words
     status, out, err = run("assembly", command, path, *options)
     assert (status, out) == (2, "")
@@ -77,7 +79,7 @@ def test_wrong_forces_of_drives_are_refused_in_one_line(run, path, words, messag
     assert err.count("\n") == 1
 
 
-def test_all_drives_as_forces_leave_the_robot_loose(run, path):
+def test_robot_is_not_determined_if_all_drives_apply_given_forces(run, path):
     words = ["solve", path, "--drive-force", "rocker=12,crank=1", "--json", "-"]
     status, out, _ = run("assembly", *words)
     answer = json.loads(out)
@@ -88,7 +90,7 @@ def test_all_drives_as_forces_leave_the_robot_loose(run, path):
     )
 
 
-def test_sweep_varies_the_force_of_a_drive(run, path, tmp_path):
+def test_force_of_a_drive_can_be_varied_in_a_sweep(run, path, tmp_path):
     """The energy grows with its square."""
     robot = with_drive_forces(crossed_cranks(), {"rocker": 1.0})
     write_robot(robot, tmp_path / "driven.toml")

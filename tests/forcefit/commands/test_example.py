@@ -77,7 +77,7 @@ def test_example_files_are_unchanged_on_repeat_and_edited_files_are_kept(run, tm
         (["irsbot2", "-o", "nowhere"], "nowhere: found no such folder"),
     ],
 )
-def test_wrong_example_name_or_folder_gives_one_message(
+def test_invalid_example_name_or_folder_is_reported_by_one_message(
     run, tmp_path, monkeypatch, words, message
 ):
     monkeypatch.chdir(tmp_path)

@@ -55,7 +55,7 @@ MATERIAL = ["--young", "6e10", "--poisson", "0.3"]
          "--json: found together with --to csv"),
     ],
 )  # fmt: skip
-def test_options_that_exclude_each_other_give_one_message(
+def test_options_that_exclude_each_other_are_reported_by_one_message(
     run, tmp_path, monkeypatch, words, message
 ):
     monkeypatch.chdir(tmp_path)
@@ -78,7 +78,7 @@ def test_straight_curve_file_and_beam_options_have_equal_compliance(run, tmp_pat
                                other / np.outer(scale, scale), atol=1e-9)  # fmt: skip
 
 
-def test_margins_alone_equal_those_of_the_whole_solution(run):
+def test_margins_computed_separately_equal_those_of_the_whole_solution(run):
     _, whole, _ = run("assembly", "solve", "irsbot2", "--json", "-")
     status, margins, _ = run(
         "assembly", "solve", "irsbot2", "--quantities", "margin,margin_free", "--json",

@@ -23,7 +23,7 @@ def options_of(command):
 
 
 @pytest.mark.parametrize(("old", "new"), COMMANDS.items())
-def test_old_command_is_translated_to_an_existing_one(old, new, capsys):
+def test_old_command_is_translated_to_an_existing_command(old, new, capsys):
     words = ["file", "--at", "radius=1", "--json", "-"]  # looking up needs a place
     assert with_new_names([*old.split(), *words]) == [*new, *words]
     assert capsys.readouterr().err == f"forcefit: {old} is now {' '.join(new)}\n"
@@ -47,7 +47,7 @@ def test_old_command_has_the_result_of_the_new_one(run, old, new):
 
 
 @pytest.mark.parametrize(("command", "old", "new"), RENAMED)
-def test_old_option_is_translated_to_an_existing_one(command, old, new, capsys):
+def test_old_option_is_translated_to_an_existing_option(command, old, new, capsys):
     words, present = command.split(), list(COMMANDS.get(command, command.split()))
     joined = f"{old}=value" if old.startswith("--") else f"{old}value"
     found = with_new_names([*words, old, "value", joined, "--json", "-"])

@@ -109,7 +109,9 @@ def test_sweep_of_an_open_closure_has_its_energy_at_every_point(
 
 
 @robots
-def test_study_of_an_open_closure_gives_its_energy(files, run, words, key, energy):
+def test_study_of_an_open_closure_has_the_energy_of_its_gap(
+    files, run, words, key, energy
+):
     study = f'robot = "robot.toml"\noutput = "{files}/out"\n{key}\n'
     checks = "[checks]\npicture = false\ncrosscheck = false\nreference = false\n"
     (files / "study.toml").write_text(study + checks)
@@ -181,7 +183,7 @@ def test_sweep_over_drive_values_is_refused_with_mismatch(run, tmp_path):
 
 
 @robots
-def test_converted_robot_closes_and_keeps_its_energy(files, run, words, key, energy):
+def test_converted_robot_closes_and_has_the_same_energy(files, run, words, key, energy):
     """Commands without the two options need a file whose loops close."""
     target = files / "closed.toml"
     assert run("convert", files / "robot.toml", "-o", target)[0] == 2

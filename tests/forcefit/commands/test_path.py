@@ -92,7 +92,7 @@ def test_path_writes_data_figure_and_page(run, tmp_path):
     assert files["png"].read_bytes().startswith(b"\x89PNG")
 
 
-def test_path_beyond_a_limit_keeps_the_results_before_it(run, slide):
+def test_path_beyond_a_limit_reports_the_results_before_the_limit(run, slide):
     """The rail may go to 50 mm: half of a path of 100 mm, up to the highest speed."""
     file = slide / "slide.toml"
     text = file.read_text().replace(
@@ -166,7 +166,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_bad_options_of_a_path_are_refused_in_one_line(run, slide, name):
+def test_invalid_options_of_a_path_are_refused_in_one_line(run, slide, name):
     words, message = BAD[name]
     output = slide / "out.nc"
     status, out, err = run(
@@ -179,7 +179,7 @@ def test_bad_options_of_a_path_are_refused_in_one_line(run, slide, name):
     assert not output.exists()
 
 
-def test_row_out_of_reach_is_named(run, tmp_path):
+def test_message_about_a_path_row_out_of_reach_names_the_row(run, tmp_path):
     file = tmp_path / "far.csv"
     file.write_text("id,time,pose.tx,pose.ty\na,0,0,0.14\nb,1,0.01,0.9\n")
     status, out, err = run("assembly", "path", "five_bar", "--path", file)

@@ -69,7 +69,7 @@ def test_free_motion_has_null_compliance_and_exit_status_1(run, tmp_path):
         ["frequencies", "--state", "exact", "--load", "fz=5"],
     ],
 )
-def test_load_that_nothing_resists_has_exit_status_1_and_names_the_motion(
+def test_load_on_a_free_motion_gives_exit_status_1_and_the_motion_is_named(
     run, tmp_path, words
 ):
     (tmp_path / "slider.toml").write_text(SLIDER)
@@ -151,7 +151,9 @@ def test_stiffness_along_a_direction_has_its_value_and_shares(run):
         (["--pose", "tz=-9"], "cannot be reached"),
     ],
 )
-def test_bad_input_to_stiffness_gives_one_line_and_exit_status_2(run, words, message):
+def test_invalid_input_to_stiffness_is_reported_in_one_line_with_exit_status_2(
+    run, words, message
+):
     status, out, err = run("assembly", "stiffness", "delta", *words)
     assert status == 2
     assert out == ""

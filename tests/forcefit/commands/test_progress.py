@@ -29,14 +29,14 @@ def test_progress_line_is_printed_at_most_every_two_seconds(capsys, monkeypatch)
     ]  # fmt: skip
 
 
-def test_every_step_of_an_exact_solution_is_reported():
+def test_progress_reports_every_step_of_an_exact_solution():
     steps = []
     posture = home_posture(load_robot("five_bar"))
     solved = solve_exact(posture, progress=lambda done, most: steps.append(done))
     assert steps == list(range(1, solved.iterations + 1))
 
 
-def test_every_load_of_a_curve_is_reported():
+def test_progress_reports_every_load_of_a_curve():
     said = []
     posture = home_posture(load_robot("hexapod"))
     deflection_curve(

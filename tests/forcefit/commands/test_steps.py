@@ -53,7 +53,7 @@ def files(tmp_path):
     return write
 
 
-def test_steps_have_the_forces_and_energies_of_the_springs(run, files):
+def test_forces_and_energies_of_steps_equal_hand_calculation_with_springs(run, files):
     """x = sum k d / sum k; the last leg closes 53.3 um with 80 N and 2.133 mJ."""
     status, out, _ = run("assembly", "steps", *files(JOINS), "--json", "-")
     results = json.loads(out)
@@ -89,7 +89,7 @@ def test_best_order_is_printed_with_its_bound(run, files):
     assert "least force" in run(*words)[1]
 
 
-def test_draws_have_the_quantiles_of_the_springs(run, files, tmp_path):
+def test_quantiles_of_draws_equal_those_of_the_springs(run, files, tmp_path):
     """Only leg 1 varies, uniformly by 30 um: the platform moves by a sixth of it."""
     errors = tmp_path / "errors.toml"
     errors.write_text('[[errors]]\nframes = ["leg1"]\nmost = [0, 0, 0, 0, 0, 3e-5]\n')
@@ -145,7 +145,7 @@ def test_draws_have_the_quantiles_of_the_springs(run, files, tmp_path):
         ("", "step: missing"),
     ],
 )
-def test_bad_plan_is_one_line(run, files, plan, text):
+def test_invalid_plan_of_steps_is_reported_in_one_line(run, files, plan, text):
     status, out, err = run("assembly", "steps", *files(plan))
     assert status == 2
     assert text in err
@@ -153,7 +153,7 @@ def test_bad_plan_is_one_line(run, files, plan, text):
     assert err.count("\n") == 1
 
 
-def test_step_that_cannot_be_carried_out_ends_with_its_name(run, tmp_path):
+def test_message_about_a_step_that_cannot_be_carried_out_names_the_step(run, tmp_path):
     """Two rigid legs of different lengths."""
     robot = tmp_path / "robot.toml"
     robot.write_text(

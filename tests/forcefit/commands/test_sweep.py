@@ -99,7 +99,7 @@ def test_plot_draws_a_saved_sweep_without_solving(run, tmp_path, monkeypatch):
          "no.nc: no such file; expected a data set"),
     ],
 )  # fmt: skip
-def test_bad_input_to_a_sweep_gives_one_message_and_writes_nothing(
+def test_invalid_input_to_a_sweep_is_reported_by_one_message_and_nothing_is_written(
     run, tmp_path, monkeypatch, words, message
 ):
     monkeypatch.chdir(tmp_path)
@@ -294,7 +294,7 @@ def test_error_without_ctrl_c_is_raised_unchanged(run, monkeypatch):
         run("study")
 
 
-def test_damaged_sweep_file_gives_one_message(run, tmp_path, monkeypatch):
+def test_damaged_sweep_file_is_reported_by_one_message(run, tmp_path, monkeypatch):
     """HDF5 opens some of these files,
     and h5netcdf then fails while the file is half open."""
     from forcefit.commands import sweep

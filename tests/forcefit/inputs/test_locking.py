@@ -12,7 +12,7 @@ from forcefit.inputs.locking import locked_file
 ROOT = Path(__file__).parents[3]
 
 
-def test_locked_file_is_refused_until_released(tmp_path):
+def test_locked_file_is_refused_until_its_lock_is_released(tmp_path):
     """Also within a single process."""
     path = tmp_path / "map.nc.journal"
     with locked_file(path):

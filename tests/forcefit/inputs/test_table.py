@@ -30,12 +30,12 @@ def message(function, *args, **kwargs):
     return str(caught.value)
 
 
-def test_bad_input_is_a_value_error():
+def test_bad_input_error_is_a_value_error():
     """Callers of the library need not know this class."""
     assert isinstance(BadInput("x"), ValueError)
 
 
-def test_bad_input_message_is_one_line_for_any_text():
+def test_message_of_a_bad_input_error_is_one_line_for_any_text():
     text = str(BadInput("a\nb\x1b[31m\u2028c\ud800"))
     assert text == r"a\nb\x1b[31m\u2028c\ud800"
     assert len(str(BadInput("x" * 10**6))) <= 800

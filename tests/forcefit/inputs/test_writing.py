@@ -118,7 +118,9 @@ WRITE = {
 
 @pytest.mark.parametrize("name", WRITE)
 @pytest.mark.parametrize("before", [None, b"what stood there\n"])
-def test_full_disk_gives_one_message_and_keeps_the_old_file(tmp_path, name, before):
+def test_full_disk_is_reported_by_one_message_and_the_old_file_is_unchanged(
+    tmp_path, name, before
+):
     path = tmp_path / name
     if before is not None:
         path.write_bytes(WRITTEN.get(path.suffix, before))

@@ -100,7 +100,7 @@ def slide(tab, name, value):
     wait(tab, "return window.again")
 
 
-def test_page_opens_without_console_errors_or_network_requests(tab):
+def test_report_page_opens_without_console_errors_or_network_requests(tab):
     said = [one for one in tab.get_log("browser") if one["level"] == "SEVERE"]
     assert said == []
     fetched = tab.execute_script(

@@ -92,7 +92,7 @@ def test_contents_list_links_to_every_section_of_the_page():
     assert [text.count(f'id="{name}"') for name in links] == [1, 1, 1, 1]
 
 
-def test_page_fetches_nothing_and_is_small():
+def test_report_page_needs_no_network_and_is_small():
     text = written(bars({"a": 1.0}, Axis("x"), ""))
     assert parse(text).fetched == []
     assert "@import" not in text

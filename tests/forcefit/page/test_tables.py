@@ -37,7 +37,7 @@ def test_no_line_breaks_between_a_number_and_its_unit():
     )
 
 
-def test_long_comparison_shows_its_largest_changes_and_folds_the_others():
+def test_long_comparison_shows_the_largest_changes_and_folds_the_others():
     """Folded parts are not printed; 1000 changes would take dozens of sheets."""
     first = {"robot": "r", "values": {f"v{k}": 1.0 for k in range(1000)}}
     second = {"robot": "r", "values": {f"v{k}": 1.0 + k / 1e3 for k in range(1000)}}

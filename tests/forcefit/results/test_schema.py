@@ -89,7 +89,7 @@ def test_written_robot_files_follow_the_schema(name, tmp_path, validator):
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_schema_and_reader_refuse_the_same_fault(fault, validator):
+def test_schema_and_reader_refuse_the_same_mistake(fault, validator):
     table = copy.deepcopy(ARM)
     robot_of(Table(copy.deepcopy(table), "robot.toml", ""), "arm")
     assert not [*validator("robot").iter_errors(table)]

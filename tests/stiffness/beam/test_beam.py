@@ -90,7 +90,7 @@ def test_turning_the_beam_turns_its_compliance(rng):
     assert_same(turned, A @ straight @ A.T, 1e-13)
 
 
-def test_section_height_lies_along_the_up_direction():
+def test_section_height_is_along_the_up_direction():
     """A plate on edge is stiff against a force along its height."""
     plate = rectangular_section(width=0.01, height=0.1, nu=NU)
     C = beam_compliance(1.0, plate, E, NU, axis=[1, 0, 0], up=[0, 0, 1], theory="euler")
@@ -141,7 +141,7 @@ def test_thin_tube_reaches_cowpers_limit():
         (lambda: Section(1, 1, 1, 0, 1, 1), "section: J = 0 must be finite and > 0"),
     ],
 )
-def test_wrong_beam_is_refused(call, message):
+def test_invalid_beam_is_refused(call, message):
     with pytest.raises(BadInput) as caught:
         call()
     assert message in str(caught.value)
@@ -162,7 +162,7 @@ def test_link_stiffness_is_read_only_and_the_inverse_of_its_compliance():
         link.stiffness[0, 0] = 1
 
 
-def test_turning_a_link_keeps_its_energy(rng):
+def test_rotating_a_link_does_not_change_its_energy(rng):
     link = paper_link()
     R = rotation_matrix(rng.normal(size=3))
     turned = turn_link(link, R)
@@ -191,13 +191,13 @@ PARALLEL[[0, 1], [1, 0]] = np.nextafter(1.0, 0.0)
         (np.full((6, 6), math.nan), "expected (6, 6) of finite numbers"),
     ],
 )
-def test_wrong_compliance_is_refused(C, message):
+def test_invalid_compliance_is_refused(C, message):
     with pytest.raises(BadInput) as caught:
         LinkStiffness("test", C, tip=[0, 0, 0], base=[0, 0, 0])
     assert message in str(caught.value)
 
 
 @pytest.mark.parametrize("vector", [[1.0, math.nan, 0.0], [1.0, 2.0], [1.0] * 4])
-def test_direction_that_is_not_three_finite_numbers_is_refused(vector):
+def test_direction_that_does_not_consist_of_three_finite_numbers_is_refused(vector):
     with pytest.raises(BadInput, match="axis: found .*, expected 3 finite numbers"):
         unit_vector("axis", vector)

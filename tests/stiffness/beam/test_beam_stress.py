@@ -225,7 +225,7 @@ def test_peak_stress_is_at_the_tip_when_a_force_cancels_the_base_moment():
         (BAR, 0.1, np.full(6, np.nan), "finite numbers"),
     ],
 )
-def test_wrong_stress_input_is_refused(section, length, wrench, message):
+def test_invalid_stress_input_is_refused(section, length, wrench, message):
     with pytest.raises(BadInput, match=message):
         peak_beam_stress(section, length, wrench)
 
@@ -236,7 +236,9 @@ def test_wrong_stress_input_is_refused(section, length, wrench, message):
     {"width": 0.05, "height": 0.03, "wall": 0.002},
 ])  # fmt: skip
 @pytest.mark.parametrize("length", [0.0, 0.02, 1.0])
-def test_a_quarter_turn_of_section_and_wrench_turns_the_peak(section, length):
+def test_quarter_turn_of_section_and_wrench_rotates_the_position_of_the_peak(
+    section, length
+):
     """y becomes z, and z becomes -y; also for short beams, with shear and torsion."""
     rng = np.random.default_rng(9)
     turned = section | {"width": section["height"], "height": section["width"]}

@@ -144,7 +144,7 @@ def test_turning_the_curve_turns_its_compliance(rng):
         (lambda: i_section(0.1, math.nan, 0.01, 0.01, NU), "height = nan"),
     ],
 )
-def test_wrong_curve_or_section_is_refused(call, message):
+def test_invalid_curve_or_section_is_refused(call, message):
     with pytest.raises(BadInput) as caught:
         call()
     assert message in str(caught.value)
@@ -218,7 +218,9 @@ def test_section_constants_of_a_thin_box_agree_with_finite_elements():
 
 @pytest.mark.parametrize("away", [(0.0, 0.0, 0.0), (0.7, -0.3, 0.5)])
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e2])
-def test_curve_cut_in_two_keeps_compliance_and_length_at_any_place(away, size):
+def test_cutting_a_curve_in_two_at_any_point_does_not_change_compliance_and_length(
+    away, size
+):
     """An arc cut into two arcs and a bar cut into two bars; their lengths add up."""
     o, turn = np.array(away) * size, np.array([0.0, 0.6, 0.0])
     centre, corner = o + [0, 0, 0.2 * size], o + [-0.3 * size, 0, 0]

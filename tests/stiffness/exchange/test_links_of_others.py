@@ -204,7 +204,7 @@ def test_matrix_of_six_rows_is_the_stiffness_at_the_tip(tmp_path):
     )
 
 
-def test_mass_matrix_gives_mass_centre_and_inertia(tmp_path):
+def test_mass_centre_and_inertia_are_computed_from_a_mass_matrix(tmp_path):
     """Two lumps at the ends:
     the centre is in the middle, the inertia about it m L^2 / 4."""
     path = tmp_path / "k.mtx"
@@ -243,7 +243,7 @@ def test_chain_of_two_half_beams_is_condensed_to_one_beam(tmp_path):
     (lambda K: K, ["--order", "x"], '--order: found "x"'),
     (lambda K: np.array(["a"]), [], "expected a square of numbers"),
 ])  # fmt: skip
-def test_matrix_that_is_not_of_a_link_is_refused_in_one_line(
+def test_matrix_that_is_not_the_stiffness_of_a_link_is_refused_in_one_line(
     run, matrix, options, message, tmp_path
 ):
     path = tmp_path / "k.npy"

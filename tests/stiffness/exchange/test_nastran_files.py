@@ -72,7 +72,7 @@ LAYOUTS = [between_commas, cards_between_commas, between_blanks, large_fields]
 
 
 @pytest.mark.parametrize("write", LAYOUTS)
-def test_dmig_of_every_layout_gives_the_textbook_stiffness_and_mass(write, tmp_path):
+def test_dmig_of_every_layout_has_the_textbook_stiffness_and_mass(write, tmp_path):
     """In mm and tonnes; stiffness of the beam's closed forms, and mass rho A L."""
     path = tmp_path / "beam.dmig"
     path.write_text(
@@ -142,7 +142,9 @@ def test_wrong_dmig_is_refused(text, message, tmp_path):
         read_matrix(path)
 
 
-def test_mass_is_not_read_from_a_stiffness_name_but_from_an_unknown_name(tmp_path):
+def test_mass_matrix_is_read_under_an_unknown_name_but_not_under_a_stiffness_name(
+    tmp_path,
+):
     path = tmp_path / "k.pch"
     path.write_text(large_fields(textbook_beam(), "KAAX"))
     with pytest.raises(BadInput, match=r"KAAX \(stiffness\), expected one of mass"):

@@ -204,7 +204,7 @@ def test_stiffness_at_another_tip_follows_from_a_screw_map(order):
 
 
 @pytest.mark.parametrize("name", sorted({"SuperLU", solver_name()}))
-def test_singular_matrix_is_reported_with_the_solver(name):
+def test_error_for_a_singular_matrix_names_the_solver(name):
     """SuperLU finds an empty column, PARDISO a negative pivot."""
     mesh = isoparametric(box_solid((1, 1, 1), (1, 1, 1)))
     upper = assemble(mesh, *constants(mesh))
@@ -341,7 +341,7 @@ def flat_and_bent(order, bulge):
 
 @pytest.mark.parametrize("order", [2, 3])
 @pytest.mark.parametrize("bulge", [-0.3, 0.0, 0.04])
-def test_normals_point_out_of_flat_and_bent_elements(order, bulge):
+def test_normals_point_out_of_straight_and_curved_elements(order, bulge):
     """Gauss's theorem: the integral of n is zero, that of x . n is three times the
     volume. The middle of a flat element is beyond the tangent planes of a face that
     bends in.

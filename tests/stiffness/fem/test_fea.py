@@ -137,7 +137,7 @@ def test_mesh_is_refined_up_to_the_budget_of_unknowns():
 
 
 @pytest.mark.parametrize("budget", [Budget(unknowns=99), Budget(seconds=1e-9)])
-def test_first_mesh_above_the_budget_is_refused(budget):
+def test_first_mesh_that_exceeds_the_budget_is_refused(budget):
     words = r"the coarsest mesh that follows the part has \d+ unknowns, about .* s and"
     with pytest.raises(MeshFailed, match=f"{words}.*allow more time"):
         solve_bar({"radius": 0.1}, Material(E, NU), FemOptions(budget=budget))

@@ -12,7 +12,7 @@ BOUNDS = [45822, 48702, 9.5734e6, 1.04078e9, 2.89622e8, 2.92001e6]
 
 
 @pytest.mark.slow
-def test_filleted_plate_keeps_its_volume_and_stiffness_stays_below_upper_bounds(
+def test_filleted_plate_has_its_exact_volume_and_a_stiffness_below_upper_bounds(
     tmp_path,
 ):
     """The volume agrees with the integral over the height to 0.01 %, and no element is

@@ -40,7 +40,7 @@ def test_mass_properties_of_a_box_with_two_point_masses_follow_steiners_rule():
     np.testing.assert_allclose(inertia, about + own, rtol=1e-10, atol=1e-12)
 
 
-def test_mass_without_density_is_that_of_the_point_masses():
+def test_mass_of_a_link_without_density_equals_the_point_masses():
     mesh = box()
     nothing = np.zeros(len(mesh.cells))
     mass, centre, inertia = mass_properties(mesh, nothing)

@@ -16,7 +16,7 @@ def test_wrong_density_is_refused(density):
         Material(2.1e11, 0.3, density)
 
 
-def test_element_has_the_last_material_that_contains_its_centre():
+def test_material_of_an_element_is_the_last_one_whose_region_contains_its_centre():
     """Lame's constants at the mean of the four corners,
     for curved and straight elements."""
     solid = box_solid((2, 1, 3), np.array([0.1, 0.1, 0.1]))

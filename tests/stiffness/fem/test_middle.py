@@ -25,7 +25,7 @@ def random_definite(seed, size=1.0):
 
 
 @given(st.integers(0, 10**6), st.floats(1e-6, 30.0))
-def test_stated_error_covers_the_whole_interval(seed, size):
+def test_estimated_error_covers_the_whole_interval(seed, size):
     """From K_h down to K_h - c E for any c in 0 to 1,
     also where E is larger than K_h."""
     K_h, E = random_definite(seed), random_definite(seed + 1, size)
@@ -35,7 +35,7 @@ def test_stated_error_covers_the_whole_interval(seed, size):
         assert (gap <= np.abs(told) * (1 + 1e-9) + 1e-12 * np.abs(K_h).max()).all()
 
 
-def test_geometry_error_adds_to_the_stated_error_and_keeps_the_middle():
+def test_geometry_error_increases_the_estimated_error_and_not_the_stiffness():
     K, E = random_definite(3), random_definite(4, 1e-3)
     geometry = 1e-4 * random_definite(5) * np.where(np.eye(6), -1, 1)
     middle, told = middle_stiffness(K, E, geometry)
@@ -65,7 +65,7 @@ def bar():
     return solve_bar({"width": 0.25, "height": 0.25}, Material(2.0, 0.3), options)
 
 
-def test_link_stiffness_is_below_the_meshs_by_the_stated_error(bar):
+def test_stiffness_of_a_link_is_below_that_of_its_mesh_by_the_estimated_error(bar):
     """K_h is the upper end of the interval, the link's stiffness its middle."""
     K_h, K = bar.level.solution.stiffness, bar.link.stiffness
     above = np.diag(scaled(K_h - K, K))

@@ -87,7 +87,7 @@ def box_of_stress(tip_scale=1.0):
 
 
 @pytest.mark.parametrize("scale", [1.0, 1.5, 0.5])
-def test_stresses_near_the_ends_are_excluded(scale):
+def test_stresses_near_the_interfaces_are_excluded(scale):
     """A stretch of 1 along z has the stresses lam and lam + 2 mu,
     times five for a unit force."""
     solved = box_of_stress(scale)

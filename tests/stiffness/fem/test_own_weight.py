@@ -47,7 +47,7 @@ def test_peak_stress_under_own_weight_agrees_with_the_beam(bar):
     assert peak.error < 1e-2 * there
 
 
-def test_weight_along_the_bar_gives_a_linear_axial_stress(bar):
+def test_weight_along_the_bar_causes_a_linear_axial_stress(bar):
     """rho g (L - z), the weight below each section."""
     field = stress_influence(with_own_weight(bar), 0.1)
     stress = field.stresses(np.r_[np.zeros(6), 0.0, 0.0, G])[:, 2]

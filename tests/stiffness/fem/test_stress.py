@@ -78,7 +78,7 @@ def test_stress_of_a_bar_in_tension_is_axial_only(solved):
     assert np.abs(stress[:, :2]).max() < 1e-3 * 1e3 / AREA
 
 
-def test_a_bent_bar_peaks_at_the_far_section_of_the_region(solved):
+def test_stress_of_a_bent_bar_is_largest_at_the_section_nearest_to_the_base(solved):
     stress = stress_influence(solved, away=2 * R)
     value, place = stress.peak([0, 0, 0, 1e3, 0, 0])
     distance = L - place[2]

@@ -97,7 +97,7 @@ def test_volume_of_a_round_bar_converges_with_the_sixth_power():
 
 
 @pytest.mark.parametrize("order", [2, 3])
-def test_cutting_layers_keeps_volume_and_area_of_bent_elements(order):
+def test_cutting_layers_does_not_change_volume_and_area_of_curved_elements(order):
     """Parts are cut in the element's own coordinates."""
     whole, cut = layers_of_bar(2, 4, order)
     assert len(cut.cells) > len(whole.cells)
@@ -120,7 +120,7 @@ def test_volume_of_a_sphere_converges_with_the_sixth_power():
     assert error[2] < 1e-6
 
 
-def test_nodes_on_the_planes_of_a_sphere_sector_lie_on_them():
+def test_nodes_on_plane_faces_of_a_sphere_sector_remain_on_the_planes():
     mesh = isoparametric(shell((2, 2, 2), 0.6, 1.0))
     for number in range(2, 6):
         solid = shell((1, 1, 1), 0.6, 1.0)

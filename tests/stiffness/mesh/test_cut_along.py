@@ -27,7 +27,7 @@ def area_of(solid, patch):
 
 
 @pytest.mark.parametrize("edge", [0.37, 0.5, 0.52, 0.601])
-def test_face_cut_along_a_line_has_the_area_up_to_the_line(edge):
+def test_face_that_is_cut_along_a_line_has_the_area_up_to_the_line(edge):
     """The bottom of a unit box belongs to patch 0 up to x = edge, to patch 3 beyond."""
     box = box_solid((4, 3, 3), (1.0, 1.0, 1.0))
     middle = box.points[box.faces].mean(axis=1)
@@ -67,7 +67,7 @@ def test_interface_without_a_sharp_edge_ends_where_the_rounding_begins(tmp_path)
 
 
 @pytest.mark.slow
-def test_rounded_block_has_no_forbidden_coupling_and_stays_below_an_upper_bound(
+def test_stiffness_of_a_rounded_block_is_symmetric_and_below_an_upper_bound(
     tmp_path,
 ):
     """Couplings that its mirror planes forbid vanish; 119 142 N m/rad is an upper

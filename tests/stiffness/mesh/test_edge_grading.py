@@ -128,7 +128,9 @@ def check_layers(solid, held):
     kept=st.lists(st.booleans(), min_size=12, max_size=12).filter(any),
     held=st.sampled_from(CLAMPED),
 )
-def test_layers_of_any_union_of_boxes_conform_and_keep_the_volume(kept, held):
+def test_layers_of_any_union_of_boxes_are_conforming_and_preserve_the_volume(
+    kept, held
+):
     """Also bodies that touch in an edge or a corner, holes and steps."""
     counts = np.array([3, 2, 2])
 

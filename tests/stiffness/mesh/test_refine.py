@@ -48,7 +48,7 @@ def test_refined_faces_stay_on_the_boundary_of_their_patch_and_point_outward(sol
 
 
 @pytest.mark.parametrize("halvings", [0, 1, 2, 4])
-def test_every_part_of_a_cell_is_halved_as_often_as_requested(rng, halvings):
+def test_every_part_of_a_cell_is_bisected_as_often_as_requested(rng, halvings):
     """At least as often; other cells are halved only where they must conform."""
     solid = crooked(rng)
     asked = np.zeros(len(solid.cells), dtype=int)

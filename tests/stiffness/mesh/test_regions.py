@@ -73,7 +73,7 @@ def test_material_layers_in_series_stretch_like_springs(contrast):
 
 
 @pytest.mark.parametrize("contrast", [0.1, 10, 100])
-def test_stated_error_covers_a_material_boundary_that_cuts_elements(contrast):
+def test_estimated_error_covers_a_material_boundary_that_cuts_elements(contrast):
     """The layer is a function of the points alone,
     so the mesh is not cut along its faces."""
     jagged = replace(layer(contrast), faces=())

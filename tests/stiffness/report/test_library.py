@@ -93,7 +93,7 @@ def test_two_processes_build_all_library_entries(spec):
     assert len(read_library(spec.folder)) == 9
 
 
-def test_stated_error_between_grid_points_covers_the_true_error(spec, rng):
+def test_estimated_error_between_grid_points_covers_the_true_error(spec, rng):
     """The stiffness is nearly a power of the lengths:
     a grid of three points gives 2 %."""
     build_library(spec)
@@ -320,7 +320,9 @@ def meshed_bar(length):
 
 
 @pytest.mark.parametrize("length", [0.24, 0.36])
-def test_stated_error_between_finite_element_entries_covers_a_direct_mesh(length):
+def test_estimated_error_between_finite_element_entries_covers_a_direct_solution(
+    length,
+):
     """The direct answer is meshed where the library has no entry, and has an estimated
     error of its own. Between three lengths interpolation itself leaves less than 1
     %.
@@ -349,7 +351,7 @@ BETWEEN = {
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_build_file_of_each_shape_ships_with_its_entries(shape):
+def test_build_file_of_each_shape_is_distributed_with_its_entries(shape):
     """The keys are those that a build would make; the folder has an entry for each."""
     spec = read_spec(SHIPPED / f"{shape}.toml")
     assert (spec.shape, spec.method) == (shape, "fea")
@@ -362,7 +364,7 @@ def test_build_file_of_each_shape_ships_with_its_entries(shape):
 
 
 @pytest.mark.parametrize(("shape", "length"), BETWEEN)
-def test_stated_error_between_shipped_entries_covers_an_independent_stiffness(
+def test_estimated_error_between_shipped_entries_covers_an_independent_stiffness(
     shape, length
 ):
     K, error = look_up(read_library(SHIPPED / shape), {"length": length})

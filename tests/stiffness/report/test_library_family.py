@@ -64,7 +64,7 @@ def test_build_recomputes_only_the_row_whose_file_changed(parts):
 
 
 @pytest.mark.parametrize("length", [0.25, 0.37, 0.55])
-def test_stated_error_between_family_sizes_covers_the_closed_form(parts, length):
+def test_estimated_error_between_family_sizes_covers_the_closed_form(parts, length):
     folder, _ = parts
     build_library(read_spec(folder / "spec.toml"))
     K, error = look_up(read_library(folder / "links"), {"length": length})
@@ -73,7 +73,7 @@ def test_stated_error_between_family_sizes_covers_the_closed_form(parts, length)
     assert np.abs(scaled(error, truth)).max() < 0.02
 
 
-def test_stated_error_of_the_other_sizes_covers_an_omitted_entry(parts):
+def test_estimated_error_covers_an_entry_that_is_left_out(parts):
     folder, _ = parts
     build_library(read_spec(folder / "spec.toml"))
     entries = read_library(folder / "links")

@@ -50,7 +50,7 @@ def test_end_effect_fit_recovers_the_simulated_coefficients():
     assert "c = 0.200 0.200 0.200 (rotations)" in sweep.explanation
 
 
-def test_modulus_error_stays_in_the_residual_of_the_end_effect_fit():
+def test_error_of_the_modulus_is_not_absorbed_by_the_fit_of_end_effects():
     """A modulus 1 % too high is not an end effect,
     since it does not fade with length."""
     comparisons = []
@@ -183,7 +183,7 @@ def curve_file(tmp_path: Path, content: str) -> Path:
     return path
 
 
-def test_curve_file_of_an_l_shape_gives_the_compliance_by_hand(tmp_path):
+def test_compliance_of_an_l_shape_from_a_curve_file_equals_hand_calculation(tmp_path):
     """The command prints the result of the function; the length is 0.35 m.
 
     Castigliano by hand for a force along y at the tip: both legs bend, the first
@@ -205,7 +205,7 @@ def test_curve_file_of_an_l_shape_gives_the_compliance_by_hand(tmp_path):
     assert C[4, 4] == pytest.approx(expected, rel=1e-9)
 
 
-def test_curve_file_of_tapers_and_arcs_gives_closed_forms(tmp_path):
+def test_compliance_of_tapers_and_arcs_from_a_curve_file_equals_closed_forms(tmp_path):
     """The axial compliance of a cone is L / (E pi r1 r2);
     a quarter circle ends on its axis."""
     cone = """
@@ -272,7 +272,7 @@ def rectangle(width, height, up, stiffer=1.0, axis=(0, 0, 1)):
 
 
 @pytest.mark.parametrize("axis", [(0, 0, 1), (0.6, 0, 0.8)])
-def test_comparison_reports_a_section_turned_by_90_degrees(axis):
+def test_comparison_reports_a_section_rotated_by_90_degrees(axis):
     """A 20 x 60 mm bar 2 % stiffer than its beam; I differs ninefold if turned."""
     solid = rectangle(0.06, 0.02, [0, 1, 0], 1.02, axis)
     right = compare_link(rectangle(0.06, 0.02, [0, 1, 0], axis=axis), solid, 0.03)
@@ -294,7 +294,7 @@ def test_comparison_reports_a_section_turned_by_90_degrees(axis):
         assert comparison_results(turned)["axes_turned"] == 90
 
 
-def test_comparison_reports_no_turn_within_the_error_of_the_mesh():
+def test_comparison_reports_no_rotation_if_differences_are_within_the_mesh_error():
     solid = rectangle(0.0200, 0.0202, [0, 1, 0])
     unsure = replace(solid, stiffness_error=0.02 * solid.stiffness)
     beam = rectangle(0.0202, 0.0200, [0, 1, 0])

@@ -41,7 +41,7 @@ def cube(corner="{k}", line="f {corners}\n"):
         "no last line end",
     ],
 )  # fmt: skip
-def test_obj_corners_in_every_notation_give_the_same_cube(tmp_path, content):
+def test_obj_corners_in_every_notation_describe_the_same_cube(tmp_path, content):
     path = tmp_path / "cube.obj"
     path.write_bytes(content.encode())
     points, faces = read_obj(path)
@@ -88,5 +88,5 @@ def test_wrong_obj_line_is_refused_with_its_number(tmp_path, line, message):
 def test_obj_file_without_faces_is_refused(tmp_path):
     path = tmp_path / "points.obj"
     path.write_text(POINTS)
-    with pytest.raises(BadInput, match="holds no triangles, or is not OBJ"):
+    with pytest.raises(BadInput, match="contains no triangles, or is not OBJ"):
         read_surface(path)

@@ -125,7 +125,7 @@ def barrel(facets=32, layers=12):
 
 
 @pytest.mark.slow
-def test_facets_of_an_unknown_shape_are_lifted_toward_the_true_surface():
+def test_facets_of_an_unknown_shape_are_curved_toward_the_true_surface():
     """Middles of 32-sided rings lack 0.48 % of the radius, lifted ones 0.02 %."""
     surface, _ = barrel()
     patches = find_patches(surface, parse_interface("z=0"), parse_interface("z=0.1"))
@@ -152,6 +152,6 @@ def test_mesh_of_a_barrel_has_the_volume_of_the_smooth_shape(tmp_path):
     assert abs(volume / exact - 1) < 3e-4
 
 
-def test_one_interface_at_both_ends_is_refused():
+def test_same_interface_at_base_and_tip_is_refused():
     with pytest.raises(BadInput, match="the same faces"):
         find_patches(bar(), parse_interface("z=0"), parse_interface("z=0"))

@@ -91,7 +91,7 @@ def test_flat_chamfers_are_not_recognised_as_a_cylinder(flat):
     assert len(patches.shapes) == 8
 
 
-def test_flat_side_between_fillets_stays_flat():
+def test_flat_side_between_fillets_remains_flat():
     """The side consists of two triangles, 150 x 6 mm,
     and meets fillets on three edges."""
     surface = filleted_plate()

@@ -79,7 +79,7 @@ def spoke(low, high):
 
 
 @pytest.mark.parametrize("unit", [0.1, 1.0, 10.0])
-def test_disc_interface_has_the_triangles_within_its_radius(unit):
+def test_disc_interface_consists_of_the_triangles_within_its_radius(unit):
     """To 0.2 %; a triangle from 1 % inside to 1 % outside is cut, and refused."""
     radius, shift = 0.2, np.array([0.3, -0.1, 0.2])
     center = ",".join(map(str, unit * shift))

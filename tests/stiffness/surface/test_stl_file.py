@@ -63,7 +63,7 @@ def read(tmp_path, content):
         "name of keywords", "several solids",
     ],
 )  # fmt: skip
-def test_text_stl_is_read_exactly(tmp_path, content):
+def test_text_stl_file_is_read_without_rounding(tmp_path, content):
     """In double precision, equal to the last bit."""
     np.testing.assert_array_equal(read(tmp_path, content), CORNERS)
 
@@ -84,7 +84,7 @@ def test_text_stl_is_read_exactly(tmp_path, content):
         "count of -1", "last tag cut",
     ],
 )  # fmt: skip
-def test_binary_stl_is_read(tmp_path, content):
+def test_binary_stl_file_is_read(tmp_path, content):
     """In single precision, as the format has."""
     found = read(tmp_path, content)
     np.testing.assert_array_equal(found, CORNERS.astype("<f4"))
@@ -93,7 +93,7 @@ def test_binary_stl_is_read(tmp_path, content):
 @pytest.mark.parametrize(("content", "message"), [
     (BINARY[:-60], "found 10 whole triangles, expected 12"),
     (b"no stl at all", "not a readable STL file"),
-    (b"solid cube\nendsolid cube\n", "holds no triangles, or is not STL"),
+    (b"solid cube\nendsolid cube\n", "contains no triangles, or is not STL"),
     (TEXT[: TEXT.rindex(b"vertex")], "facet 12: found 2 vertices, expected 3; the"),
     (TEXT.replace(b"  endloop\n", b"vertex 1 1 1\n", 1), "facet 1: found 4 vertic"),
     (TEXT.replace(b" facet", b" faces", 1), "before the first facet: found 3"),

@@ -79,7 +79,7 @@ def test_step_file_with_a_wrong_unit_is_refused_with_the_likely_unit(
         read_surface("bar.step", "inch")
 
 
-def test_points_of_no_triangle_are_ignored():
+def test_points_that_belong_to_no_triangle_are_ignored():
     """Such a point may be NaN or far away."""
     points = np.concatenate([[[np.nan] * 3, [1e6, 0, 0]], CUBE])
     surface = check_surface(points, CUBE_TRIANGLES + 2, "cube")
@@ -147,7 +147,7 @@ DUST = 1e-9 * np.random.default_rng(0).normal(size=(60_000, 3))
 REFUSED = [
     (CUBE, with_corner(-1), "a triangle has a corner that is not among the points"),
     (CUBE, with_corner(8), "a triangle has a corner that is not among the points"),
-    (CUBE, CUBE_TRIANGLES[:0], "holds no triangles"),
+    (CUBE, CUBE_TRIANGLES[:0], "contains no triangles"),
     (np.where(CUBE == CUBE[3], [0, np.nan, 0], CUBE), CUBE_TRIANGLES, "not finite"),
     (CORNERS, TETRAHEDRON[:3], "found 3 triangles with an area"),
     (CORNERS, SLIVERS, "found 3 triangles with an area"),

@@ -86,7 +86,7 @@ def test_msh_file_of_a_cube_is_read(tmp_path, content, capfd):
 @pytest.mark.parametrize(("content", "message"), [
     ("no mesh at all", "not a readable MSH file"),
     (msh2(TRIANGLES, 2)[:300], "not a readable MSH file"),
-    (msh2([(1, 2)], 1), "holds neither triangles nor tetrahedra"),
+    (msh2([(1, 2)], 1), "contains neither triangles nor tetrahedra"),
     (msh2(TRIANGLES[:-1], 2), "the surface is open"),
 ])  # fmt: skip
 def test_wrong_msh_file_is_refused(tmp_path, content, message, capfd):
@@ -228,7 +228,9 @@ def test_files_written_by_gmsh_are_read(tmp_path, gmsh, version, binary, dimensi
 def test_a_broken_step_file_is_refused(tmp_path, gmsh):
     path = tmp_path / "part.step"
     path.write_text("rubbish")
-    with pytest.raises(BadInput, match="not a readable STEP file|holds no triangles"):
+    with pytest.raises(
+        BadInput, match="not a readable STEP file|contains no triangles"
+    ):
         read_surface(path)
 
 

@@ -38,7 +38,7 @@ def test_error_above_20_um_or_1_per_cent_makes_the_verdict_amber(second, kind):
     assert "(1 further errors are not known)" in text
 
 
-def test_page_shows_the_largest_error_over_the_poses():
+def test_report_page_shows_the_largest_error_over_the_poses():
     text = shown(Cost(2e-3, 1e-6, 0.001), Cost(1e-3, 30e-6, 0.0))
     (row,) = parse(text).table("assumption", "largest rotation")[1:]
     assert [cell.value for cell in row[1:4]] == [2e-3, 30e-6, 0.001]
@@ -46,7 +46,7 @@ def test_page_shows_the_largest_error_over_the_poses():
     assert tiles(text)["Largest error of position"] == ("30 µm", "linear closures.")
 
 
-def test_page_without_a_known_error_is_red():
+def test_verdict_of_a_page_without_a_known_error_is_red():
     """Without errors and a load no model deforms."""
     costs = costs_at(home_posture(load_robot("four_bar")))
     text = costs_page(costs, {}, Provenance())

@@ -49,7 +49,7 @@ def posture():
     return posture
 
 
-def test_solid_link_has_no_rigid_energy_and_nearly_the_stiffness_of_a_beam():
+def test_solid_link_has_nearly_the_stiffness_of_a_beam_and_is_free_in_rigid_motions():
     """Square section 1 x 2, length 6: held ends add a few per cent to K_E."""
     link = BeamLink({"width": 0.05, "height": 0.1}, 70e9, 0.3, up=(0, 1, 1))
     frame = Frame("tip", translation=[0.1, 0.2, -0.2], link=link)
@@ -75,7 +75,7 @@ def test_virtual_joints_reproduce_solids_loaded_at_their_ends(posture):
 
 
 @pytest.mark.slow
-def test_cost_of_a_single_link_equals_that_of_the_platform():
+def test_error_from_a_single_link_model_equals_the_error_of_the_platform():
     frame = Frame("tip", translation=[0.3, 0.0, 0.0], link=ROUND)
     posture = home_posture(Robot("cantilever", "tip", (frame,)))
     solid = solid_link(frame)
@@ -88,7 +88,7 @@ def test_cost_of_a_single_link_equals_that_of_the_platform():
     assert costs.by_link == {"tip": pytest.approx(costs.beams)}
 
 
-def test_platform_cost_of_many_poses_equals_that_of_each_pose():
+def test_platform_error_of_many_poses_equals_that_of_each_pose():
     robot = load_robot("irsbot2")
     postures = [place_robot(robot, {"tx": x, "tz": -0.5}) for x in (0.0, 0.2)]
     both = platform_costs(postures)
@@ -112,7 +112,7 @@ def test_robots_without_solids_or_stiffness_are_refused():
 
 
 @pytest.mark.slow
-def test_validity_command_names_the_link_of_largest_cost(run, tmp_path):
+def test_validity_command_names_the_link_with_the_largest_error(run, tmp_path):
     path, picture = tmp_path / "triangle.toml", tmp_path / "cost.svg"
     write_robot(triangle(), path)
     status, out, _ = run(
@@ -126,7 +126,7 @@ def test_validity_command_names_the_link_of_largest_cost(run, tmp_path):
     assert "only that link a beam" in picture.read_text()
 
 
-def test_validity_over_poses_reports_median_and_largest_cost(run, tmp_path):
+def test_validity_over_poses_reports_the_median_and_the_largest_error(run, tmp_path):
     """One of three poses is out of reach;
     a list of the same poses has the same result."""
     listed = tmp_path / "poses.csv"

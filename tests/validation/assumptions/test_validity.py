@@ -80,7 +80,7 @@ def test_margin_of_two_bushes_for_a_shift_across_the_tilt_is_a_root_of_squares()
     assert bush_margin(at) == pytest.approx(expected, rel=1e-9)
 
 
-def test_two_bushes_lie_between_full_and_half_disc_and_cone(posture):
+def test_margin_of_two_bushes_is_between_those_of_full_and_half_disc_and_cone(posture):
     """Both in energy and in margin."""
     frames = tuple(
         replace(f, clearance=replace(
@@ -110,7 +110,7 @@ def test_bushes_do_not_change_joints_without_tilt_clearance():
 
 @pytest.mark.exudyn
 @pytest.mark.slow
-def test_simulation_with_two_bushes_gives_the_same_energy_ratio(posture):
+def test_simulation_with_two_bushes_has_the_same_energy_ratio(posture):
     """Energy of bushes over that of disc and cone, in the limit of small errors.
 
     At a sixteenth both models of contact differ from finite rotations by 0.2 per cent,
@@ -148,7 +148,7 @@ def test_half_weights_overestimate_the_sag_of_a_cantilever_by_a_third():
     assert cost.energy == pytest.approx((1 / 24) / (1 / 40) - 1, rel=1e-9)
 
 
-def test_energy_of_a_heavy_cantilever_is_that_of_its_ends_plus_that_between():
+def test_energy_of_a_heavy_cantilever_is_that_of_end_loads_plus_the_inner_load():
     """The sum is q^2 L^5 / 40 EI,
     of which q^2 L^5 / 1440 EI is stored between the ends."""
     L, g = 0.5, 9.81
@@ -163,7 +163,9 @@ def test_energy_of_a_heavy_cantilever_is_that_of_its_ends_plus_that_between():
 
 @pytest.mark.exudyn
 @pytest.mark.parametrize("elements", [1, 2, 8])
-def test_energy_of_simulated_elements_equals_that_of_ends_plus_between_ends(elements):
+def test_energy_of_simulated_elements_is_that_of_end_loads_plus_the_inner_load(
+    elements,
+):
     """In all directions, with shear.
 
     Exudyn has no energy within an element. The weight is scaled down to 1e-3 m/s^2,
@@ -185,7 +187,7 @@ def test_energy_of_simulated_elements_equals_that_of_ends_plus_between_ends(elem
     assert whole + energy_between_ends(at, g) >= energy
 
 
-def test_link_cost_is_zero_for_equal_stiffness(posture):
+def test_error_of_a_link_model_is_zero_for_equal_stiffness(posture):
     """The beam's K_E given as a matrix costs nothing;
     half of that stiffness costs much."""
     beams = {
@@ -200,7 +202,9 @@ def test_link_cost_is_zero_for_equal_stiffness(posture):
     assert link_cost(posture, {k: K / 2 for k, K in beams.items()}).matters
 
 
-def test_cost_of_linear_closures_grows_with_the_square_of_the_errors(posture):
+def test_error_from_linear_closures_grows_with_the_square_of_the_geometric_errors(
+    posture,
+):
     """The position error falls to a quarter as errors and clearances are halved."""
     from forcefit.validation.crosscheck.pair import scaled
 
@@ -231,7 +235,7 @@ def test_thick_bar_with_held_ends_is_stiffer_than_its_beam_in_bending_only(postu
     np.testing.assert_allclose(values, np.linalg.eigvalsh(K), rtol=1e-6)
 
 
-def test_costs_are_unknown_without_errors_and_load(tmp_path):
+def test_errors_of_assumptions_are_unknown_without_geometric_errors_and_load(tmp_path):
     """Both models then store energies of rounding, whose ratio is not a cost."""
     target = tmp_path / "costs.json"
     words = ["validity", "irsbot2", "--pose", "tx=0,tz=-0.5", "--json", str(target)]
@@ -244,7 +248,7 @@ def test_costs_are_unknown_without_errors_and_load(tmp_path):
     assert "nothing to compare" in costs["disc and cone, not two bushes"]["reason"]
 
 
-def test_position_cost_is_known_without_stored_energy():
+def test_position_error_of_an_assumption_is_known_without_stored_energy():
     """A serial bar turned by t at its base:
     the tip's position has an error of l t^2 / 2."""
     frames = (
@@ -258,7 +262,7 @@ def test_position_cost_is_known_without_stored_energy():
     assert cost.matters
 
 
-def test_validity_command_reports_which_assumptions_matter(tmp_path):
+def test_validity_command_marks_assumptions_with_errors_above_the_limits(tmp_path):
     """Disc and cone matter for the paper's robot;
     costs that are unknown have a reason."""
     target, file = tmp_path / "costs.json", tmp_path / "robot.toml"
@@ -277,7 +281,7 @@ def test_validity_command_reports_which_assumptions_matter(tmp_path):
 
 
 @pytest.mark.usefixtures("coarse_solids")
-def test_every_assumption_has_a_cost_for_heavy_round_bars(posture):
+def test_every_assumption_causes_an_error_for_heavy_round_bars(posture):
     """Round bars with L / r = 10, with weight and solids."""
     heavy = replace(posture, robot=with_bars(posture.robot, 10.0, 2700.0))
     costs = assumption_costs(heavy, gravity=[0, 0, -9.81], solids=True)

@@ -51,7 +51,9 @@ def test_table_of_a_campaign_has_the_columns_of_its_file(tmp_path):
     assert (units["cov.time"], units["reading"]) == ("s", "rad, m")
 
 
-def test_take_keeps_the_requested_order_and_the_configuration_numbers(tmp_path):
+def test_selected_rows_keep_the_requested_order_and_their_configuration_numbers(
+    tmp_path,
+):
     campaign = read_campaign(write_campaign(tmp_path))
     some = campaign.take([3, 1])
     assert some.ids == ("m4", "m2")
@@ -62,7 +64,7 @@ def test_take_keeps_the_requested_order_and_the_configuration_numbers(tmp_path):
     assert len(campaign.take([])) == 0
 
 
-def test_commanded_poses_give_the_commanded_joints(tmp_path):
+def test_commanded_poses_are_converted_to_the_commanded_joint_coordinates(tmp_path):
     """The rows command the tool's poses that follow from the same joint values."""
     joints = read_campaign(write_campaign(tmp_path / "joints"))
     tool = joints.transforms[:, joints.robot.index("tool")]
@@ -77,7 +79,7 @@ def test_commanded_poses_give_the_commanded_joints(tmp_path):
     np.testing.assert_array_equal(poses.configuration, joints.configuration)
 
 
-def test_machine_without_drives_has_one_configuration(tmp_path):
+def test_campaign_of_a_machine_without_drives_has_one_configuration(tmp_path):
     robot = 'name = "post"\nplatform = "top"\n[[frame]]\nname = "top"\n'
     robot += 'parent = "base"\ntranslation = [0, 0, 2]\n'
     folder = write_campaign(tmp_path, robot=robot, head="id,meas.tz,cov.temperature",
@@ -94,7 +96,7 @@ def test_campaign_reads_a_built_in_robot(tmp_path):
     assert read_campaign(folder).robot.name == load_robot("irsbot2").name
 
 
-def test_labels_in_any_script_and_spaces_are_read(tmp_path):
+def test_labels_with_spaces_and_letters_of_any_script_are_read(tmp_path):
     """Only control characters are refused."""
     rows = [r.replace(f"m{k}", f"Übung\u00a0{k} é٣") for k, r in enumerate(ROWS, 1)]
     assert read_campaign(write_campaign(tmp_path, rows=rows)).ids[0].startswith("Ü")
@@ -197,7 +199,7 @@ BAD_TABLES = {
         r'; the decimal mark here is not ",": write "0.00001", or set in \[table\] '
         r'delimiter = ";", decimal = "," in campaign.toml and separate cells by ";"'),
     "a NUL in a label": (HEAD, [ROWS[0].replace("m1", "m\0"), *ROWS[1:]],
-        r"line 2 holds NUL; expected a text file"),
+        r"line 2 contains NUL; expected a text file"),
     "a line break in a label": (HEAD, [ROWS[0].replace("m1", '"m\n1"')],
         r"line 3, \"id\": found 'm\\n1', expected text without line breaks"),
     "ragged": (HEAD, [*ROWS[:2], "m9,0.1"], r"line 4: found 2 cells, expected 11 as"),
@@ -246,7 +248,7 @@ BAD_TABLES = {
 
 
 @pytest.mark.parametrize("case", BAD_TABLES)
-def test_wrong_table_is_refused_in_one_line(case, tmp_path):
+def test_invalid_table_is_refused_in_one_line(case, tmp_path):
     head, rows, message = BAD_TABLES[case]
     folder = write_campaign(tmp_path, head=head, rows=rows)
     with pytest.raises(BadInput, match=message) as caught:
@@ -291,7 +293,7 @@ def test_wrong_campaign_file_is_refused_in_one_line(case, tmp_path):
     assert "\n" not in str(caught.value)
 
 
-def test_refusal_does_not_print_the_content_of_another_file(tmp_path):
+def test_message_about_a_file_of_another_kind_does_not_print_its_content(tmp_path):
     folder = write_campaign(tmp_path)
     (folder / "measurements.csv").write_text("root:secret:0:0\nother:words\n")
     with pytest.raises(BadInput, match="found no column") as caught:
@@ -381,7 +383,7 @@ def test_each_of_several_tables_becomes_a_session(tmp_path):
     ("id,q.one,q.two,meas.tx", "m1,0,0,1e-5", "[points]\ntx = [0, 0, 0]\n",
      'points: found "tx"'),
 ])  # fmt: skip
-def test_wrong_sessions_and_points_are_refused(head, cells, extra, message, tmp_path):
+def test_invalid_sessions_and_points_are_refused(head, cells, extra, message, tmp_path):
     with pytest.raises(BadInput) as error:
         read_campaign(write_campaign(tmp_path, head, [cells], extra=extra))
     assert message in str(error.value)

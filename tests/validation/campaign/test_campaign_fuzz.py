@@ -95,7 +95,7 @@ def assert_read_or_says_why(folder):
     ),
     registration=st.sampled_from(["known", "unknown"]),
 )
-def test_table_with_odd_cells_is_read_or_refused_in_one_line(
+def test_table_with_unusual_cells_is_read_or_refused_in_one_line(
     changes, registration, tmp_path
 ):
     table = [line.split(",") for line in TEXT.splitlines()]
@@ -230,7 +230,9 @@ def test_garbled_bytes_of_a_study_are_read_or_refused_in_one_line(content, tmp_p
 
 @QUICK
 @given(key=st.sampled_from(STUDY_KEYS), value=st.sampled_from(ODD_VALUES))
-def test_odd_values_of_a_study_are_read_or_refused_in_one_line(key, value, tmp_path):
+def test_unusual_values_of_a_study_are_read_or_refused_in_one_line(
+    key, value, tmp_path
+):
     line = f"{key} = {value}"
     text = re.sub(rf"(?m)^{re.escape(key)} = .*$", lambda _: line, STUDY, count=1)
     assert_study_is_read_or_refused(text.encode(), tmp_path)
@@ -255,7 +257,7 @@ def test_garbled_bytes_of_error_sources_are_read_or_refused_in_one_line(
 
 @LIGHT
 @given(rows=st.lists(st.lists(st.floats(-1e3, 1e3), min_size=10, max_size=10)))
-def test_any_numbers_are_read_or_refused_in_one_line(rows, tmp_path):
+def test_arbitrary_numbers_are_read_or_refused_in_one_line(rows, tmp_path):
     lines = [",".join([f"r{i}", *map(repr, row)]) for i, row in enumerate(rows)]
     assert_read_or_says_why(write_campaign(tmp_path, HEAD, lines))
 

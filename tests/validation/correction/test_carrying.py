@@ -89,7 +89,7 @@ def carried(run, machine, folder, *words):
     return code, text, json.loads(file.read_text())["sessions"], out
 
 
-def test_robot_is_carried_to_a_new_session_by_few_rows(machine, run):
+def test_robot_is_fitted_to_a_new_session_with_few_rows(machine, run):
     folder = measured(machine, 60, 0.8)
     code, _, (day,), out = carried(run, machine, folder, "--setup", "12")
     assert code == 0
@@ -108,7 +108,7 @@ def test_robot_is_carried_to_a_new_session_by_few_rows(machine, run):
     assert again.error.position < 1.3 * SIGMA
 
 
-def test_set_up_rows_of_a_single_place_do_not_suffice(machine, run):
+def test_set_up_rows_at_a_single_position_are_not_sufficient(machine, run):
     """Forty rows within a milliradian determine a place, not the device's rotation."""
     wide = measured(machine, 60, 0.8)
     text = (wide / "measurements.csv").read_text().splitlines()
@@ -141,7 +141,7 @@ def test_saved_robot_predicts_its_own_sessions(machine, run):
     assert 0.8 < error.normalised < 1.1
 
 
-def test_robot_is_carried_to_each_session_separately(machine, run):
+def test_robot_is_fitted_to_each_session_separately(machine, run):
     folder = measured(machine, 60, 0.8, ["a", "b"] * 30)
     code, _, days, out = carried(run, machine, folder, "--setup", "10")
     assert code == 0
@@ -149,7 +149,7 @@ def test_robot_is_carried_to_each_session_separately(machine, run):
     assert set(load_robot(out).session_effects) == {"a", "b"}
 
 
-def test_drift_is_not_carried_over_without_a_clock(machine, run):
+def test_drift_of_an_earlier_session_is_not_used_without_a_common_clock(machine, run):
     """The drift of another day, 15 sigma, is not written to the carried file."""
     folder = measured(machine, 60, 0.8)
     with_a_wave(machine, 3e-4, 1e-4)

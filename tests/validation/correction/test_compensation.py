@@ -33,7 +33,7 @@ def written(tmp_path, robot, rows, head="id,q.one,q.two"):
     return str(path), str(table)
 
 
-def test_compensation_table_equals_the_arrays(tmp_path):
+def test_compensation_table_equals_the_arrays_of_the_result(tmp_path):
     """An offset of 2 mrad of a zero needs the opposite offset of its command."""
     pytest.importorskip("xarray")
     robot, targets = written(tmp_path, ARM + ZERO, ["a,0.3,0.9", "b,-0.2,1.2"])
@@ -197,7 +197,9 @@ parameters = { "0" = OFF }
 
 
 @pytest.mark.parametrize("off", [2e11, -5.0, 1e-3])
-def test_correction_larger_than_the_robot_keeps_the_command(off, tmp_path, run):
+def test_command_is_not_changed_if_its_correction_exceeds_the_size_of_the_robot(
+    off, tmp_path, run
+):
     """The function shifts a slide by metres."""
     robot, table = written(
         tmp_path, SLIDE.replace("OFF", repr(off)), ["a,0.3"], "id,q.carriage"

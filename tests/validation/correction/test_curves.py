@@ -53,7 +53,7 @@ def test_explain_takes_a_range_and_writes_a_figure(tmp_path, run):
     assert figure.read_text().count("gear of the drive") >= 1
 
 
-def test_function_of_two_variables_gives_three_curves(tmp_path, run):
+def test_function_of_two_variables_is_shown_by_three_curves(tmp_path, run):
     both = (
         LAG
         .replace('"lag"', '"powers"')

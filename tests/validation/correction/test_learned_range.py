@@ -50,7 +50,7 @@ def test_learned_range_has_a_margin_of_five_per_cent(tmp_path):
     (("q.two", "q.one"), "scaled_waves", "1.sine", 1),
     (("q.one",), "powers", "1", 1),
 ])  # fmt: skip
-def test_full_turn_of_a_joint_stays_in_the_learned_range(
+def test_full_turn_of_a_joint_is_inside_the_learned_range(
     variables, form, name, outside, tmp_path
 ):
     """Except for functions of the angle that are not periodic."""
@@ -102,4 +102,4 @@ def test_reversed_learned_range_is_refused(tmp_path, run):
     path.write_text('learned_range = { "cov.tilt" = [1.0, 0.4] }\n' + ARM)
     code, _, error = run("validation", "explain", str(path))
     assert code == 2
-    assert "cov.tilt: found [1, 0.4], expected the smaller one first" in error
+    assert "cov.tilt: found [1, 0.4], expected the smaller number first" in error

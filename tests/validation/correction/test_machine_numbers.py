@@ -50,7 +50,7 @@ def wet_post(readings, wet, covariance, folder, numbers=("0", "1")):
     return replace(campaign, robot=saved), campaign
 
 
-def test_carried_parameter_is_the_weighted_mean_of_prior_and_readings(tmp_path):
+def test_refitted_parameter_is_the_weighted_mean_of_prior_and_readings(tmp_path):
     """Prior 0 +- s, n readings of y +- sigma: conjugate normal distributions."""
     y, s, n = 4e-5, 3e-5, 8
     saved, declared = wet_post([y] * 12, [1] * 12, [[s**2]], tmp_path, ("1",))
@@ -80,7 +80,7 @@ def test_known_sum_of_two_parameters_is_kept(tmp_path):
     assert numbers["0"] + numbers["1"] == pytest.approx(0.0, abs=0.01 * a)
 
 
-def test_prior_is_widened_for_a_change_of_twenty_standard_deviations(
+def test_prior_is_widened_if_a_parameter_changes_by_twenty_standard_deviations(
     tmp_path,
 ):
     """The carried parameter then follows the readings."""
@@ -94,7 +94,7 @@ def test_prior_is_widened_for_a_change_of_twenty_standard_deviations(
     assert day.suffices
 
 
-def test_carried_file_predicts_the_other_rows_with_the_reported_error(tmp_path):
+def test_refitted_robot_file_predicts_the_other_rows_with_the_reported_error(tmp_path):
     s, y = 3e-5, 4e-5
     saved, declared = wet_post([y] * 12, [1] * 12, [[s**2]], tmp_path, ("1",))
     carried = carry(saved, declared, np.arange(12) < 8, ())
@@ -129,7 +129,7 @@ def test_machine_parameters_exclude_those_of_a_session(tmp_path):
     assert len(own) == 2
 
 
-def test_carried_compliance_stays_positive():
+def test_refitted_compliance_stays_positive():
     """At least a thousandth of the compliance remains; a rigid joint stays rigid."""
     robot = campaign_of(np.zeros((1, 6))).robot
     K = np.diag([np.inf, np.inf, np.inf, 1e6, np.inf, np.inf])
@@ -176,7 +176,7 @@ def test_slopes_of_functions_equal_finite_differences(where, component, kind, tm
 
 
 @pytest.mark.slow
-def test_softer_spring_is_found_in_a_new_session_from_twenty_rows(tmp_path):
+def test_softer_spring_is_identified_in_a_new_session_from_twenty_rows(tmp_path):
     """The machine is diagnosed on Monday; on Tuesday its drive is a quarter softer."""
     springs = {"monday": 5e4, "tuesday": 4e4}
     days = {}

@@ -128,7 +128,7 @@ def test_axial_clearance_reduces_the_misfit(misfit):
 
 
 @pytest.mark.parametrize("pause", [0.0, 0.05])
-def test_time_limit_ends_only_its_own_simulation(pause, monkeypatch):
+def test_time_limit_of_a_simulation_does_not_end_other_simulations(pause, monkeypatch):
     """Also where the processor sleeps; Exudyn's timer is one for all models.
 
     Without a limit 0.05 s at each of some 3000 calls of the contact are minutes.

@@ -202,7 +202,7 @@ def test_crosscheck_of_a_delta_with_errors_of_3_mrad_passes(seed, load):
     assert check.passed, check.text()
 
 
-def test_smaller_scales_are_added_until_limits_are_known(irsbot2):
+def test_smaller_scales_are_added_until_the_limit_at_scale_zero_is_determined(irsbot2):
     """From the two requested scales limits are uncertain by over a thousandth."""
     at = place_robot(
         with_papers_errors(load_robot("irsbot2"), 0, signed=True), {"tx": 0, "tz": -0.5}

@@ -22,7 +22,7 @@ def test_extrapolation_is_exact_for_polynomials():
 SCALES = np.array([1.0, 0.5, 0.25, 0.125])
 
 
-def test_slope_ignores_differences_below_the_floor():
+def test_slope_ignores_differences_below_the_noise_floor():
     scales = [1.0, 0.1, 0.01]
     slope = difference_slope(scales, [1e-3, 1e-5, 1e-6], 1e-5 / 2)
     assert slope == pytest.approx(2.0)

@@ -49,7 +49,7 @@ def compared(scales, wrong, second=0.05, third=0.03):
     return compare_scales(scales, solve, Found)
 
 
-def test_correct_model_passes_from_two_requested_scales():
+def test_correct_model_passes_if_only_two_scales_are_requested():
     """The slope of 1.76 and the limit of 0.015 on two scales alone would not pass."""
     s = np.array([1.0, 0.5])
     assert abs(difference_slope(s, 0.05 * s**2 + 0.03 * s**3, 0) - 2) > 0.1
@@ -64,17 +64,19 @@ def test_correct_model_passes_from_two_requested_scales():
 
 @pytest.mark.parametrize("wrong", [0.003, -0.003, 0.02, -0.05])
 @pytest.mark.parametrize("scales", [(1.0, 0.5), (1.0, 0.7), (2.0, 1.0, 0.5)])
-def test_wrong_term_of_three_thousandths_fails_on_few_scales(wrong, scales):
+def test_error_of_three_thousandths_in_a_term_is_detected_from_few_scales(
+    wrong, scales
+):
     """On two scales alone its limit is uncertain by 0.05."""
     assert verdict(compared(scales, wrong)) == "failed"
 
 
-def test_wrong_term_that_the_second_order_cancels_at_one_scale_fails():
+def test_wrong_term_that_is_cancelled_by_second_order_at_one_scale_is_detected():
     """At s = 0.5 both cancel: -0.025 s + 0.05 s^2."""
     assert verdict(compared((1.0, 0.5), wrong=-0.025, third=0.0)) == "failed"
 
 
-def test_no_scale_is_added_when_limits_are_known():
+def test_no_scale_is_added_if_the_limit_at_scale_zero_is_determined():
     comparison = compared((1.0, 0.5, 0.25, 0.125), wrong=0.0)
     assert len(comparison.pairs) == 4
     assert verdict(comparison) == "passed"
@@ -105,7 +107,7 @@ def test_comparison_of_noise_has_the_verdict_no_signal():
     assert len(comparison.pairs) == 4
 
 
-def test_zero_compared_with_a_signal_fails():
+def test_check_of_zero_against_a_signal_fails():
     """A signal in only one of the models is a difference."""
 
     def solve(s):

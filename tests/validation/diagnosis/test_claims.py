@@ -36,7 +36,9 @@ def first(fit):
 
 @pytest.mark.parametrize(("times", "claimed"), [(0.98, False), (1.02, True)])
 @pytest.mark.parametrize("sign", [1, -1])
-def test_length_is_claimed_at_the_threshold_of_one_in_a_thousand(times, claimed, sign):
+def test_length_error_is_reported_at_a_significance_of_one_in_a_thousand(
+    times, claimed, sign
+):
     """Its standard deviation is sigma / sqrt(8), from eight readings along the bar."""
     length = sign * times * SURE * SIGMA[3] / np.sqrt(8)
     plain = bar(link=BEAM)
@@ -45,7 +47,7 @@ def test_length_is_claimed_at_the_threshold_of_one_in_a_thousand(times, claimed,
     assert first(fit) == claimed
 
 
-def test_drive_that_turns_against_its_load_gets_no_compliance():
+def test_no_compliance_is_identified_for_a_drive_that_turns_against_its_load():
     """The compliance is at its lower bound, zero, and no parameter is reported."""
     seen = np.tile([0, 0, -3e-4, 0, 0, 0], (8, 1))
     fit = machine(bar([0, 0, 30.0, 0, 0, 0], seen), SOFTER, start=1e-6)

@@ -63,7 +63,7 @@ def test_diagnose_writes_results_report_and_robot(small, tmp_path, run):
     assert np.abs(fitted - predict(declared).deviation[0]).max() > 1e-5
 
 
-def test_diagnose_does_not_save_a_robot_without_findings(tmp_path, run):
+def test_diagnose_does_not_save_a_robot_if_no_effect_is_identified(tmp_path, run):
     folder = measure(tmp_path / "campaign", configurations=8, passes=3)
     status, _, err = run(
         "validation", "diagnose", folder, "--save", tmp_path / "r.toml"

@@ -76,7 +76,9 @@ def found(columns, readings, seed, device=DEVICE):
     pytest.param(DEVICE, (3e-4, 0.0), marks=pytest.mark.slow),
     pytest.param(0.1 * DEVICE, (0.0, 5e-6), marks=pytest.mark.slow),
 ])  # fmt: skip
-def test_common_noise_is_found_with_its_sizes(columns, device, sizes):
+def test_common_noise_is_identified_with_its_standard_deviations(
+    columns, device, sizes
+):
     """60 measurements of three components determine a size to 5 %;
     the tolerance is 25 %."""
     rng = np.random.default_rng([7, 1])
@@ -92,7 +94,7 @@ def test_common_noise_is_found_with_its_sizes(columns, device, sizes):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
-def test_length_is_found_next_to_common_noise(columns, seed):
+def test_length_error_is_identified_in_the_presence_of_common_noise(columns, seed):
     """Its uncertainty is that of the mean of 60 measurements, not of 180 points."""
     true = 2e-5
     rng = np.random.default_rng([seed, 2])
@@ -118,7 +120,7 @@ def test_fit_counts_common_noise_once_per_measurement():
 
 
 @pytest.mark.parametrize("repeats", [True, False])
-def test_deviation_equal_in_repeats_is_a_lack_of_fit(repeats):
+def test_deviation_common_to_all_repeats_is_a_lack_of_fit(repeats):
     """The deviation is a motion that is equal in all repeats of a command."""
     rng = np.random.default_rng(3)
     campaign = three_points(80)
@@ -146,7 +148,7 @@ def diagnosed(robot, wanted, seed, folder):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
-def test_poor_repeatability_alone_leads_to_no_claim(seed, tmp_path):
+def test_poor_repeatability_alone_does_not_lead_to_a_reported_effect(seed, tmp_path):
     robot = with_errors(arm()) if seed % 2 else without_clearance(three_rrr())
     _, diagnosis = diagnosed(robot, {}, seed, tmp_path)
     assert diagnosis.verdict == "none_needed"
@@ -161,7 +163,7 @@ def test_poor_repeatability_alone_leads_to_no_claim(seed, tmp_path):
 
 
 @pytest.mark.slow
-def test_intervals_cover_the_truth_next_to_common_noise(tmp_path):
+def test_intervals_cover_the_true_values_in_the_presence_of_common_noise(tmp_path):
     """An encoder's offset in twelve campaigns:
     at least 8 of the 90 % intervals cover it."""
     covers, hidden = 0, [(Hidden("encoder_offset", {"j2": 1e-4}), 5.0)]

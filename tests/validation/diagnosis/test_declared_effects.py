@@ -90,7 +90,7 @@ def widest(campaign, name, true):
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_fit_next_to_a_wrong_declared_effect_recovers_the_machine(name):
+def test_fit_recovers_the_machine_in_spite_of_a_wrong_declared_effect(name):
     """Readings of the machine without noise: its numbers, and its readings.
 
     Softer or stiffer, longer or shorter than declared.
@@ -135,7 +135,7 @@ PLANAR_CASES = {
 
 
 @pytest.mark.parametrize("name", PLANAR_CASES)
-def test_difference_from_a_declared_effect_is_found_and_saved(name, tmp_path):
+def test_difference_from_a_declared_effect_is_identified_and_saved(name, tmp_path):
     """Drives and beams of a plane; the saved parameters are the machine's."""
     declared, true, machine = PLANAR_CASES[name]
     campaign = measured(tmp_path / name, seed=4, configurations=12, passes=3, **machine)

@@ -78,7 +78,7 @@ def left_by_the_truth(name, found, folder):
     return float(np.sqrt(np.nanmean(z[found.held.rows] ** 2)))
 
 
-def test_single_effect_is_found_with_its_value(diagnosed, tmp_path):
+def test_single_effect_is_identified_with_its_value(diagnosed, tmp_path):
     found = diagnosed("one")
     assert (found.verdict, found.claimed) == ("explained", ("drive_compliance",))
     assert found.probability["drive_compliance"] > 0.9
@@ -151,7 +151,7 @@ def test_diagnosis_does_not_change_a_correct_model(diagnosed):
     assert "suffices" in sentence(found)
 
 
-def test_two_effects_are_found_together_with_their_values(diagnosed, tmp_path):
+def test_two_effects_are_identified_together_with_their_values(diagnosed, tmp_path):
     found = diagnosed("pair")
     assert found.verdict == "explained"
     assert set(found.claimed) == {"encoder_offset", "thermal_expansion"}

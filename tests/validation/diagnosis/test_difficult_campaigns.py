@@ -82,7 +82,7 @@ def test_clearance_in_a_leg_is_explained_as_clearance(diagnosed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["fb_wear", "fb_gear"])
-def test_effects_outside_the_library_are_learned(name, diagnosed):
+def test_effects_outside_the_library_are_learned_as_functions(name, diagnosed):
     """A rod that grows with time and a gear's waves are learned down to the noise."""
     found = diagnosed(CASES / name)
     assert (found.verdict, found.claimed) == ("learned", ())
@@ -90,7 +90,7 @@ def test_effects_outside_the_library_are_learned(name, diagnosed):
 
 
 @pytest.mark.slow
-def test_scatter_of_repeats_is_not_claimed_as_drift(diagnosed):
+def test_scatter_of_repeats_is_not_reported_as_drift(diagnosed):
     """Errors are in units of the stated sigma, and hysteresis is not a drift."""
     found = diagnosed(CASES / "hyst")
     assert not set(found.claimed) & {"drift", "encoder_eccentricity"}

@@ -63,7 +63,7 @@ def test_random_readings_are_not_explained(seed):
 
 
 @pytest.mark.parametrize("rows", [2, 3])
-def test_very_few_rows_lead_to_no_claim(rows):
+def test_no_effect_is_reported_from_very_few_rows(rows):
     """Functions have at most as many columns as there are rows."""
     campaign = seen(rows, 1)
     time = np.linspace(0.0, 600.0, rows)

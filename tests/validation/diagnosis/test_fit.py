@@ -67,7 +67,7 @@ def test_standard_deviation_follows_from_the_slopes_at_the_fitted_value():
     assert abs(value - e) < 0.05 * std
 
 
-def test_intervals_cover_the_truth_at_the_stated_rate():
+def test_intervals_cover_the_true_value_at_the_stated_rate():
     """One standard deviation in 68 %, of 60 campaigns."""
     rng = np.random.default_rng(8)
     inside = 0

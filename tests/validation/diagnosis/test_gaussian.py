@@ -36,7 +36,7 @@ def test_leave_block_out_equals_refits(draw):
         assert densities[k] == pytest.approx(expected, rel=1e-8)
 
 
-def test_flat_columns_are_projected_out_exactly(draw):
+def test_columns_with_a_flat_prior_are_projected_out_exactly(draw):
     X, std, z = draw
     flat = np.linalg.qr(np.random.default_rng(0).normal(size=(40, 3)))[0]
     without = np.eye(40) - flat @ flat.T

@@ -46,7 +46,7 @@ def test_few_configurations_are_held_out_by_spans_of_time():
 
 
 @pytest.mark.parametrize(("rows", "folds"), [(1, 1), (2, 2), (3, 3), (7, 5)])
-def test_every_row_of_a_small_campaign_is_held_out_once(rows, folds):
+def test_every_row_of_a_small_campaign_is_held_out_exactly_once(rows, folds):
     campaign = campaign_of(np.ones((rows, 6)), time=60.0 * np.arange(rows))
     parts = held_in(campaign)
     assert len(parts) == folds
@@ -54,7 +54,7 @@ def test_every_row_of_a_small_campaign_is_held_out_once(rows, folds):
     assert (hold_out(campaign).how == "none") == (rows == 1)
 
 
-def test_hidden_rows_have_no_readings_and_keep_their_commands():
+def test_held_out_rows_keep_their_commands_but_have_no_readings():
     campaign = campaign_of(np.ones((4, 6)), loads=np.arange(24.0).reshape(4, 6))
     rows = np.array([True, False, False, True])
     there = hidden(campaign, rows)

@@ -104,7 +104,7 @@ def assert_near(found, std, truth):
 LEAD = {"y.amplitude": 1e-5, "y.phase": 0.7, "y.period": 0.012}
 
 
-def test_lead_error_of_a_screw_is_found_with_its_period(hidden):
+def test_lead_error_of_a_screw_is_identified_with_its_period(hidden):
     """The period within 1 %, a sin(2 pi y/p + f) as its sine and its cosine."""
     found, true = hidden(gantry(), "_lead", LEAD, LONG)
     values, std = only(found, where="y", form="waves", of=["q.y"])
@@ -114,7 +114,7 @@ def test_lead_error_of_a_screw_is_found_with_its_period(hidden):
     assert_near(values, std, {"period": 0.012} | parts)
 
 
-def test_backlash_that_varies_over_a_turn_of_a_screw_is_found(hidden):
+def test_backlash_that_varies_over_a_turn_of_a_screw_is_identified(hidden):
     found, true = hidden(gantry(), "_lead_backlash", LEAD, LONG)
     values, std = only(found, where="y", form="reversal_waves", of=["approach", "q.y"])
     assert values["period"] == pytest.approx(0.012, rel=0.01)
@@ -124,7 +124,9 @@ def test_backlash_that_varies_over_a_turn_of_a_screw_is_found(hidden):
 
 
 @pytest.mark.parametrize(("below", "above"), [(1e-5, 2e-6), (2e-6, 1e-5)])
-def test_joint_with_two_compliances_is_found_with_its_knee(hidden, below, above):
+def test_joint_with_two_compliances_is_identified_with_the_load_at_which_they_change(
+    hidden, below, above
+):
     given = {"j2.below": below, "j2.above": above, "j2.knee": 4.0}
     found, true = hidden(arm(), "_two_steps", given)
     values, std = only(found, where="j2", form="knee", of=["wrench.j2.mz"])
@@ -132,7 +134,7 @@ def test_joint_with_two_compliances_is_found_with_its_knee(hidden, below, above)
     assert_near(values, std, {k: true[f"j2.{v}"] for k, v in truth.items()})
 
 
-def test_backlash_whose_side_follows_the_load_is_found_with_its_size(hidden):
+def test_backlash_whose_side_follows_the_load_is_identified_with_its_size(hidden):
     found, true = hidden(arm(), "_torque_backlash", {"j2": 5e-5})
     values, std = only(found, where="j2", form="knee", of=["wrench.j2.mz"])
     assert_near(values, std, {"size": true["j2"]})
@@ -146,7 +148,7 @@ def claimed(found, name, where):
     return ({p["name"]: p[key] for p in rows} for key in ("value", "std"))
 
 
-def test_heavier_body_is_found_with_its_mass_and_moments(hidden):
+def test_heavier_body_is_identified_with_its_mass_and_moments_of_inertia(hidden):
     """The centre of mass follows from the first moments."""
     given = {"j4.mass": 0.5, "j4.moment.x": 0.05, "j4.moment.y": 0.03}
     weighed = replace(DESIGN, gravity=9.81)
@@ -157,12 +159,14 @@ def test_heavier_body_is_found_with_its_mass_and_moments(hidden):
 @pytest.mark.parametrize(("name", "where"), [
     ("thermal_expansion", ["j2", "j3", "tool"]), ("link_length", ["j3"])
 ])  # fmt: skip
-def test_bodies_without_beams_that_grow_are_found_with_their_rates(hidden, name, where):
+def test_thermal_expansion_of_bodies_without_beams_is_identified_with_its_rate(
+    hidden, name, where
+):
     found, true = hidden(arm(link=None), name, dict.fromkeys(where, 2e-5))
     assert_near(*claimed(found, name, where), true)
 
 
-def test_measured_motion_is_found_with_its_gain(hidden):
+def test_gain_of_a_measured_motion_is_identified(hidden):
     found, true = hidden(
         arm(), "_tilting", {"gain": 0.93}, replace(DESIGN, tilt=1e-4),
         '[units]\ncov.tilt = "rad"\n',

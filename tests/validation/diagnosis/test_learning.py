@@ -40,7 +40,7 @@ def inaccurate(tmp_path_factory):
     return diagnose(read_campaign(folder))
 
 
-def test_geometric_errors_are_not_claimed_as_effects(inaccurate):
+def test_geometric_errors_are_not_reported_as_effects(inaccurate):
     """No effect of the library is claimed for errors of all frames.
 
     After: 40 rows of 6 readings, each in one of five folds; their noise's rms has a

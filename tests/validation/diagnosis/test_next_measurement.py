@@ -24,7 +24,7 @@ from tests.bar_for_tests import (
 from tests.planar_arm_for_tests import SIGMA
 
 
-def test_another_temperature_separates_expansion_from_length():
+def test_measurement_at_another_temperature_separates_expansion_from_length():
     """d'(I + J C J')^-1 d by hand, where d = alpha L 10 K / sigma along the bar.
 
     R readings at T leave the length sigma^2 / R and the expansion that much over
@@ -46,7 +46,9 @@ def test_another_temperature_separates_expansion_from_length():
 
 
 @pytest.mark.parametrize(("power", "worth"), [(1.5, True), (0.9, False)])
-def test_next_measurement_is_suggested_from_a_power_of_one(power, worth):
+def test_next_measurement_is_suggested_if_its_non_centrality_is_at_least_one(
+    power, worth
+):
     """Expansion against length, for an expansion of given power."""
     R, T = 8, 5.0
     heat = {"temperature": np.full(R, T)}

@@ -79,7 +79,7 @@ def test_mean_of_an_ornstein_uhlenbeck_process_has_the_textbook_variance():
 
 
 @pytest.mark.slow
-def test_intervals_of_90_per_cent_cover_the_truth_under_correlated_noise(rng):
+def test_intervals_of_90_per_cent_cover_the_true_value_under_correlated_noise(rng):
     """The share and the time constant are estimated; intervals for white noise would
     cover little more than half. For 200 campaigns of three independent unknowns the
     rate is 0.9 +- 0.012. The fit removes part of the correlation, so that a slightly

@@ -135,7 +135,7 @@ def test_collinear_points_do_not_determine_the_device_rotation():
         register(campaign, conditions_of(campaign))
 
 
-def test_device_is_found_next_to_declared_errors():
+def test_device_frame_is_found_in_the_presence_of_declared_errors():
     """The declared error of the tip, 4 mm, is not part of the device frame."""
     plain = bar()
     errors = np.zeros((2, 6))

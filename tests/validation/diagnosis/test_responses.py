@@ -77,7 +77,7 @@ def test_readings_of_small_screws_follow_the_device_frame():
         )
 
 
-def test_row_without_a_solution_has_zero_response():
+def test_response_of_a_row_without_a_solution_is_zero():
     """A closed chain with an unknown error; other rows are as before."""
     at = home_posture(five_bar())
     three = replace(
@@ -98,7 +98,7 @@ def test_row_without_a_solution_has_zero_response():
 
 @pytest.mark.parametrize("held", [False, True])
 @pytest.mark.parametrize("closed", [False, True])
-def test_clearance_closed_by_the_load_changes_no_response(held, closed):
+def test_clearance_closed_by_the_load_does_not_change_the_response(held, closed):
     """To first order the joint stays where the load has shifted it.
 
     For an open and a closed chain.
@@ -127,7 +127,7 @@ def test_clearance_closed_by_the_load_changes_no_response(held, closed):
     assert tight.wrenches.any()
 
 
-def test_clearance_of_one_of_two_parallel_springs_shifts_no_load():
+def test_clearance_in_one_of_two_parallel_springs_does_not_change_the_load():
     """Each spring carries half: responses equal those without clearance."""
     spring = np.eye(6) * 1e6
     robot = Robot("pair", "end_a", (

@@ -64,7 +64,7 @@ def with_gain(campaign, gain):
     return replace(campaign, robot=replace(campaign.robot, functions=(turn,)))
 
 
-def test_prediction_with_the_known_gain_of_a_motion_has_the_error_of_noise(rocking):
+def test_prediction_with_the_known_gain_of_a_motion_is_accurate_to_the_noise(rocking):
     """1 mrad at 0.7 m is about twenty sigma,
     a gain that is too large by 0.2 about four sigma."""
     assert predict(rocking).error.normalised > 8

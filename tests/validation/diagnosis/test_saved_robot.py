@@ -68,7 +68,7 @@ def test_table_of_a_diagnosis_has_the_printed_errors(found):
     assert table["held_out", ""].sum() == found.held.rows.sum()
 
 
-def test_method_save_writes_the_files_of_the_command(found, tmp_path, monkeypatch):
+def test_method_save_writes_the_same_files_as_the_command(found, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     save(found, "robot.toml")
     files = {path.name: path.read_bytes() for path in tmp_path.iterdir()}

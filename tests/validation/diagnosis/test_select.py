@@ -35,14 +35,14 @@ def found(columns, readings, seed=0, *, noise=1.0):
 
 
 @pytest.mark.parametrize("noise", [0.5, 1.0, 2.0, 3.0])
-def test_noise_of_any_scale_leads_to_no_selection(columns, noise):
+def test_noise_of_any_scale_leads_to_no_selected_effect(columns, noise):
     selected = found(columns, np.zeros((ROWS, 6)), noise=noise)
     assert selected.hypotheses == selected.functions == ()
     assert max(selected.probability.values(), default=0.0) < 0.1
     assert selected.noise.tau == pytest.approx(noise, rel=0.2)
 
 
-def test_a_longer_bar_is_found_with_its_length(columns):
+def test_longer_bar_is_identified_with_its_length_error(columns):
     sigma = CAMPAIGN.sigma[0, 3]
     longer = np.hstack([np.zeros((ROWS, 3)), 8 * sigma * along(CAMPAIGN)])
     selected = found(columns, longer)
@@ -51,7 +51,7 @@ def test_a_longer_bar_is_found_with_its_length(columns):
     assert selected.values[0] == pytest.approx(8 * sigma, abs=4 * sigma / 30**0.5)
 
 
-def test_waves_of_a_gear_are_found_with_their_number(columns):
+def test_waves_of_a_gear_are_identified_with_their_number_per_turn(columns):
     sigma = CAMPAIGN.sigma[0, 3]
     selected = found(columns, turned(12 * sigma * np.sin(5 * TURN + 0.4)))
     assert selected.hypotheses == ()
@@ -62,7 +62,7 @@ def test_waves_of_a_gear_are_found_with_their_number(columns):
     assert one.probability > 0.9
 
 
-def test_growth_with_time_is_learned_at_a_body_instead_of_the_reading(columns):
+def test_growth_with_time_is_attributed_to_a_body_instead_of_the_reading(columns):
     sigma = CAMPAIGN.sigma[0, 3]
     grown = 12 * sigma * (TIME / TIME.max())[:, None] * along(CAMPAIGN)
     selected = found(columns, np.hstack([np.zeros((ROWS, 3)), grown]))
@@ -71,7 +71,7 @@ def test_growth_with_time_is_learned_at_a_body_instead_of_the_reading(columns):
     assert selected.functions[0].candidate.parts[0].where != "reading"
 
 
-def test_search_excludes_outliers(columns):
+def test_model_search_excludes_outliers(columns):
     sigma = CAMPAIGN.sigma[0, 3]
     readings = np.zeros((ROWS, 6))
     readings[[1, 10, 21], [3, 4, 3]] = 40 * sigma
@@ -80,7 +80,7 @@ def test_search_excludes_outliers(columns):
     assert (selected.weights < 0.5).sum() == 3
 
 
-def test_places_visible_only_by_rounding_are_excluded():
+def test_effects_that_are_visible_only_by_rounding_are_excluded():
     campaign = bar(link=BEAM, rows=ROWS, spread=0.0, time=TIME)
     measured = np.full((ROWS, 6), np.nan)
     measured[:, 3] = 0.0  # along the bar: turning the drive moves it by rounding
@@ -93,7 +93,7 @@ def test_places_visible_only_by_rounding_are_excluded():
 
 
 @pytest.mark.parametrize("size", [6.0, 25.0])
-def test_single_row_selects_no_function(columns, size):
+def test_no_function_is_selected_from_a_single_row(columns, size):
     readings = np.zeros((ROWS, 6))
     readings[17] = size * CAMPAIGN.sigma[17] * [1, -1, 1, 1, -1, 1]
     selected = found(columns, readings)

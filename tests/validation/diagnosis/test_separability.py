@@ -21,7 +21,7 @@ def test_cosine_of_two_lines_is_the_cosine_of_their_angle():
     assert found.classes() == found.imitated() == found.overlapping() == []
 
 
-def test_planes_with_a_common_line_overlap_and_a_line_in_a_plane_is_imitated():
+def test_intersecting_column_spaces_overlap_and_a_contained_one_is_imitated():
     """Half of the squared length of (e1 + e2) is in the plane (e1, e3)."""
     found = compare_signatures({
         "plane": columns([1, 0, 0], [0, 1, 0]),
@@ -36,7 +36,7 @@ def test_planes_with_a_common_line_overlap_and_a_line_in_a_plane_is_imitated():
     assert found.classes() == []
 
 
-def test_equal_column_spaces_form_a_class(rng):
+def test_effects_with_equal_column_spaces_form_an_equivalence_class(rng):
     A = rng.normal(size=(50, 3))
     found = compare_signatures({
         "a": A, "b": A @ rng.normal(size=(3, 3)), "c": rng.normal(size=(50, 3))
@@ -85,7 +85,7 @@ def test_invisible_effect_is_compared_at_any_size(rng):
     assert found.classes() == [("a", "b")]
 
 
-def test_rank_counts_unknowns_of_unequal_scale(rng):
+def test_rank_is_correct_for_unknowns_of_different_scales(rng):
     """An angle of 1e4 and an orthogonal shift of 100 sigma, and their sum."""
     A = np.eye(3)[:, :2] * [1e4, 100.0]
     found = compare_signatures({"a": np.column_stack([A, A.sum(axis=1)])})

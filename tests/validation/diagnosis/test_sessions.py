@@ -74,7 +74,7 @@ def parameters(found, name, session=None):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("known", [True, False])
-def test_encoder_offsets_and_tool_are_found_for_each_session(known, tmp_path):
+def test_encoder_offsets_and_tool_are_identified_for_each_session(known, tmp_path):
     """A common spring is found together with them, and saved."""
     spring = Hidden("drive_compliance", {"j2": SPRING})
     hidden = {
@@ -112,7 +112,7 @@ def test_encoder_offsets_and_tool_are_found_for_each_session(known, tmp_path):
 
 
 @pytest.mark.slow
-def test_common_effects_are_claimed_for_all_sessions(tmp_path):
+def test_common_effects_are_reported_for_all_sessions(tmp_path):
     """Common effects are claimed and saved without a session."""
     zeros = Hidden("encoder_offset", ZEROS["monday"])
     folder = measured(tmp_path, {"monday": [], "tuesday": []}, [zeros])
@@ -125,7 +125,7 @@ def test_common_effects_are_claimed_for_all_sessions(tmp_path):
 
 
 @pytest.mark.slow
-def test_drift_is_found_for_each_session(tmp_path):
+def test_drift_is_identified_for_each_session(tmp_path):
     """Different components, and time constants of 900 s and 2000 s."""
     drifts = {
         "monday": {"amplitude.tx": 8e-5, "amplitude.ry": 1e-4, "time_constant": 900.0},

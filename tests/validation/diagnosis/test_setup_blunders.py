@@ -137,7 +137,7 @@ def test_exchanged_joints_are_reported_by_name(rng, pair):
     assert said(machine.campaign()) == {("exchanged", names)}
 
 
-def test_two_set_up_blunders_are_both_reported(rng):
+def test_two_set_up_mistakes_are_both_reported(rng):
     machine = Machine(rng, unknown=True)
     machine.q[:, 1] *= -1
     machine.q[:, 3] += np.pi / 2
@@ -205,7 +205,7 @@ def test_misread_rotations_are_reported(rng, change, kind, words):
                        for n in ("delta", "hexapod"))],
 )  # fmt: skip
 @pytest.mark.parametrize("unknown", [False, True])
-def test_inaccurate_machine_has_no_reported_blunder(rng, name, unknown):
+def test_no_set_up_mistake_is_reported_for_an_inaccurate_machine(rng, name, unknown):
     """Errors of a millimetre, a hundred sigma, are no blunder."""
     machine = Machine(rng, name, spread=0.005, unknown=unknown)
     assert said(machine.campaign(rotations=True)) == set()
@@ -227,11 +227,11 @@ def test_outliers_do_not_hide_a_reversed_joint(rng):
     assert said(machine.campaign()) == {("sign", ("q.joint3",))}
 
 
-def test_campaign_within_its_noise_has_no_blunder(rng):
+def test_no_set_up_mistake_is_reported_for_deviations_within_the_noise(rng):
     assert found(Machine(rng, own=0.0).campaign()) == ()
 
 
-def test_missing_compliance_is_not_reported_as_a_blunder_of_units(rng):
+def test_missing_compliance_is_not_reported_as_a_wrong_unit(rng):
     """The declared drives are compliant, the machine is stiff."""
     machine = Machine(rng, force=1e3)
     T, _ = machine.declared(machine.q, machine.loads)

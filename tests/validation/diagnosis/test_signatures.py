@@ -48,7 +48,7 @@ def test_function_of_a_covariate_requires_its_column(name, given):
             conditions_of(campaign)
 
 
-def test_residual_is_reading_minus_declared_prediction():
+def test_residual_equals_reading_minus_prediction_of_the_declared_model():
     """A bar declared 0.1 mm longer, read 0.3 mm longer; some cells not measured."""
     plain = bar()
     errors = np.zeros((2, 6))

@@ -52,7 +52,7 @@ def assert_true_numbers(found, made):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", LIBRARY)
-def test_every_effect_is_found_at_five_times_the_noise(name, tmp_path):
+def test_every_effect_is_identified_at_five_times_the_noise(name, tmp_path):
     """Or a set of effects that the simulation finds equivalent within the noise."""
     found, allowed = understood({name: 5.0}, 4, tmp_path)
     if found.verdict == "ambiguous":
@@ -76,7 +76,7 @@ def test_every_effect_is_found_at_five_times_the_noise(name, tmp_path):
     ],
     ids="+".join,
 )
-def test_pair_of_simulated_effects_is_found(wanted, tmp_path):
+def test_pair_of_simulated_effects_is_identified(wanted, tmp_path):
     found, allowed = understood(wanted, 5, tmp_path)
     assert found.verdict == "explained"
     assert tuple(sorted(found.claimed)) in allowed

@@ -59,7 +59,7 @@ def heated(tmp_path_factory):
     return diagnosed(folder, read, covariates), noise
 
 
-def test_causes_are_learned_as_polynomials(heated):
+def test_dependences_on_measured_variables_are_learned_as_polynomials(heated):
     """Noise correlated in time would favour splines and functions of time.
 
     The tolerance of the bed's gain is five of its standard errors. The noise is 2.5 um,
@@ -89,7 +89,7 @@ def test_held_out_spans_of_time_are_predicted_to_the_noise(heated):
     assert diagnosis.after.position < 1.5 * left
 
 
-def test_many_outliers_do_not_prevent_learning(tmp_path):
+def test_many_outliers_do_not_prevent_learning_a_function(tmp_path):
     """Eleven outliers, each two thirds as large as the one before."""
     rng = np.random.default_rng(9)
     warm = np.sin(np.linspace(0, 20, 320))

@@ -26,7 +26,7 @@ def covariance(root, loadings, visit):
 
 
 @pytest.mark.parametrize("k", [1, 3, 6])
-def test_cells_are_independent_after_whitening(k):
+def test_cells_of_readings_are_independent_after_whitening(k):
     rng = np.random.default_rng(k)
     root, L = rng.uniform(0.2, 2, 11), 3 * rng.normal(size=(11, k))
     C = covariance(root, L, VISIT)
@@ -98,7 +98,7 @@ def test_whitened_residual_of_common_noise_is_independent_with_unit_variance():
     assert size == pytest.approx(np.sqrt(10) * campaign.sigma[:, 3:])
 
 
-def test_points_measured_at_once_are_held_out_together():
+def test_points_measured_at_the_same_time_are_held_out_together():
     campaign = replace(two_points(30), configuration=np.zeros(60, dtype=int))
     blocks = blocks_of(campaign)[0]
     assert len(np.unique(blocks)) > 8

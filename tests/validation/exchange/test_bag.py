@@ -61,7 +61,7 @@ def write_bag(path, plugin, transforms):
 
 @pytest.mark.parametrize("transforms", [False, True])
 @pytest.mark.parametrize("plugin", ["SQLITE3", "MCAP"])
-def test_bag_is_joined_to_commands_by_time(tmp_path, run, plugin, transforms):
+def test_ros_bag_is_joined_to_commands_by_time(tmp_path, run, plugin, transforms):
     """Double precision is kept: deviations are rounding."""
     pytest.importorskip("rosbags")
     lab = Lab(tmp_path)
@@ -78,7 +78,7 @@ def test_bag_is_joined_to_commands_by_time(tmp_path, run, plugin, transforms):
     assert np.abs(campaign.measured[:, 3:]).max() < 1e-12
 
 
-def test_damaged_bag_is_refused_in_one_line(tmp_path):
+def test_damaged_ros_bag_is_refused_in_one_line(tmp_path):
     pytest.importorskip("rosbags")
     (tmp_path / "metadata.yaml").write_text("rosbag2_bagfile_information: {}\n")
     for path in (tmp_path, tmp_path / "no.bag"):
@@ -87,7 +87,7 @@ def test_damaged_bag_is_refused_in_one_line(tmp_path):
         assert "\n" not in str(error.value)
 
 
-def test_bag_without_rosbags_is_refused_with_the_package_to_install(
+def test_ros_bag_without_the_package_rosbags_is_refused_with_the_package_to_install(
     tmp_path, monkeypatch
 ):
     monkeypatch.setitem(__import__("sys").modules, "rosbags.highlevel", None)
@@ -95,5 +95,5 @@ def test_bag_without_rosbags_is_refused_with_the_package_to_install(
         read_bag(tmp_path / "lab.bag")
 
 
-def test_overlong_name_is_not_taken_for_a_bag():
+def test_overlong_file_name_is_not_taken_for_a_ros_bag():
     assert not is_bag("x" * 300)

@@ -214,7 +214,7 @@ def test_declared_unit_that_contradicts_the_file_is_refused(lab, run):
     assert 'line 1: found the unit "in", expected "mm" as declared' in line
 
 
-def test_decimal_is_declared_for_each_table(lab, run):
+def test_decimal_separator_is_declared_for_each_table(lab, run):
     text = (lab.folder / "commands.csv").read_text().replace(",", ";")
     (lab.folder / "commands.csv").write_text(text)
     body = [

@@ -169,7 +169,7 @@ def test_deviations_with_a_known_registration_are_unchanged(lab, run):
     assert campaign.measured[:, 3:] == pytest.approx(np.array(expected), abs=1e-14)
 
 
-def test_exchanged_targets_and_blunders_are_left_out_and_reported(lab, run, rng):
+def test_exchanged_targets_and_outliers_are_left_out_and_reported(lab, run, rng):
     """At p3 the targets A and B are exchanged, at p7 C is 30 mm off."""
 
     def change(k, name, p):

@@ -146,7 +146,7 @@ def test_noise_that_differs_from_the_stated_sigma_is_remarked(rng):
     assert any("Repeats scatter only 0." in t for t in texts(quiet))
 
 
-def test_consecutive_suspects_are_remarked(rng):
+def test_consecutive_outliers_are_remarked(rng):
     """Six readings 30 sigma off at once, or spread over the session."""
     for rows, sentence in (
         (range(10, 16), "suspects careful: Readings far from their repeats follow"),

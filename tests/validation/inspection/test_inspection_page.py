@@ -17,9 +17,7 @@ def shown(run, name, folder):
     return page.read_text(encoding="utf-8")
 
 
-def test_page_at_one_temperature_does_not_distinguish_expansion_from_length(
-    run, tmp_path
-):
+def test_page_at_one_temperature_does_not_separate_expansion_from_length(run, tmp_path):
     text = shown(run, "constant_temperature", tmp_path)
     assert "<p class='verdict mixed'>" in text
     lost = text.partition('<section id="section-what-this-campaign-cannot')[2]

@@ -23,7 +23,7 @@ def interleaved(rng, rows=120, kinds=40):
     return np.concatenate([rng.permutation(kinds) for _ in range(passes)])[:rows]
 
 
-def test_noise_is_the_pooled_variance():
+def test_noise_estimate_is_the_pooled_variance_of_repeats():
     """Sets (1, 3), (2, 2, 5) and a single: sums of squares 2 and 6 over 1 + 2."""
     measured = np.full((6, 6), np.nan)
     measured[:, 3] = [1, 3, 2, 2, 5, 100]
@@ -37,7 +37,7 @@ def test_noise_is_the_pooled_variance():
     np.testing.assert_allclose(noise.component_interval[3], [low, high])
 
 
-def test_missing_cell_reduces_only_the_freedom_of_its_component():
+def test_missing_cell_reduces_only_the_degrees_of_freedom_of_its_component():
     """One of two rows has no tx: five components repeat."""
     measured = np.zeros((2, 6))
     measured[1] = 2.0
@@ -48,7 +48,7 @@ def test_missing_cell_reduces_only_the_freedom_of_its_component():
     assert noise.ratio == pytest.approx(np.sqrt(2))
 
 
-def test_rows_without_repeats_give_no_noise():
+def test_noise_is_not_estimated_from_rows_without_repeats():
     assert repeat_noise(campaign_of(np.zeros((5, 6)))) is None
     measured = np.full((2, 6), np.nan)
     measured[0, 0] = measured[1, 1] = 1.0
@@ -96,7 +96,7 @@ def test_drift_does_not_enter_the_noise_estimate(rng):
         assert noise.taken_out["temperature"] < 1e-6
 
 
-def test_intervals_cover_the_truth_at_the_stated_rate(rng):
+def test_intervals_cover_the_true_value_at_the_stated_rate(rng):
     """400 campaigns: 90 % +- 3 standard deviations of a count, 0.855 ... 0.945; a
     suspect in at most 1 % + 3 standard deviations of them, 0.025."""
     inside = suspected = 0
@@ -166,7 +166,7 @@ def test_revisits_classify_the_order_of_repeats(rng):
     assert revisits(row, np.r_[np.zeros(59), 1]).order == "back to back"
 
 
-def test_points_read_at_once_count_as_one_visit():
+def test_points_read_at_the_same_time_count_as_one_visit():
     """Twenty configurations are visited three times,
     with three points read at each visit."""
     ids = tuple(f"m{i}{end}" for i in range(60) for end in ("", ":left", ":right"))

@@ -78,7 +78,7 @@ def test_a_small_general_misfit_stores_the_series_energy(rng):
 
 @pytest.mark.parametrize("elements", [1, 2, 5])
 @pytest.mark.parametrize("theory", ["timoshenko", "euler"])
-def test_corrected_beam_element_bends_exactly(elements, theory):
+def test_corrected_beam_element_has_the_exact_bending_deflection(elements, theory):
     """P L^3 / 3EI + P L / GA for any number of elements; up is y, the height 0.05 m."""
     L, P = 0.5, 1e-3
     posture = cantilever(replace(FLAT, theory=theory))
@@ -204,7 +204,7 @@ def test_infinite_joint_stiffness_locks_its_axis():
 
 
 @pytest.mark.parametrize("clearance", [None, Clearance(radial=1e-5)])
-def test_bearing_turns_freely_and_is_elastic_otherwise(clearance):
+def test_bearing_is_free_about_its_axis_and_elastic_in_other_directions(clearance):
     """A bar between a bearing and a wall that is misaligned by up to 3e-3 rad and 0.2
     mm.
 

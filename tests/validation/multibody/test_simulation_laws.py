@@ -164,7 +164,7 @@ def test_spring_link_without_matrix_is_refused():
         simulate_assembly(coaxial(np.zeros(6)), model=SimulationModel("shell"))
 
 
-def test_without_clearance_keeps_passive_joints_free():
+def test_removing_clearances_keeps_passive_joints_free():
     clearance = Clearance(radial=1e-5, spin=0.1)
     robot = Robot("pin", "pin", (Frame("pin", joint="revolute", clearance=clearance),))
     assert without_clearance(robot).frames[0].clearance is None
@@ -183,7 +183,7 @@ def test_logarithm_inverts_the_exponential_map(rng):
         np.testing.assert_allclose(inverse(T), exponential(-screw), atol=1e-14)
 
 
-def test_closing_sequence_closes_gaps_evenly(rng):
+def test_closing_sequence_reduces_gaps_evenly(rng):
     """From the open robot with errors to the assembly, in even steps."""
     posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
     robot = posture.robot

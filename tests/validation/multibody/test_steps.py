@@ -49,7 +49,7 @@ def by_simulation(errors, load):
     return simulate_assembly(three_beams(errors, ("c", "b"), shim))
 
 
-def test_bolted_and_forced_joints_differ_from_finite_motions_by_second_order():
+def test_small_motions_of_joined_parts_differ_from_finite_ones_by_second_order():
     """The difference falls by four when errors and loads are halved."""
     errors = {
         "b": np.array([2e-3, -1e-3, 1e-3, 4e-4, -3e-4, 5e-4]),

@@ -79,7 +79,7 @@ def test_wrench_of_a_bent_spring_is_the_gradient_of_its_energy(size):
     np.testing.assert_allclose(far, near, atol=1e-14 * np.abs(near).max())
 
 
-def test_tangent_of_a_spring_bent_by_half_a_radian_follows_from_its_energy():
+def test_tangent_of_a_spring_rotated_by_half_a_radian_follows_from_its_energy():
     """The force times the spring's shift across the rotation is a couple,
     which Exudyn omits."""
     K = np.diag([40.0, 50.0, 60.0, 300.0, 400.0, 500.0])

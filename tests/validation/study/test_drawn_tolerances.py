@@ -34,7 +34,7 @@ def results(tmp_path_factory):
     return found, page, json.loads((folder / "out" / "results.json").read_text())
 
 
-def test_study_has_the_worst_case_of_the_drawing_by_hand(results):
+def test_worst_case_of_a_drawing_in_a_study_equals_hand_calculation(results):
     """0.1903 mrad: 20 um times the sum of the coefficients over the lever."""
     _, _, table = results
     worst = table["statistics"]["worst_case"]["rotation"]
@@ -43,7 +43,7 @@ def test_study_has_the_worst_case_of_the_drawing_by_hand(results):
     assert worst["attained"] <= worst["bound"] <= 1.001 * worst["attained"]
 
 
-def test_study_importance_names_the_callouts_with_the_shares_by_hand(results):
+def test_shares_of_callouts_in_a_study_equal_hand_calculation(results):
     """Errors add linearly, so a share is c^2 over the sum; intervals hold 95 %."""
     _, _, table = results
     shares = table["statistics"]["importance"]["quantities"]["rotation"]["total_index"]
@@ -59,7 +59,7 @@ def test_study_importance_names_the_callouts_with_the_shares_by_hand(results):
         assert one["rotation_part"] ** 2 / whole == pytest.approx(expected, abs=0.03)
 
 
-def test_study_page_has_the_numbers_of_its_results(results):
+def test_numbers_on_the_page_of_a_drawn_study_equal_its_results(results):
     found, page, table = results
     rows = {row[0].text: row for row in page.table("error", "attained")[1:]}
     worst = table["statistics"]["worst_case"]
@@ -115,7 +115,7 @@ def turned_by_hand(tx):
     return (abs(e2 @ e4) + abs(e3 @ e4) + 1 + abs(e4[0])) / abs(lever)
 
 
-def test_map_bounds_the_rotation_over_all_parts_as_by_hand(tmp_path):
+def test_bound_of_the_rotation_in_the_map_of_a_study_equals_hand_calculation(tmp_path):
     """At each pose 20 um times the sum of the coefficients of that pose over the lever;
     bounds are within 1e-3 above it."""
     assert turned_by_hand(0.13949) == pytest.approx(

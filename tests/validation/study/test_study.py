@@ -150,7 +150,7 @@ def test_study_page_shows_words_instead_of_keys(results):
     )
 
 
-def test_study_of_explicit_errors_has_the_energy_by_hand(tmp_path):
+def test_energy_in_a_study_of_explicit_errors_equals_hand_calculation(tmp_path):
     write_robot(coaxial_beams(np.zeros(6)), tmp_path / "beams.toml")
     text = (
         'robot = "beams.toml"\n[errors.explicit]\ntwo = [0, 0, 0, 2e-4, 0, 0]\n'
@@ -245,7 +245,7 @@ def test_study_of_a_just_constrained_robot_reports_the_unchecked_parts(tmp_path)
     assert not results.passed
 
 
-def test_study_whose_map_has_no_reachable_point_does_not_pass(tmp_path):
+def test_study_without_a_reachable_point_in_its_map_does_not_pass(tmp_path):
     text = SMALL.replace("tz=-0.5:-0.4:0.1", "tz=-5:-4:0.5") + QUIET
     text += "crosscheck = false\n"
     results = run_study(read_study(study_file(tmp_path, text), tmp_path / "out"))
@@ -273,7 +273,7 @@ def test_study_whose_reference_has_no_answer_does_not_pass(tmp_path, monkeypatch
     assert "Not compared: cvxpy: the problem" in report_page(results)
 
 
-def test_headline_is_the_worst_clearance_over_the_map(tmp_path):
+def test_headline_of_a_study_is_the_worst_clearance_over_the_map(tmp_path):
     """At a pose it is the bound of ``assembly error``,
     over the map the largest of these bounds."""
     text = 'robot = "five_bar"\ngrid = "tx=-0.01:0.01:0.01,ty=0.15"\n'
@@ -314,7 +314,7 @@ def test_study_reports_a_manipulator_that_cannot_be_assembled(tmp_path):
     )
 
 
-def test_robot_file_in_place_of_a_study_names_the_line_that_makes_one(tmp_path):
+def test_message_about_a_robot_file_given_as_a_study_states_the_missing_line(tmp_path):
     path = tmp_path / "arm.toml"
     robot = BUILT_IN["five_bar"]()
     write_robot(robot, path)

@@ -99,7 +99,7 @@ def test_every_effect_of_the_library_is_tested():
     [pytest.param(n, marks=[pytest.mark.slow] * (i % 3 > 0))
      for i, n in enumerate(EFFECTS)],
 )  # fmt: skip
-def test_effect_adds_the_deviation_of_a_machine_that_has_it(
+def test_effect_in_a_simulation_adds_its_deviation_to_the_machine(
     name, program, robot, machine
 ):
     """Deviations up to 500 um and urad agree with finite motions to 30 nm and nrad.

@@ -77,7 +77,7 @@ def quick(wanted, robot=None, **given):
     return generate_campaign(robot, wanted, design, program="springs", **given)
 
 
-def test_plan_interleaves_configurations_with_repeats_and_zero_loads():
+def test_plan_alternates_configurations_and_includes_repeats_and_zero_loads():
     """Each pass visits every configuration once;
     some loads are repeated, some are 0."""
     plan = plan_campaign(two_axes(), SMALL, np.random.default_rng(0))
@@ -101,7 +101,7 @@ def test_every_simulated_effect_has_the_requested_strength(name):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_effect_that_the_loads_do_not_excite_is_drawn_again(seed):
+def test_effect_that_the_loads_do_not_excite_is_replaced_by_another_draw(seed):
     """Forces at a point on the wrist's axis do not twist it:
     another drive gets the compliance."""
     arm = two_axes()
@@ -178,7 +178,9 @@ def test_spring_program_and_exact_equilibrium_agree_for_large_errors(name):
     np.testing.assert_allclose(springs, exact, rtol=0, atol=2e-9)
 
 
-def test_written_campaign_is_read_again_and_hides_the_truth(tmp_path):
+def test_written_campaign_is_read_again_and_does_not_contain_the_hidden_effects(
+    tmp_path,
+):
     noise = Noise(missing=0.05, outliers=2, hidden_frame=1e-3)
     design = replace(SMALL, reference_point=(0, 0, 0.1))
     campaign = quick({"drift": 5.0}, design=design, seed=7, noise=noise)
@@ -219,7 +221,7 @@ def test_campaign_of_commanded_poses_is_read_again(tmp_path):
     np.testing.assert_allclose(readings, np.array(expected)[:, own], rtol=0, atol=1e-9)
 
 
-def test_truth_has_the_keys_of_the_practice_campaigns():
+def test_file_of_hidden_effects_has_the_keys_of_the_practice_campaigns():
     campaign = quick({"drive_compliance": 5.0, "link_length": 3.0}, seed=1)
     truth = json.loads(json.dumps(plain(truth_of(campaign))))
     assert truth["verdict"] == "explained"
@@ -237,7 +239,7 @@ def test_truth_has_the_keys_of_the_practice_campaigns():
 
 
 @pytest.mark.parametrize("name", sorted(TRUTH))
-def test_committed_campaigns_agree_with_their_truth(name):
+def test_stored_campaigns_agree_with_their_hidden_effects(name):
     """The multibody simulation made them,
     and springs explain them down to the noise.
 
@@ -298,7 +300,7 @@ QUICK = ("self_weight", "drive_compliance", "encoder_offset", "registration",
     [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow)
      for name in LIBRARY if name not in ("joint_clearance", "geometric_stiffening")],
 )  # fmt: skip
-def test_simulated_effect_is_its_own_best_alternative(name):
+def test_simulated_effect_has_the_best_score_among_all_effects(name):
     design = varied_for(SMALL, [name])
     readings = alternatives(quick({name: 5.0}, design=design, seed=6))
     own = min(one.residual for one in readings if one.names[0].startswith(name))
@@ -342,7 +344,7 @@ def test_strengthened_effects_keep_shape_parameters():
 
 
 @pytest.mark.slow
-def test_generate_writes_a_campaign_or_one_message(tmp_path):
+def test_generate_writes_a_campaign_or_prints_one_message(tmp_path):
     def run(*words):
         command = [sys.executable, "-m", "forcefit", "validation", "generate", *words]
         return subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)

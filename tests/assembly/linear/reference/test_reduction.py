@@ -27,7 +27,7 @@ def rigid_beams(gap):
 
 
 @pytest.mark.parametrize("gap", [1e-11, 1e-6, 1e-2])
-def test_rigid_closure_stays_open_by_its_error(gap):
+def test_rigid_closure_remains_open_by_its_error(gap):
     """The reference length is 1 m, so the relative gap equals the gap in metres."""
     assert reduced(rigid_beams([0, 0, 0, 0, gap, 0])).inconsistent == pytest.approx(gap)
     assert reduced(rigid_beams([gap, 0, 0, 0, 0, 0])).inconsistent == pytest.approx(gap)
