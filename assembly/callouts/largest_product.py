@@ -26,16 +26,37 @@ def largest_product(
         sum of the norms of multipliers with sum bound^T multiplier = w.  For a cone,
         the norm is the larger one of the first entry and of the norm of the others.
     """
+    x, value, _ = product_by_bounds(w, bounds, cones)
+    return x, value
+
+
+def product_by_bounds(
+    w: NDArray, bounds: Sequence[NDArray], cones: Sequence[NDArray] = ()
+) -> tuple[NDArray, float, NDArray]:
+    """Return :func:`largest_product`, and the parts of its bound.
+
+    Args:
+        w: (m,).
+        bounds: as there.
+        cones: as there.
+
+    Returns:
+        x and the upper bound, and its part by each of ``bounds`` and ``cones``, the
+        size of the multiplier: the derivative of the bound with respect to the
+        logarithm of their size.
+    """
     length = float(np.linalg.norm(w))
     if length == 0.0:
-        return np.zeros_like(w), 0.0
+        return np.zeros_like(w), 0.0, np.zeros(len(bounds) + len(cones))
     # the value attained along w itself is the unit of all other values
     reached = 1.0 / max(_largest_gauge(w, bounds, cones), 1e-300)
     unit = length * length * reached
     w = w / unit
     rows, x, mu = np.vstack([*bounds, *cones]), np.zeros_like(w), 1.0
-    best = float(np.abs(np.linalg.lstsq(rows.T, w, rcond=None)[0]).sum())
+    start = np.abs(np.linalg.lstsq(rows.T, w, rcond=None)[0])
+    best = float(start.sum())
     ends = np.cumsum([len(b) for b in (*bounds, *cones)])[:-1]
+    of_bounds = [float(part.sum()) for part in np.split(start, ends)]
     while best > (1 + _GAP) * max(float(w @ x), 0.0) and mu > _LEAST_MU:
         centre = _centre(w, bounds, cones, x, mu)
         if centre is None:  # rounding errors: keep the value certified so far
@@ -49,10 +70,11 @@ def largest_product(
         sizes += [
             max(abs(part[0]), float(np.linalg.norm(part[1:]))) for part in parts[count:]
         ]
-        best = min(best, sum(sizes))
+        if sum(sizes) < best:
+            best, of_bounds = sum(sizes), sizes
         mu /= 10
     outside = max(1.0, _largest_gauge(x, bounds, cones))
-    return x / outside, best * unit
+    return x / outside, best * unit, np.array(of_bounds) * unit
 
 
 def _largest_gauge(

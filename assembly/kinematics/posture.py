@@ -29,7 +29,7 @@ from forcefit.assembly.kinematics.singular_posture import is_singular
 from forcefit.assembly.kinematics.track import Track
 from forcefit.assembly.model.largest import LARGEST_LENGTH
 from forcefit.assembly.model.robot import Robot
-from forcefit.inputs.table import BadInput, nearest
+from forcefit.inputs.table import BadInput, nearest, quoted
 from forcefit.results.display import (
     Figures,
     brief,
@@ -127,7 +127,15 @@ def together(postures: Sequence[Posture]) -> Posture:
 
     Returns:
         The postures with a leading axis.
+
+    Raises:
+        TypeError: a robot is given in place of postures.
     """
+    if isinstance(postures, Robot):
+        raise TypeError(
+            f"found the robot {quoted(postures.name)}, expected a posture of it, such "
+            "as forcefit.place_robot(robot)"
+        )
     return Posture(
         postures[0].robot, np.array([p.coordinates for p in postures]),
         np.array([p.transforms for p in postures]),

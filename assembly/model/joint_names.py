@@ -8,6 +8,7 @@ finds the joints.
 """
 
 import re
+from collections.abc import Container
 
 from forcefit.assembly.model.frame_series import NamedJoint
 from forcefit.assembly.model.robot import Robot
@@ -101,6 +102,23 @@ def shown_name(robot: Robot, row: int) -> str:
     return name
 
 
+def clearance_name(robot: Robot, row: int, bound: str) -> str:
+    """Return the name under which a bound of a clearance is shown.
+
+    Args:
+        robot: any robot.
+        row: of the frame with the clearance.
+        bound: ``radial``, ``axial``, ``tilt``, ``spin`` or ``ball``.
+
+    Returns:
+        ``"rail.clearance"`` of a contact of the joint ``rail``, because the bounds of
+        its contacts follow from the joint's gaps; otherwise ``"hinge.tilt"``.
+    """
+    if owner_of_contact(robot.frames[row].name, names_of(robot)):
+        return f"{joint_of(robot, row)}.clearance"
+    return f"{shown_name(robot, row)}.{bound}"
+
+
 def joint_of(robot: Robot, row: int) -> str:
     """Return the name of the drawn joint to which a frame belongs.
 
@@ -113,13 +131,27 @@ def joint_of(robot: Robot, row: int) -> str:
         is (``"foot"`` of ``foot.bore_start``); otherwise the name of the frame.
     """
     frame = robot.frames[row]
-    stem, _, end = frame.name.rpartition(".")
-    of_contact = frame.joint == "fixed" and _CONTACT.fullmatch(end) is not None
-    name = stem if of_contact and stem in names_of(robot) else frame.name
+    fixed = frame.joint == "fixed"
+    owner = owner_of_contact(frame.name, names_of(robot)) if fixed else ""
+    name = owner or frame.name
     for joint in robot.joints.values():
         if name in joint.frames:
             return joint.name
     return name
+
+
+def owner_of_contact(name: str, names: Container[str]) -> str:
+    """Return the joint or frame whose contact a frame is, or an empty text.
+
+    Args:
+        name: of a frame, such as ``"foot.bore_start"``.
+        names: of frames and joints.
+
+    Returns:
+        ``"foot"`` if it is one of the names.
+    """
+    stem, _, end = name.rpartition(".")
+    return stem if stem in names and _CONTACT.fullmatch(end) else ""
 
 
 def moves(robot: Robot, name: str) -> bool:

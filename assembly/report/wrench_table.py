@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from forcefit.assembly.linear.assembled import without_rounding
+from forcefit.assembly.model.joint_names import owner_of_contact
 from forcefit.results.text import table_lines
 from forcefit.stiffness.screws import WRENCH
 
@@ -24,7 +25,8 @@ def wrench_lines(
     """Return the wrenches through all frames and closures as lines of text.
 
     A joint that consists of several frames has one row, at the joint's point in its
-    axes, because the wrench through its other frames is the same.
+    axes, because the wrench through its other frames is the same.  The contacts of a
+    clearance have no row: together they carry the wrench through their joint.
 
     Args:
         frames: wrenches by frame, from
@@ -40,7 +42,8 @@ def wrench_lines(
         "wrenches through the bodies, at each frame's origin in its axes":
             ("frame", {
                 row: frame["wrench"] for name, frame in frames.items()
-                if (row := _shown(name, joints))
+                if not owner_of_contact(name, {*frames, *joints})
+                and (row := _shown(name, joints))
             }),
         "wrenches at the start of links under their own weight": ("frame", starts),
         "wrenches of the closures, at the platform's origin, base axes":

@@ -197,7 +197,9 @@ def capability_text(results: Mapping[str, Any]) -> str:
     """Return the capability of draws as text, with one line per quantity."""
 
     def index(one: Mapping[str, float]) -> str:
-        return f"{one['value']:.3g} ({one['lower']:.3g} to {one['upper']:.3g})"
+        # a quotient by an unknown, infinite width may be -0.0
+        value, low, high = (one[key] + 0.0 for key in ("value", "lower", "upper"))
+        return f"{value:.3g} ({low:.3g} to {high:.3g})"
 
     return "\n".join(
         f"{key} up to {one['limit']:.4g} {one['unit']}: Cp {index(one['cp'])} and Cpk "

@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
+from forcefit.assembly.callouts.largest_product import product_by_bounds
 from forcefit.assembly.callouts.zone import Zone
 from forcefit.assembly.kinematics.placed_callout import PlacedCallout
 from forcefit.assembly.kinematics.ranks import RANK
 from forcefit.assembly.linear.reference.reduction import complement
 from forcefit.assembly.model.contact_closures import contact_closures
 from forcefit.assembly.model.error_distributions import KINDS, ErrorSources
-from forcefit.assembly.model.joint_names import shown_name
+from forcefit.assembly.model.joint_names import clearance_name
 from forcefit.assembly.statistics.callout_sources import CalloutSources, Sources
 from forcefit.assembly.statistics.linear_response import LinearResponse
 from forcefit.inputs.table import BadInput
@@ -107,6 +108,61 @@ def error_sets(prepared: LinearResponse, sources: Sources) -> ErrorSets:
     )  # fmt: skip
 
 
+def parts_of(sets: ErrorSets, along: NDArray) -> list[float]:
+    """Return the parts of the zones in the largest product, loops free to open.
+
+    Args:
+        sets: zones of errors and clearances.
+        along: (total,) weights of the coordinates.
+
+    Returns:
+        One for each zone; their sum is the largest product.
+    """
+    weights = sets.weights_on_zones(along)
+    pairs = zip(sets.zones, sets.columns, strict=True)
+    return [zone.farthest_u(weights[columns])[1] for zone, columns in pairs]
+
+
+def rigid_parts(sets: ErrorSets, along: NDArray) -> list[float]:
+    """Return the parts of the zones in the largest product where rigid loops close.
+
+    Args:
+        sets: zones of errors and clearances.
+        along: (total,) weights of the coordinates.
+
+    Returns:
+        One for each zone: the derivative of the largest product with respect to the
+        logarithm of the zone's size.  Their sum is the largest product (Euler).
+    """
+    N, bounds, cones = bounds_where_closed(sets, sets.rigid_rows)
+    _, _, sizes = product_by_bounds(along @ N, bounds, cones)
+    counts = [len(zone.bounds_on_u) for zone in sets.zones]
+    cone_counts = [len(zone.cones_on_u) for zone in sets.zones]
+    by_zone = np.repeat(np.arange(len(counts)), counts).tolist()
+    by_zone += np.repeat(np.arange(len(counts)), cone_counts).tolist()
+    found = np.bincount(by_zone, weights=sizes, minlength=len(counts))
+    return [float(part) for part in found]
+
+
+def bounds_where_closed(
+    sets: ErrorSets, rows: NDArray
+) -> tuple[NDArray, list[NDArray], list[NDArray]]:
+    """Return the null space of rows, and the bounds of all zones in it.
+
+    Args:
+        sets: zones of errors and clearances.
+        rows: (k, total) that must be zero.
+
+    Returns:
+        (total, m) orthonormal basis, and the rows of balls and of double cones (., m).
+    """
+    N = np.linalg.svd(rows)[2][len(rows) :].T
+    own = list(zip(sets.zones, sets.columns, strict=True))
+    bounds = [b @ N[columns] for zone, columns in own for b in zone.bounds_on_u]
+    cones = [c @ N[columns] for zone, columns in own for c in zone.cones_on_u]
+    return N, bounds, cones
+
+
 def _contact_rows(prepared: LinearResponse, columns: NDArray) -> NDArray:
     """Return the closure rows that couple the parallel contacts of a joint."""
     found = [np.zeros((0, columns.shape[1]))]
@@ -167,7 +223,9 @@ def _half_widths(sources: ErrorSources) -> NDArray:
 
 
 def _cone_name(prepared: LinearResponse, column: NDArray) -> str:
-    """Return the name of a clearance: its frame and its components."""
+    """Return the name of a clearance: its joint or frame, and its components."""
     row = int(np.flatnonzero(column)[0])
     kind = ("tilt", "tilt", "spin", "radial", "radial", "axial")[row % 6]
-    return f"{kind} clearance of {shown_name(prepared.posture.robot, row // 6)}"
+    name = clearance_name(prepared.posture.robot, row // 6, kind)
+    joint, _, bound = name.rpartition(".")
+    return f"{'' if bound == 'clearance' else f'{bound} '}clearance of {joint}"

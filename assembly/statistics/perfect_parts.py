@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.assembly.model.clearance import bound_name
-from forcefit.assembly.model.joint_names import shown_name
+from forcefit.assembly.model.joint_names import clearance_name
 from forcefit.assembly.statistics.experiment import Experiment
 from forcefit.assembly.statistics.linear_response import LinearResponse
 from forcefit.assembly.statistics.quantities import POSE_ERRORS, UNITS
@@ -97,8 +97,11 @@ def _clearance_kinds(prepared: LinearResponse) -> list[str]:
     robot, kinds = prepared.posture.robot, []
     for first, end in zip(prepared.starts[:-1], prepared.starts[1:], strict=True):
         columns: NDArray = prepared.joints.cones[:, first:end]
-        name = shown_name(robot, int(columns.any(axis=1).argmax()) // 6)
-        kinds.append(f"{kind_of(name)}.{bound_name(columns)}")
+        row = int(columns.any(axis=1).argmax()) // 6
+        joint, _, bound = clearance_name(robot, row, bound_name(columns)).rpartition(
+            "."
+        )
+        kinds.append(f"{kind_of(joint)}.{bound}")
     return kinds
 
 

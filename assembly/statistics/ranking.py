@@ -74,12 +74,13 @@ def shares_sentence(
 
     Returns:
         A sentence such as ``"position of bore 2 on link_a: 31 % of the variance of the
-        translation (27 to 36 %); .."``.
+        translation (27 to 36 %); .."``.  Estimates and intervals from few draws may
+        leave the range from 0 to 100 %; the sentence states the part within it.
     """
-    parts = [
-        f"{name}: {100 * value:.0f} % ({100 * low:.0f} to {100 * high:.0f} %)"
-        for name, (value, low, high) in shares[:_IN_SENTENCE]
-    ]
+    parts = []
+    for name, share in shares[:_IN_SENTENCE]:
+        value, low, high = (100 * min(max(x, 0.0), 1.0) for x in share)
+        parts.append(f"{name}: {value:.0f} % ({low:.0f} to {high:.0f} %)")
     parts[0] = parts[0].replace(" % (", f" % of the variance of the {quantity} (", 1)
     return "; ".join(parts)
 

@@ -29,7 +29,10 @@ from forcefit.assembly.solvers.outer_cuts import farthest
 from forcefit.assembly.statistics.callout_sources import CalloutSources, Sources
 from forcefit.assembly.statistics.error_sets import (
     ErrorSets,
+    bounds_where_closed,
     error_sets,
+    parts_of,
+    rigid_parts,
     zones_of_errors,
 )
 from forcefit.assembly.statistics.linear_response import LinearResponse, linear_response
@@ -127,17 +130,13 @@ def worst_pose(
         direction = screw[half : half + 3]
     size = float(np.linalg.norm(direction))
     direction = direction / size if size else np.eye(3)[0]
-    weights = sets.weights_on_zones(direction @ sets.screws[half : half + 3])
-    shares = [
-        (name, zone.farthest_u(weights[columns])[1])
-        for name, zone, columns in zip(
-            sets.names, sets.zones, sets.columns, strict=True
-        )
-    ]
-    shares.sort(key=lambda share: -share[1])
-    return WorstPose(
-        quantity, reading, low, max(low, high), direction, tuple(shares), rigid
-    )
+    along = direction @ sets.screws[half : half + 3]
+    parts = rigid_parts(sets, along) if reading == "rigid" else parts_of(sets, along)
+    shares: dict[str, float] = {}  # the contacts of one joint have one name
+    for name, part in zip(sets.names, parts, strict=True):
+        shares[name] = shares.get(name, 0.0) + part
+    ordered = tuple(sorted(shares.items(), key=lambda share: -share[1]))
+    return WorstPose(quantity, reading, low, max(low, high), direction, ordered, rigid)
 
 
 def bound_worst_pose(
@@ -249,10 +248,7 @@ def _support(
             return height, sets.screws @ z, z
 
         return closed_form
-    N = np.linalg.svd(rows)[2][len(rows) :].T
-    own = list(zip(sets.zones, sets.columns, strict=True))
-    bounds = [b @ N[columns] for zone, columns in own for b in zone.bounds_on_u]
-    cones = [c @ N[columns] for zone, columns in own for c in zone.cones_on_u]
+    N, bounds, cones = bounds_where_closed(sets, rows)
 
     def programme(direction: NDArray) -> tuple[float, NDArray, NDArray]:
         y, height = largest_product(direction @ P @ N, bounds, cones)

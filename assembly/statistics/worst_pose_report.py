@@ -11,6 +11,7 @@ from forcefit.page.page import paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
 
 _LISTED = 8  # largest number of shares in the text
+_LEAST = 1e-6  # smallest part of the sum that is listed; less is rounding
 
 
 def worst_results(
@@ -55,7 +56,7 @@ def worst_text(results: Mapping[str, Any]) -> str:
         lines += [
             f"  {name}: {share:.3g} {unit} ({share / total:.0%})"
             for name, share in list(worst["shares"].items())[:_LISTED]
-            if share > 0
+            if share > _LEAST * total
         ]
     return "\n".join(lines)
 
@@ -72,7 +73,7 @@ def worst_section(results: Mapping[str, Any]) -> str:
         [f"{key}: {name}", Value(share, one["unit"]),
          share / sum(one["shares"].values())]
         for key, one in results.items() for name, share in one["shares"].items()
-        if share > 0
+        if share > _LEAST * sum(one["shares"].values())
     ]  # fmt: skip
     text = paragraph("Over all errors within tolerance and all clearances:")
     of: list[str | Column] = ["error or clearance", "its part", Column("share")]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.assembly.model.robot import Robot
-from forcefit.inputs.table import BadInput, nearest, quoted
+from forcefit.inputs.table import BadInput, quoted
 from forcefit.stiffness.screws import SCREW
 
 Closure = tuple[str, str]
@@ -192,8 +192,8 @@ def check_plan(plan: Plan, robot: Robot) -> None:
         if isinstance(step, Release):
             for name in step.steps:
                 if name not in held:
-                    found = f"found {quoted(name)}{nearest(name, held)}"
-                    raise BadInput(f"{where}.release: {found}, expected {_held(held)}")
+                    found = f"found {quoted(name)}, which nothing holds"
+                    raise BadInput(f"{where}.release: {found}; expected {_held(held)}")
                 del held[name]
 
 

@@ -134,6 +134,18 @@ def _check_name(whose: str, what: str, name: str, robot: Robot | None) -> None:
         raise BadInput(f'{whose}: unknown {what} "{name[:60]}"{hint}')
 
 
+def _check_columns(
+    whose: str, header: Sequence[str], extra: Sequence[str], robot: Robot
+) -> None:
+    """Reject a column that no posture has, under the name that the file gives it."""
+    joints = [_JOINT + f.name for f in robot.frames if f.actuated]
+    valid = [*(f"pose.{name}" for name in POSE), *joints, *extra]
+    for name in header:
+        if name not in valid and name not in POSE:
+            hint = nearest(name, valid)
+            raise BadInput(f"{whose}: unknown column {quoted(name)}{hint}")
+
+
 def _check_kind(whose: str, names: Mapping | Sequence[str]) -> None:
     """Reject a mixture of pose components and joint coordinates."""
     joints = [name for name in names if name.startswith(_JOINT)]
@@ -202,9 +214,8 @@ def read_targets(path: Path | str, robot: Robot, extra: Sequence[str] = ()) -> T
         )
     header = [cell.strip() for cell in rows[0][1]]
     names = [cell.removeprefix("pose.") for cell in header if cell != "id"]
+    _check_columns(f"{path}: line 1", header, ("id", *extra), robot)
     for name in names:
-        if name not in extra:
-            _check_name(f"{path}: line 1", "column", name, robot)
         if names.count(name) > 1 or header.count("id") > 1:
             raise BadInput(f"{path}: line 1: a column is given twice: {quoted(name)}")
     components = [name for name in names if name not in extra]

@@ -339,7 +339,8 @@ class Table:
             f"< {below:g}" if below < math.inf else "",
         ]
         range_ = " and ".join(filter(None, limits))
-        expected = " ".join(filter(None, ["a finite number", range_, f"[{unit}]"]))
+        of_unit = f"[{unit}]" if unit else ""
+        expected = " ".join(filter(None, ["a finite number", range_, of_unit]))
         if default is not None and not self.has(key):
             return default
         value = as_number(self.require(key, expected))
@@ -348,7 +349,7 @@ class Table:
             raise self.bad(key, f"found {value_text}, expected {expected}")
         if abs(value) > largest:
             value_text = describe(self.content[key])
-            expected = f"a number of size at most {largest:g} [{unit}]"
+            expected = f"a number of size at most {largest:g} {of_unit}".rstrip()
             raise self.bad(key, f"found {value_text}, expected {expected}")
         return value
 

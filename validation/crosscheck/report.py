@@ -105,7 +105,9 @@ def compared(check: Crosscheck) -> list[str]:
         "A linearised model must differ from the simulation by the square of the "
         f"errors' size: slope 2. {_slope_text(check.slope)}"
     )
-    return [text, *pieces, _slope_chart(check, check.metric)]
+    # differences below the noise draw no line of slope 2
+    chart = [] if np.isnan(check.slope) else [_slope_chart(check, check.metric)]
+    return [text, *pieces, *chart]
 
 
 def _slope_text(slope: float) -> str:

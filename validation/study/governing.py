@@ -10,6 +10,12 @@ from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
 from forcefit.assembly.linear.pose_error import bound_pose_error
 from forcefit.assembly.linear.reference.reduction import FreeMotion
 from forcefit.assembly.model.clearance import BOUNDS, own_cone
+from forcefit.assembly.model.joint_names import (
+    joint_of,
+    names_of,
+    owner_of_contact,
+    shown_name,
+)
 from forcefit.assembly.model.robot import Frame, Robot
 from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.assembly.steps.bolted import bolt_joints
@@ -66,21 +72,40 @@ def _improved(robot: Robot) -> list[tuple[str, str, Robot]]:
             errors = declared.copy()
             errors[i] = 0.0
             cases.append((frame.name, ERROR, bolt_joints(robot.with_errors(errors))))
-    for i, frame in enumerate(robot.frames):
-        tight = _tight(frame)
-        if tight is not None:
-            frames = (*robot.frames[:i], tight, *robot.frames[i + 1 :])
-            cases.append((frame.name, CLEARANCE, replace(robot, frames=frames)))
+    for part, rows in _loose_parts(robot).items():
+        frames = list(robot.frames)
+        for i in rows:
+            frames[i] = _tight(frames[i])
+        cases.append((part, CLEARANCE, replace(robot, frames=tuple(frames))))
     return cases
 
 
-def _tight(frame: Frame) -> Frame | None:
-    """Return the joint without its clearances; None if there are no clearances."""
+def _loose_parts(robot: Robot) -> dict[str, list[int]]:
+    """Rows of the frames with clearance, by joint: all contacts of one together."""
+    parts: dict[str, list[int]] = {}
+    names = names_of(robot)
+    for i, frame in enumerate(robot.frames):
+        if _finite_bounds(frame):
+            contact = owner_of_contact(frame.name, names)
+            part = joint_of(robot, i) if contact else shown_name(robot, i)
+            parts.setdefault(part, []).append(i)
+    return parts
+
+
+def _finite_bounds(frame: Frame) -> dict[str, float]:
+    """Bounds of a joint's clearances; an infinite one is a free motion."""
+    if frame.clearance is None:
+        return {}
     own = own_cone(frame)
-    clearances = [key for k, key in enumerate(BOUNDS) if k != own]
-    bounds = [getattr(frame.clearance, key, None) or 0.0 for key in clearances]
-    if not any(bounds) or np.isinf(bounds).any():  # inf is free, not a clearance
-        return None
+    bounds = {
+        key: getattr(frame.clearance, key, None) or 0.0
+        for k, key in enumerate(BOUNDS) if k != own
+    }  # fmt: skip
+    return {key: bound for key, bound in bounds.items() if 0.0 < bound < np.inf}
+
+
+def _tight(frame: Frame) -> Frame:
+    """Return the joint without its clearances."""
     assert frame.clearance is not None
-    tight = replace(frame.clearance, **dict.fromkeys(clearances))
+    tight = replace(frame.clearance, **dict.fromkeys(_finite_bounds(frame)))
     return replace(frame, clearance=tight)

@@ -9,6 +9,7 @@ import numpy as np
 from forcefit.assembly.linear.assembled import Assembly, without_rounding
 from forcefit.assembly.linear.zone import ASSEMBLABLE
 from forcefit.assembly.model.contact_closures import loops
+from forcefit.assembly.model.joint_names import joint_of
 from forcefit.assembly.model.statuses import FAILED, OK, PASSED
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import write_json, write_text
@@ -134,9 +135,13 @@ def report_page(results: StudyResults) -> str:
         stiffness_section(results),
         crosscheck_section(results),
     ]
+    described = (
+        f"{robot.name}: {robot.description}" if robot.description else robot.name
+    )
+    closed = len(loops(robot))
     about = (
-        f"{robot.name}: {robot.description}. {len(robot.frames)} frames, "
-        f"{len(loops(robot))} closures; {study.errors}; link stiffness: "
+        f"{described}. {len(robot.frames)} frames, {closed} "
+        f"closure{'' if closed == 1 else 's'}; {study.errors}; link stiffness: "
         f"{study.source}."
     )
     command = command_line()
@@ -217,7 +222,7 @@ def _force_tile(assembly: Assembly) -> Tile:
     for part, unit in ((slice(0, 3), "N m"), (slice(3, 6), "N")):
         sizes = np.linalg.norm(wrenches[:, part], axis=1)
         row = largest_row(sizes)
-        names.append(assembly.posture.robot.frames[row].name)
+        names.append(joint_of(assembly.posture.robot, row))
         shown += [" and " if shown else "", Value(float(sizes[row]), unit)]
     return Tile("Moment and force of assembly", shown, [
         f"Largest values through a body, at {names[0]} and {names[1]}; energy ",

@@ -11,7 +11,10 @@ from forcefit.assembly.kinematics.posture import (
     place_robot,
     together,
 )
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.zone import zone_margin
 from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from forcefit.assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
 from tests.linkages_for_tests import four_bar, four_bar_angles
@@ -135,3 +138,9 @@ def test_missing_distance_in_the_message_has_the_unit_of_the_requested_component
     assert message.endswith(
         f", {missing} short; expected a configuration in which every closure holds"
     )
+
+
+@pytest.mark.parametrize("function", [solve_assembly, zone_margin, platform_stiffness])
+def test_a_robot_in_place_of_a_posture_is_refused_with_a_way_out(function):
+    with pytest.raises(TypeError, match=r'robot "bars".*forcefit.place_robot\(robot\)'):
+        function(four_bar())

@@ -144,7 +144,7 @@ def test_path_that_cannot_be_computed_is_refused(call, message):
         ("time,pose.tx\n0,0\n1,nan\n", 'line 3, pose.tx: found "nan"'),
         ("time,pose.tx\n0,0\ninf,1\n", 'line 3, time: found "inf"'),
         ("time\n0\n1\n", "line 1: found no posture"),
-        ("time,pose.tw\n0,0\n1,1\n", 'line 1: unknown column "tw"'),
+        ("time,pose.tw\n0,0\n1,1\n", 'line 1: unknown column "pose.tw"'),
         ("time,pose.tx\n0,0\n1\n", "line 3: found 1 cells, expected 2"),
     ],
 )

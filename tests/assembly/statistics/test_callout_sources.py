@@ -212,7 +212,7 @@ def test_command_reports_the_importance_by_callout(tmp_path):
     assert sum(turned["shares"].values()) == pytest.approx(0.1903e-3, abs=5e-8)
     shares = results["importance"]["quantities"]["translation"]["total_index"]
     name = max(shares, key=lambda group: shares[group][0])
-    value, low, high = (round(100 * share) for share in shares[name])
+    value, low, high = (round(100 * min(share, 1.0)) for share in shares[name])
     sentence = f"{name}: {value} % of the variance of the translation ({low} to {high}"
     assert sentence in result.output
     page = (tmp_path / "page.html").read_text()

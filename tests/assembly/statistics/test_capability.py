@@ -5,9 +5,11 @@ import pytest
 
 from forcefit.assembly.statistics.capability import (
     capability,
+    capability_text,
     cp_interval,
     cpk_interval,
     cpk_interval_one_sided,
+    draws_capability,
     quantile_cp,
     quantile_cpk,
     share_outside,
@@ -81,3 +83,11 @@ def test_cp_by_quantiles_of_a_uniform_disc_equals_that_of_its_radius():
 def test_cpk_of_few_draws_has_no_lower_bound_above_zero():
     assert quantile_cpk(np.arange(100.0), 200.0)[1] == 0.0
     assert quantile_cp(np.arange(100.0), 200.0)[1] == 0.0
+
+
+def test_text_on_few_draws_above_the_limit_has_no_negative_zero():
+    x = np.linspace(2.0, 3.0, 100)
+    few = {"limit": 1.0, "unit": "m", "probability": 1.0, "lower": 0.96, "upper": 1.0}
+    text = capability_text({"size": draws_capability(x, few)})
+    assert "-0)" not in text
+    assert " to 0)" in text

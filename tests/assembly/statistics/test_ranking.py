@@ -6,6 +6,7 @@ from forcefit.assembly.statistics.ranking import (
     named_together,
     possible_ranks,
     rank_text,
+    shares_sentence,
 )
 
 
@@ -48,3 +49,11 @@ def test_error_of_a_robot_without_legs_is_reported_by_its_name():
     assert kind_of("tip.RX") == "tip.RX"
     assert kind_of("leg1.upper.pin.TZ") == "upper.pin.TZ"
     assert kind_of("leg1.hinge") == "hinge"
+
+
+def test_sentence_states_no_share_beyond_the_whole_variance():
+    few = [("bore", (0.78, 0.3, 1.63)), ("pin", (0.01, -0.02, 0.02))]
+    assert shares_sentence(few, "translation") == (
+        "bore: 78 % of the variance of the translation (30 to 100 %); "
+        "pin: 1 % (0 to 2 %)"
+    )

@@ -55,7 +55,7 @@ def test_table_of_postures_is_read_in_its_order(robot, tmp_path):
     [
         ("", "found nothing; expected a header and a row for each posture"),
         ("pose.tx\n", "found only a header; expected a header and a row"),
-        ("pose.tx,pose.ux\n1,2\n", 'line 1: unknown column "ux"'),
+        ("pose.tx,pose.ux\n1,2\n", 'line 1: unknown column "pose.ux"'),
         ("q.leg1.drve\n1\n", 'did you mean "q.leg1.drive"?'),
         ("q.leg1.elbow\n1\n", 'unknown column "q.leg1.elbow"'),
         ("pose.tx,q.leg1.drive\n1,2\n",

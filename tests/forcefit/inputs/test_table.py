@@ -207,3 +207,9 @@ def test_dotted_keys_are_read_next_to_dots_in_values(tmp_path):
 def test_integer_beyond_the_range_of_doubles_is_refused():
     with pytest.raises(BadInput, match="--workers: found inf, expected"):
         checked("--workers", 10**400, "1", least=1)
+
+
+def test_message_on_a_number_without_a_unit_has_no_brackets():
+    table = Table({"cp": -1}, "f.toml", "tolerance")
+    with pytest.raises(BadInput, match="found -1, expected a finite number > 0$"):
+        table.number("cp", "", above=0.0)

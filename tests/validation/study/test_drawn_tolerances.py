@@ -75,7 +75,8 @@ def test_numbers_on_the_page_of_a_drawn_study_equal_its_results(results):
     text = verdict(found)
     begin = "For all parts within the tolerances of the drawing and all positions"
     assert f"{begin} within the clearances its platform is at most" in text
-    assert f"{worst['rotation']['bound'] * 1e3:.3g} mrad and " in text
+    turn, shift = (1e3 * worst[key]["bound"] for key in ("rotation", "translation"))
+    assert f"{turn:.3g} mrad and {shift:.3g} mm from the nominal pose" in text
     assert "Without these tolerances and for all positions within the clear" in text
     assert "Of 4000 drawn machines 4000 assemble" in text
 
@@ -132,10 +133,13 @@ def test_bound_of_the_rotation_in_the_map_of_a_study_equals_hand_calculation(tmp
     over = table["worst_clearance"]["drawn"]["map"]
     assert over["rotation"] == bounds.values.max()
     assert over["points"] == 4
-    assert f"{1e3 * bounds.values.max():.3g} mrad and " in verdict(found)
-    assert "over the 4 poses of the map" in verdict(found)
+    turn, shift = (1e3 * over[key] for key in ("rotation", "translation"))
+    assert f"{turn:.3g} mrad and {shift:.3g} mm over the 4 poses" in verdict(found)
     page = (tmp_path / "out" / "report.html").read_text()
     assert "largest rotation over all parts within the tolerances" in page
+    # a four-bar closes one loop; this one has no description
+    assert ">four_bar. " in page
+    assert " frames, 1 closure; " in page
 
 
 def test_study_without_tolerances_has_no_statistics(tmp_path):

@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from forcefit.assembly.files.robot_file import read_robot
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from forcefit.validation.study.governing import CLEARANCE, ERROR, governing
+from tests.guided_stage_for_tests import STAGE
 
 
 def chain(*parts):
@@ -63,3 +65,17 @@ def test_a_ball_is_one_governing_clearance():
 
 def test_perfect_robot_has_no_governing_rows():
     assert governing(chain((0.0, None), (0.0, None))) == []
+
+
+def test_contacts_of_one_joint_are_one_governing_clearance(tmp_path):
+    """Slabs and octahedra of the other two joints in cvxpy, from 12 starts."""
+    path = tmp_path / "stage.toml"
+    path.write_text(STAGE)
+    rows = governing(home_posture(read_robot(path)))
+    assert [(one["part"], one["what"]) for one in rows] == [
+        ("x", CLEARANCE), ("foot", CLEARANCE), ("y", CLEARANCE)
+    ]  # fmt: skip
+    for one, size in zip(rows, (49.025e-6, 62.425e-6, 107.196e-6), strict=True):
+        assert size * (1 - 1e-5) <= one["translation"] <= size + 1e-6
+    turns = [one["rotation"] for one in rows]
+    assert turns == pytest.approx([0.48487e-3, 0.71161e-3, 0.56899e-3], rel=1e-4)
