@@ -94,5 +94,5 @@ def test_only_a_helical_joint_has_a_component_along_its_thread(tmp_path):
     with_function(tmp_path, "rs", "screw", "q.spindle", 2e-4)
     text = file.read_text().replace('where = "spindle"', 'where = "tool"')
     file.write_text(text)
-    with pytest.raises(BadInput, match='components: found "rs" there'):
+    with pytest.raises(BadInput, match='components: found "rs"'):
         read_robot(file)
