@@ -43,7 +43,7 @@ _RANK = 1e-9
 
 
 class NoSolids(Exception):
-    """Error: no link of the robot has a shape that can be meshed."""
+    """Exception: no link of the robot has a shape that can be meshed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,8 +179,8 @@ def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArr
     other = np.ones(joints.elastic.shape[1], dtype=bool)
     owner = np.abs(joints.elastic).argmax(axis=0) // 6
     other[joints.links & np.isin(owner, rows)] = False
-    # The columns belong to springs other than solids, free joints and the ends of
-    # solids.
+    # The columns belong to three kinds of motions, in this order: springs other than
+    # solids, free joints, and the ends of solids.
     columns = np.hstack([joints.elastic[:, other], joints.free])
     steps = columns.reshape(count, 6, columns.shape[1])
     first = steps.shape[2]

@@ -5,10 +5,11 @@ Each of five assumptions is compared with a model that does not make it:
 ==================  ==================================================================
 assumption          compared with
 ==================  ==================================================================
-linear closures loop closure with finite motions, :func:`.solve_exact` beams solids with
-rigid ends, computed by finite elements loads at the ends a weight spread over its link
-disc and cone a pin in two bushes, :mod:`forcefit.validation.assumptions.bushes` one
-spring a beam the same beam cut into more and more pieces, finite motions
+linear closures     loop closure with finite motions, :func:`.solve_exact`
+beams               solids with rigid ends, computed by finite elements
+loads at the ends   a weight that is distributed over its link
+disc and cone       a pin in two bushes, :mod:`forcefit.validation.assumptions.bushes`
+one spring a beam   a beam cut into more and more pieces, with finite motions
 ==================  ==================================================================
 
 Two numbers measure the error of an assumption: the difference of the platform's pose
@@ -60,7 +61,7 @@ class Cost:
 
     @property
     def matters(self) -> bool:
-        """Whether the energy error exceeds one per cent or the position error 20 um."""
+        """Whether the energy error exceeds 1 % or the position error exceeds 20 um."""
         return self.position > POSITION_LIMIT or self.energy > ENERGY_LIMIT
 
     @property

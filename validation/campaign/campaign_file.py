@@ -277,7 +277,8 @@ def _rows_of_points(
         np.isfinite(readings).any(axis=1) for readings, _ in every.values()
     ])
     if not measured:
-        # Keep rows of commands for several points if no point has been measured.
+        # If further points are declared but no point has a reading, each command is
+        # kept for every declared point, and not for the reference point.
         alone = not taken.any() and len(every) > 1
         taken[~taken.any(axis=1)] = taken.any(axis=0) if taken.any() else True
         taken[:, 0] &= not alone
@@ -360,7 +361,7 @@ def _commanded(table: MeasurementTable, robot: Robot) -> str:
 
 
 def _command(table: MeasurementTable, robot: Robot, commanded: str) -> NDArray:
-    """Return (R, 6) poses ``[t r]`` or (R, n) joint coordinates; NaN where free."""
+    """Return (R, 6) poses ``[t r]`` or (R, n) joint coordinates; free ones are NaN."""
     if commanded == "pose":
         return table.stack("pose", POSE, np.nan)
     return table.stack("q", tuple(f.name for f in robot.frames), np.nan)

@@ -17,7 +17,8 @@ _ANGLES = {
     "rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180,
     "arcsec": math.pi / 648000,
 }  # fmt: skip
-# Factors from the accepted units of each key in [units] to the SI unit, listed first.
+# For each key in [units]: the accepted units and their factors to the SI unit.  The SI
+# unit is listed first.
 UNITS = {
     "position": _LENGTHS,
     "rotation": _ANGLES,

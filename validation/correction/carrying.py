@@ -149,7 +149,7 @@ def _sessions(campaign: Campaign) -> tuple[str | None, ...]:
 
 
 def _of(campaign: Campaign, session: str | None, setup: NDArray) -> NDArray:
-    """Return (R,) bool of a session's rows; check that some, not all, are set-up."""
+    """Return (R,) bool, True for a session's rows; some must be set-up rows, not all."""
     own = campaign.in_session(session)
     if setup[own].any() and not setup[own].all():
         return own
@@ -182,7 +182,8 @@ def _judged(fit: SessionsFit, other: SessionsFit, number: int) -> Carried:
     ]
     level = max(*off, float(np.median(campaign.sigma[own])))
     cells = campaign.cells & ~setup[:, None]
-    cells[:, :3] &= not cells[:, 3:].any()  # positions only, if there are any
+    # if any position was measured, rotations are ignored
+    cells[:, :3] &= not cells[:, 3:].any()
     variance, blame = fit.spread(number, cells)
     names = [*(name for _, name in one.unknowns.names), _MACHINE]
     worst = np.flatnonzero(blame > 0.1 * blame.max()).tolist()
@@ -224,7 +225,7 @@ def carried_robot(carried: CarriedRobot) -> Robot:
 
 
 def _added(before: Any, more: dict[str, dict[str, float]]) -> dict[str, Any]:
-    """Return effects with ``more`` added to their parameters; a drift is replaced."""
+    """Return effects after adding ``more`` to their parameters; replace a drift."""
     merged = {name: dict(values) for name, values in before.items()}
     for effect, values in more.items():
         own = merged.setdefault(effect, {})

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_MOVED = 3.0  # a residual above this factor shows that the device was moved
+_MOVED = 3.0  # largest ratio of residuals, saved to fitted pose, of an unmoved device
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +108,7 @@ class PredictedReadings:
 
 
 def _both(values: NDArray) -> dict[str, float]:
-    """Return the root mean squares of positions and of rotations."""
+    """Return the root mean square of all positions, and that of all rotations."""
     return {"position": rms(values[:, 3:]), "rotation": rms(values[:, :3])}
 
 

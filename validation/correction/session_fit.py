@@ -1,13 +1,13 @@
 r"""Fit the parameters of sessions and of the machine to set-up rows.
 
-======  =============  =========  ====================================================
-symbol  code           shape      meaning
-======  =============  =========  ====================================================
-x ``x`` (k,) parameters of all sessions, then u of the machine J ``slopes`` (R,6,p+r)
-derivative of the readings by a session's p
-                                  values and of u
-C ``covariance`` (k, k) covariance of x
-======  =============  =========  ====================================================
+======  ==============  ============  ================================================
+symbol  code            shape         meaning
+======  ==============  ============  ================================================
+x       ``x``           (k,)          parameters of all sessions, then u of the machine
+J       ``slopes``      (R, 6, p+r)   derivative of the readings by a session's p
+                                      parameters and by u
+C       ``covariance``  (k, k)        covariance of x
+======  ==============  ============  ================================================
 
 The parameters of each session (:mod:`.session_unknowns`) have a flat or a Gaussian
 prior.  The parameters u of the machine (:mod:`.machine_numbers`) are common to all
@@ -80,7 +80,7 @@ class SetUp:
 
     @property
     def told(self) -> float:
-        """Prior variance of a reading over sigma^2; larger for repeated rows."""
+        """Ratio of a reading's prior variance to sigma^2; it increases with repeats."""
         left = self.campaign.robot.diagnosis.get("normalised")
         level = max(1.0, left) if isinstance(left, float) else 1.0
         return level**2 * self.repeated
@@ -140,7 +140,7 @@ class SetUp:
     def whitened(
         self, machine: MachineNumbers, values: NDArray, u: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """Return (n,) residuals and (n, p + r) slopes of set-up rows, over sigma."""
+        """Return (n,) residuals / sigma of set-up rows, and their (n, p + r) slopes."""
         own = self.own
         read, slopes = self.tangent(machine, values, u, self.rows)
         A = (slopes / own.sigma[:, :, None])[own.cells]
@@ -298,7 +298,7 @@ def _widened(
     blocks = np.concatenate([_blocks(sessions, k) for k in range(len(sessions))])
 
     def predicted(k: float) -> tuple[NDArray, float]:
-        """Return the squared prediction errors of every block, and tau."""
+        """Return each block's sum of squared prediction errors, and tau."""
         std = np.append(known, np.full(len(machine), np.sqrt(k)))
         marginal = marginalise(A, std, z, Q)
         errors, _ = leave_block_out(marginal, blocks)
@@ -316,13 +316,13 @@ def _widened(
 
 
 def _matters(more: NDArray, count: int) -> bool:
-    """Return whether the prediction errors of blocks are significantly larger."""
+    """Return whether an increase of the blocks' squared errors is significant."""
     error = float(more.std(ddof=1)) * np.sqrt(len(more)) if len(more) > 1 else 0.0
     return bool(more.sum() > max(_SURE * error, _MATTERS * count))
 
 
 def _blocks(sessions: Sequence[SetUp], number: int) -> NDArray:
-    """Return (n,) configurations of set-up readings, counted over all sessions."""
+    """Return the (n,) configuration of set-up readings, numbered over all sessions."""
     before = sum(len(np.unique(s.own.configuration)) for s in sessions[:number])
     own = sessions[number].own
     rows = np.nonzero(own.cells)[0]

@@ -116,7 +116,7 @@ class PoseMetric:
 
     @cached_property
     def limits(self) -> dict[str, Check]:
-        """Relative difference of each quantity, extrapolated to scale 0.
+        """Relative difference of both models by quantity, extrapolated to scale 0.
 
         The rotation and translation parts of screws and wrenches are compared
         separately.  Each is divided by the largest value of all frames with such a

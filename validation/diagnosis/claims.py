@@ -52,7 +52,7 @@ def supported(fit: MachineFit, one: Acting) -> bool:
 
 
 def _without_devices(fit: MachineFit, slopes: NDArray) -> NDArray:
-    """Return (n, k) slopes without the part that a measuring frame can imitate."""
+    """Return (n, k) slopes without what the measuring frame's pose can imitate."""
     own = [fit.own(one)[2] for one in fit.unknowns.effects if one.device]
     if not own:
         return slopes

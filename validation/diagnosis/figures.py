@@ -122,7 +122,7 @@ def _labels(diagnosis: Diagnosis) -> list[str]:
 
 
 def _varied(diagnosis: Diagnosis) -> dict[tuple[str, str], NDArray]:
-    """Return the variables of the charts with their names and units."""
+    """Return the name and unit of each variable that a chart shows."""
     campaign = diagnosis.campaign
     varied = {("load size", "N"): np.linalg.norm(campaign.loads[:, 3:], axis=1)}
     for i, frame in enumerate(campaign.robot.frames):

@@ -55,12 +55,12 @@ class CandidateShape:
 
     @property
     def bends(self) -> NDArray:
-        """Value of the shape parameter as (1,) if it is fitted, otherwise (0,)."""
+        """The shape parameter as an array (1,) if it is fitted; otherwise (0,)."""
         one = len(self.given) == 1 and self.form != "step"
         return np.array([value for _, value in self.given] if one else [])
 
     def bent(self, by: float) -> "CandidateShape":
-        """Return the form with its shape parameter multiplied by a factor."""
+        """Return the form with its shape parameter increased by ``by``."""
         ((key, value),) = self.given
         return replace(self, given=((key, value + by),))
 
@@ -156,7 +156,7 @@ def screw(
 
 
 def is_screw(shape: CandidateShape) -> bool:
-    """Return whether a form is one of :func:`screw`."""
+    """Return whether a form is a wave with a given period, as from :func:`screw`."""
     return shape.form.endswith("waves") and bool(shape.given)
 
 
@@ -226,7 +226,7 @@ def near(
 
 
 def _steps(conditions: Conditions, name: str, count: int) -> list[CandidateShape]:
-    """Return steps at quantiles of a variable."""
+    """Return step functions that jump at quantiles of a variable."""
     levels = np.quantile(variable(conditions, name), np.linspace(0.05, 0.95, count))
     return _at_each("step", ("size",), "at", np.unique(levels))
 

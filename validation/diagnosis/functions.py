@@ -60,7 +60,7 @@ class ScoredFunction:
 
 
 def _by_kind(turns: NDArray, gram: NDArray) -> NDArray:
-    """Return (f, c, m) rms norms of columns, for rotations and translations."""
+    """Return (f, c, m) rms norms of columns, separately by rotation and translation."""
     diagonal = np.einsum("...kk->...k", gram)
     squares = np.zeros_like(diagonal)
     for kind in (turns, ~turns):

@@ -30,7 +30,8 @@ from scipy.special import log_ndtr
 # Degrees of freedom of the prior of tau^2; the prior allows a true sigma between 1/2
 # and 3 times the declared sigma.
 FREEDOM = 20.0
-# [sigma] Prior contributions to the readings, over which the evidence is averaged.
+# [sigma] Prior standard deviations of a candidate's contribution to the readings.  The
+# evidence is averaged over these values.
 SIZES = 10.0 ** np.arange(-0.5, 4.1, 0.5)
 SPAN = math.log(SIZES[-1] / SIZES[0])
 _SEEN = 1e-8  # smaller eigenvalues of a scaled candidate are rounding errors
@@ -58,7 +59,11 @@ class Marginal:
 
 
 def marginalise(columns: NDArray, std: NDArray, z: NDArray, flat: NDArray) -> Marginal:
-    """Marginalise columns (n, k) of prior std (k,); ``flat`` (n, f) is orthonormal."""
+    """Marginalise the unknowns of the columns (n, k), with prior std (k,).
+
+    The unknowns of the orthonormal columns ``flat`` (n, f) have a flat prior.  The
+    readings ``z`` (n,) are orthogonal to ``flat``.
+    """
     X = columns * std
     M = X.T @ X
     M[np.diag_indices(len(M))] += 1.0
@@ -83,7 +88,7 @@ def leave_block_out(
         if len(U) <= U.shape[1]:
             left = np.eye(len(U)) - U @ U.T
             errors[own] = np.linalg.lstsq(left, held, rcond=None)[0]
-        else:  # Woodbury: one equation per column
+        else:  # Woodbury identity: one equation for each column
             left = np.eye(U.shape[1]) - U.T @ U
             errors[own] = held + U @ np.linalg.lstsq(left, U.T @ held, rcond=None)[0]
         size = np.linalg.slogdet(left)[1] - len(U) * math.log(2 * math.pi * tau**2)

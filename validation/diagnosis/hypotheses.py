@@ -128,7 +128,7 @@ def _of(
 def _choices(
     effect: Effect, unknowns: tuple[Unknown, ...], loads: Sequence[str]
 ) -> Iterator[list[Unknown]]:
-    """Yield subsets of the unknowns of an effect without frames; all of them first."""
+    """Yield subsets of the unknowns of an effect without frames, the full set first."""
     if effect.follows_load:
         # An offset in a direction without recorded load belongs to a different
         # candidate model.

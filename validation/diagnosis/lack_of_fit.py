@@ -106,9 +106,10 @@ def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfF
 
 
 def _alike(campaign: Campaign) -> NDArray:
-    """Return (R,) numbers, equal for equal command, load and covariates except time."""
-    # Covariates are alike if they differ by at most a thirtieth of their range.  Then
-    # an effect that is not modelled does not count as noise.
+    """Return (R,) group numbers: equal for equal command, load and covariates."""
+    # The time is ignored.  Other covariates count as equal if they differ by at most a
+    # thirtieth of their range.  Then an effect that is not modelled does not count as
+    # noise.
     parts = [campaign.repeat]
     for name, values in campaign.covariates.items():
         span = float(np.ptp(values))
@@ -129,8 +130,8 @@ def outlying(campaign: Campaign, residual: NDArray, most: int | None = None) -> 
         (R,) bool, True for an outlier.
 
     Sources:
-    Baarda (1968), A testing procedure for use in geodetic networks: the largest
-    residual is tested first.
+        Baarda (1968), A testing procedure for use in geodetic networks: the largest
+        residual is tested first.
     """
     rows = np.nonzero(campaign.cells)[0]
     squares = np.bincount(rows, residual**2, minlength=len(campaign))

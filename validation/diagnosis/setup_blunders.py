@@ -31,9 +31,11 @@ _ROWS = 40  # number of rows by which corrections are compared
 _TRIMMED = 0.9
 _MOST = 3  # largest number of simultaneous blunders
 _BEAM = 4  # number of sets of corrections that are extended
-# If a residual falls below this fraction of the initial one, only its set is extended.
+# If one set of corrections reduces the residual below this fraction of the initial one,
+# only this set is extended.
 _CLEAR = 0.1
-# A further correction is tried only if it reduces the residual below this fraction.
+# A correction is added to a set only if it reduces the residual below this fraction of
+# the set's residual.
 _LESS = 0.9
 # Blunders are reported if the residual falls below this fraction of the initial one.
 _DECISIVE = 0.5
@@ -222,7 +224,7 @@ class _Judge:
         if setup.places is not given.places or setup.axes is not given.axes:
             wide = np.nanstd(setup.points, axis=0).max()
             if np.std(setup.places, axis=0).max() > _FAR * wide:
-                return None  # unreachable targets take long
+                return None  # solving unreachable targets takes long
             poses = np.hstack([setup.places, rotation_vector(setup.axes)])
             postures, _ = place_many(moved.robot, poses)
         elif setup.coordinates is not given.coordinates:

@@ -1,12 +1,12 @@
 """Compute signatures: the first-order change of the readings by each hypothesis.
 
-======  =============  =========  ================================================
-symbol  code           shape      meaning
-======  =============  =========  ================================================
-z ``residual`` (N,) (reading - model) / sigma, measured cells only A ``columns`` (N, k)
-derivative of the model by each unknown / sigma o ``offset`` (N,) change of the model at
-zero unknowns / sigma
-======  =============  =========  ================================================
+======  ============  ======  ========================================================
+symbol  code          shape   meaning
+======  ============  ======  ========================================================
+z       ``residual``  (N,)    (reading - model) / sigma, measured cells only
+A       ``columns``   (N, k)  derivative of the model by each unknown / sigma
+o       ``offset``    (N,)    change of the model / sigma if all unknowns are zero
+======  ============  ======  ========================================================
 """
 
 from collections.abc import Mapping

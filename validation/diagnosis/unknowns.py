@@ -280,7 +280,7 @@ def _linear(conditions: Conditions) -> Conditions:
 
 
 def _resting_as(conditions: Conditions, held: Conditions) -> Conditions:
-    """Return conditions with the rest positions of others, without base compliance."""
+    """Return conditions with the rest positions of ``held``; new frames are at 0."""
     assert held.rest is not None
     rest = np.zeros_like(conditions.errors)
     for row, frame in enumerate(conditions.robot.frames):

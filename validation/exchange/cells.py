@@ -125,6 +125,6 @@ def _cells(line: str, mark: str) -> list[str]:
         line = re.sub(r"\s+(?=\[)", "", line.replace("\t", _BLANK).strip())  # X [mm]
     try:
         row = next(csv.reader([line], delimiter=mark, skipinitialspace=True))
-    except csv.Error:  # an unclosed quote
+    except csv.Error:  # the line contains an unclosed quote
         row = line.split(mark)
     return [cell.strip().strip('"').removeprefix("'").strip() for cell in row]

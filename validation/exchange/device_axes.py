@@ -31,7 +31,8 @@ _SCALED = 0.02  # largest relative scatter of distance ratios for a wrong unit
 _UNIT = 0.05
 # Distances are computed from each reading to this number of following readings.
 _PAIRED = 10
-# Relative to the declared distance of two targets; larger differences are reported.
+# Largest accepted difference between measured and declared distance of two targets,
+# relative to the declared distance.
 _APART = 0.1
 # Reversal of one axis; reversals of other axes differ only by a rotation.
 _MIRRORED = np.array([1.0, -1.0, 1.0])

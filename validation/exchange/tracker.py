@@ -27,7 +27,8 @@ from forcefit.validation.exchange.placing import Placed, place
 from forcefit.validation.exchange.reading import Reading
 from forcefit.validation.exchange.targets_file import TargetsFile, read_targets
 
-# Largest fraction of readings that may be omitted; a larger fraction has another cause.
+# Largest accepted fraction of omitted readings.  If more readings do not fit, the input
+# files are probably wrong.
 _MOST_LEFT_OUT = 0.2
 
 

@@ -43,7 +43,7 @@ _POOL = 600  # number of rows to choose from
 # Number of rows with the smallest and with the largest derivatives between which
 # exchanges are tried.
 _TRIED = 4
-_BETTER = 1e-3  # relative increase of the criterion that counts
+_BETTER = 1e-3  # smallest increase of the criterion for which rows are exchanged
 _AVERAGE = 20  # number of random plans for comparison
 _PACE = 60.0  # [s] assumed time to measure one row
 _SWING = 2400.0  # [s] assumed period of the temperature of a machine
@@ -212,7 +212,7 @@ class _Criterion:
         self._X = np.hstack(blocks).reshape(rows, -1, begin[-1])
 
     def apart(self, chosen: NDArray) -> NDArray:
-        """Return (e, e) mean non-centralities of effects if another is fitted."""
+        """Return the (e, e) mean non-centrality of each effect if another is fitted."""
         return self._value(chosen)[0]
 
     def _value(self, chosen: NDArray) -> tuple[NDArray, NDArray]:

@@ -5,13 +5,15 @@ set contain noise and changes between the rows.  Slow changes with time, tempera
 side of approach are fitted to all sets together and subtracted, so that drift does not
 count as noise.
 
-======  =============  =========  ================================================
-symbol  code           shape      meaning
-======  =============  =========  ================================================
-z ``whitened`` (N,) readings / declared sigma, measured cells by row B ``slow`` (N, p)
-columns of slow changes / sigma e ``rest`` (N,) z minus the mean of its set and the
-fitted B x h ``leverage`` (N,) weight of a cell in its fitted value
-======  =============  =========  ================================================
+======  ============  ======  ========================================================
+symbol  code          shape   meaning
+======  ============  ======  ========================================================
+z       ``whitened``  (N,)    readings / declared sigma, measured cells by row
+B       ``slow``      (N, p)  columns of slow changes / sigma
+x                     (p,)    coefficients of the slow changes
+e       ``rest``      (N,)    z minus the mean of its set and the fitted B x
+h       ``leverage``  (N,)    weight of a cell in its fitted value
+======  ============  ======  ========================================================
 
 Sources:
     Cook, Weisberg (1982), Residuals and influence in regression: the deleted residual e

@@ -1,10 +1,9 @@
 """Simulate the forced assembly as a multibody system, independently of the model.
 
 In the open robot, every body is placed without stress and with its full geometric
-error.  The loops are then closed by force, and Exudyn computes the static equilibrium
-with finite rotations.  Only the data of the robot and its joint coordinates are shared
-with the virtual-joint model.  Placement, beams and equilibrium are computed
-independently.
+error.  Forces then close the loops, and Exudyn computes the static equilibrium with
+finite rotations.  Only the data of the robot and its joint coordinates are shared with
+the virtual-joint model.  Placement, beams and equilibrium are computed independently.
 
 At each frame, the geometric error is applied first, then the deformation of the link,
 then the motion of the joint, as in the paper.  Rotation vector and translation of an

@@ -229,7 +229,7 @@ def _interleaved(design: CampaignDesign, rng: np.random.Generator) -> NDArray:
 
 
 def _loads(design: CampaignDesign, order: NDArray, rng: np.random.Generator) -> NDArray:
-    """Return (rows, 6) [N m, N] loads; two rows of each configuration repeat one."""
+    """Return (rows, 6) [N m, N] loads; each configuration repeats two of its loads."""
     loads = np.zeros((design.rows, 6))
     if design.levels == "one":
         loads[:, 3:] = (design.load * _direction(rng)).round(3)

@@ -127,7 +127,7 @@ def beam_length(robot: Robot, name: str) -> float:
 def lengthened(robot: Robot, name: str, change: float) -> Robot:
     """Return a robot with a body longer by ``change`` [m] along its actual axis."""
     frame = robot.frame(name)
-    if not isinstance(frame.link, BeamLink):  # along the line between its joints
+    if not isinstance(frame.link, BeamLink):  # lengthen the line between its joints
         longer = 1.0 + change / float(np.linalg.norm(frame.translation))
         return with_frame(robot, replace(frame, translation=longer * frame.translation))
     length, x = beam_span(frame, frame.link)
@@ -145,7 +145,7 @@ def with_frame(robot: Robot, frame: Frame) -> Robot:
 
 
 def misread(machine: Machine, name: str, suffix: str, change: float) -> Machine:
-    """Return a machine with a joint that deviates from its command by [rad or m]."""
+    """Return a machine with a joint displaced by ``change`` [rad or m]."""
     screw = along_own_axis(machine.robot.frame(name), change)
     robot = insert_after(machine.robot, name, suffix, geometric_error=screw)
     return replace(machine, robot=robot)
@@ -272,7 +272,7 @@ def _load_gain(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _body_mass(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Add a mass [kg] to a body, with its centre at the moment [kg m] over the mass."""
+    """Add a mass [kg] to a body; its centre is the moment [kg m] over the mass."""
     robot = machine.robot
     keys = ("mass", "moment.x", "moment.y", "moment.z")
     for name in dict.fromkeys(n for key in keys for n in named(given, key)):

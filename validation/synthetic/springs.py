@@ -140,7 +140,8 @@ def _spring_model(machines: Sequence[Machine], q: NDArray) -> _SpringModel:
     first, second = np.array(pairs, dtype=int).reshape(-1, 2).T
     closed = np.linalg.inv(nominal[:, first]) @ nominal[:, second]
     passive = [i for i, f in enumerate(robot.frames) if f.passive and not f.compliant]
-    known: dict[int, tuple[NDArray, NDArray]] = {}  # rows share frames
+    # machines share frames, which are computed once
+    known: dict[int, tuple[NDArray, NDArray]] = {}
     for frame in (f for m in machines for f in m.robot.frames):
         if id(frame) not in known:
             known[id(frame)] = _compliances(frame)
