@@ -95,7 +95,7 @@ def _verdict(costs: CostsOverPoses) -> str:
 
 
 def _good(costs: CostsOverPoses) -> bool | None:
-    """Return True without significant errors, None with any; False if all are unknown."""
+    """Return False if no error is known, None if an error is significant, else True."""
     if not costs.known:
         return False
     return None if _significant(costs) else True

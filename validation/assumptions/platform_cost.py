@@ -58,8 +58,8 @@ class PlatformCosts:
             by rounding.
         ends: (k,) [-] difference between the models ``meshed`` (rigid ends) and
             ``spread`` (wrenches distributed over the ends).
-        by_link: for each link, (k,) [-] difference between the robot with only this
-            link modelled as a beam and the robot with all links as solids; the link
+        by_link: for each link, (k,) [-] difference between two robots: one with only
+            this link modelled as a beam, and one with all links as solids.  The link
             with the largest difference is first.
         left: names of the links without a known shape.  All four models use the
             declared stiffness of these links.
@@ -159,9 +159,9 @@ def difference(C: NDArray, other: NDArray) -> float:
 def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArray:
     """Return the platform's compliance with links as solids (displacement method).
 
-    The unknowns are the displacement of each link's tip relative to its base, the
-    deformations of the joint springs and the motions of the free joints.  The elastic
-    energy of a solid depends on the displacements of both of its ends.
+    There are three kinds of unknowns: the displacement of each link's tip relative to
+    its base, the deformations of joint springs, and the motions of free joints.  The
+    elastic energy of a solid depends on the displacements of both of its ends.
 
     Args:
         posture: the robot's configuration; its clearances count as zero.

@@ -90,8 +90,8 @@ def read_commands(source: Path | str, robot: Robot) -> Campaign:
     Args:
         source: a campaign, or a single table with the same columns in SI units.  The
             readings of a single table belong to the measured point for which the robot
-            was identified, or to the platform's origin if the robot file names no
-            point.
+            was identified.  If the robot file names no point, they belong to the
+            platform's origin.
         robot: robot that replaces the robot of the campaign.
 
     Returns:
@@ -157,7 +157,7 @@ def _table_names(root: Table) -> list[str]:
         return [root.text("measurements", expected="a CSV file")]
     proper = given and all(isinstance(v, str) and v.strip() for v in given)
     if not proper or len({Path(v).stem for v in given}) < len(given):
-        message = f"found {describe(given)}, expected CSV files of different names"
+        message = f"found {describe(given)}, expected a list of different CSV files"
         raise root.bad("measurements", message)
     return given
 
@@ -180,7 +180,7 @@ def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Ca
     for name in declared.dialect.motions:
         if f"cov.{name}" not in table.columns or name in COVARIATES:
             units = declared.root.table("units")
-            message = f"found {quoted(name)}, expected a column of further covariates"
+            message = f"found {quoted(name)}, expected a covariate column of the table"
             raise units.bad(f"cov.{name}", message)
     commanded = _commanded(table, robot)
     check_commands(table, robot)

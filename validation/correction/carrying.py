@@ -1,14 +1,14 @@
 r"""Fit a saved robot to set-up rows of a new session, and test it on other rows.
 
-The parameters of a session are the pose of the measuring device, the changes with time
-and, if requested, the measured point and the zeros of the joints
+The parameters of a session are the pose of the measuring device and the changes with
+time.  If requested, the measured point and the zeros of the joints are parameters too
 (:mod:`.session_unknowns`).  The prior of the robot's parameters consists of their saved
 values and covariance (:mod:`.machine_numbers`).  All parameters are fitted to the
 set-up rows of all sessions (:mod:`.session_fit`), and tested on all other rows.  Set-up
 rows are the rows that are measured first to fit a new session.
 
-The set-up rows are insufficient if the uncertainty of the fit, propagated to the other
-rows, exceeds the residual of the set-up rows with the saved robot.
+The uncertainty of the fit is propagated to the other rows.  The set-up rows are
+insufficient if this uncertainty exceeds their own residual with the saved robot.
 """
 
 import math
@@ -149,7 +149,7 @@ def _sessions(campaign: Campaign) -> tuple[str | None, ...]:
 
 
 def _of(campaign: Campaign, session: str | None, setup: NDArray) -> NDArray:
-    """Return (R,) bool, True for a session's rows; some must be set-up rows, not all."""
+    """Return (R,) bool, True for a session's rows; check its set-up rows."""
     own = campaign.in_session(session)
     if setup[own].any() and not setup[own].all():
         return own

@@ -56,9 +56,10 @@ def offset_table(compensation: "Compensation") -> str:
         compensation: result of :func:`.compensation.compensate`.
 
     Returns:
-        CSV with ``id``, ``offset.<drive>`` [rad or m], the errors ``before`` and
-        ``after`` correction in position [m] and rotation [rad], and the standard
-        deviation ``spread`` [m] of the position after correction.
+        CSV with ``id`` and the offsets ``offset.<drive>`` [rad or m].  The columns
+        ``before`` and ``after`` contain the errors before and after correction in
+        position [m] and rotation [rad].  The column ``spread`` is the standard
+        deviation [m] of the position after correction.
     """
     columns: dict[str, Any] = {
         f"offset.{n}": x

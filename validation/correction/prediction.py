@@ -117,8 +117,8 @@ def predict(commands: Campaign) -> PredictedReadings:
 
     The registration is the pose of the measuring device.  An unknown registration is
     read from the robot file.  The registration is fitted to the measured rows if the
-    file contains none, or if the residual of these rows shows that the device was
-    moved.
+    file contains none.  It is also fitted if the residual of these rows shows that the
+    device was moved.
 
     Args:
         commands: campaign with the robot, its effects and its rows.

@@ -17,10 +17,10 @@ degrees of freedom.  Rows of one configuration contain the same information, so 
 they have the weight of one row.
 
 k is chosen by cross-validation: each configuration of the set-up rows is predicted by a
-fit to the others.  A larger k replaces a smaller one only if its predictions are better
-by more than a standard error and by a relevant part of the noise.  The Bayesian
-evidence of k is not used, because the evidence assumes that the machine changed in the
-directions of the covariance.
+fit to the others.  A larger k replaces a smaller one only if it reduces the prediction
+error significantly: by more than a standard error, and by a relevant part of the noise.
+The Bayesian evidence of k is not used, because the evidence assumes that the machine
+changed in the directions of the covariance.
 """
 
 from collections.abc import Sequence
@@ -48,7 +48,7 @@ from forcefit.validation.diagnosis.separability import orthonormal_basis
 
 _STEPS = 8
 _SETTLED = 1e-3  # [standard deviations] largest change at convergence
-_WIDENED = 4.0 ** np.arange(8)  # candidate values of k
+_WIDENED = 4.0 ** np.arange(8)  # candidate values of k, the factor on the covariance
 _SURE = 1.0  # number of standard errors by which a larger k must predict better
 _MATTERS = 0.03  # [-] smallest relevant improvement / variance of the noise
 _AT_ONCE = 1000  # number of rows processed together, which limits memory
@@ -170,7 +170,7 @@ class SessionsFit:
 
     @property
     def u(self) -> NDArray:
-        """(r,) independent variables of the machine's changes."""
+        """(r,) independent variables u that describe the changes of the machine."""
         return self.x[len(self.x) - len(self.machine) :]
 
     @property
@@ -244,7 +244,7 @@ def _settled(
     sessions: Sequence[SetUp], machine: MachineNumbers, x: NDArray,
     told: Sequence[float], widened: float,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the most probable x (k,) and its covariance (k, k)."""
+    """Return the most probable parameters x (k,) and their covariance (k, k)."""
     begin = len(x) - len(machine)
     mean = np.concatenate([
         *(s.unknowns.mean for s in sessions),
@@ -269,7 +269,7 @@ def _settled(
 
 
 def _inverse(H: NDArray) -> NDArray:
-    """Return the inverse of H; directions without information remain finite."""
+    """Return the inverse of the information matrix H, finite for a singular H too."""
     size = np.sqrt(np.diag(H))
     unit = np.where(size > 0, size, 1.0)
     scaled = H / np.outer(unit, unit) + 1e-14 * np.eye(len(H))
@@ -280,7 +280,7 @@ def _widened(
     sessions: Sequence[SetUp], machine: MachineNumbers, x: NDArray,
     told: Sequence[float],
 ) -> tuple[float, float]:  # fmt: skip
-    """Return the factor k on the covariance, and tau; both from cross-validation."""
+    """Return the factor k on the robot's covariance, and the noise scale tau."""
     values = sum(len(one.unknowns) for one in sessions)
     zs, rows = [], []
     for k, one in enumerate(sessions):

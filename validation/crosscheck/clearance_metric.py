@@ -63,8 +63,8 @@ class ClearanceMetric:
     def gaps(self) -> NDArray:
         """(k,) relative optimality gaps of the simulated clearance screws.
 
-        The gap is divided by the energy of closing the loops without clearances, or by
-        the energy stored under the load if that is larger.
+        The gap is divided by the larger of two energies: the energy of closing the
+        loops without clearances, and the energy stored under the load.
         """
         return np.array([optimality_gap(pair) for pair in self.pairs])
 

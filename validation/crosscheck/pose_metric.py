@@ -42,7 +42,7 @@ SLOPE_TOLERANCE = 0.1
 # [-] Largest accepted fraction of the pose difference that remains with the exact model
 # if links are springs.
 EXPLAINED_TOLERANCE = 0.02
-# [-] First-order difference between a mesh's K_E and its solid, relative to the pose.
+# [-] Relative pose difference of first order between a mesh's K_E and its solid.
 # Rounding causes this difference, which is significant only if second-order terms are
 # as small.
 _ROUNDING = 2e-5

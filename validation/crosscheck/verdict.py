@@ -1,7 +1,7 @@
 """Decide whether two models agree, and add scales until every check is decided.
 
-At large errors and few scales, the uncertainty of a limit exceeds its bound, because
-terms of higher order can imitate or cancel errors of first order.  Smaller scales are
+Terms of higher order can imitate or cancel errors of first order.  At large errors and
+few scales, the uncertainty of a limit therefore exceeds its bound.  Smaller scales are
 then added, each half of the last, until every check is decided.  At small scales, terms
 of higher order vanish and a wrong term of first order remains.  A check can fail only
 if at least four scales were solved.

@@ -61,7 +61,7 @@ def _without_devices(fit: MachineFit, slopes: NDArray) -> NDArray:
 
 
 def _at_bound(bound: float, value: float) -> bool:
-    """Return whether a value is at a finite bound."""
+    """Return whether a parameter's value is at a finite bound of the parameter."""
     return bool(np.isfinite(bound) and abs(value - bound) <= _AT_BOUND * abs(bound))
 
 

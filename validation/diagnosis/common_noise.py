@@ -1,11 +1,11 @@
 """Estimate the noise that the points of one measurement share.
 
-If a device measures several points of the platform together, the readings of all points
-contain the repeatability of the machine and the motion of the device's frame.  This
-shared noise is modelled as a small random motion of the platform in each measurement.
-One standard deviation describes its rotations, and one describes the translations of
-the points' centre.  Both standard deviations maximise the evidence of a model of the
-readings, in which all other unknowns are marginalised.
+A device may measure several points of the platform together.  The readings of all these
+points then share two errors: the machine's repeatability error and the motion of the
+device's frame.  This shared noise is modelled as a small random motion of the platform
+in each measurement.  One standard deviation describes its rotations, and one describes
+the translations of the points' centre.  Both standard deviations maximise the evidence
+of a model of the readings, in which all other unknowns are marginalised.
 """
 
 import math

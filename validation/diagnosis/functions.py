@@ -95,7 +95,7 @@ class Functions:
         return other
 
     def at_rows(self, rows: NDArray) -> "Functions":
-        """Return the functions with the columns of selected rows only."""
+        """Return the candidate functions, with their columns for selected rows only."""
         other = copy(self)
         other.campaign = self.campaign.take(rows)
         other.sensitivities = self.sensitivities.take(rows)
@@ -268,7 +268,7 @@ class Functions:
         return [_at(p, part.variables, one.shape).parts for p in same]
 
     def element(self, one: Candidate, log_prior: float) -> Element | None:
-        """Return the element of a candidate; None if it is not visible."""
+        """Return the element of a candidate function; None if no reading shows it."""
         columns = in_cells(self.sensitivities, one, self.campaign)
         axes = self.sensitivities.axes(one)
         each = columns.shape[1] // sum(len(p.components) for p in one.parts)
@@ -281,6 +281,6 @@ class Functions:
 def _at(
     place: tuple[Where, ...], variables: Variables, shape: CandidateShape
 ) -> Candidate:
-    """Return the candidate with given variables at a place."""
+    """Return the candidate function of given variables that acts at a place."""
     part = CandidatePart(place[0][0], tuple(w[1] for w in place), *variables)
     return Candidate((part,), place[0][2], shape)

@@ -38,12 +38,12 @@ _SEEN = 1e-8  # smaller eigenvalues of a scaled candidate are rounding errors
 
 
 def deviance(squares: NDArray | float, count: int) -> NDArray | float:
-    """Return -2 ln p(z) of n readings, without terms independent of z' C^-1 z."""
+    """Return the part of -2 ln p(z) that depends on ``squares``, that is, on z' C^-1 z."""
     return (FREEDOM + count) * np.log1p(np.asarray(squares) / FREEDOM)
 
 
 def scale(squares: float, count: int) -> tuple[float, float]:
-    """Return the estimate of tau and its standard deviation."""
+    """Return the estimated noise scale tau and the standard deviation of tau."""
     freedom = FREEDOM + count
     tau = np.sqrt((FREEDOM + squares) / max(freedom - 2.0, 1.0))
     return float(tau), float(tau / np.sqrt(2 * freedom))
@@ -61,8 +61,11 @@ class Marginal:
 def marginalise(columns: NDArray, std: NDArray, z: NDArray, flat: NDArray) -> Marginal:
     """Marginalise the unknowns of the columns (n, k), with prior std (k,).
 
-    The unknowns of the orthonormal columns ``flat`` (n, f) have a flat prior.  The
-    readings ``z`` (n,) are orthogonal to ``flat``.
+    The columns ``flat`` (n, f) are orthonormal, and their unknowns have a flat prior.
+    The readings ``z`` (n,) are orthogonal to ``flat``.
+
+    Returns:
+        The model, to which candidates can be added.
     """
     X = columns * std
     M = X.T @ X

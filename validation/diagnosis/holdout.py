@@ -78,7 +78,7 @@ def hold_out(campaign: Campaign) -> HeldOut:
 
 
 def hidden(campaign: Campaign, rows: NDArray) -> Campaign:
-    """Return a campaign without the readings of rows (R,) bool, which are NaN."""
+    """Return a campaign in which the readings of selected rows (R,) bool are NaN."""
     readings = np.where(rows[:, None], np.nan, campaign.measured)
     return replace(campaign, measured=readings)
 

@@ -269,4 +269,4 @@ def _impossible(campaign: Campaign) -> tuple[str, ...]:
     ids = [campaign.ids[i] for i in np.flatnonzero(impossible_rows(campaign))]
     if not ids:
         return ()
-    return (f"a temperature that no sensor has, left out: {', '.join(ids[:10])}",)
+    return (f"rows left out, impossible temperature: {', '.join(ids[:10])}",)

@@ -28,8 +28,8 @@ UNLIKELY = 1e-3  # probability below which one of many tested residuals is unlik
 OUTLIERS = 20  # one outlier is accepted per this number of rows
 # Number of bins of a covariate's range; rows in one bin count as replicates.
 _LEVELS = 30
-_OUTLYING = 5.5  # rms of an outlying row / median of all rows
-_MOST = 6  # largest number of trends that are reported
+_OUTLYING = 5.5  # smallest ratio of an outlying row's rms to the median rms of all rows
+_MOST = 6  # largest number of reported trends
 
 
 @dataclass(frozen=True)

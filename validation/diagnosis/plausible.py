@@ -1,9 +1,9 @@
 """Find implausible parameters of a machine, and impossible readings of a sensor.
 
-A fit may explain readings by absurd parameters, such as a base at a distance of 29 m on
-a foundation as soft as rubber.  The plausible ranges are wide and depend on the size of
-the robot and on the largest load.  If a parameter is outside its range, the deviation
-probably has another cause, and no effect is claimed.
+A fit may explain readings by absurd parameters.  An example is a base at a distance of
+29 m on a foundation as soft as rubber.  The plausible ranges are wide and depend on the
+size of the robot and on the largest load.  If a parameter is outside its range, the
+deviation probably has another cause, and no effect is claimed.
 
 Sources:
     Ashby, Materials Selection in Mechanical Design, 4th ed., figure 4.11 (expansion of

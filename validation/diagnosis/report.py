@@ -144,7 +144,7 @@ def _steps(answer: Table) -> str:
 
 
 def _sets(answer: Table) -> str:
-    """Return the table of the sets of effects."""
+    """Return the table of the sets of effects with their probabilities."""
     rows: list[list[Cell]] = [
         [" + ".join(one["names"]) or "none", one["probability"]]
         for one in answer["alternatives"]

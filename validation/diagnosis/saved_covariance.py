@@ -222,7 +222,7 @@ def read_covariance(robot: Robot) -> SavedCovariance | None:
     except FileNotFoundError:
         raise BadInput(f"{path}: no such file; {expected}") from None
     except Exception:  # a damaged archive may raise any exception
-        raise BadInput(f"{path}: found other content, {expected}") from None
+        raise BadInput(f"{path}: found damaged content, {expected}") from None
     if C.shape != (len(values), len(values)) or not np.isfinite(C).all():
         raise BadInput(
             f"{path}: found shape {C.shape}, expected {len(values)} rows and columns"

@@ -70,7 +70,7 @@ class Scores:
     def best_to_add(
         self, state: State, *, functions: bool = True, products: bool = False
     ) -> list[tuple[float, Element]]:
-        """Return the best elements to add, with estimates of the log posterior."""
+        """Return the best elements to add to a model, with estimated log posteriors."""
         listed = [*self._library.elements, *self._explicit.elements]
         some = self._explicit.gains(state.sample_marginal)
         gains = [self._library.gains(state.marginal), self._more * some]
@@ -111,7 +111,7 @@ class Scores:
     def look(
         self, state: State, requests: Sequence[Request], most: int = 3
     ) -> list[ScoredFunction]:
-        """Return the best functions to add; scores refer to all rows."""
+        """Return the best functions to add to a model, scored over all rows."""
         found = self.functions.look(
             state.sample_marginal, self.weighted, requests, most
         )
@@ -133,7 +133,7 @@ class Scores:
         return self._made[one]
 
     def forms_of(self, last: Element, base: State) -> list[Element | None]:
-        """Return the best forms of a function's variables."""
+        """Return the forms of a function's variables with the highest scores."""
         one = last.candidate
         variables = one.parts[0].variables
         priors = self.functions.shapes_of(variables)

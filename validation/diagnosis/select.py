@@ -197,10 +197,10 @@ def _confirmed(search: Search, states: list[State]) -> list[State]:
 def _merged(states: Sequence[State]) -> list[State]:
     """Return models with distinct predictions, the best first.
 
-    Of several models with equal predictions, the one with the fewest functions is
-    returned, because a function with the columns of a library effect is the same
-    effect.  Errors of the measuring device are an exception, because the machine may
-    have the same error.
+    Of several models with equal predictions, the model with the fewest functions is
+    returned.  The reason is that a function with the columns of a library effect is the
+    same effect.  Errors of the measuring device are an exception, because the machine
+    may have the same error.
     """
     every = _best_first(states)
     # Models without functions are included in case no function is confirmed.

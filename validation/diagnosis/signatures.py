@@ -32,8 +32,8 @@ from forcefit.validation.diagnosis.hypotheses import (
     sessions_of,
 )
 
-_PROBES = 3  # number of random projections that detect equal columns
-_DIGITS = 6  # number of digits of a projection that must agree
+_PROBES = 3  # number of random projections by which equal columns are found
+_DIGITS = 6  # number of digits in which projections of equal columns must agree
 # Number of tested rows with the largest loads, and with the largest rotations.
 _PROBED = 4
 # Smallest visible change: sum of squares of all whitened readings.

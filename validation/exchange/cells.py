@@ -54,7 +54,7 @@ def read_sheet(path: Path | str, decimal: str = ".") -> Sheet:
         if line.strip() and not line.lstrip().startswith(("//", "#"))
     ]
     if not lines:
-        raise BadInput(f"{path}: empty; expected a table")
+        raise BadInput(f"{path}: found an empty file, expected a table")
     mark = _mark([line for _, line in lines[:_SAMPLE]], decimal)
     rows = [(number, _cells(line, mark)) for number, line in lines]
     for number, cells in rows:

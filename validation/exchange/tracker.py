@@ -113,7 +113,7 @@ def import_readings(
         The campaign that was written.
 
     Raises:
-        BadInput: a file violates a rule, or too many readings would be omitted, or the
+        BadInput: a file violates a rule; too many readings would be omitted; or the
             readings fit far better in a different unit, mirrored or with exchanged
             targets.  In these cases no file is written.
     """

@@ -39,7 +39,7 @@ from forcefit.validation.synthetic.design import (
 )
 from forcefit.validation.synthetic.generator import Synthetic
 
-_POOL = 600  # number of rows to choose from
+_POOL = 600  # number of candidate rows, of which some are chosen
 # Number of rows with the smallest and with the largest derivatives between which
 # exchanges are tried.
 _TRIED = 4
@@ -136,7 +136,7 @@ def plan_rows(
 def _pool(
     robot: Robot, design: CampaignDesign, wanted: int, rng: np.random.Generator
 ) -> CampaignPlan:
-    """Return the rows to choose from, spread over the duration of the required rows."""
+    """Return the candidate rows, spread over the time needed for the planned rows."""
     # The temperature changes slowly, so rows at equal times have equal temperatures.
     plan = plan_campaign(robot, design, rng)
     time = np.array([row.covariates["time"] for row in plan.rows])
@@ -258,7 +258,7 @@ class _Criterion:
 
 
 def _told(apart: NDArray) -> float:
-    """Return the value of the criterion for given non-centralities."""
+    """Return the criterion, the sum of ln(1 + l_ef), for given non-centralities."""
     return float(np.nansum(np.log1p(apart)))
 
 

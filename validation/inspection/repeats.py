@@ -2,8 +2,8 @@
 
 Rows of the same configuration and load form a set.  The residuals about the mean of a
 set contain noise and changes between the rows.  Slow changes with time, temperature and
-side of approach are fitted to all sets together and subtracted, so that drift does not
-count as noise.
+side of approach are fitted to all sets together.  They are subtracted, so that drift
+does not count as noise.
 
 ======  ============  ======  ========================================================
 symbol  code          shape   meaning
@@ -223,7 +223,7 @@ class _RepeatFit:
         )
 
     def noise(self, suspects: list[Suspect]) -> RepeatNoise:
-        """Return the noise computed without the suspects."""
+        """Return the noise computed from the repeats without the suspect readings."""
         free, rest = 1 - self.leverage, self.rest**2
         degrees = np.bincount(self.component, free, 6)
         cells = np.maximum(np.bincount(self.component, minlength=6), 1)

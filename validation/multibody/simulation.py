@@ -5,12 +5,12 @@ error.  Forces then close the loops, and Exudyn computes the static equilibrium 
 finite rotations.  Only the data of the robot and its joint coordinates are shared with
 the virtual-joint model.  Placement, beams and equilibrium are computed independently.
 
-At each frame, the geometric error is applied first, then the deformation of the link,
-then the motion of the joint, as in the paper.  Rotation vector and translation of an
-error are both in the frame's axes.  Without clearances, passive joints move freely
-about or along their z axis.  A connector closes each loop.  The target of the connector
-is corrected until the closure error vanishes, so overconstrained rigid loops such as
-parallelograms need no special treatment.
+At each frame, three motions are applied in the order of the paper: the geometric error,
+the deformation of the link, and the motion of the joint.  Rotation vector and
+translation of an error are both in the frame's axes.  Without clearances, passive
+joints move freely about or along their z axis.  A connector closes each loop.  The
+target of the connector is corrected until the closure error vanishes, so
+overconstrained rigid loops such as parallelograms need no special treatment.
 
 Sources:
     Gerstmayr (2023), "Exudyn - a C++-based Python package for flexible multibody

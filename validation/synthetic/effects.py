@@ -1,12 +1,13 @@
 """Model the effects of a simulated machine by their physics.
 
 The machine is a tree of frames, and most effects are additional frames.  For example,
-an elastic drive is a spring after the joint, an encoder error is a finite rotation
-after the joint, and an elastic foundation is a spring below all frames.  Other effects
-change a body (length, compliance, clearance), the load (weight, or a load that differs
-from the recorded load), the measuring frame, or only the reading.
+an elastic drive is a spring after the joint.  An encoder error is a finite rotation
+after the joint.  An elastic foundation is a spring below all frames.  Other effects
+change a body (length, compliance, clearance) or the load (weight, or a load that
+differs from the recorded load).  Further effects change the measuring frame, or only
+the reading.
 
-The code of the effects that a diagnosis fits is not used here, because an error in that
+A diagnosis fits effects with its own code, which is not used here.  An error in that
 code must not affect the data with which it is tested.  Effects have their public names
 and parameters.  Springs, rotations and translations of joints act about or along the z
 axis of the joint.
