@@ -141,11 +141,16 @@ def _per_session(root: Table) -> tuple[str, ...]:
     given = root.get("per_session", [])
     valid = [name for name, effect in LIBRARY.items() if effect.by_row]
     if not isinstance(given, list):
-        raise root.bad("per_session", f"found {describe(given)}, expected effects")
+        raise root.bad(
+            "per_session", f"found {describe(given)}, expected a list of effects"
+        )
     for name in given:
         if name not in valid:
             hint = nearest(str(name), valid)
-            message = f"found {describe(name)}, expected effects of single rows{hint}"
+            message = (
+                f"found {describe(name)}, expected an effect that can differ between "
+                f"sessions{hint}"
+            )
             raise root.bad("per_session", message)
     return tuple(given)
 
@@ -293,7 +298,7 @@ def _read_points(root: Table) -> dict[str, NDArray]:
     table = root.table("points")
     for name in table.content:
         if not name or "." in name or ":" in name or name in READING:
-            message = "expected a name without . and : that is no component"
+            message = "expected a name without . and : other than tx ... rz"
             raise table.bad("", f"found {quoted(name)}, {message}")
     return {name: table.array(name, (3,), "m", largest=1e4) for name in table.content}
 

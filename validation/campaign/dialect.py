@@ -49,11 +49,11 @@ class Dialect:
     motions: dict[str, str] = field(default_factory=dict)
 
     def unit(self, key: str) -> str:
-        """Return the unit of a key."""
+        """Return the unit in which the table states the quantity of a key."""
         return self.units.get(key) or next(iter(UNITS[key]))
 
     def factor(self, key: str) -> float:
-        """Return the factor from a key's unit to SI."""
+        """Return the factor from the unit of a key to the SI unit."""
         return UNITS[key][self.unit(key)]
 
     @property

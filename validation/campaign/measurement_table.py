@@ -118,7 +118,7 @@ def read_table(
         sessions = tuple(row[header.index("session")] for row in rows)
     table = MeasurementTable(str(path), ids, tuple(lines), {}, dialect, sessions)
     for i in [i for i, name in enumerate(sessions) if not name][:1]:
-        raise table.bad(i, "session", "found an empty cell, expected the session")
+        raise table.bad(i, "session", "found an empty cell, expected a session name")
     for k, name in enumerate(header):
         if name not in _TEXTS:
             table.columns[name] = _numbers(table, robot, name, [row[k] for row in rows])

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
 _STEPS = 25
 _HALVINGS = 8
-_STILL = 1e-10  # [rad or m] smaller changes of a command count as zero
+_STILL = 1e-10  # [rad or m] changes of a command below this value count as zero
 _TURN = np.pi  # [rad] largest accepted correction of a revolute drive
 # Factor on the weight of rotations if the drives cannot correct all six components.
 _LOW = 1e-4

@@ -47,7 +47,7 @@ from forcefit.validation.diagnosis.registration import coarse_frame
 from forcefit.validation.diagnosis.separability import orthonormal_basis
 
 _STEPS = 8
-_SETTLED = 1e-3  # [standard deviations] largest change at convergence
+_SETTLED = 1e-3  # [standard deviations] largest change of x at convergence
 _WIDENED = 4.0 ** np.arange(8)  # candidate values of k, the factor on the covariance
 _SURE = 1.0  # number of standard errors by which a larger k must predict better
 _MATTERS = 0.03  # [-] smallest relevant improvement / variance of the noise

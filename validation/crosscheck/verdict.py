@@ -61,7 +61,7 @@ class Check:
             return FAILS
         if not self.signal and not max(self.value, self.uncertainty) > self.bound:
             return NO_SIGNAL
-        # NaN counts as an unknown value.
+        # A comparison with NaN is false, so a NaN value is never "ok".
         known = self.value <= self.bound and self.uncertainty <= self.bound
         return OK if known else UNDECIDED
 

@@ -176,7 +176,7 @@ class Dense:
     def __init__(
         self, elements: list[Element], cells: NDArray, whiten: Whitening
     ) -> None:
-        """Group elements by their number of columns in cells (N,) bool."""
+        """Group elements by their number of columns; use only the cells (N,) bool."""
         self.elements = elements
         self._offsets: list[tuple[int, NDArray]] = []
         self._groups: list[tuple[NDArray, NDArray, NDArray, NDArray, NDArray]] = []

@@ -29,7 +29,7 @@ _TURNS = 0.5
 # Largest number of turns over the travel; in addition, at most two turns per position.
 _MOST_TURNS = 200.0
 _FINER = 1.2  # first factor in the refinement of a shape parameter
-# Smaller loads, relative to the largest load, do not close backlash.
+# Loads below this fraction of the largest load do not close backlash.
 _NO_LOAD = 1e-3
 _HIGH = 12  # highest order of waves that is tried separately
 _CLOCKS = "time", "cov.time"
@@ -243,7 +243,7 @@ def _reversals(
 
 
 def log_priors(shapes: Sequence[CandidateShape]) -> NDArray:
-    """Return the log prior of each form among all forms of its variables."""
+    """Return each form's log prior probability among all forms of its variables."""
     weight = np.array([_weight(shape) for shape in shapes])
     families = [shape.form for shape in shapes]
     total = {f: weight[[g == f for g in families]].sum() for f in set(families)}
@@ -252,7 +252,7 @@ def log_priors(shapes: Sequence[CandidateShape]) -> NDArray:
 
 
 def _weight(shape: CandidateShape) -> float:
-    """Return the relative prior of a form in its family."""
+    """Return the relative prior probability of a form in its family."""
     if is_screw(shape):
         return dict(shape.given)["period"]
     return 1.0 / max(*_orders(shape), 1) if shape.form.endswith("waves") else 1.0

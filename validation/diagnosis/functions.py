@@ -41,7 +41,7 @@ from forcefit.validation.diagnosis.places import Places, Weighted, Where
 from forcefit.validation.diagnosis.sensitivities import Sensitivities, in_cells
 
 Variables = tuple[str, ...]
-# The variables of a function, and the forms to be scored.
+# A request: the variables of a function, and the forms to be scored.
 Request = tuple[Variables, tuple[CandidateShape, ...]]
 # Largest number of columns of a function: six columns for each of six components.
 _WIDEST = 36

@@ -38,7 +38,7 @@ _SEEN = 1e-8  # smaller eigenvalues of a scaled candidate are rounding errors
 
 
 def deviance(squares: NDArray | float, count: int) -> NDArray | float:
-    """Return the part of -2 ln p(z) that depends on ``squares``, that is, on z' C^-1 z."""
+    """Return the part of -2 ln p(z) that depends on ``squares``, that is, z' C^-1 z."""
     return (FREEDOM + count) * np.log1p(np.asarray(squares) / FREEDOM)
 
 

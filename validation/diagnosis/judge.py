@@ -269,4 +269,6 @@ def _impossible(campaign: Campaign) -> tuple[str, ...]:
     ids = [campaign.ids[i] for i in np.flatnonzero(impossible_rows(campaign))]
     if not ids:
         return ()
-    return (f"rows left out, impossible temperature: {', '.join(ids[:10])}",)
+    return (
+        f"rows left out because of an impossible temperature: {', '.join(ids[:10])}",
+    )

@@ -223,7 +223,7 @@ def _powers(x: NDArray) -> NDArray:
 
 
 def _test(name: str, X: NDArray, z: NDArray, tried: int) -> Trend | None:
-    """Return the F test of functions with a constant, fitted to all components."""
+    """Return the F test of whether functions of a variable explain the residual."""
     before = after = 0.0
     extra = freedom = 0
     for column in z.T:

@@ -147,7 +147,7 @@ def _conditions_tried(conditions: Conditions) -> Conditions:
 
 def _between(measured: Conditions, rng: np.random.Generator) -> Conditions:
     """Return conditions with half of the configurations moved towards other ones."""
-    # Rest positions are known only for the measured configurations.
+    # Rest positions of clearances are known only for the measured configurations.
     if measured.rest is not None:
         return measured
     actuated = np.array([frame.actuated for frame in measured.robot.frames])

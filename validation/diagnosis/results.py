@@ -215,7 +215,7 @@ def learned(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     places = places or [len(sequence) - 1]
     shown = []
     for k, functions in enumerate(functions_of(diagnosis)):
-        # With folds, some fits may contain fewer functions.
+        # The fits of some folds may contain fewer functions.
         at = places[min(k, len(places) - 1)]
         found = diagnosis.traced.selected.functions[k]
         same = [

@@ -69,7 +69,7 @@ class Number:
         return 0.0
 
     def moved(self, robot: Robot, by: float) -> Robot:
-        """Return the robot with a larger parameter value; compliances stay positive."""
+        """Return the robot with the parameter increased; compliances stay positive."""
         if self.kind == ERROR:
             row, axis = robot.index(self.owner), READING.index(self.name)
             return with_error(robot, *map(np.atleast_1d, (row, axis, by)))

@@ -17,8 +17,8 @@ from forcefit.validation.diagnosis.states import MORE, State
 from forcefit.validation.diagnosis.weighted_readings import WeightedReadings
 from forcefit.validation.diagnosis.whitening import Whitening
 
-BEAM = 6  # largest number of elements that are tried in a model
-OF_NAME = 2  # largest number of tried elements with the same name
+BEAM = 6  # largest number of candidate elements that are added to a model on trial
+OF_NAME = 2  # largest number of these candidates with the same name
 _VARIABLES = 4  # number of variables whose products with other variables are scored
 # Largest number of columns of a function at several places, which limits memory.
 _WIDEST = 600

@@ -165,7 +165,7 @@ class Search:
             self._keep(self._refined((elements, base) for elements in tried))
 
     def _refined(self, tried: Iterable[Tried]) -> list[State]:
-        """Fit models; optimise the nuisance groups of the best three and relinearise."""
+        """Fit models; optimise nuisance groups of the best three and relinearise."""
         new = [self.models.state(elements, s.mode, s) for elements, s in tried]
         new.sort(key=lambda s: -s.score)
         best = [self._fitted(s.elements, s) for s in new[:_KEPT]]

@@ -34,11 +34,13 @@ from forcefit.validation.diagnosis.states import State, prediction_gain
 from forcefit.validation.diagnosis.unknowns import Small
 from forcefit.validation.diagnosis.weighted_readings import NONE, WeightedReadings
 
-# Models are equally good if their log posteriors differ by less (odds of 20).
+# Two models are equally good if their log posteriors differ by less than this value
+# (odds of 20).
 _EQUAL = 3.0
-# The best model must contain functions if their probability is larger.
+# The best model must contain functions if the probability of functions exceeds this
+# value.
 _CLAIMED = 0.9
-# Predictions are equal if their squared whitened difference is smaller.
+# Two predictions are equal if their squared whitened difference is below this value.
 _SAME = 1.0
 _LISTED = 20  # number of listed models; others have negligible weight
 _COMPARED = 60  # number of models whose predictions are compared
@@ -46,8 +48,8 @@ _FEWEST = 5  # smallest number of blocks for cross-validation of functions
 # Number of searches with updated shared noise, which hardly changes after the first
 # search.
 _AGAIN = 3
-# Required gain in standard errors; in tests, false functions reached 1.8 and true ones
-# at least 6.9.
+# Gain in prediction that a function must reach, in standard errors.  In tests, false
+# functions reached 1.8, and true functions at least 6.9.
 _SURE = 2.0
 
 

@@ -41,7 +41,8 @@ _LESS = 0.9
 _DECISIVE = 0.5
 # A correction is necessary if the residual without it is larger by this factor.
 _NEEDED = 1.5
-# Distances above this multiple of the spread of the readings are not caused by units.
+# A corrected set-up is not tested if its commanded positions spread by more than this
+# multiple of the spread of the readings.
 _FAR = 10.0
 _NOISE = 3.0  # [sigma] residual below which the search for blunders ends
 _LEAST = 100.0  # smallest decrease of chi-square for each reported blunder

@@ -22,7 +22,7 @@ from forcefit.validation.diagnosis.signatures import loaded_components
 _UNITS = {  # factors between units that are often confused
     "length": (25.4, 1e3),  # inches, millimetres
     "angle": (180 / np.pi,),  # degrees
-    "load": (9.81, 1e3),  # kilograms, kilonewtons
+    "load": (9.81, 1e3),  # kilograms-force, kilonewtons
 }
 
 

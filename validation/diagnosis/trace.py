@@ -56,7 +56,7 @@ _GROSS = 30.0  # smallest rms of a gross blunder / median rms of all rows
 # Functions of time must improve the prediction of other rows by this number of standard
 # errors.
 _CLEARLY = 2.0
-# [sigma] Second-order terms are added if they change a reading by more.
+# [sigma] Second-order terms are added if they change a reading by more than this value.
 _BENT = 0.3
 
 

@@ -115,7 +115,7 @@ def check_targets(
             raise BadInput(
                 f"{file}: targets: {remarks[0]}: all distances are {factor:.4g} "
                 f"times as large as declared{', ' if meant else ''}{meant}; "
-                "expected places in m"
+                "expected target positions in m"
             )
     return remarks
 

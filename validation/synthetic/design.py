@@ -16,7 +16,7 @@ from forcefit.validation.synthetic.effects import Row
 TEMPERATURES = ("swing", "around", "constant")
 _PERIOD = 2400.0  # [s] period of the temperature
 _STEP = 60.0  # [s] time between measurements
-_DRAWS = 40  # largest ratio of draws to configurations
+_DRAWS = 40  # largest number of random draws per configuration
 _DIGITS = 6  # number of decimal digits of commanded coordinates
 
 

@@ -157,7 +157,7 @@ def _of_drives_and_lengths(
 def _of_loads(
     campaign: Synthetic, differences: "_FiniteDifferences"
 ) -> Iterator[tuple[str, NDArray]]:
-    """Return columns of effects that depend on loads: springs, weight, wrong loads."""
+    """Return columns of effects that depend on loads: springs, weight, load errors."""
     beams = [f for f in campaign.robot.frames if isinstance(f.link, BeamLink)]
     base = [
         differences.loaded("base_compliance", f"stiffness.{k}", _SOFT, 1 / _SOFT)
