@@ -166,7 +166,7 @@ def summary(
 def _unexplained(
     record: Mapping[str, Any], diagnosed: Mapping[str, float] | None
 ) -> dict[str, float] | None:
-    """Return the [m, rad] unexplained error of a diagnosis; None if unknown."""
+    """Return the unexplained position [m] and rotation [rad] error; None if unknown."""
     sizes = {}
     for key in ("position", "rotation"):
         after = record.get(key, 0.0) if diagnosed is None else diagnosed[key]

@@ -20,13 +20,13 @@ from forcefit.validation.diagnosis.weighted_readings import NONE
 
 # First step of the logarithms of both standard deviations, which start at one sigma.
 _STEP = 1.0
-_CLOSE = 0.05  # change of a logarithm at which the search ends
+_CLOSE = 0.05  # change of a standard deviation's logarithm at which the search ends
 # [sigma] A standard deviation with a smaller contribution to the readings is set to 0.
 _LEAST = 0.02
 # [sigma] A standard deviation with a larger contribution to the readings is required.
 _CLEAR = 1.0
 _EVALUATIONS = 40  # largest number of evaluations; each fits a model
-_STABLE = 0.1  # changes of a logarithm below this value change no decision
+_STABLE = 0.1  # smaller changes of a standard deviation's logarithm change no decision
 
 
 def common_sizes(state: State) -> tuple[float, float]:

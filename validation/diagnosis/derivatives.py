@@ -44,7 +44,7 @@ class Derivatives:
 
     @cached_property
     def response(self) -> Responses:
-        """Response of the readings to small screws at all frames."""
+        """Response of the readings to small screws at each frame, see ``Responses``."""
         return responses(self.conditions)
 
     @cached_property

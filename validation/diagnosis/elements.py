@@ -152,7 +152,7 @@ def function_element(
     candidate: Candidate, columns: NDArray, axes: NDArray, falling: NDArray,
     most: float, log_prior: float,
 ) -> Element | None:  # fmt: skip
-    """Return the element of a function of m unknowns; None if it is not visible.
+    """Return the element of a function of m unknowns; None if no reading shows it.
 
     ``columns`` (N, m) are the whitened changes of the readings per unknown.  ``axes``
     (m,) is the screw component of each unknown.  ``falling`` (m,) are the relative

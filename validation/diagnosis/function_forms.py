@@ -20,7 +20,8 @@ MANY = 150  # number of rows from which waves of high order are searched
 # Time constants relative to the duration of the campaign.
 LAGS = 0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2, 0.3, 0.5
 _CYCLES = 0.5, 1, 1.5, 2, 3, 4, 6  # cycles of a slow wave in the campaign's duration
-_DEPTHS = 0.03, 0.1, 0.3, 1.0  # depths of slip, relative to the variable's range
+# depths of slip (hysteresis) that are tried, relative to the variable's range
+_DEPTHS = 0.03, 0.1, 0.3, 1.0
 # Depths of slip near the best depth, for the refined search.
 _ALL_DEPTHS = tuple(0.01 * 1.4**k for k in range(15))
 # Step of the search for the number of screw turns over the travel of a slide; a larger

@@ -140,7 +140,7 @@ class Functions:
         return requests
 
     def products(self, names: Iterable[str]) -> list[Request]:
-        """Return the requests for products of the given variables with all others."""
+        """Return requests for functions of two variables, of which one is given."""
         requests: dict[Variables, tuple[CandidateShape, ...]] = {}
         for name in names:
             for other in self.variables:
@@ -253,7 +253,7 @@ class Functions:
             )  # fmt: skip
 
     def _columns(self, variables: Variables, shape: CandidateShape) -> NDArray:
-        """Return (R, q) columns of a form, scaled by their relative prior."""
+        """Return (R, q) columns of a form, scaled by relative prior deviations."""
         columns = self.sensitivities.basis(variables, shape)[0]
         return columns * forms.falling(shape, columns.shape[1])
 

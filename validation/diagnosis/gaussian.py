@@ -79,7 +79,7 @@ def marginalise(columns: NDArray, std: NDArray, z: NDArray, flat: NDArray) -> Ma
 def leave_block_out(
     marginal: Marginal, blocks: NDArray, tau: float = 1.0
 ) -> tuple[NDArray, NDArray]:
-    """Predict each block of readings (n,) exactly by a fit to all others.
+    """Predict each block of readings (n,) exactly by a fit to all other blocks.
 
     Returns:
         (n,) prediction errors, and (blocks,) logarithms of the predictive densities.

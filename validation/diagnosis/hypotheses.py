@@ -213,7 +213,7 @@ def with_declared(listed: Sequence[Hypothesis], robot: Robot) -> list[Hypothesis
     return list(kept)
 
 
-# Two instances of such an effect do not combine to one effect.
+# Nonlinear effects: two instances of one of them do not combine to one effect.
 _CURVED = ("contact_stiffening", "delayed_expansion")
 _SPRINGS = ("drive_compliance", "base_compliance")
 

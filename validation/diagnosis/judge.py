@@ -166,7 +166,7 @@ def judge(
 
 def _noisy(campaign: Campaign, traced: Traced) -> Campaign:
     """Return the campaign with the noise level that residuals are compared with."""
-    # Sigma is the declared one, unless a part of it is the noise shared by points.
+    # The declared sigma is used, unless a part of sigma is the noise that points share.
     common = traced.campaign.common
     if common is None:
         return campaign

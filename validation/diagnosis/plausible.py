@@ -26,8 +26,11 @@ from forcefit.validation.diagnosis.nuisance import (
     LARGEST_TURN,
 )
 
-_GIVES = 0.2  # [rad, robot sizes] largest deformation by the largest load
-# [rad, robot sizes] largest plausible geometric error of a manufactured frame
+# [rad, or relative to the robot's size] largest plausible deformation under the largest
+# load
+_GIVES = 0.2
+# Largest plausible geometric error of a manufactured frame: rotation [rad], and
+# translation relative to the robot's size.
 _MADE = (0.1, 0.02)
 _HOT = 150.0  # [K] largest plausible difference from the calibration temperature
 _G = 9.81  # [m/s^2] acceleration of gravity

@@ -56,7 +56,7 @@ class Number:
     session: str = ""
 
     def of(self, robot: Robot) -> float:
-        """Return the value of the parameter; 0 for a change of a compliance."""
+        """Return the parameter's value in a robot; 0 for a compliance in series."""
         if self.kind == ERROR:
             return float(
                 robot.errors[robot.index(self.owner), READING.index(self.name)]
@@ -176,7 +176,7 @@ def _numbers(fit: MachineFit, robot: Robot) -> list[Number]:
 
 
 def _of_frames(part: Small, robot: Robot) -> list[Number]:
-    """Return parameters of geometric errors or compliances in the order of unknowns."""
+    """Return the names of geometric errors or compliances in the order of unknowns."""
     kind = ERROR if part.name == GEOMETRY else COMPLIANCE
     return [
         Number(kind, robot.frames[row].name, READING[axis])

@@ -127,7 +127,7 @@ class Scores:
         return len(self.readings.sampled) / max(int(self.readings.sampled.sum()), 1)
 
     def _element(self, one: Candidate, log_prior: float) -> Element | None:
-        """Return the cached element of a function, with columns of all cells."""
+        """Return the element of a function with columns of all cells, from a cache."""
         if one not in self._made:
             self._made[one] = self.functions.element(one, log_prior)
         return self._made[one]
@@ -158,7 +158,7 @@ class Scores:
         return [e for _, e in best]
 
     def sharper(self, e: Element, base: State) -> Element:
-        """Return a function with a refined shape parameter."""
+        """Return a function after a refined search for its best shape parameter."""
         one = e.candidate
         if not len(one.shape.bends):
             return e

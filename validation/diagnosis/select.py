@@ -221,7 +221,7 @@ def _merged(states: Sequence[State]) -> list[State]:
 
 
 def _without_refinements(states: Sequence[State]) -> list[State]:
-    """Merge models with a refined effect into those with the simple one if similar."""
+    """Merge a model with a refined effect into a similar one with the simple effect."""
     kept: list[State] = []
     for state in sorted(_best_first(states), key=_is_refined):
         plain = sorted(_refined(e) or e.name for e in state.elements)
@@ -242,7 +242,7 @@ def _best_first(states: Sequence[State]) -> list[State]:
 
 
 def _joined(one: State, other: State) -> State:
-    """Add the weight of another model to the weight of a model."""
+    """Return a model with the weight of another model added to its own weight."""
     return replace(one, score=float(np.logaddexp(one.score, other.score)))
 
 
@@ -251,7 +251,7 @@ def _is_refined(state: State) -> bool:
 
 
 def _refined(e: Element) -> str:
-    """Return the simpler effect that an element's effect refines, or nothing."""
+    """Return the simpler effect that an element's effect refines; empty if none."""
     return LIBRARY[e.name].refines if e.name else ""
 
 
@@ -287,7 +287,7 @@ def _models(states: Sequence[State], weights: NDArray) -> tuple[Model, ...]:
 def _learned(
     search: Search, states: Sequence[State], weights: NDArray, k: int
 ) -> Learned:
-    """Return a function of the best model, and equivalent functions."""
+    """Return a function of the best model together with its equivalent functions."""
     best, e = states[0], states[0].elements[k]
     rest = best.without([e])
     equal = list(search.columns.functions.equivalents(e.candidate))

@@ -156,12 +156,12 @@ def _needed(
 
 
 def _without(chosen: Sequence[Correction], one: Correction) -> Corrections:
-    """Return all corrections except one."""
+    """Return a set of corrections without one of its corrections."""
     return tuple(other for other in chosen if other is not one)
 
 
 def _sample(campaign: Campaign) -> NDArray:
-    """Return evenly spaced rows from those by which a set-up can be tested."""
+    """Return evenly spaced rows, out of all rows that can test a set-up."""
     cells = campaign.cells
     enough = np.any if campaign.registration == "known" else np.all
     usable = cells[:, :3].all(axis=1) | enough(cells[:, 3:], axis=1)
@@ -170,7 +170,7 @@ def _sample(campaign: Campaign) -> NDArray:
 
 
 class _Judge:
-    """Compute residuals of assumed set-ups on a sample of rows."""
+    """Computes the residuals that assumed set-ups cause in a sample of the rows."""
 
     def __init__(self, campaign: Campaign, conditions: Conditions) -> None:
         self.campaign, self.given = campaign, as_given(campaign)
@@ -220,7 +220,7 @@ class _Judge:
         return float(np.sqrt(np.mean(kept**2)))
 
     def _moved(self, setup: SetUp) -> Conditions | None:
-        """Return the conditions of a set-up; None if a command is unreachable."""
+        """Return the conditions under a set-up; None if a command is unreachable."""
         moved, given = replace(self.conditions, load=setup.loads), self.given
         if setup.places is not given.places or setup.axes is not given.axes:
             wide = np.nanstd(setup.points, axis=0).max()

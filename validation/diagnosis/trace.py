@@ -107,7 +107,7 @@ class Traced:
 
     @property
     def _alone(self) -> bool:
-        """Whether the best model contains only one element."""
+        """Whether the best model contains exactly one effect or function."""
         found = self.selected
         device = self.campaign.registration == "unknown"
         return len(found.hypotheses) - device + len(found.functions) == 1
@@ -136,7 +136,7 @@ class Traced:
         return list(found.values())
 
     def _device_frames(self, hypothesis: Hypothesis) -> list[Acting]:
-        """Return the estimated pose of the device, one hypothesis for each session."""
+        """Return the device's estimated pose as hypotheses, one for each session."""
         base = np.broadcast_to(self.conditions.base, (len(self.campaign), 6))
         own = {}
         for session in self.campaign.sessions or (None,):

@@ -112,7 +112,7 @@ def independent(campaign: Campaign, residual: NDArray) -> NDArray:
 
 
 def size_of_noise(campaign: Campaign) -> NDArray:
-    """Return (R, 6) [rad, m] standard deviations of the readings and shared noise."""
+    """Return the (R, 6) [rad, m] standard deviations of readings with shared noise."""
     if campaign.common is None:
         return campaign.sigma
     return np.sqrt(campaign.sigma**2 + np.sum(campaign.common**2, axis=2))

@@ -1,4 +1,4 @@
-"""Read the table of commands of an import."""
+"""Read the table of the machine's commands for an import of measured data."""
 
 import re
 from collections.abc import Mapping

@@ -7,7 +7,7 @@ from forcefit.validation.campaign.campaign import LOAD, READING, Campaign
 
 
 def row_counts(kinds: NDArray) -> dict:
-    """Return the number of kinds, and the range and median of the rows of a kind."""
+    """Return the number of kinds; minimum, median and maximum of rows of a kind."""
     _, rows = np.unique(kinds, return_counts=True)
     return {"count": len(rows), "rows_each": [rows.min(), np.median(rows), rows.max()]}
 

@@ -35,7 +35,8 @@ IN_BOUNDS = (
     "errors above alone, and the mean clearance of fits"
 )
 DRAWN_ERRORS = {key: f"drawn_{key}_error" for key in POSE_ERRORS}
-_MAP_TOLERANCE = 1e-3  # [-] accuracy of the bounds of a map
+# [-] relative accuracy of the certified bounds at each point of a map
+_MAP_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)

@@ -336,12 +336,15 @@ CHANGES: dict[str, Change] = {
     "body_mass": _body_mass,
     "geometric_stiffening": _geometric_stiffening,
 }
-POSES: dict[str, Moved] = {  # effects on the pose (4, 4)
+# functions that change the measured pose (4, 4), by name of the effect
+POSES: dict[str, Moved] = {
     "registration": _registration,
     "device_scale": _device_scale,
 }
-READINGS: dict[str, Moved] = {"drift": _drift}  # effects on the reading (6,)
-COVARIATES: dict[str, tuple[str, ...]] = {  # covariates that change the machine
+# functions that change the reading (6,), by name of the effect
+READINGS: dict[str, Moved] = {"drift": _drift}
+# names of the covariates that change the machine, by name of the effect
+COVARIATES: dict[str, tuple[str, ...]] = {
     "thermal_expansion": ("temperature",),
     "friction_hysteresis": ("approach",),
 }
