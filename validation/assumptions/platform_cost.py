@@ -95,7 +95,7 @@ def platform_costs(postures: Sequence[Posture]) -> PlatformCosts:
         raise FreeMotion(without_clearance(postures[0]).free_text)
     solids = solid_links(robot)
     if not solids:
-        raise NoSolids("no link has a shape that could be meshed")
+        raise NoSolids("no link has a shape that can be meshed")
     meshed = {name: solid.condensed for name, solid in solids.items()}
     true = np.full_like(declared, np.nan)
     for i in np.flatnonzero(known).tolist():

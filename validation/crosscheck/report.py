@@ -28,7 +28,7 @@ _LISTED = 30  # largest number of parameters in the table of smallest changes
 ASSUMED = (
     "The simulation (Exudyn) has geometrically exact motions; the virtual-joint model "
     "is linear in errors and loads.",
-    "Both models read the same robot file, so a wrong number in it is not found.",
+    "Both models read the same robot file, so a wrong number there is not found.",
     "Neither model has friction or contact stiffness.",
 )
 Cells = list[list[Cell]]

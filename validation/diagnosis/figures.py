@@ -167,8 +167,8 @@ def imitation_chart(shared: NDArray, names: tuple[str, ...]) -> str:
         HTML.
     """
     return matrix(
-        shared, names, "share of the row that the column can imitate",
-        "1: the column's effect can reproduce every effect of the row's.", around=False,
+        shared, names, "fraction of the row's effect that the column can imitate",
+        "Value 1: the column's effect can imitate any effect of the row.", around=False,
     )  # fmt: skip
 
 

@@ -104,7 +104,10 @@ def _text(path: Path | str) -> str:
         raise BadInput(
             f"{path}: line {line}: found the character NUL; expected a text file"
         )
-    raise BadInput(f"{path}: not UTF-16 despite its byte order mark; expected text")
+    raise BadInput(
+        f"{path}: found a byte order mark of UTF-16 but no UTF-16 text; expected a text "
+        "file"
+    )
 
 
 def _mark(lines: Sequence[str], decimal: str) -> str:
