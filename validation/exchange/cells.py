@@ -105,8 +105,8 @@ def _text(path: Path | str) -> str:
             f"{path}: line {line}: found the character NUL; expected a text file"
         )
     raise BadInput(
-        f"{path}: found a byte order mark of UTF-16 but no UTF-16 text; expected a text "
-        "file"
+        f"{path}: found a byte order mark of UTF-16 but no UTF-16 text; expected a "
+        "text file"
     )
 
 
