@@ -60,7 +60,7 @@ class MachineNumbers:
         """Return the robot with its parameters changed by L u, within their range.
 
         Args:
-            u: (r,).
+            u: (r,) independent variables; a change of the parameters is L u.
 
         Returns:
             The robot.  A parameter that cannot be negative is multiplied by a positive

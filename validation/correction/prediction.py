@@ -108,7 +108,7 @@ class PredictedReadings:
 
 
 def _both(values: NDArray) -> dict[str, float]:
-    """Return the root mean square of all positions, and that of all rotations."""
+    """Return the root mean square of the positions [m] and of the rotations [rad]."""
     return {"position": rms(values[:, 3:]), "rotation": rms(values[:, :3])}
 
 

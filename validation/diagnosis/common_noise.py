@@ -25,7 +25,7 @@ _CLOSE = 0.05  # change of a standard deviation's logarithm at which the search 
 _LEAST = 0.02
 # [sigma] A standard deviation with a larger contribution to the readings is required.
 _CLEAR = 1.0
-_EVALUATIONS = 40  # largest number of evaluations; each fits a model
+_EVALUATIONS = 40  # largest number of evaluations of the evidence; each fits a model
 _STABLE = 0.1  # smaller changes of a standard deviation's logarithm change no decision
 
 

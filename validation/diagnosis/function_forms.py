@@ -27,14 +27,16 @@ _ALL_DEPTHS = tuple(0.01 * 1.4**k for k in range(15))
 # Step of the search for the number of screw turns over the travel of a slide; a larger
 # step would miss waves.
 _TURNS = 0.5
-# Largest number of turns over the travel; in addition, at most two turns per position.
+# Largest number of screw turns over the travel of a slide.  A smaller limit applies to
+# few positions: two turns for each different position.
 _MOST_TURNS = 200.0
 _FINER = 1.2  # first factor in the refinement of a shape parameter
 # Loads below this fraction of the largest load do not close backlash.
 _NO_LOAD = 1e-3
 _HIGH = 12  # highest order of waves that is tried separately
 _CLOCKS = "time", "cov.time"
-# Number of times at which a step is tried, in short and in long campaigns.
+# Number of points in time at which a step function is tried, in short and in long
+# campaigns.
 _JUMPS, _MANY_JUMPS = 10, 91
 _INNER = np.linspace(0.1, 0.9, 9)  # quantiles at which other shape parameters are tried
 
@@ -171,9 +173,9 @@ def of_direction(conditions: Conditions, name: str) -> list[CandidateShape]:
 def of_two(
     conditions: Conditions, first: str, second: str
 ) -> tuple[tuple[str, str], list[CandidateShape]] | None:
-    """Return forms of products of two variables, and the variables in their order.
+    """Return the forms of functions of two variables, and the variables in order.
 
-    The result is None if this product is not considered.
+    The result is None if functions of these two variables are not considered.
     """
     angles = [is_angle(conditions.robot, name) for name in (first, second)]
     if {first, second} == set(_CLOCKS):

@@ -18,7 +18,8 @@ from forcefit.results.text import readings_text
 _BLUNDERS = 2e-4  # prior probability of a blunder
 _WIDTH = 30.0  # ratio of the standard deviation of a blunder to tau
 _LEFT_OUT = 1e-12  # weight of a blunder relative to a good reading
-_CLEAR = 10.0  # smallest residual / tau of a blunder before a model is fitted
+# smallest ratio of a blunder's residual to tau while no model has been fitted
+_CLEAR = 10.0
 # Largest fraction of blunders, as in the final test; more outliers indicate an effect.
 _MANY = 0.05
 _UNLIKE = 4.0  # standard deviations by which tau must differ from 1 to be reported

@@ -20,7 +20,7 @@ from forcefit.validation.diagnosis.weighted_readings import WeightedReadings
 Update = Callable[[str, int, int], None]
 # Elements to fit, and the model whose estimates are the start values.
 Tried = tuple[tuple[Element, ...], State]
-_MOST = 5  # largest number of elements (docs/diagnosis.md)
+_MOST = 5  # largest number of elements in a model (docs/diagnosis.md)
 _KEPT = 3  # width of the beam: number of models that are kept
 _LOOKED = 2  # number of models to which functions are added
 _FORMS = 4  # number of models whose last function is tried in all forms

@@ -103,7 +103,7 @@ def setup_blunders(
 
 
 def _blunder(correction: Correction, before: float, after: float) -> SetupBlunder:
-    """Return a blunder with a sentence that describes it."""
+    """Return a blunder, including a sentence that tells the user what to check."""
     columns = correction.columns
     fit, s = ("fits", "") if len(columns) == 1 else ("fit", "s")
     sentence = (

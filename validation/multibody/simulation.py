@@ -301,7 +301,7 @@ def simulated_frequencies(
         meshes={}, elements=elements, clearances=False, bushes=False,
         load=np.zeros(6), gravity=np.zeros(3), couple=np.zeros(3),
     )  # fmt: skip
-    # The robot is built closed and without load, so it is in equilibrium.
+    # The robot is built with closed loops and without load, so it is in equilibrium.
     model = Model(
         *import_exudyn(), robot.name, Regularisation(math.inf, IDLE_STIFFNESS)
     )
