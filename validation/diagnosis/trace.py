@@ -261,7 +261,7 @@ def _errors(fit: MachineFit) -> NDArray:
 
 
 def _gross(campaign: Campaign, fit: MachineFit, used: NDArray) -> NDArray:
-    """Return (R,) bool, True for fitted rows with gross outliers, which are not searched."""
+    """Return (R,) bool, True for fitted rows with gross outliers, to be omitted."""
     left = residual_of(campaign, fit.robot) / campaign.sigma
     left = np.where(campaign.cells & used[:, None], left, 0.0)
     count = np.maximum((campaign.cells & used[:, None]).sum(axis=1), 1)
