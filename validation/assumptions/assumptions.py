@@ -76,7 +76,7 @@ def assumption_costs(
 
 
 class _NotApplicable(Exception):
-    """Error: an assumption does not apply, or its error is not computed."""
+    """Exception: an assumption does not apply to the robot, or its error is unknown."""
 
 
 def _pieces_cost(

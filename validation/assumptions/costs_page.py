@@ -95,14 +95,14 @@ def _verdict(costs: CostsOverPoses) -> str:
 
 
 def _good(costs: CostsOverPoses) -> bool | None:
-    """Return True without significant errors, None with any, False if none is known."""
+    """Return False if no error is known, None if an error is significant, else True."""
     if not costs.known:
         return False
     return None if _significant(costs) else True
 
 
 def _tiles(costs: CostsOverPoses) -> list[Tile]:
-    """Return tiles of the largest errors, and of the platform's stiffness."""
+    """Return tiles with the largest pose errors and the platform's stiffness error."""
     tiles = []
     for half, unit in _HALVES:
         largest = {
@@ -190,7 +190,7 @@ def _platform(costs: CostsOverPoses) -> list[str]:
 
 
 def _poses(costs: CostsOverPoses) -> str:
-    """Return a table of the errors at every pose; an empty text for one pose."""
+    """Return a table of the errors at every pose, or an empty text for one pose."""
     if len(costs.asked) < 2:
         return ""
     head = ["pose [m, rad]", *(f"{name}, position" for name in costs.assumptions)]
@@ -207,7 +207,7 @@ def _position(cost: Cost | str) -> Cell:
 
 
 def _unreached(costs: CostsOverPoses) -> Sequence[str]:
-    """Return a table of the unreachable poses and the reasons."""
+    """Return a table of the unreachable poses, with the reason for each pose."""
     rows = [
         [pose_text(pose), why]
         for pose, why in zip(costs.asked, costs.unreached, strict=True) if why

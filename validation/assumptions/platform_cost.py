@@ -43,7 +43,7 @@ _RANK = 1e-9
 
 
 class NoSolids(Exception):
-    """Error: no link of the robot has a shape that can be meshed."""
+    """Exception: no link of the robot has a shape that can be meshed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +58,8 @@ class PlatformCosts:
             by rounding.
         ends: (k,) [-] difference between the models ``meshed`` (rigid ends) and
             ``spread`` (wrenches distributed over the ends).
-        by_link: for each link, (k,) [-] difference between the robot with only this
-            link modelled as a beam and the robot with all links as solids; the link
+        by_link: for each link, (k,) [-] difference between two robots: one with only
+            this link modelled as a beam, and one with all links as solids.  The link
             with the largest difference is first.
         left: names of the links without a known shape.  All four models use the
             declared stiffness of these links.
@@ -95,7 +95,7 @@ def platform_costs(postures: Sequence[Posture]) -> PlatformCosts:
         raise FreeMotion(without_clearance(postures[0]).free_text)
     solids = solid_links(robot)
     if not solids:
-        raise NoSolids("no link has a shape that could be meshed")
+        raise NoSolids("no link has a shape that can be meshed")
     meshed = {name: solid.condensed for name, solid in solids.items()}
     true = np.full_like(declared, np.nan)
     for i in np.flatnonzero(known).tolist():
@@ -159,9 +159,9 @@ def difference(C: NDArray, other: NDArray) -> float:
 def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArray:
     """Return the platform's compliance with links as solids (displacement method).
 
-    The unknowns are the displacement of each link's tip relative to its base, the
-    deformations of the joint springs and the motions of the free joints.  The elastic
-    energy of a solid depends on the displacements of both of its ends.
+    There are three kinds of unknowns: the displacement of each link's tip relative to
+    its base, the deformations of joint springs, and the motions of free joints.  The
+    elastic energy of a solid depends on the displacements of both of its ends.
 
     Args:
         posture: the robot's configuration; its clearances count as zero.
@@ -179,8 +179,8 @@ def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArr
     other = np.ones(joints.elastic.shape[1], dtype=bool)
     owner = np.abs(joints.elastic).argmax(axis=0) // 6
     other[joints.links & np.isin(owner, rows)] = False
-    # The columns belong to springs other than solids, free joints and the ends of
-    # solids.
+    # The columns belong to three kinds of motions, in this order: springs other than
+    # solids, free joints, and the ends of solids.
     columns = np.hstack([joints.elastic[:, other], joints.free])
     steps = columns.reshape(count, 6, columns.shape[1])
     first = steps.shape[2]

@@ -25,7 +25,7 @@ _Pose = Mapping[str, float]
 
 
 def costs_table(costs: CostsOverPoses) -> dict[str, Any]:
-    """Return the errors [rad], [m], [-] at one pose, or why they are unknown."""
+    """Return each error at one pose in rad, m and [-], or why the error is unknown."""
     return {
         "robot": costs.robot.name, "pose": costs.asked[0], "limits": _LIMITS,
         **_at(costs, 0),
@@ -55,7 +55,7 @@ def over_poses_table(costs: CostsOverPoses) -> dict[str, Any]:
 
 
 def _at(costs: CostsOverPoses, i: int) -> dict[str, Any]:
-    """Return the errors at the i-th pose reached."""
+    """Return the errors at the i-th reachable pose."""
     platform: dict[str, Any] = {"reason": costs.platform}
     if isinstance(costs.platform, PlatformCosts):
         platform = _platform(costs.platform, lambda values: values[i])
@@ -81,7 +81,7 @@ def _platform(costs: PlatformCosts, shown: Callable[[NDArray], Any]) -> dict[str
 
 
 def spread(values: NDArray, where: Sequence[_Pose]) -> dict[str, Any]:
-    """Return the median, the largest finite value, and the pose of the latter."""
+    """Return the median and the largest finite value, and the pose of the largest."""
     known = np.isfinite(values)
     if not known.any():
         return {"median": np.nan, "largest": np.nan, "at": None}

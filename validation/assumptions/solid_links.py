@@ -23,7 +23,7 @@ from forcefit.stiffness.fem.material import Material
 from forcefit.stiffness.fem.two_ends import two_ends
 from forcefit.stiffness.link import scaled
 
-_KEPT = 32  # largest number of shapes in the cache
+_KEPT = 32  # largest number of cross-section shapes in the cache
 _OPTIONS = FemOptions(
     # At this accuracy, the error of the mesh's K_E is below 1e-3 of sqrt(K_ii K_jj).
     accuracy=5e-4,

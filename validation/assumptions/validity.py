@@ -5,17 +5,18 @@ Each of five assumptions is compared with a model that does not make it:
 ==================  ==================================================================
 assumption          compared with
 ==================  ==================================================================
-linear closures loop closure with finite motions, :func:`.solve_exact` beams solids with
-rigid ends, computed by finite elements loads at the ends a weight spread over its link
-disc and cone a pin in two bushes, :mod:`forcefit.validation.assumptions.bushes` one
-spring a beam the same beam cut into more and more pieces, finite motions
+linear closures     loop closure with finite motions, :func:`.solve_exact`
+beams               solids with rigid ends, computed by finite elements
+loads at the ends   a weight that is distributed over its link
+disc and cone       a pin in two bushes, :mod:`forcefit.validation.assumptions.bushes`
+one spring a beam   a beam cut into more and more pieces, with finite motions
 ==================  ==================================================================
 
 Two numbers measure the error of an assumption: the difference of the platform's pose
 and the relative difference of the elastic energy.  The error is significant if the
-energy differs by more than one per cent, or the position by more than 20 um, the
-required accuracy of the paper's robot.  If no energy is stored and the platform does
-not move in either model, the error is unknown.
+energy differs by more than one per cent.  It is also significant if the position
+differs by more than 20 um, the required accuracy of the paper's robot.  If no energy is
+stored and the platform does not move in either model, the error is unknown.
 
 The poses of the solutions of least energy are compared.  This pose is not unique if no
 load acts on a clearance, see ``docs/validity.md``.
@@ -60,7 +61,7 @@ class Cost:
 
     @property
     def matters(self) -> bool:
-        """Whether the energy error exceeds one per cent or the position error 20 um."""
+        """Whether the energy error exceeds 1 % or the position error exceeds 20 um."""
         return self.position > POSITION_LIMIT or self.energy > ENERGY_LIMIT
 
     @property
@@ -81,9 +82,9 @@ def cost_between(
             contains.
 
     Returns:
-        The error.  Without loads, an energy below 1e-6 of the energy without clearances
-        is replaced by this limit, because inside an assembly zone both energies are
-        rounding errors.
+        The error.  Without loads, energies below a limit are replaced by this limit:
+        1e-6 of the energy without clearances.  Inside an assembly zone both energies
+        are rounding errors below the limit.
     """
     energy = better.energy + missing
     least = 0.0 if model.frame_loads else 1e-6 * model.energy_without_clearance
@@ -193,8 +194,8 @@ def pieces_cost(
     """Return the error of modelling a beam as one spring, compared with many pieces.
 
     The error of n pieces decreases as 1 / n^2 (``docs/proofs.md``).  The solutions with
-    one and two pieces therefore determine the limit for infinitely many pieces, and the
-    number of pieces for which the errors are below the limits.
+    one and two pieces therefore determine the solution for infinitely many pieces.
+    They also determine the number of pieces for which the errors are not significant.
 
     Args:
         posture: the robot's configuration.

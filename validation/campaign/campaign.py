@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# components of a deviation, in the order of a screw
+# names of the six components of a deviation, rotations before translations
 READING = ("rx", "ry", "rz", "tx", "ty", "tz")
 LOAD = ("mx", "my", "mz", "fx", "fy", "fz")
 
@@ -193,7 +193,7 @@ class Campaign:
         return np.array(rows, dtype=int)
 
     def in_session(self, session: str | None) -> NDArray:
-        """Return (R,) bool, True for rows of the session; all True for None."""
+        """Return (R,) bool, True for rows of the session.  For None, all are True."""
         every = np.ones(len(self), dtype=bool)
         return every if session is None else np.asarray(self.session == session)
 

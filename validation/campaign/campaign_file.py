@@ -90,8 +90,8 @@ def read_commands(source: Path | str, robot: Robot) -> Campaign:
     Args:
         source: a campaign, or a single table with the same columns in SI units.  The
             readings of a single table belong to the measured point for which the robot
-            was identified, or to the platform's origin if the robot file names no
-            point.
+            was identified.  If the robot file names no point, they belong to the
+            platform's origin.
         robot: robot that replaces the robot of the campaign.
 
     Returns:
@@ -141,11 +141,16 @@ def _per_session(root: Table) -> tuple[str, ...]:
     given = root.get("per_session", [])
     valid = [name for name, effect in LIBRARY.items() if effect.by_row]
     if not isinstance(given, list):
-        raise root.bad("per_session", f"found {describe(given)}, expected effects")
+        raise root.bad(
+            "per_session", f"found {describe(given)}, expected a list of effects"
+        )
     for name in given:
         if name not in valid:
             hint = nearest(str(name), valid)
-            message = f"found {describe(name)}, expected effects of single rows{hint}"
+            message = (
+                f"found {describe(name)}, expected an effect that can differ between "
+                f"sessions{hint}"
+            )
             raise root.bad("per_session", message)
     return tuple(given)
 
@@ -157,7 +162,7 @@ def _table_names(root: Table) -> list[str]:
         return [root.text("measurements", expected="a CSV file")]
     proper = given and all(isinstance(v, str) and v.strip() for v in given)
     if not proper or len({Path(v).stem for v in given}) < len(given):
-        message = f"found {describe(given)}, expected CSV files of different names"
+        message = f"found {describe(given)}, expected a list of different CSV files"
         raise root.bad("measurements", message)
     return given
 
@@ -180,7 +185,7 @@ def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Ca
     for name in declared.dialect.motions:
         if f"cov.{name}" not in table.columns or name in COVARIATES:
             units = declared.root.table("units")
-            message = f"found {quoted(name)}, expected a column of further covariates"
+            message = f"found {quoted(name)}, expected a covariate column of the table"
             raise units.bad(f"cov.{name}", message)
     commanded = _commanded(table, robot)
     check_commands(table, robot)
@@ -277,7 +282,8 @@ def _rows_of_points(
         np.isfinite(readings).any(axis=1) for readings, _ in every.values()
     ])
     if not measured:
-        # Keep rows of commands for several points if no point has been measured.
+        # If further points are declared but no point has a reading, each command is
+        # kept for every declared point, and not for the reference point.
         alone = not taken.any() and len(every) > 1
         taken[~taken.any(axis=1)] = taken.any(axis=0) if taken.any() else True
         taken[:, 0] &= not alone
@@ -292,7 +298,7 @@ def _read_points(root: Table) -> dict[str, NDArray]:
     table = root.table("points")
     for name in table.content:
         if not name or "." in name or ":" in name or name in READING:
-            message = "expected a name without . and : that is no component"
+            message = "expected a name without . and : other than tx ... rz"
             raise table.bad("", f"found {quoted(name)}, {message}")
     return {name: table.array(name, (3,), "m", largest=1e4) for name in table.content}
 
@@ -360,7 +366,7 @@ def _commanded(table: MeasurementTable, robot: Robot) -> str:
 
 
 def _command(table: MeasurementTable, robot: Robot, commanded: str) -> NDArray:
-    """Return (R, 6) poses ``[t r]`` or (R, n) joint coordinates; NaN where free."""
+    """Return (R, 6) poses ``[t r]`` or (R, n) joint coordinates; free ones are NaN."""
     if commanded == "pose":
         return table.stack("pose", POSE, np.nan)
     return table.stack("q", tuple(f.name for f in robot.frames), np.nan)

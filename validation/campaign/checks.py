@@ -154,7 +154,7 @@ def extent_of(transforms: NDArray, reference_points: NDArray) -> float:
 
 
 def _body_length(robot: Robot) -> float:
-    """Return the total length [m] of all bodies, or the largest travel if larger."""
+    """Return the total length [m] of all bodies or, if larger, the largest travel."""
     lengths = np.linalg.norm(robot.fixed_transforms[:, :3, 3], axis=1).sum()
     slides = [abs(f.position) for f in robot.frames if f.joint == "prismatic"]
     return float(lengths + sum(slides)) or 1.0
@@ -162,7 +162,7 @@ def _body_length(robot: Robot) -> float:
 
 def _within(table: MeasurementTable, name: str, values: NDArray, largest: float,
             expected: str) -> None:  # fmt: skip
-    """Raise BadInput at the first value whose size exceeds the largest accepted one."""
+    """Raise BadInput at the first value whose magnitude exceeds the accepted limit."""
     for i in np.flatnonzero(np.abs(values) > largest * (1 + 1e-9))[:1]:
         message = f"found {values[i]:g}, expected {expected}"
         raise table.bad(int(i), name, message)

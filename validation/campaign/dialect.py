@@ -17,7 +17,8 @@ _ANGLES = {
     "rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180,
     "arcsec": math.pi / 648000,
 }  # fmt: skip
-# Factors from the accepted units of each key in [units] to the SI unit, listed first.
+# For each key in [units]: the accepted units and their factors to the SI unit.  The SI
+# unit is listed first.
 UNITS = {
     "position": _LENGTHS,
     "rotation": _ANGLES,
@@ -48,11 +49,11 @@ class Dialect:
     motions: dict[str, str] = field(default_factory=dict)
 
     def unit(self, key: str) -> str:
-        """Return the unit of a key."""
+        """Return the unit in which the table states the quantity of a key."""
         return self.units.get(key) or next(iter(UNITS[key]))
 
     def factor(self, key: str) -> float:
-        """Return the factor from a key's unit to SI."""
+        """Return the factor from the unit of a key to the SI unit."""
         return UNITS[key][self.unit(key)]
 
     @property

@@ -33,7 +33,7 @@ from forcefit.validation.campaign.dialect import (
     parse_number,
 )
 
-_TEXTS = ("id", "session")  # columns that contain text instead of numbers
+_TEXTS = ("id", "session")  # names of columns that contain text instead of numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +118,7 @@ def read_table(
         sessions = tuple(row[header.index("session")] for row in rows)
     table = MeasurementTable(str(path), ids, tuple(lines), {}, dialect, sessions)
     for i in [i for i, name in enumerate(sessions) if not name][:1]:
-        raise table.bad(i, "session", "empty; expected the name of a session")
+        raise table.bad(i, "session", "found an empty cell, expected a session name")
     for k, name in enumerate(header):
         if name not in _TEXTS:
             table.columns[name] = _numbers(table, robot, name, [row[k] for row in rows])
@@ -178,7 +178,7 @@ def _cells(path: Path, dialect: Dialect) -> tuple[list[int], list[list[str]]]:
     reader = csv.reader(text, delimiter=dialect.delimiter, strict=True)
     try:
         for row in reader:
-            if row:  # not a blank line
+            if row:  # blank lines are skipped
                 lines.append(reader.line_num)
                 rows.append([cell.strip() for cell in row])
                 _check_printable(path, reader.line_num, rows)
@@ -271,7 +271,7 @@ def _check_labels(table: MeasurementTable) -> None:
     for label, line in zip(table.ids, table.lines, strict=True):
         where = f"{table.file}: line {line}, id"
         if not label:
-            raise BadInput(f"{where}: empty; expected a label")
+            raise BadInput(f"{where}: found an empty cell, expected a label")
         if label in seen:
             raise BadInput(
                 f"{where}: found {quoted(label)}, already the label of "
@@ -330,7 +330,7 @@ def _number_hint(name: str, cell: str, dialect: Dialect) -> str:
 
 
 def _unit_key(name: str, robot: Robot) -> str:
-    """Return the key in ``[units]`` for a column; empty for a pure number."""
+    """Return the key in ``[units]`` of a column; empty for a dimensionless column."""
     group, _, rest = name.partition(".")
     if group in {"meas", "sigma"}:
         turns = rest.rpartition(".")[2][0] == "r"

@@ -19,7 +19,7 @@ _UNITS = {"temperature": "K", "time": "s", "approach": "1"}
 
 
 def screw(words: str, meaning: str = "") -> Quantity:
-    """Return the description of a quantity with small screws as values."""
+    """Return the description of a quantity whose values are small screws [rad, m]."""
     return Quantity(words, "rad, m", ("screw",), meaning)
 
 

@@ -71,7 +71,7 @@ def covariance_of(carried: CarriedRobot, robot: Robot) -> SavedCovariance:
 
 
 def _with_std(robot: Robot, known: SavedCovariance) -> Robot:
-    """Return the robot whose functions have the standard deviations of ``known``."""
+    """Return the robot; its functions get the standard deviations in ``known``."""
     functions = list(robot.functions)
     for number, sigma in zip(known.numbers, known.std.tolist(), strict=True):
         if number.kind == FUNCTION:

@@ -1,14 +1,14 @@
 r"""Fit a saved robot to set-up rows of a new session, and test it on other rows.
 
-The parameters of a session are the pose of the measuring device, the changes with time
-and, if requested, the measured point and the zeros of the joints
+The parameters of a session are the pose of the measuring device and the changes with
+time.  If requested, the measured point and the zeros of the joints are parameters too
 (:mod:`.session_unknowns`).  The prior of the robot's parameters consists of their saved
 values and covariance (:mod:`.machine_numbers`).  All parameters are fitted to the
 set-up rows of all sessions (:mod:`.session_fit`), and tested on all other rows.  Set-up
 rows are the rows that are measured first to fit a new session.
 
-The set-up rows are insufficient if the uncertainty of the fit, propagated to the other
-rows, exceeds the residual of the set-up rows with the saved robot.
+The uncertainty of the fit is propagated to the other rows.  The set-up rows are
+insufficient if this uncertainty exceeds their own residual with the saved robot.
 """
 
 import math
@@ -149,7 +149,7 @@ def _sessions(campaign: Campaign) -> tuple[str | None, ...]:
 
 
 def _of(campaign: Campaign, session: str | None, setup: NDArray) -> NDArray:
-    """Return (R,) bool of a session's rows; check that some, not all, are set-up."""
+    """Return (R,) bool, True for a session's rows; check its set-up rows."""
     own = campaign.in_session(session)
     if setup[own].any() and not setup[own].all():
         return own
@@ -182,7 +182,8 @@ def _judged(fit: SessionsFit, other: SessionsFit, number: int) -> Carried:
     ]
     level = max(*off, float(np.median(campaign.sigma[own])))
     cells = campaign.cells & ~setup[:, None]
-    cells[:, :3] &= not cells[:, 3:].any()  # positions only, if there are any
+    # if any position was measured, rotations are ignored
+    cells[:, :3] &= not cells[:, 3:].any()
     variance, blame = fit.spread(number, cells)
     names = [*(name for _, name in one.unknowns.names), _MACHINE]
     worst = np.flatnonzero(blame > 0.1 * blame.max()).tolist()
@@ -224,7 +225,7 @@ def carried_robot(carried: CarriedRobot) -> Robot:
 
 
 def _added(before: Any, more: dict[str, dict[str, float]]) -> dict[str, Any]:
-    """Return effects with ``more`` added to their parameters; a drift is replaced."""
+    """Return effects after adding ``more`` to their parameters; replace a drift."""
     merged = {name: dict(values) for name, values in before.items()}
     for effect, values in more.items():
         own = merged.setdefault(effect, {})

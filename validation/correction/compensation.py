@@ -10,9 +10,9 @@ the wanted pose:
 ======  =============  ==========  ===================================================
 symbol  code           shape       meaning
 ======  =============  ==========  ===================================================
-q ``drives`` (R, d) commands of the driven joints e ``error`` (R, 6) motion from the
-machine's pose to the wanted pose J ``jacobian`` (R, 6, d) derivative of the platform's
-pose by the drives
+q       ``drives``     (R, d)      commands of the driven joints
+e       ``error``      (R, 6)      motion from the machine's pose to the wanted pose
+J       ``jacobian``   (R, 6, d)   derivative of the platform's pose by the drives
 ======  =============  ==========  ===================================================
 
 If a robot has fewer than six drives, correcting positions has priority over rotations.
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
 _STEPS = 25
 _HALVINGS = 8
-_STILL = 1e-10  # [rad or m] smaller changes of a command count as zero
+_STILL = 1e-10  # [rad or m] changes of a command below this value count as zero
 _TURN = np.pi  # [rad] largest accepted correction of a revolute drive
 # Factor on the weight of rotations if the drives cannot correct all six components.
 _LOW = 1e-4
@@ -199,7 +199,7 @@ def _limits(robot: Robot, driven: NDArray) -> tuple[NDArray, NDArray]:
 def _too_far(
     robot: Robot, driven: NDArray, change: NDArray, reason: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Find rows with corrections (R, d) larger than the robot, and the reasons.
+    """Find rows whose correction (R, d) exceeds the robot's size, or a half turn.
 
     Returns:
         (R,) bool, True for such rows, and (R,) texts of the reasons.
@@ -220,7 +220,7 @@ def _too_far(
 
 
 def _astray(robot: Robot, error: NDArray, reason: NDArray) -> NDArray:
-    """Return (R,) reasons, one for each error (R, 6) larger than the robot."""
+    """Return (R,) reasons; rows whose error (R, 6) exceeds the robot's size get one."""
     size, reason = size_of(robot), reason.copy()
     off = np.linalg.norm(error[:, 3:], axis=1)
     for row in np.flatnonzero((off > size) & (reason == "")):

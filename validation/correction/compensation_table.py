@@ -56,9 +56,10 @@ def offset_table(compensation: "Compensation") -> str:
         compensation: result of :func:`.compensation.compensate`.
 
     Returns:
-        CSV with ``id``, ``offset.<drive>`` [rad or m], the errors ``before`` and
-        ``after`` correction in position [m] and rotation [rad], and the standard
-        deviation ``spread`` [m] of the position after correction.
+        CSV with ``id`` and the offsets ``offset.<drive>`` [rad or m].  The columns
+        ``before`` and ``after`` contain the errors before and after correction in
+        position [m] and rotation [rad].  The column ``spread`` is the standard
+        deviation [m] of the position after correction.
     """
     columns: dict[str, Any] = {
         f"offset.{n}": x
@@ -165,7 +166,7 @@ def summary(
 def _unexplained(
     record: Mapping[str, Any], diagnosed: Mapping[str, float] | None
 ) -> dict[str, float] | None:
-    """Return the [m, rad] unexplained error of a diagnosis; None if unknown."""
+    """Return the unexplained position [m] and rotation [rad] error; None if unknown."""
     sizes = {}
     for key in ("position", "rotation"):
         after = record.get(key, 0.0) if diagnosed is None else diagnosed[key]

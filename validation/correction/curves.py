@@ -33,10 +33,10 @@ if TYPE_CHECKING:
 
 _POINTS = 181
 _SHOWN = 13  # number of points of each curve in the text
-_LATE = 4.0  # [time constants or periods] plotted duration
+_LATE = 4.0  # [time constants or periods] plotted duration of a response in time
 # Half of the plotted range of each variable, in the unit of the variable.
 _RANGES = {"temperature": 10.0, "approach": 1.0}
-_LOAD = 100.0  # [N, N m] half of the plotted range of a load
+_LOAD = 100.0  # [N, N m] half of the plotted range of a load component
 _TRAVEL = 0.5  # [m] half of the plotted range of a position
 
 
@@ -153,7 +153,7 @@ def _covariance_of(robot: Robot, function: Function) -> tuple[list[str], NDArray
 def _values(
     function: Function, component: str, x: NDArray, fixed: tuple[str, float] | None
 ) -> NDArray:
-    """Return the values of a component of the function along x."""
+    """Return the values of one component of the function at the variable's values x."""
     own = parameters_of(function, component)
     inputs = [x]
     if function.form in {"lag", "creep"}:

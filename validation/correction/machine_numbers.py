@@ -60,7 +60,7 @@ class MachineNumbers:
         """Return the robot with its parameters changed by L u, within their range.
 
         Args:
-            u: (r,).
+            u: (r,) independent variables; a change of the parameters is L u.
 
         Returns:
             The robot.  A parameter that cannot be negative is multiplied by a positive
@@ -110,7 +110,7 @@ def _is_shared(number: Number, robot: Robot) -> bool:
 
 
 def _possible(number: Number, robot: Robot, by: float) -> float:
-    """Return a change of a parameter that does not leave its admissible range."""
+    """Return the change of a parameter, limited to the parameter's admissible range."""
     value = number.of(robot)
     if number.kind == EFFECT and value > 0.0:
         unknowns = LIBRARY[number.owner].unknowns(robot)
@@ -120,7 +120,7 @@ def _possible(number: Number, robot: Robot, by: float) -> float:
 
 
 def unchanging(robot: Robot) -> MachineNumbers:
-    """Return the robot without any uncertainty of its parameters."""
+    """Return an empty set of parameters: the robot is treated as known exactly."""
     return MachineNumbers(robot, (), np.zeros((0, 0)))
 
 

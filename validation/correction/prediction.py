@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_MOVED = 3.0  # a residual above this factor shows that the device was moved
+_MOVED = 3.0  # largest ratio of residuals, saved to fitted pose, of an unmoved device
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +108,7 @@ class PredictedReadings:
 
 
 def _both(values: NDArray) -> dict[str, float]:
-    """Return the root mean squares of positions and of rotations."""
+    """Return the root mean square of the positions [m] and of the rotations [rad]."""
     return {"position": rms(values[:, 3:]), "rotation": rms(values[:, :3])}
 
 
@@ -117,8 +117,8 @@ def predict(commands: Campaign) -> PredictedReadings:
 
     The registration is the pose of the measuring device.  An unknown registration is
     read from the robot file.  The registration is fitted to the measured rows if the
-    file contains none, or if the residual of these rows shows that the device was
-    moved.
+    file contains none.  It is also fitted if the residual of these rows shows that the
+    device was moved.
 
     Args:
         commands: campaign with the robot, its effects and its rows.

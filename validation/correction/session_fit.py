@@ -1,13 +1,13 @@
 r"""Fit the parameters of sessions and of the machine to set-up rows.
 
-======  =============  =========  ====================================================
-symbol  code           shape      meaning
-======  =============  =========  ====================================================
-x ``x`` (k,) parameters of all sessions, then u of the machine J ``slopes`` (R,6,p+r)
-derivative of the readings by a session's p
-                                  values and of u
-C ``covariance`` (k, k) covariance of x
-======  =============  =========  ====================================================
+======  ==============  ============  ================================================
+symbol  code            shape         meaning
+======  ==============  ============  ================================================
+x       ``x``           (k,)          parameters of all sessions, then u of the machine
+J       ``slopes``      (R, 6, p+r)   derivative of the readings by a session's p
+                                      parameters and by u
+C       ``covariance``  (k, k)        covariance of x
+======  ==============  ============  ================================================
 
 The parameters of each session (:mod:`.session_unknowns`) have a flat or a Gaussian
 prior.  The parameters u of the machine (:mod:`.machine_numbers`) are common to all
@@ -17,10 +17,10 @@ degrees of freedom.  Rows of one configuration contain the same information, so 
 they have the weight of one row.
 
 k is chosen by cross-validation: each configuration of the set-up rows is predicted by a
-fit to the others.  A larger k replaces a smaller one only if its predictions are better
-by more than a standard error and by a relevant part of the noise.  The Bayesian
-evidence of k is not used, because the evidence assumes that the machine changed in the
-directions of the covariance.
+fit to the others.  A larger k replaces a smaller one only if it reduces the prediction
+error significantly: by more than a standard error, and by a relevant part of the noise.
+The Bayesian evidence of k is not used, because the evidence assumes that the machine
+changed in the directions of the covariance.
 """
 
 from collections.abc import Sequence
@@ -47,8 +47,8 @@ from forcefit.validation.diagnosis.registration import coarse_frame
 from forcefit.validation.diagnosis.separability import orthonormal_basis
 
 _STEPS = 8
-_SETTLED = 1e-3  # [standard deviations] largest change at convergence
-_WIDENED = 4.0 ** np.arange(8)  # candidate values of k
+_SETTLED = 1e-3  # [standard deviations] largest change of x at convergence
+_WIDENED = 4.0 ** np.arange(8)  # candidate values of k, the factor on the covariance
 _SURE = 1.0  # number of standard errors by which a larger k must predict better
 _MATTERS = 0.03  # [-] smallest relevant improvement / variance of the noise
 _AT_ONCE = 1000  # number of rows processed together, which limits memory
@@ -80,7 +80,7 @@ class SetUp:
 
     @property
     def told(self) -> float:
-        """Prior variance of a reading over sigma^2; larger for repeated rows."""
+        """Ratio of a reading's prior variance to sigma^2; it increases with repeats."""
         left = self.campaign.robot.diagnosis.get("normalised")
         level = max(1.0, left) if isinstance(left, float) else 1.0
         return level**2 * self.repeated
@@ -95,7 +95,7 @@ class SetUp:
         return x
 
     def _still(self, robot: Robot, rows: NDArray) -> Conditions:
-        """Return the conditions of selected rows without effects of the session."""
+        """Return the conditions of selected rows without the session's effects."""
         bare = replace(self.campaign, robot=without_session(robot))
         return finite_conditions(bare, rows)
 
@@ -140,7 +140,7 @@ class SetUp:
     def whitened(
         self, machine: MachineNumbers, values: NDArray, u: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """Return (n,) residuals and (n, p + r) slopes of set-up rows, over sigma."""
+        """Return (n,) residuals / sigma of set-up rows, and their (n, p + r) slopes."""
         own = self.own
         read, slopes = self.tangent(machine, values, u, self.rows)
         A = (slopes / own.sigma[:, :, None])[own.cells]
@@ -170,7 +170,7 @@ class SessionsFit:
 
     @property
     def u(self) -> NDArray:
-        """(r,) independent variables of the machine's changes."""
+        """(r,) independent variables u that describe the changes of the machine."""
         return self.x[len(self.x) - len(self.machine) :]
 
     @property
@@ -244,7 +244,7 @@ def _settled(
     sessions: Sequence[SetUp], machine: MachineNumbers, x: NDArray,
     told: Sequence[float], widened: float,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the most probable x (k,) and its covariance (k, k)."""
+    """Return the most probable parameters x (k,) and their covariance (k, k)."""
     begin = len(x) - len(machine)
     mean = np.concatenate([
         *(s.unknowns.mean for s in sessions),
@@ -269,7 +269,7 @@ def _settled(
 
 
 def _inverse(H: NDArray) -> NDArray:
-    """Return the inverse of H; directions without information remain finite."""
+    """Return the inverse of the information matrix H, finite for a singular H too."""
     size = np.sqrt(np.diag(H))
     unit = np.where(size > 0, size, 1.0)
     scaled = H / np.outer(unit, unit) + 1e-14 * np.eye(len(H))
@@ -280,7 +280,7 @@ def _widened(
     sessions: Sequence[SetUp], machine: MachineNumbers, x: NDArray,
     told: Sequence[float],
 ) -> tuple[float, float]:  # fmt: skip
-    """Return the factor k on the covariance, and tau; both from cross-validation."""
+    """Return the factor k on the robot's covariance, and the noise scale tau."""
     values = sum(len(one.unknowns) for one in sessions)
     zs, rows = [], []
     for k, one in enumerate(sessions):
@@ -298,7 +298,7 @@ def _widened(
     blocks = np.concatenate([_blocks(sessions, k) for k in range(len(sessions))])
 
     def predicted(k: float) -> tuple[NDArray, float]:
-        """Return the squared prediction errors of every block, and tau."""
+        """Return each block's sum of squared prediction errors, and tau."""
         std = np.append(known, np.full(len(machine), np.sqrt(k)))
         marginal = marginalise(A, std, z, Q)
         errors, _ = leave_block_out(marginal, blocks)
@@ -316,13 +316,13 @@ def _widened(
 
 
 def _matters(more: NDArray, count: int) -> bool:
-    """Return whether the prediction errors of blocks are significantly larger."""
+    """Return whether an increase of the blocks' squared errors is significant."""
     error = float(more.std(ddof=1)) * np.sqrt(len(more)) if len(more) > 1 else 0.0
     return bool(more.sum() > max(_SURE * error, _MATTERS * count))
 
 
 def _blocks(sessions: Sequence[SetUp], number: int) -> NDArray:
-    """Return (n,) configurations of set-up readings, counted over all sessions."""
+    """Return the (n,) configuration of set-up readings, numbered over all sessions."""
     before = sum(len(np.unique(s.own.configuration)) for s in sessions[:number])
     own = sessions[number].own
     rows = np.nonzero(own.cells)[0]

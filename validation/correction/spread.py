@@ -93,7 +93,7 @@ def number_slopes(
 
 
 def _is_direct(robot: Robot, number: Number) -> bool:
-    """Return whether a function is independent of the motion that it causes."""
+    """Return whether a function's variables do not change by the motion it causes."""
     function = robot.functions[int(number.owner)]
     wrench = any(name.startswith("wrench.") for name in function.variables)
     alone = function.where not in PLACES and function.kind == "compliance"

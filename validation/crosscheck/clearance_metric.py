@@ -32,7 +32,7 @@ from forcefit.validation.crosscheck.pair import Pair
 from forcefit.validation.crosscheck.verdict import Check
 
 TOLERANCE = 0.02  # [-] bound of differences; contacts are compliant and smoothed
-FLOOR_ENERGY = 1e-4  # [J] energy of the centring springs of clearances, scale 1
+FLOOR_ENERGY = 1e-4  # [J] energy of the springs that centre clearances, at scale 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +63,8 @@ class ClearanceMetric:
     def gaps(self) -> NDArray:
         """(k,) relative optimality gaps of the simulated clearance screws.
 
-        The gap is divided by the energy of closing the loops without clearances, or by
-        the energy stored under the load if that is larger.
+        The gap is divided by the larger of two energies: the energy of closing the
+        loops without clearances, and the energy stored under the load.
         """
         return np.array([optimality_gap(pair) for pair in self.pairs])
 
@@ -82,7 +82,7 @@ class ClearanceMetric:
 
     @cached_property
     def limits(self) -> dict[str, Check]:
-        """Relative difference of each quantity, extrapolated to scale 0."""
+        """Relative difference of both models by quantity, extrapolated to scale 0."""
         ours = np.array([pair.linear_energy for pair in self.pairs])
         theirs = np.array([pair.simulated.rigid_energy for pair in self.pairs])
         gap = limit_of(self.scales**2, self.gaps)

@@ -252,7 +252,8 @@ def crosscheck(
     springs = links == "spring"
     between = 0.0 if springs else energy_between_ends(compared, g, ELEMENTS)
 
-    held: list[float] = []  # held free motions stay held at smaller scales
+    # free motions that springs hold at one scale are held at smaller scales too
+    held: list[float] = []
 
     def solve(s: float) -> Pair:
         models = [compared] if clearances else [compared, hold_free_motions(compared)]

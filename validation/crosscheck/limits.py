@@ -179,9 +179,9 @@ def slope_check(
 
     Returns:
         The check.  Its uncertainty is the change of the slope when the largest scale is
-        omitted, and infinite for two scales.  The check has no signal if fewer than two
-        differences are above the floor, or if noise can change the slope by more than
-        the bound.
+        omitted, and infinite for two scales.  The check has no signal in two cases:
+        fewer than two differences are above the floor, or noise can change the slope by
+        more than the bound.
     """
     value = 2.0 - difference_slope(scales, differences, floor)
     if math.isnan(value):

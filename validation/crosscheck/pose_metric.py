@@ -42,7 +42,7 @@ SLOPE_TOLERANCE = 0.1
 # [-] Largest accepted fraction of the pose difference that remains with the exact model
 # if links are springs.
 EXPLAINED_TOLERANCE = 0.02
-# [-] First-order difference between a mesh's K_E and its solid, relative to the pose.
+# [-] Relative pose difference of first order between a mesh's K_E and its solid.
 # Rounding causes this difference, which is significant only if second-order terms are
 # as small.
 _ROUNDING = 2e-5
@@ -116,7 +116,7 @@ class PoseMetric:
 
     @cached_property
     def limits(self) -> dict[str, Check]:
-        """Relative difference of each quantity, extrapolated to scale 0.
+        """Relative difference of both models by quantity, extrapolated to scale 0.
 
         The rotation and translation parts of screws and wrenches are compared
         separately.  Each is divided by the largest value of all frames with such a

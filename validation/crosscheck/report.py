@@ -28,7 +28,7 @@ _LISTED = 30  # largest number of parameters in the table of smallest changes
 ASSUMED = (
     "The simulation (Exudyn) has geometrically exact motions; the virtual-joint model "
     "is linear in errors and loads.",
-    "Both models read the same robot file, so a wrong number in it is not found.",
+    "Both models read the same robot file, so a wrong number there is not found.",
     "Neither model has friction or contact stiffness.",
 )
 Cells = list[list[Cell]]
@@ -105,13 +105,13 @@ def compared(check: Crosscheck) -> list[str]:
         "A linearised model must differ from the simulation by the square of the "
         f"errors' size: slope 2. {_slope_text(check.slope)}"
     )
-    # differences below the noise draw no line of slope 2
+    # If the differences are below the noise, there is no slope and no chart.
     chart = [] if np.isnan(check.slope) else [_slope_chart(check, check.metric)]
     return [text, *pieces, *chart]
 
 
 def _slope_text(slope: float) -> str:
-    """Return the slope as text, or another text if no slope was determined."""
+    """Return a sentence with the slope, or a sentence that there is no slope."""
     if np.isnan(slope):
         return "The two models do not differ here, so there is no slope."
     return f"Measured: {slope:.3f}."

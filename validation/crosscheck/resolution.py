@@ -90,9 +90,9 @@ def resolutions(
         gravity: (3,) [m/s^2] gravity at scale 1.
 
     Returns:
-        One result for each link, each finite entry of a joint stiffness, each clearance
-        and each nonzero component of a geometric error, in the order of the robot's
-        frames.
+        One result for each parameter, in the order of the robot's frames.  Parameters
+        are links, finite entries of joint stiffnesses, clearances, and nonzero
+        components of geometric errors.
     """
     found = []
     for name, kind, value, frame in _changes(posture, bool(gravity.any())):

@@ -39,7 +39,8 @@ from forcefit.validation.multibody.tangent import (
     simulated_tangent,
 )
 
-# [-] Tolerances of differences of entries over sqrt(C_ii C_jj), by model of the links.
+# [-] Largest accepted difference between entries of two compliances, divided by
+# sqrt(C_ii C_jj), for each model of the links.
 TOLERANCE = {"spring": 1e-6, "beam": 1e-3, "fem": 2e-2}
 CONTACT_TOLERANCE = 2e-2
 # [-] Equilibria are different if the displacements of the platform differ by more than

@@ -1,7 +1,7 @@
 """Decide whether two models agree, and add scales until every check is decided.
 
-At large errors and few scales, the uncertainty of a limit exceeds its bound, because
-terms of higher order can imitate or cancel errors of first order.  Smaller scales are
+Terms of higher order can imitate or cancel errors of first order.  At large errors and
+few scales, the uncertainty of a limit therefore exceeds its bound.  Smaller scales are
 then added, each half of the last, until every check is decided.  At small scales, terms
 of higher order vanish and a wrong term of first order remains.  A check can fail only
 if at least four scales were solved.
@@ -61,7 +61,7 @@ class Check:
             return FAILS
         if not self.signal and not max(self.value, self.uncertainty) > self.bound:
             return NO_SIGNAL
-        # NaN counts as an unknown value.
+        # A comparison with NaN is false, so a NaN value is never "ok".
         known = self.value <= self.bound and self.uncertainty <= self.bound
         return OK if known else UNDECIDED
 

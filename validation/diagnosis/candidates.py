@@ -74,7 +74,7 @@ def is_turn(component: str) -> bool:
 
 
 def own_component(frame: Frame) -> str:
-    """Return the component of a joint's own motion; a screw moves along its thread."""
+    """Return the component in which a joint moves; for a screw, along its thread."""
     return THREAD if frame.pitch else AXES[frame.own_axis]
 
 
@@ -102,7 +102,7 @@ def variables_of(conditions: Conditions) -> list[str]:
 
 
 def _kind(name: str) -> str:
-    """Return the vector to which a component belongs, or the name of a scalar."""
+    """Return the name of the vector that contains a component, or a scalar's name."""
     vectors = "position.", "load.m", "load.f"
     return next((v for v in vectors if name.startswith(v)), name)
 

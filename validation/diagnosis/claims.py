@@ -52,7 +52,7 @@ def supported(fit: MachineFit, one: Acting) -> bool:
 
 
 def _without_devices(fit: MachineFit, slopes: NDArray) -> NDArray:
-    """Return (n, k) slopes without the part that a measuring frame can imitate."""
+    """Return (n, k) slopes without what the measuring frame's pose can imitate."""
     own = [fit.own(one)[2] for one in fit.unknowns.effects if one.device]
     if not own:
         return slopes
@@ -61,7 +61,7 @@ def _without_devices(fit: MachineFit, slopes: NDArray) -> NDArray:
 
 
 def _at_bound(bound: float, value: float) -> bool:
-    """Return whether a value is at a finite bound."""
+    """Return whether a parameter's value is at a finite bound of the parameter."""
     return bool(np.isfinite(bound) and abs(value - bound) <= _AT_BOUND * abs(bound))
 
 

@@ -155,7 +155,7 @@ class Columns:
         return bool(self.library or self.explicit or self.functions.variables)
 
     def loadings(self, cells: NDArray) -> NDArray | None:
-        """Return (n, 6) changes of cells over sigma per rotation and translation."""
+        """Return (n, 6) changes of the readings over sigma per platform motion."""
         if self.motions is None:
             return None
         measured = self.campaign.cells
@@ -205,7 +205,7 @@ class Columns:
         return np.hstack([columns * self.tangents.rows_of(s) for s in sessions])
 
     def _told(self, signature: Signature) -> Signature:
-        """Return a per-session hypothesis without the part that devices can imitate."""
+        """Return a per-session hypothesis without what the device pose can imitate."""
         h = signature.hypothesis
         if not self.flat.shape[1] or sessions_of(h) == (None,):
             return signature

@@ -1,11 +1,11 @@
 """Estimate the noise that the points of one measurement share.
 
-If a device measures several points of the platform together, the readings of all points
-contain the repeatability of the machine and the motion of the device's frame.  This
-shared noise is modelled as a small random motion of the platform in each measurement.
-One standard deviation describes its rotations, and one describes the translations of
-the points' centre.  Both standard deviations maximise the evidence of a model of the
-readings, in which all other unknowns are marginalised.
+A device may measure several points of the platform together.  The readings of all these
+points then share two errors: the machine's repeatability error and the motion of the
+device's frame.  This shared noise is modelled as a small random motion of the platform
+in each measurement.  One standard deviation describes its rotations, and one describes
+the translations of the points' centre.  Both standard deviations maximise the evidence
+of a model of the readings, in which all other unknowns are marginalised.
 """
 
 import math
@@ -20,13 +20,13 @@ from forcefit.validation.diagnosis.weighted_readings import NONE
 
 # First step of the logarithms of both standard deviations, which start at one sigma.
 _STEP = 1.0
-_CLOSE = 0.05  # change of a logarithm at which the search ends
+_CLOSE = 0.05  # change of a standard deviation's logarithm at which the search ends
 # [sigma] A standard deviation with a smaller contribution to the readings is set to 0.
 _LEAST = 0.02
 # [sigma] A standard deviation with a larger contribution to the readings is required.
 _CLEAR = 1.0
-_EVALUATIONS = 40  # largest number of evaluations; each fits a model
-_STABLE = 0.1  # changes of a logarithm below this value change no decision
+_EVALUATIONS = 40  # largest number of evaluations of the evidence; each fits a model
+_STABLE = 0.1  # smaller changes of a standard deviation's logarithm change no decision
 
 
 def common_sizes(state: State) -> tuple[float, float]:

@@ -33,16 +33,16 @@ class Declared:
 
     @cached_property
     def derivatives(self) -> Derivatives:
-        """Derivatives of the declared readings with clearances at rest."""
+        """Derivatives of the declared readings; clearances are in rest position."""
         return Derivatives(at_rest(self.conditions))
 
     def bent(
         self, campaign: Campaign, conditions: Conditions, errors: NDArray, least: float
     ) -> Conditions | None:
-        """Return conditions with finite motions' effect on geometric errors (n, 6).
+        """Return conditions with the second-order change by geometric errors (n, 6).
 
-        The result is None if this effect changes every reading of the campaign by less
-        than ``least`` [sigma].
+        The errors are added to the declared ones.  The result is None if the
+        second-order change of every reading is at most ``least`` [sigma].
         """
         if not errors.any():
             return None
@@ -75,7 +75,7 @@ def declared(campaign: Campaign, *, finite: bool = False) -> Declared:
 
 
 def at_rest(conditions: Conditions) -> Conditions:
-    """Return conditions with clearances of closed chains at rest (cached)."""
+    """Return conditions; clearances of closed chains are in rest position (cached)."""
     if conditions.robot.closures and virtual_joints(conditions.robot).cones.shape[1]:
         return with_rest_positions(conditions)
     return conditions

@@ -20,8 +20,8 @@ from forcefit.validation.diagnosis.hypotheses import Slot
 from forcefit.validation.diagnosis.responses import Responses, responses
 from forcefit.validation.diagnosis.sensitivities import Sensitivities
 
-# Step relative to an unknown's plausible size; it limits both rounding and truncation
-# errors.
+# Step of numerical derivatives, relative to the plausible size of the unknown.  The
+# value keeps both rounding and truncation errors small.
 STEP = 1e-3
 
 
@@ -44,7 +44,7 @@ class Derivatives:
 
     @cached_property
     def response(self) -> Responses:
-        """Response of the readings to small screws at all frames."""
+        """Response of the readings to small screws at each frame, see ``Responses``."""
         return responses(self.conditions)
 
     @cached_property

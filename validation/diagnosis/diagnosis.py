@@ -123,7 +123,7 @@ class Diagnosis:
 
     @property
     def robot(self) -> Robot:
-        """The fitted machine."""
+        """The robot with all fitted parameters, which is saved."""
         return self.fit.robot
 
     @property

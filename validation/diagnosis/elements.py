@@ -152,7 +152,7 @@ def function_element(
     candidate: Candidate, columns: NDArray, axes: NDArray, falling: NDArray,
     most: float, log_prior: float,
 ) -> Element | None:  # fmt: skip
-    """Return the element of a function of m unknowns; None if it is not visible.
+    """Return the element of a function of m unknowns; None if no reading shows it.
 
     ``columns`` (N, m) are the whitened changes of the readings per unknown.  ``axes``
     (m,) is the screw component of each unknown.  ``falling`` (m,) are the relative
@@ -176,7 +176,7 @@ class Dense:
     def __init__(
         self, elements: list[Element], cells: NDArray, whiten: Whitening
     ) -> None:
-        """Group elements by their number of columns in cells (N,) bool."""
+        """Group elements by their number of columns; use only the cells (N,) bool."""
         self.elements = elements
         self._offsets: list[tuple[int, NDArray]] = []
         self._groups: list[tuple[NDArray, NDArray, NDArray, NDArray, NDArray]] = []

@@ -25,7 +25,7 @@ _COLOURS = {"before": RED, "after": BLUE}
 
 
 def error_chart(diagnosis: Diagnosis) -> str:
-    """Return a bar chart of held-out errors before and after, and of the noise."""
+    """Return a bar chart of held-out errors before and after diagnosis, and noise."""
     charts = []
     for kind, unit in (("rotation", "rad"), ("position", "m")):
         names = ("before", "after", "noise")
@@ -75,13 +75,13 @@ def vector_charts(diagnosis: Diagnosis) -> str:
                 "line": {"color": _COLOURS[name]}, "text": ids, "hoverinfo": "text",
             })  # fmt: skip
         axes = Axis("xyz"[i], "m"), Axis("xyz"[j], "m", {"scaleanchor": "x"})
-        caption = f"Seen {side}, {larger:.0f} times larger; all rows but outliers."
+        caption = f"Seen {side}; residuals {larger:.0f} times larger; no outliers."
         charts.append(chart(traces, *axes, caption))
     return grid(*charts)
 
 
 def covariate_charts(diagnosis: Diagnosis) -> str:
-    """Return charts of the residual before and after, over load and other variables."""
+    """Return charts of the residual before and after diagnosis, over each variable."""
     kept, rows = ~diagnosis.outliers, _labels(diagnosis)
     sizes = {
         name: np.sqrt(np.nanmean((left / diagnosis.campaign.sigma) ** 2, axis=1))[kept]
@@ -111,7 +111,7 @@ def covariate_charts(diagnosis: Diagnosis) -> str:
 
 
 def _residuals(diagnosis: Diagnosis) -> dict[str, NDArray]:
-    """Return the (R, 6) [rad, m] residuals before and after."""
+    """Return the (R, 6) [rad, m] residuals before and after the diagnosis."""
     return {"before": diagnosis.residual_before, "after": diagnosis.residual_after}
 
 
@@ -122,7 +122,7 @@ def _labels(diagnosis: Diagnosis) -> list[str]:
 
 
 def _varied(diagnosis: Diagnosis) -> dict[tuple[str, str], NDArray]:
-    """Return the variables of the charts with their names and units."""
+    """Return the name and unit of each variable that a chart shows."""
     campaign = diagnosis.campaign
     varied = {("load size", "N"): np.linalg.norm(campaign.loads[:, 3:], axis=1)}
     for i, frame in enumerate(campaign.robot.frames):
@@ -141,7 +141,7 @@ def probability_chart(diagnosis: Diagnosis) -> str:
     axis = Axis(f"probability (claimed from {CLAIM}, a rival from {RIVAL})",
                 options={"range": [0, 1]})  # fmt: skip
     return bars(
-        dict(ranked), axis, "Posterior weight of all sets containing it.", CLAIM
+        dict(ranked), axis, "Posterior weight of all sets with this effect.", CLAIM
     )
 
 
@@ -167,8 +167,8 @@ def imitation_chart(shared: NDArray, names: tuple[str, ...]) -> str:
         HTML.
     """
     return matrix(
-        shared, names, "share of the row that the column can imitate",
-        "1: the column's effect can reproduce every effect of the row's.", around=False,
+        shared, names, "fraction of the row's effect that the column can imitate",
+        "Value 1: the column's effect can imitate any effect of the row.", around=False,
     )  # fmt: skip
 
 

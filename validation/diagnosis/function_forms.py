@@ -20,20 +20,23 @@ MANY = 150  # number of rows from which waves of high order are searched
 # Time constants relative to the duration of the campaign.
 LAGS = 0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2, 0.3, 0.5
 _CYCLES = 0.5, 1, 1.5, 2, 3, 4, 6  # cycles of a slow wave in the campaign's duration
-_DEPTHS = 0.03, 0.1, 0.3, 1.0  # depths of slip, relative to the variable's range
+# depths of slip (hysteresis) that are tried, relative to the variable's range
+_DEPTHS = 0.03, 0.1, 0.3, 1.0
 # Depths of slip near the best depth, for the refined search.
 _ALL_DEPTHS = tuple(0.01 * 1.4**k for k in range(15))
 # Step of the search for the number of screw turns over the travel of a slide; a larger
 # step would miss waves.
 _TURNS = 0.5
-# Largest number of turns over the travel; in addition, at most two turns per position.
+# Largest number of screw turns over the travel of a slide.  A smaller limit applies to
+# few positions: two turns for each different position.
 _MOST_TURNS = 200.0
 _FINER = 1.2  # first factor in the refinement of a shape parameter
-# Smaller loads, relative to the largest load, do not close backlash.
+# Loads below this fraction of the largest load do not close backlash.
 _NO_LOAD = 1e-3
 _HIGH = 12  # highest order of waves that is tried separately
 _CLOCKS = "time", "cov.time"
-# Number of times at which a step is tried, in short and in long campaigns.
+# Number of points in time at which a step function is tried, in short and in long
+# campaigns.
 _JUMPS, _MANY_JUMPS = 10, 91
 _INNER = np.linspace(0.1, 0.9, 9)  # quantiles at which other shape parameters are tried
 
@@ -55,12 +58,12 @@ class CandidateShape:
 
     @property
     def bends(self) -> NDArray:
-        """Value of the shape parameter as (1,) if it is fitted, otherwise (0,)."""
+        """The shape parameter as an array (1,) if it is fitted; otherwise (0,)."""
         one = len(self.given) == 1 and self.form != "step"
         return np.array([value for _, value in self.given] if one else [])
 
     def bent(self, by: float) -> "CandidateShape":
-        """Return the form with its shape parameter multiplied by a factor."""
+        """Return the form with its shape parameter increased by ``by``."""
         ((key, value),) = self.given
         return replace(self, given=((key, value + by),))
 
@@ -156,7 +159,7 @@ def screw(
 
 
 def is_screw(shape: CandidateShape) -> bool:
-    """Return whether a form is one of :func:`screw`."""
+    """Return whether a form is a wave with a given period, as from :func:`screw`."""
     return shape.form.endswith("waves") and bool(shape.given)
 
 
@@ -170,9 +173,9 @@ def of_direction(conditions: Conditions, name: str) -> list[CandidateShape]:
 def of_two(
     conditions: Conditions, first: str, second: str
 ) -> tuple[tuple[str, str], list[CandidateShape]] | None:
-    """Return forms of products of two variables, and the variables in their order.
+    """Return the forms of functions of two variables, and the variables in order.
 
-    The result is None if this product is not considered.
+    The result is None if functions of these two variables are not considered.
     """
     angles = [is_angle(conditions.robot, name) for name in (first, second)]
     if {first, second} == set(_CLOCKS):
@@ -226,7 +229,7 @@ def near(
 
 
 def _steps(conditions: Conditions, name: str, count: int) -> list[CandidateShape]:
-    """Return steps at quantiles of a variable."""
+    """Return step functions that jump at quantiles of a variable."""
     levels = np.quantile(variable(conditions, name), np.linspace(0.05, 0.95, count))
     return _at_each("step", ("size",), "at", np.unique(levels))
 
@@ -243,7 +246,7 @@ def _reversals(
 
 
 def log_priors(shapes: Sequence[CandidateShape]) -> NDArray:
-    """Return the log prior of each form among all forms of its variables."""
+    """Return each form's log prior probability among all forms of its variables."""
     weight = np.array([_weight(shape) for shape in shapes])
     families = [shape.form for shape in shapes]
     total = {f: weight[[g == f for g in families]].sum() for f in set(families)}
@@ -252,7 +255,7 @@ def log_priors(shapes: Sequence[CandidateShape]) -> NDArray:
 
 
 def _weight(shape: CandidateShape) -> float:
-    """Return the relative prior of a form in its family."""
+    """Return the relative prior probability of a form in its family."""
     if is_screw(shape):
         return dict(shape.given)["period"]
     return 1.0 / max(*_orders(shape), 1) if shape.form.endswith("waves") else 1.0

@@ -41,7 +41,7 @@ from forcefit.validation.diagnosis.places import Places, Weighted, Where
 from forcefit.validation.diagnosis.sensitivities import Sensitivities, in_cells
 
 Variables = tuple[str, ...]
-# The variables of a function, and the forms to be scored.
+# A request: the variables of a function, and the forms to be scored.
 Request = tuple[Variables, tuple[CandidateShape, ...]]
 # Largest number of columns of a function: six columns for each of six components.
 _WIDEST = 36
@@ -60,7 +60,7 @@ class ScoredFunction:
 
 
 def _by_kind(turns: NDArray, gram: NDArray) -> NDArray:
-    """Return (f, c, m) rms norms of columns, for rotations and translations."""
+    """Return (f, c, m) rms norms of columns, separately by rotation and translation."""
     diagonal = np.einsum("...kk->...k", gram)
     squares = np.zeros_like(diagonal)
     for kind in (turns, ~turns):
@@ -95,7 +95,7 @@ class Functions:
         return other
 
     def at_rows(self, rows: NDArray) -> "Functions":
-        """Return the functions with the columns of selected rows only."""
+        """Return the candidate functions, with their columns for selected rows only."""
         other = copy(self)
         other.campaign = self.campaign.take(rows)
         other.sensitivities = self.sensitivities.take(rows)
@@ -140,7 +140,7 @@ class Functions:
         return requests
 
     def products(self, names: Iterable[str]) -> list[Request]:
-        """Return the requests for products of the given variables with all others."""
+        """Return requests for functions of two variables, of which one is given."""
         requests: dict[Variables, tuple[CandidateShape, ...]] = {}
         for name in names:
             for other in self.variables:
@@ -253,7 +253,7 @@ class Functions:
             )  # fmt: skip
 
     def _columns(self, variables: Variables, shape: CandidateShape) -> NDArray:
-        """Return (R, q) columns of a form, scaled by their relative prior."""
+        """Return (R, q) columns of a form, scaled by relative prior deviations."""
         columns = self.sensitivities.basis(variables, shape)[0]
         return columns * forms.falling(shape, columns.shape[1])
 
@@ -268,7 +268,7 @@ class Functions:
         return [_at(p, part.variables, one.shape).parts for p in same]
 
     def element(self, one: Candidate, log_prior: float) -> Element | None:
-        """Return the element of a candidate; None if it is not visible."""
+        """Return the element of a candidate function; None if no reading shows it."""
         columns = in_cells(self.sensitivities, one, self.campaign)
         axes = self.sensitivities.axes(one)
         each = columns.shape[1] // sum(len(p.components) for p in one.parts)
@@ -281,6 +281,6 @@ class Functions:
 def _at(
     place: tuple[Where, ...], variables: Variables, shape: CandidateShape
 ) -> Candidate:
-    """Return the candidate with given variables at a place."""
+    """Return the candidate function of given variables that acts at a place."""
     part = CandidatePart(place[0][0], tuple(w[1] for w in place), *variables)
     return Candidate((part,), place[0][2], shape)

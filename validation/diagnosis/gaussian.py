@@ -30,19 +30,20 @@ from scipy.special import log_ndtr
 # Degrees of freedom of the prior of tau^2; the prior allows a true sigma between 1/2
 # and 3 times the declared sigma.
 FREEDOM = 20.0
-# [sigma] Prior contributions to the readings, over which the evidence is averaged.
+# [sigma] Prior standard deviations of a candidate's contribution to the readings.  The
+# evidence is averaged over these values.
 SIZES = 10.0 ** np.arange(-0.5, 4.1, 0.5)
 SPAN = math.log(SIZES[-1] / SIZES[0])
 _SEEN = 1e-8  # smaller eigenvalues of a scaled candidate are rounding errors
 
 
 def deviance(squares: NDArray | float, count: int) -> NDArray | float:
-    """Return -2 ln p(z) of n readings, without terms independent of z' C^-1 z."""
+    """Return the part of -2 ln p(z) that depends on ``squares``, that is, z' C^-1 z."""
     return (FREEDOM + count) * np.log1p(np.asarray(squares) / FREEDOM)
 
 
 def scale(squares: float, count: int) -> tuple[float, float]:
-    """Return the estimate of tau and its standard deviation."""
+    """Return the estimated noise scale tau and the standard deviation of tau."""
     freedom = FREEDOM + count
     tau = np.sqrt((FREEDOM + squares) / max(freedom - 2.0, 1.0))
     return float(tau), float(tau / np.sqrt(2 * freedom))
@@ -58,7 +59,14 @@ class Marginal:
 
 
 def marginalise(columns: NDArray, std: NDArray, z: NDArray, flat: NDArray) -> Marginal:
-    """Marginalise columns (n, k) of prior std (k,); ``flat`` (n, f) is orthonormal."""
+    """Marginalise the unknowns of the columns (n, k), with prior std (k,).
+
+    The columns ``flat`` (n, f) are orthonormal, and their unknowns have a flat prior.
+    The readings ``z`` (n,) are orthogonal to ``flat``.
+
+    Returns:
+        The model, to which candidates can be added.
+    """
     X = columns * std
     M = X.T @ X
     M[np.diag_indices(len(M))] += 1.0
@@ -71,7 +79,7 @@ def marginalise(columns: NDArray, std: NDArray, z: NDArray, flat: NDArray) -> Ma
 def leave_block_out(
     marginal: Marginal, blocks: NDArray, tau: float = 1.0
 ) -> tuple[NDArray, NDArray]:
-    """Predict each block of readings (n,) exactly by a fit to all others.
+    """Predict each block of readings (n,) exactly by a fit to all other blocks.
 
     Returns:
         (n,) prediction errors, and (blocks,) logarithms of the predictive densities.
@@ -83,7 +91,7 @@ def leave_block_out(
         if len(U) <= U.shape[1]:
             left = np.eye(len(U)) - U @ U.T
             errors[own] = np.linalg.lstsq(left, held, rcond=None)[0]
-        else:  # Woodbury: one equation per column
+        else:  # Woodbury identity: one equation for each column
             left = np.eye(U.shape[1]) - U.T @ U
             errors[own] = held + U @ np.linalg.lstsq(left, U.T @ held, rcond=None)[0]
         size = np.linalg.slogdet(left)[1] - len(U) * math.log(2 * math.pi * tau**2)

@@ -59,7 +59,7 @@ def hold_out(campaign: Campaign) -> HeldOut:
     count = len(names)
     if count < 2:
         every = np.ones(len(campaign), dtype=bool)
-        return HeldOut("none", (every,), "no rows held out: too few to spare")
+        return HeldOut("none", (every,), "no rows held out: there are too few rows")
     if count >= _SPLIT:
         quarter, tenth = (round(share * count) for share in _SHARES)
         chosen = max(min(quarter, _ENOUGH), tenth)
@@ -78,7 +78,7 @@ def hold_out(campaign: Campaign) -> HeldOut:
 
 
 def hidden(campaign: Campaign, rows: NDArray) -> Campaign:
-    """Return a campaign without the readings of rows (R,) bool, which are NaN."""
+    """Return a campaign in which the readings of selected rows (R,) bool are NaN."""
     readings = np.where(rows[:, None], np.nan, campaign.measured)
     return replace(campaign, measured=readings)
 

@@ -128,7 +128,7 @@ def _of(
 def _choices(
     effect: Effect, unknowns: tuple[Unknown, ...], loads: Sequence[str]
 ) -> Iterator[list[Unknown]]:
-    """Yield subsets of the unknowns of an effect without frames; all of them first."""
+    """Yield subsets of the unknowns of an effect without frames, the full set first."""
     if effect.follows_load:
         # An offset in a direction without recorded load belongs to a different
         # candidate model.
@@ -213,7 +213,7 @@ def with_declared(listed: Sequence[Hypothesis], robot: Robot) -> list[Hypothesis
     return list(kept)
 
 
-# Two instances of such an effect do not combine to one effect.
+# Nonlinear effects: two instances of one of them do not combine to one effect.
 _CURVED = ("contact_stiffening", "delayed_expansion")
 _SPRINGS = ("drive_compliance", "base_compliance")
 

@@ -74,12 +74,13 @@ def _knees(functions: Functions, name: str, component: str) -> list[CandidateSha
     if axis != frame.own_axis or name not in (*drives(robot), *elastic_joints(robot)):
         return []
     load = functions.sensitivities.wrenches[:, robot.index(name), axis]
-    # The library contains the clearance of a slide along its own axis.
+    # For a slide, a jump at load zero is omitted, because the library contains the
+    # clearance of a slide along its own axis.
     return forms.knees(np.abs(load), jump=frame.turns)
 
 
 def _by_kind(functions: Functions) -> Iterator[tuple[str, Parts, list[CandidateShape]]]:
-    """Return functions at all bodies, and of the coordinates of all drives."""
+    """Return functions that act at all bodies, or at all drives along their motions."""
     for kind, parts in places_of(functions.campaign.robot, functions.variables):
         if len(parts) > 1:
             known = functions.known(parts[0].variable)

@@ -166,7 +166,7 @@ def judge(
 
 def _noisy(campaign: Campaign, traced: Traced) -> Campaign:
     """Return the campaign with the noise level that residuals are compared with."""
-    # Sigma is the declared one, unless a part of it is the noise shared by points.
+    # The declared sigma is used, unless a part of sigma is the noise that points share.
     common = traced.campaign.common
     if common is None:
         return campaign
@@ -269,4 +269,6 @@ def _impossible(campaign: Campaign) -> tuple[str, ...]:
     ids = [campaign.ids[i] for i in np.flatnonzero(impossible_rows(campaign))]
     if not ids:
         return ()
-    return (f"a temperature that no sensor has, left out: {', '.join(ids[:10])}",)
+    return (
+        f"rows left out because of an impossible temperature: {', '.join(ids[:10])}",
+    )

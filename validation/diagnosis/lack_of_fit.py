@@ -28,8 +28,8 @@ UNLIKELY = 1e-3  # probability below which one of many tested residuals is unlik
 OUTLIERS = 20  # one outlier is accepted per this number of rows
 # Number of bins of a covariate's range; rows in one bin count as replicates.
 _LEVELS = 30
-_OUTLYING = 5.5  # rms of an outlying row / median of all rows
-_MOST = 6  # largest number of trends that are reported
+_OUTLYING = 5.5  # smallest ratio of an outlying row's rms to the median rms of all rows
+_MOST = 6  # largest number of reported trends
 
 
 @dataclass(frozen=True)
@@ -106,9 +106,10 @@ def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfF
 
 
 def _alike(campaign: Campaign) -> NDArray:
-    """Return (R,) numbers, equal for equal command, load and covariates except time."""
-    # Covariates are alike if they differ by at most a thirtieth of their range.  Then
-    # an effect that is not modelled does not count as noise.
+    """Return (R,) group numbers: equal for equal command, load and covariates."""
+    # The time is ignored.  Other covariates count as equal if they differ by at most a
+    # thirtieth of their range.  Then an effect that is not modelled does not count as
+    # noise.
     parts = [campaign.repeat]
     for name, values in campaign.covariates.items():
         span = float(np.ptp(values))
@@ -129,8 +130,8 @@ def outlying(campaign: Campaign, residual: NDArray, most: int | None = None) -> 
         (R,) bool, True for an outlier.
 
     Sources:
-    Baarda (1968), A testing procedure for use in geodetic networks: the largest
-    residual is tested first.
+        Baarda (1968), A testing procedure for use in geodetic networks: the largest
+        residual is tested first.
     """
     rows = np.nonzero(campaign.cells)[0]
     squares = np.bincount(rows, residual**2, minlength=len(campaign))
@@ -222,7 +223,7 @@ def _powers(x: NDArray) -> NDArray:
 
 
 def _test(name: str, X: NDArray, z: NDArray, tried: int) -> Trend | None:
-    """Return the F test of functions with a constant, fitted to all components."""
+    """Return the F test of whether functions of a variable explain the residual."""
     before = after = 0.0
     extra = freedom = 0
     for column in z.T:

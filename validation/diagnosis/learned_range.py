@@ -1,8 +1,9 @@
 """Range of the data a model was identified on, and rows that extrapolate beyond it.
 
 An identified effect is known only in the range of the covariates on which it was
-identified.  If a joint made a full turn, its angle is compared modulo a turn, unless
-the robot file contains a function of the angle that does not repeat after a turn.
+identified.  If a joint made a full turn, its angle is compared modulo a turn.  An
+exception is a robot file with a function of the angle that does not repeat after a
+turn.
 """
 
 from collections.abc import Iterator
@@ -17,7 +18,7 @@ from forcefit.assembly.model.function import Function
 from forcefit.assembly.model.robot import Robot
 from forcefit.validation.campaign.campaign import LOAD, Campaign
 
-_MARGIN = 0.05  # accepted extrapolation / width of the range
+_MARGIN = 0.05  # accepted extrapolation beyond the range, relative to its width
 _SAME = 1e-3  # accepted relative difference if the variable never varied
 # Forms that repeat after a turn of any variable, then forms that repeat only after a
 # turn of the first variable.

@@ -32,10 +32,11 @@ from forcefit.assembly.measurement.predict import predict
 from forcefit.validation.campaign.campaign import LOAD, Campaign
 from forcefit.validation.diagnosis.fit import MachineFit
 
-_TRIED = 240  # number of conditions that are tried
+_TRIED = 240  # number of measuring conditions that are compared
 # Ratio of the tried range of loads and covariates to the measured range.
 _FURTHER = 1.5
-_STEP = 1e-3  # step of derivatives / standard deviation
+# step of numerical derivatives relative to a parameter's standard deviation
+_STEP = 1e-3
 # Conditions whose non-centrality exceeds this fraction of the largest one count as
 # equally good.
 _AS_GOOD = 0.97
@@ -146,7 +147,7 @@ def _conditions_tried(conditions: Conditions) -> Conditions:
 
 def _between(measured: Conditions, rng: np.random.Generator) -> Conditions:
     """Return conditions with half of the configurations moved towards other ones."""
-    # Rest positions are known only for the measured configurations.
+    # Rest positions of clearances are known only for the measured configurations.
     if measured.rest is not None:
         return measured
     actuated = np.array([frame.actuated for frame in measured.robot.frames])
@@ -201,7 +202,7 @@ def _model(
 
 
 def _power(d: NDArray, J: NDArray, C: NDArray) -> NDArray:
-    """Return (S,) non-centrality of d for covariance J C J'; 0 if it is not finite."""
+    """Return (S,) non-centrality of the difference d; 0 where it is not finite."""
     S = np.eye(d.shape[1]) + np.einsum("sik,kl,sjl->sij", J, C, J)
     good = np.isfinite(d).all(axis=1) & np.isfinite(S).all(axis=(1, 2))
     powers = np.zeros(len(d))

@@ -16,13 +16,14 @@ from scipy.stats import chi2
 from forcefit.results.text import readings_text
 
 _BLUNDERS = 2e-4  # prior probability of a blunder
-_WIDTH = 30.0  # standard deviation of a blunder / tau
-_LEFT_OUT = 1e-12  # relative precision assigned to a blunder
-_CLEAR = 10.0  # smallest residual / tau of a blunder before a model is fitted
+_WIDTH = 30.0  # ratio of the standard deviation of a blunder to tau
+_LEFT_OUT = 1e-12  # weight of a blunder relative to a good reading
+# smallest ratio of a blunder's residual to tau while no model has been fitted
+_CLEAR = 10.0
 # Largest fraction of blunders, as in the final test; more outliers indicate an effect.
 _MANY = 0.05
 _UNLIKE = 4.0  # standard deviations by which tau must differ from 1 to be reported
-_CLOSE = 0.2  # smallest reported abs(ln tau)
+_CLOSE = 0.2  # smallest abs(ln tau) that is reported
 _CHANCE = 1e-4  # p-value below which the readings count as not repeatable
 _MEDIAN = 0.4549  # median of chi-square with one degree of freedom
 
@@ -48,9 +49,10 @@ class Noise:
 def probability_good(squares: NDArray, *, clearly: bool = False) -> NDArray:
     """Return (n,) probabilities that readings are good, from expected squares.
 
-    The probability is set to 1 for a reading that is more probably good than not, and
-    for all readings if there are too many outliers.  If ``clearly`` is true, only large
-    residuals count as outliers, because effects have not been fitted yet.
+    The probability is set to 1 for a reading that is more probably good than not.  If
+    there are too many outliers, it is set to 1 for all readings.  If ``clearly`` is
+    true, only large residuals count as outliers, because effects have not been fitted
+    yet.
     """
     v = max(float(np.median(squares)) / _MEDIAN, 1e-12)
     with np.errstate(over="ignore", under="ignore"):

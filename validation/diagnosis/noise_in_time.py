@@ -5,13 +5,14 @@ Ornstein-Uhlenbeck process.  Its correlation between times t_i and t_j is
 
     R_ij = (1 - a) delta_ij + a exp(-|t_i - t_j| / tau).
 
-======  =============  =========  ====================================================
-symbol  code           shape      meaning
-======  =============  =========  ====================================================
-a ``share`` fraction of the variance that is correlated tau ``constant`` [s] correlation
-time G ``slopes`` (N, k) change of the whitened readings per unknown H ``covariance``
-(k, k) (G'G)^-1, covariance of the unknowns for white noise
-======  =============  =========  ====================================================
+======  ==============  =========  ===================================================
+symbol  code            shape      meaning
+======  ==============  =========  ===================================================
+a       ``share``                  fraction of the variance that is correlated
+tau     ``constant``               [s] correlation time
+G       ``slopes``      (N, k)     change of the whitened readings per unknown
+H       ``covariance``  (k, k)     (G'G)^-1, covariance of the unknowns for white noise
+======  ==============  =========  ===================================================
 
 Fits assume white noise.  If the correlation matrix is R instead of 1, the covariance of
 the fitted unknowns is H G'R G H. The likelihood of a and tau is computed by a Kalman

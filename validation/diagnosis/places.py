@@ -1,8 +1,8 @@
 """List the places at which a function can act, with the responses of the readings.
 
-A place is a screw component at a frame, at the base or in the reading, a component of
-the load, or several components at the same frame.  Places with equal responses are
-listed only once.
+A place is one of three things: a screw component at a frame, at the base or in the
+reading; a component of the load; or several components at the same frame.  Places with
+equal responses are listed only once.
 """
 
 from dataclasses import dataclass, field
@@ -22,7 +22,7 @@ from forcefit.validation.diagnosis.sensitivities import Sensitivities
 from forcefit.validation.diagnosis.signatures import fingerprints
 from forcefit.validation.diagnosis.whitening import Whitening
 
-Where = tuple[str, str, str]  # place, component, kind of candidate
+Where = tuple[str, str, str]  # place, screw component, kind of candidate function
 # Ratio of the largest unrecorded force (for example of a cable) to the largest recorded
 # force.
 _HEAVY = 10.0
@@ -112,7 +112,7 @@ class Places:
         return sorted(singles, key=self._preference), combined
 
     def _list_singles(self, singles: list[Where]) -> None:
-        """List the single components with distinct responses."""
+        """List the single screw components whose responses of the readings differ."""
         over_sigma = np.where(self._campaign.cells, 1 / self._campaign.sigma, 0.0)
         shown, answers = [], []
         for where in singles:

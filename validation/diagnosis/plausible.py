@@ -1,9 +1,9 @@
 """Find implausible parameters of a machine, and impossible readings of a sensor.
 
-A fit may explain readings by absurd parameters, such as a base at a distance of 29 m on
-a foundation as soft as rubber.  The plausible ranges are wide and depend on the size of
-the robot and on the largest load.  If a parameter is outside its range, the deviation
-probably has another cause, and no effect is claimed.
+A fit may explain readings by absurd parameters.  An example is a base at a distance of
+29 m on a foundation as soft as rubber.  The plausible ranges are wide and depend on the
+size of the robot and on the largest load.  If a parameter is outside its range, the
+deviation probably has another cause, and no effect is claimed.
 
 Sources:
     Ashby, Materials Selection in Mechanical Design, 4th ed., figure 4.11 (expansion of
@@ -26,8 +26,11 @@ from forcefit.validation.diagnosis.nuisance import (
     LARGEST_TURN,
 )
 
-_GIVES = 0.2  # [rad, robot sizes] largest deformation by the largest load
-# [rad, robot sizes] largest plausible geometric error of a manufactured frame
+# [rad, or relative to the robot's size] largest plausible deformation under the largest
+# load
+_GIVES = 0.2
+# Largest plausible geometric error of a manufactured frame: rotation [rad], and
+# translation relative to the robot's size.
 _MADE = (0.1, 0.02)
 _HOT = 150.0  # [K] largest plausible difference from the calibration temperature
 _G = 9.81  # [m/s^2] acceleration of gravity

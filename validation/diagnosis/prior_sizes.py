@@ -86,7 +86,7 @@ class Grouped:
     most: NDArray
 
     def without(self, unknowns: NDArray) -> "Grouped":
-        """Return the model without the unknowns of the given indices."""
+        """Return the model after removing the unknowns with the given indices."""
         kept = np.delete(np.arange(len(self.along)), unknowns)
         return replace(
             self, gram=self.gram[np.ix_(kept, kept)], along=self.along[kept],

@@ -68,7 +68,7 @@ def _device(campaign: Campaign, own: Conditions) -> dict[str, dict[str, float]]:
 
 
 def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]:
-    """Return a start value of the pose: Kabsch's rotation, or the mean of rotations."""
+    """Return a start value of the device's pose: Kabsch's or a mean rotation."""
     model = predict(conditions).deviation
     nominal = conditions.measured_points
     answered = np.isfinite(model).all(axis=1)

@@ -18,7 +18,7 @@ from forcefit.validation.diagnosis.signatures import Signature, Tangents
 from forcefit.validation.diagnosis.states import Models, State
 
 _ROUNDS = 3  # largest number of linearisations; they may oscillate
-MOVED = 0.3  # change of the log posterior that changes no decision
+MOVED = 0.3  # changes of the log posterior below this value change no decision
 _LINEAR = 0.5  # largest squared whitened linearisation error
 # Largest factor on a nonlinear parameter in one linearisation.
 _SHIFT = 3.0
@@ -73,7 +73,7 @@ class Relinearisation:
         return tuple(elements)
 
     def _misses(self, effects: list[Element], xs: list[NDArray]) -> float:
-        """Return the squared whitened error of the linearisation."""
+        """Return the sum of squared whitened errors of the linearisation."""
         linear = np.zeros(len(self.models.readings.cells))
         for e, x in zip(effects, xs, strict=True):
             linear += e.columns @ ((x - e.begin)[e.slots] / e.scale)

@@ -144,7 +144,7 @@ def _steps(answer: Table) -> str:
 
 
 def _sets(answer: Table) -> str:
-    """Return the table of the sets of effects."""
+    """Return the table of the sets of effects with their probabilities."""
     rows: list[list[Cell]] = [
         [" + ".join(one["names"]) or "none", one["probability"]]
         for one in answer["alternatives"]
@@ -211,7 +211,7 @@ def _noise(diagnosis: Diagnosis) -> list[str]:
     """Return sentences about the noise and the outliers."""
     lack = diagnosis.lack
     far = np.array(diagnosis.campaign.ids)[diagnosis.outliers]
-    repeats = "there are no repeats"
+    repeats = "the campaign contains no repeats"
     if lack.repeats_freedom:
         repeats = f"between repeats {lack.repeats:.2f} times"
     texts = [

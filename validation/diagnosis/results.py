@@ -20,8 +20,8 @@ from forcefit.validation.diagnosis.sequence import LEARNED
 # Verdicts for which effects are listed.
 LISTED = {statuses.EXPLAINED, statuses.AMBIGUOUS, statuses.LEARNED}
 _HARDLY = 0.05  # number of determined combinations below which a frame is not listed
-# Half width of the interval that contains 90 % of a normal distribution [standard
-# deviations].
+# Half width [standard deviations] of the interval that contains 90 % of a normal
+# distribution.
 _INTERVAL = 1.645
 _UNITS = {GEOMETRY: ("rad", "m"), SPRINGS: ("rad/(N m)", "m/N")}
 
@@ -215,7 +215,7 @@ def learned(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     places = places or [len(sequence) - 1]
     shown = []
     for k, functions in enumerate(functions_of(diagnosis)):
-        # With folds, some fits may contain fewer functions.
+        # The fits of some folds may contain fewer functions.
         at = places[min(k, len(places) - 1)]
         found = diagnosis.traced.selected.functions[k]
         same = [

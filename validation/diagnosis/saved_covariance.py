@@ -56,7 +56,7 @@ class Number:
     session: str = ""
 
     def of(self, robot: Robot) -> float:
-        """Return the value of the parameter; 0 for a change of a compliance."""
+        """Return the parameter's value in a robot; 0 for a compliance in series."""
         if self.kind == ERROR:
             return float(
                 robot.errors[robot.index(self.owner), READING.index(self.name)]
@@ -69,7 +69,7 @@ class Number:
         return 0.0
 
     def moved(self, robot: Robot, by: float) -> Robot:
-        """Return the robot with a larger parameter value; compliances stay positive."""
+        """Return the robot with the parameter increased; compliances stay positive."""
         if self.kind == ERROR:
             row, axis = robot.index(self.owner), READING.index(self.name)
             return with_error(robot, *map(np.atleast_1d, (row, axis, by)))
@@ -176,7 +176,7 @@ def _numbers(fit: MachineFit, robot: Robot) -> list[Number]:
 
 
 def _of_frames(part: Small, robot: Robot) -> list[Number]:
-    """Return parameters of geometric errors or compliances in the order of unknowns."""
+    """Return the names of geometric errors or compliances in the order of unknowns."""
     kind = ERROR if part.name == GEOMETRY else COMPLIANCE
     return [
         Number(kind, robot.frames[row].name, READING[axis])
@@ -222,7 +222,7 @@ def read_covariance(robot: Robot) -> SavedCovariance | None:
     except FileNotFoundError:
         raise BadInput(f"{path}: no such file; {expected}") from None
     except Exception:  # a damaged archive may raise any exception
-        raise BadInput(f"{path}: found other content, {expected}") from None
+        raise BadInput(f"{path}: found damaged content, {expected}") from None
     if C.shape != (len(values), len(values)) or not np.isfinite(C).all():
         raise BadInput(
             f"{path}: found shape {C.shape}, expected {len(values)} rows and columns"

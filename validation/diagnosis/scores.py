@@ -17,8 +17,8 @@ from forcefit.validation.diagnosis.states import MORE, State
 from forcefit.validation.diagnosis.weighted_readings import WeightedReadings
 from forcefit.validation.diagnosis.whitening import Whitening
 
-BEAM = 6  # largest number of elements that are tried in a model
-OF_NAME = 2  # largest number of tried elements with the same name
+BEAM = 6  # largest number of candidate elements that are added to a model on trial
+OF_NAME = 2  # largest number of these candidates with the same name
 _VARIABLES = 4  # number of variables whose products with other variables are scored
 # Largest number of columns of a function at several places, which limits memory.
 _WIDEST = 600
@@ -70,7 +70,7 @@ class Scores:
     def best_to_add(
         self, state: State, *, functions: bool = True, products: bool = False
     ) -> list[tuple[float, Element]]:
-        """Return the best elements to add, with estimates of the log posterior."""
+        """Return the best elements to add to a model, with estimated log posteriors."""
         listed = [*self._library.elements, *self._explicit.elements]
         some = self._explicit.gains(state.sample_marginal)
         gains = [self._library.gains(state.marginal), self._more * some]
@@ -111,7 +111,7 @@ class Scores:
     def look(
         self, state: State, requests: Sequence[Request], most: int = 3
     ) -> list[ScoredFunction]:
-        """Return the best functions to add; scores refer to all rows."""
+        """Return the best functions to add to a model, scored over all rows."""
         found = self.functions.look(
             state.sample_marginal, self.weighted, requests, most
         )
@@ -127,13 +127,13 @@ class Scores:
         return len(self.readings.sampled) / max(int(self.readings.sampled.sum()), 1)
 
     def _element(self, one: Candidate, log_prior: float) -> Element | None:
-        """Return the cached element of a function, with columns of all cells."""
+        """Return the element of a function with columns of all cells, from a cache."""
         if one not in self._made:
             self._made[one] = self.functions.element(one, log_prior)
         return self._made[one]
 
     def forms_of(self, last: Element, base: State) -> list[Element | None]:
-        """Return the best forms of a function's variables."""
+        """Return the forms of a function's variables with the highest scores."""
         one = last.candidate
         variables = one.parts[0].variables
         priors = self.functions.shapes_of(variables)
@@ -158,7 +158,7 @@ class Scores:
         return [e for _, e in best]
 
     def sharper(self, e: Element, base: State) -> Element:
-        """Return a function with a refined shape parameter."""
+        """Return a function after a refined search for its best shape parameter."""
         one = e.candidate
         if not len(one.shape.bends):
             return e

@@ -20,24 +20,24 @@ from forcefit.validation.diagnosis.weighted_readings import WeightedReadings
 Update = Callable[[str, int, int], None]
 # Elements to fit, and the model whose estimates are the start values.
 Tried = tuple[tuple[Element, ...], State]
-_MOST = 5  # largest number of elements (docs/diagnosis.md)
+_MOST = 5  # largest number of elements in a model (docs/diagnosis.md)
 _KEPT = 3  # width of the beam: number of models that are kept
 _LOOKED = 2  # number of models to which functions are added
 _FORMS = 4  # number of models whose last function is tried in all forms
-# Accepted decrease of the log posterior for a larger model, because two elements may be
-# effective only together.
+# Largest accepted decrease of the log posterior when an element is added.  A decrease
+# is accepted because two elements may be effective only together.
 _DROP = 1.0
 # Largest number of rounds of exchanges.  They may not converge if no model describes
 # the memory of the machine.
 _ROUNDS = 3
-_NEAR = 15.0  # error of log posteriors with fixed standard deviations
+_NEAR = 15.0  # largest error of a log posterior computed with fixed standard deviations
 
 
 class Search:
     """Search among models for one set of readings and weights."""
 
     def __init__(self, readings: WeightedReadings) -> None:
-        """Fit the models without elements."""
+        """Fit the models that contain no effects and no functions."""
         self.readings, self.columns = readings, readings.columns
         self.models, self.scores = Models(readings), Scores(readings)
         self.empty = [self.models.state((), mode) for mode in self.models.modes()]
@@ -165,7 +165,7 @@ class Search:
             self._keep(self._refined((elements, base) for elements in tried))
 
     def _refined(self, tried: Iterable[Tried]) -> list[State]:
-        """Fit models; optimise the nuisance groups of the best and relinearise."""
+        """Fit models; optimise nuisance groups of the best three and relinearise."""
         new = [self.models.state(elements, s.mode, s) for elements, s in tried]
         new.sort(key=lambda s: -s.score)
         best = [self._fitted(s.elements, s) for s in new[:_KEPT]]

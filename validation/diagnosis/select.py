@@ -34,11 +34,13 @@ from forcefit.validation.diagnosis.states import State, prediction_gain
 from forcefit.validation.diagnosis.unknowns import Small
 from forcefit.validation.diagnosis.weighted_readings import NONE, WeightedReadings
 
-# Models are equally good if their log posteriors differ by less (odds of 20).
+# Two models are equally good if their log posteriors differ by less than this value
+# (odds of 20).
 _EQUAL = 3.0
-# The best model must contain functions if their probability is larger.
+# The best model must contain functions if the probability of functions exceeds this
+# value.
 _CLAIMED = 0.9
-# Predictions are equal if their squared whitened difference is smaller.
+# Two predictions are equal if their squared whitened difference is below this value.
 _SAME = 1.0
 _LISTED = 20  # number of listed models; others have negligible weight
 _COMPARED = 60  # number of models whose predictions are compared
@@ -46,8 +48,8 @@ _FEWEST = 5  # smallest number of blocks for cross-validation of functions
 # Number of searches with updated shared noise, which hardly changes after the first
 # search.
 _AGAIN = 3
-# Required gain in standard errors; in tests, false functions reached 1.8 and true ones
-# at least 6.9.
+# Gain in prediction that a function must reach, in standard errors.  In tests, false
+# functions reached 1.8, and true functions at least 6.9.
 _SURE = 2.0
 
 
@@ -197,10 +199,10 @@ def _confirmed(search: Search, states: list[State]) -> list[State]:
 def _merged(states: Sequence[State]) -> list[State]:
     """Return models with distinct predictions, the best first.
 
-    Of several models with equal predictions, the one with the fewest functions is
-    returned, because a function with the columns of a library effect is the same
-    effect.  Errors of the measuring device are an exception, because the machine may
-    have the same error.
+    Of several models with equal predictions, the model with the fewest functions is
+    returned.  The reason is that a function with the columns of a library effect is the
+    same effect.  Errors of the measuring device are an exception, because the machine
+    may have the same error.
     """
     every = _best_first(states)
     # Models without functions are included in case no function is confirmed.
@@ -219,7 +221,7 @@ def _merged(states: Sequence[State]) -> list[State]:
 
 
 def _without_refinements(states: Sequence[State]) -> list[State]:
-    """Merge models with a refined effect into those with the simple one if similar."""
+    """Merge a model with a refined effect into a similar one with the simple effect."""
     kept: list[State] = []
     for state in sorted(_best_first(states), key=_is_refined):
         plain = sorted(_refined(e) or e.name for e in state.elements)
@@ -240,7 +242,7 @@ def _best_first(states: Sequence[State]) -> list[State]:
 
 
 def _joined(one: State, other: State) -> State:
-    """Add the weight of another model to the weight of a model."""
+    """Return a model with the weight of another model added to its own weight."""
     return replace(one, score=float(np.logaddexp(one.score, other.score)))
 
 
@@ -249,7 +251,7 @@ def _is_refined(state: State) -> bool:
 
 
 def _refined(e: Element) -> str:
-    """Return the simpler effect that an element's effect refines, or nothing."""
+    """Return the simpler effect that an element's effect refines; empty if none."""
     return LIBRARY[e.name].refines if e.name else ""
 
 
@@ -285,7 +287,7 @@ def _models(states: Sequence[State], weights: NDArray) -> tuple[Model, ...]:
 def _learned(
     search: Search, states: Sequence[State], weights: NDArray, k: int
 ) -> Learned:
-    """Return a function of the best model, and equivalent functions."""
+    """Return a function of the best model together with its equivalent functions."""
     best, e = states[0], states[0].elements[k]
     rest = best.without([e])
     equal = list(search.columns.functions.equivalents(e.candidate))

@@ -147,7 +147,7 @@ class Sensitivities:
         return raw
 
     def _wrench(self, name: str) -> NDArray:
-        """Return the (R,) [N m or N] declared load of a joint."""
+        """Return the (R,) [N m or N] load of a joint in the declared model."""
         frame, _, component = name.removeprefix("wrench.").rpartition(".")
         row = self.conditions.robot.index(frame)
         return self._response.wrenches[:, row, LOADS.index(component)]
@@ -223,7 +223,7 @@ class Sensitivities:
         for part, function in zip(one.parts, one.functions(), strict=True):
             _, mixed = self.basis(part.variables, one.shape)
             numbers, spread = dict(given), dict(sure)
-            shown = []  # components on which the readings depend
+            shown = []  # components of the candidate on which the readings depend
             alone = len(part.components) == 1
             for component in part.components:
                 own = slice(at, at + mixed.shape[1])

@@ -22,11 +22,11 @@ from forcefit.validation.diagnosis.signatures import UNSEEN
 
 LIKE = 0.98  # cosine above which a design cannot distinguish two signatures
 SEEN = 3.0  # [sigma] smallest norm of a detectable signature
-# A direction with a smaller relative size is imitated by other columns, apart from
-# rounding errors.
+# Relative size of a direction below which only rounding errors remain.  Other columns
+# then imitate the direction.
 ROUNDING = 1e-9
-# Relative size that counts as zero for signatures, which are secants and not exact
-# derivatives.
+# Relative size below which a direction of a signature counts as zero.  It is larger
+# than for rounding, because signatures are secants and not exact derivatives.
 _RANK = 1e-3
 
 
@@ -101,7 +101,7 @@ class Separability:
         return [(self.names[i], self.names[j]) for i, j in np.argwhere(one_way)]
 
     def overlapping(self) -> list[tuple[str, str]]:
-        """Return pairs of effects that can imitate each other only in part."""
+        """Return pairs of effects that can imitate each other only partly."""
         part = (self.cosine > LIKE) & (self.shared <= LIKE) & (self.shared.T <= LIKE)
         part &= np.outer(self.visible, self.visible)
         return [(self.names[i], self.names[j]) for i, j in np.argwhere(part) if i < j]

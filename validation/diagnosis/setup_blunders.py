@@ -31,15 +31,18 @@ _ROWS = 40  # number of rows by which corrections are compared
 _TRIMMED = 0.9
 _MOST = 3  # largest number of simultaneous blunders
 _BEAM = 4  # number of sets of corrections that are extended
-# If a residual falls below this fraction of the initial one, only its set is extended.
+# If one set of corrections reduces the residual below this fraction of the initial one,
+# only this set is extended.
 _CLEAR = 0.1
-# A further correction is tried only if it reduces the residual below this fraction.
+# A correction is added to a set only if it reduces the residual below this fraction of
+# the set's residual.
 _LESS = 0.9
 # Blunders are reported if the residual falls below this fraction of the initial one.
 _DECISIVE = 0.5
 # A correction is necessary if the residual without it is larger by this factor.
 _NEEDED = 1.5
-# Distances above this multiple of the spread of the readings are not caused by units.
+# A corrected set-up is not tested if its commanded positions spread by more than this
+# multiple of the spread of the readings.
 _FAR = 10.0
 _NOISE = 3.0  # [sigma] residual below which the search for blunders ends
 _LEAST = 100.0  # smallest decrease of chi-square for each reported blunder
@@ -100,7 +103,7 @@ def setup_blunders(
 
 
 def _blunder(correction: Correction, before: float, after: float) -> SetupBlunder:
-    """Return a blunder with a sentence that describes it."""
+    """Return a blunder, including a sentence that tells the user what to check."""
     columns = correction.columns
     fit, s = ("fits", "") if len(columns) == 1 else ("fit", "s")
     sentence = (
@@ -153,12 +156,12 @@ def _needed(
 
 
 def _without(chosen: Sequence[Correction], one: Correction) -> Corrections:
-    """Return all corrections except one."""
+    """Return a set of corrections without one of its corrections."""
     return tuple(other for other in chosen if other is not one)
 
 
 def _sample(campaign: Campaign) -> NDArray:
-    """Return evenly spaced rows from those by which a set-up can be tested."""
+    """Return evenly spaced rows, out of all rows that can test a set-up."""
     cells = campaign.cells
     enough = np.any if campaign.registration == "known" else np.all
     usable = cells[:, :3].all(axis=1) | enough(cells[:, 3:], axis=1)
@@ -167,7 +170,7 @@ def _sample(campaign: Campaign) -> NDArray:
 
 
 class _Judge:
-    """Compute residuals of assumed set-ups on a sample of rows."""
+    """Computes the residuals that assumed set-ups cause in a sample of the rows."""
 
     def __init__(self, campaign: Campaign, conditions: Conditions) -> None:
         self.campaign, self.given = campaign, as_given(campaign)
@@ -217,12 +220,12 @@ class _Judge:
         return float(np.sqrt(np.mean(kept**2)))
 
     def _moved(self, setup: SetUp) -> Conditions | None:
-        """Return the conditions of a set-up; None if a command is unreachable."""
+        """Return the conditions under a set-up; None if a command is unreachable."""
         moved, given = replace(self.conditions, load=setup.loads), self.given
         if setup.places is not given.places or setup.axes is not given.axes:
             wide = np.nanstd(setup.points, axis=0).max()
             if np.std(setup.places, axis=0).max() > _FAR * wide:
-                return None  # unreachable targets take long
+                return None  # solving unreachable targets takes long
             poses = np.hstack([setup.places, rotation_vector(setup.axes)])
             postures, _ = place_many(moved.robot, poses)
         elif setup.coordinates is not given.coordinates:

@@ -20,9 +20,9 @@ from forcefit.validation.campaign.campaign import Campaign
 from forcefit.validation.diagnosis.signatures import loaded_components
 
 _UNITS = {  # factors between units that are often confused
-    "length": (25.4, 1e3),  # inches, millimetres
-    "angle": (180 / np.pi,),  # degrees
-    "load": (9.81, 1e3),  # kilograms, kilonewtons
+    "length": (25.4, 1e3),  # inches or millimetres instead of metres
+    "angle": (180 / np.pi,),  # degrees instead of radians
+    "load": (9.81, 1e3),  # kilograms-force or kilonewtons instead of newtons
 }
 
 

@@ -1,12 +1,12 @@
 """Compute signatures: the first-order change of the readings by each hypothesis.
 
-======  =============  =========  ================================================
-symbol  code           shape      meaning
-======  =============  =========  ================================================
-z ``residual`` (N,) (reading - model) / sigma, measured cells only A ``columns`` (N, k)
-derivative of the model by each unknown / sigma o ``offset`` (N,) change of the model at
-zero unknowns / sigma
-======  =============  =========  ================================================
+======  ============  ======  ========================================================
+symbol  code          shape   meaning
+======  ============  ======  ========================================================
+z       ``residual``  (N,)    (reading - model) / sigma, measured cells only
+A       ``columns``   (N, k)  derivative of the model by each unknown / sigma
+o       ``offset``    (N,)    change of the model / sigma if all unknowns are zero
+======  ============  ======  ========================================================
 """
 
 from collections.abc import Mapping
@@ -32,8 +32,8 @@ from forcefit.validation.diagnosis.hypotheses import (
     sessions_of,
 )
 
-_PROBES = 3  # number of random projections that detect equal columns
-_DIGITS = 6  # number of digits of a projection that must agree
+_PROBES = 3  # number of random projections by which equal columns are found
+_DIGITS = 6  # number of digits in which projections of equal columns must agree
 # Number of tested rows with the largest loads, and with the largest rotations.
 _PROBED = 4
 # Smallest visible change: sum of squares of all whitened readings.

@@ -1,7 +1,7 @@
 """Define the models of the search and compute their log posterior.
 
-A model consists of elements (effects and functions).  Geometric errors and springs are
-included or not:
+A model consists of elements (effects and functions).  It may also contain geometric
+errors of the frames, springs in the joints, or both.  Its score is the log posterior:
 
     score = ln p(z) - cost of optimised standard deviations + bounds + ln prior
 """
@@ -99,7 +99,7 @@ class State:
         return (self.readings.z - self.fitted) / self.readings.root
 
     def own(self, k: int) -> slice:
-        """Return the slice of the unknowns of the k-th element."""
+        """Return the slice of the model's unknowns that belongs to the k-th element."""
         counts = [e.columns.shape[1] for e in self.elements]
         begin = int(self.used.sum()) + sum(counts[:k])
         return slice(begin, begin + counts[k])
@@ -115,7 +115,7 @@ class State:
         return errors
 
     def without(self, some: Sequence[Element]) -> tuple[Element, ...]:
-        """Return the elements without the given ones."""
+        """Return the elements of the model without the given elements."""
         return tuple(e for e in self.elements if e not in some)
 
     @property
@@ -129,7 +129,7 @@ class State:
 
     @property
     def supported(self) -> bool:
-        """Whether no effect is at its bounds."""
+        """Whether all effects are inside their bounds."""
         means = [self.sizes.mean[self.own(k)] for k in range(len(self.elements))]
         return not any(map(_at_bounds, self.elements, means))
 
@@ -168,9 +168,9 @@ def prediction_gain(one: State, other: State, blocks: NDArray) -> float:
 
     Each block (n,) of readings is predicted by a fit to the others.  Two gains are
     computed, and the larger one is returned.  The first is the mean difference of the
-    log predictive densities.  The second is Wilcoxon's signed-rank statistic (1945),
-    because a few blocks often dominate the mean and its scatter although nearly all
-    other blocks improve too.  The gain is 0 for a single block, because its standard
+    log predictive densities.  The second is Wilcoxon's signed-rank statistic (1945).
+    It is needed because a few blocks often dominate the mean and its scatter, although
+    nearly all blocks improve.  The gain is 0 for a single block, because its standard
     error is unknown.
     """
     densities = []

@@ -96,7 +96,7 @@ def _small_lines(one: Table | None, name: str) -> list[str]:
 
 
 def _function_lines(one: Table) -> list[str]:
-    """Return two to four lines about a learned function."""
+    """Return two to four lines of text that describe a learned function."""
     formula, parts = one["formula"], one["parts_of_range"]
     short = formula if len(formula) < 160 else f"{formula[:157]}..."
     lines = [f"learned: {one['label']}", f"  {short}"]

@@ -56,7 +56,7 @@ _GROSS = 30.0  # smallest rms of a gross blunder / median rms of all rows
 # Functions of time must improve the prediction of other rows by this number of standard
 # errors.
 _CLEARLY = 2.0
-# [sigma] Second-order terms are added if they change a reading by more.
+# [sigma] Second-order terms are added if they change a reading by more than this value.
 _BENT = 0.3
 
 
@@ -107,7 +107,7 @@ class Traced:
 
     @property
     def _alone(self) -> bool:
-        """Whether the best model contains only one element."""
+        """Whether the best model contains exactly one effect or function."""
         found = self.selected
         device = self.campaign.registration == "unknown"
         return len(found.hypotheses) - device + len(found.functions) == 1
@@ -136,7 +136,7 @@ class Traced:
         return list(found.values())
 
     def _device_frames(self, hypothesis: Hypothesis) -> list[Acting]:
-        """Return the estimated pose of the device, one hypothesis for each session."""
+        """Return the device's estimated pose as hypotheses, one for each session."""
         base = np.broadcast_to(self.conditions.base, (len(self.campaign), 6))
         own = {}
         for session in self.campaign.sessions or (None,):
@@ -261,7 +261,7 @@ def _errors(fit: MachineFit) -> NDArray:
 
 
 def _gross(campaign: Campaign, fit: MachineFit, used: NDArray) -> NDArray:
-    """Return (R,) bool: fitted rows that are outliers, which a search excludes."""
+    """Return (R,) bool, True for fitted rows with gross outliers, to be omitted."""
     left = residual_of(campaign, fit.robot) / campaign.sigma
     left = np.where(campaign.cells & used[:, None], left, 0.0)
     count = np.maximum((campaign.cells & used[:, None]).sum(axis=1), 1)

@@ -26,13 +26,14 @@ from forcefit.validation.diagnosis.responses import responses
 from forcefit.validation.diagnosis.sensitivities import Sensitivities
 from forcefit.validation.diagnosis.signatures import conditions_of
 
-_WIDE = 1e3  # prior standard deviation / plausible size of an effect's unknown
+# ratio of prior standard deviation to plausible size of an effect's unknown
+_WIDE = 1e3
 # Largest change of a function's shape parameter, and its prior standard deviation,
 # relative to its value.
 _BEND = 0.5
 # Standard deviation of an unknown fixed at its declared value, in plausible sizes.
 _HELD = 1e-12
-STEP = 1e-4  # step of derivatives / size of a parameter
+STEP = 1e-4  # step of numerical derivatives relative to the size of a parameter
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +151,7 @@ class Unknowns:
 
     @cached_property
     def places(self) -> list[tuple[Part, slice]]:
-        """Parts of x in their order, with their slices."""
+        """Each part of the parameter vector x with its slice, in the order of x."""
         parts: list[Part] = [*self.effects, *self.small, *self.functions]
         ends = np.cumsum([len(part) for part in parts]).tolist()
         return [
@@ -158,7 +159,7 @@ class Unknowns:
         ]
 
     def place(self, part: Part) -> slice:
-        """Return the slice of one part in x."""
+        """Return the slice of one part in the parameter vector x."""
         return next(own for one, own in self.places if one is part)
 
     @property
@@ -280,7 +281,7 @@ def _linear(conditions: Conditions) -> Conditions:
 
 
 def _resting_as(conditions: Conditions, held: Conditions) -> Conditions:
-    """Return conditions with the rest positions of others, without base compliance."""
+    """Return conditions with the rest positions of ``held``; new frames are at 0."""
     assert held.rest is not None
     rest = np.zeros_like(conditions.errors)
     for row, frame in enumerate(conditions.robot.frames):

@@ -5,12 +5,13 @@ divided by the declared sigma, is e + L n.  Here e is independent noise of varia
 The k independent standard normal variables n are common to all cells of the
 measurement.
 
-======  ==============  =======  =====================================================
-symbol  code            shape    meaning
-======  ==============  =======  =====================================================
-w ``root`` ** 2 (n,) relative precisions L ``loadings`` (n, k) change of the cells over
-sigma per shared variable W ``matrix`` (n, n) block-diagonal, W (w^-1 + L L') W' = 1
-======  ==============  =======  =====================================================
+======  ===============  =======  ====================================================
+symbol  code             shape    meaning
+======  ===============  =======  ====================================================
+w       ``root`` ** 2    (n,)     relative precisions
+L       ``loadings``     (n, k)   change of the cells over sigma per shared variable
+W       ``matrix``       (n, n)   block-diagonal, W (w^-1 + L L') W' = 1
+======  ===============  =======  ====================================================
 
 Among all such W, this W is the nearest to w^1/2: W = (1 + K K')^-1/2 w^1/2 with K =
 w^1/2 L.  It is computed from the singular values of the blocks of K.
@@ -111,7 +112,7 @@ def independent(campaign: Campaign, residual: NDArray) -> NDArray:
 
 
 def size_of_noise(campaign: Campaign) -> NDArray:
-    """Return (R, 6) [rad, m] standard deviations of the readings and shared noise."""
+    """Return the (R, 6) [rad, m] standard deviations of readings with shared noise."""
     if campaign.common is None:
         return campaign.sigma
     return np.sqrt(campaign.sigma**2 + np.sum(campaign.common**2, axis=2))

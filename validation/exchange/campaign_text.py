@@ -13,7 +13,7 @@ from forcefit.validation.exchange.device_frame import DeviceFrame
 from forcefit.validation.exchange.reading import Reading
 from forcefit.validation.exchange.targets_file import TargetsFile
 
-# Index of the command, and readings by target.
+# A row of the campaign: index of its command, and its readings by target.
 Rows = Sequence[tuple[int, Mapping[str, Reading]]]
 
 

@@ -54,7 +54,7 @@ def read_sheet(path: Path | str, decimal: str = ".") -> Sheet:
         if line.strip() and not line.lstrip().startswith(("//", "#"))
     ]
     if not lines:
-        raise BadInput(f"{path}: empty; expected a table")
+        raise BadInput(f"{path}: found an empty file, expected a table")
     mark = _mark([line for _, line in lines[:_SAMPLE]], decimal)
     rows = [(number, _cells(line, mark)) for number, line in lines]
     for number, cells in rows:
@@ -104,7 +104,10 @@ def _text(path: Path | str) -> str:
         raise BadInput(
             f"{path}: line {line}: found the character NUL; expected a text file"
         )
-    raise BadInput(f"{path}: not UTF-16 despite its byte order mark; expected text")
+    raise BadInput(
+        f"{path}: found a byte order mark of UTF-16 but no UTF-16 text; expected a "
+        "text file"
+    )
 
 
 def _mark(lines: Sequence[str], decimal: str) -> str:
@@ -125,6 +128,6 @@ def _cells(line: str, mark: str) -> list[str]:
         line = re.sub(r"\s+(?=\[)", "", line.replace("\t", _BLANK).strip())  # X [mm]
     try:
         row = next(csv.reader([line], delimiter=mark, skipinitialspace=True))
-    except csv.Error:  # an unclosed quote
+    except csv.Error:  # the line contains an unclosed quote
         row = line.split(mark)
     return [cell.strip().strip('"').removeprefix("'").strip() for cell in row]

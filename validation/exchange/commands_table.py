@@ -1,4 +1,4 @@
-"""Read the table of commands of an import."""
+"""Read the table of the machine's commands for an import of measured data."""
 
 import re
 from collections.abc import Mapping
@@ -117,7 +117,7 @@ def read_commands(path: Path | str, robot: Robot, writing: Writing) -> Commands:
 def _check_label(place: str, label: str, seen: Mapping[str, int]) -> None:
     """Reject a missing label and a repeated label."""
     if not label:
-        raise BadInput(f"{place}: empty; expected a label")
+        raise BadInput(f"{place}: found an empty cell, expected a label")
     if label in seen:
         raise BadInput(
             f"{place}: found {quoted(label)}, already the label of line "
@@ -130,7 +130,10 @@ def _decimal_hint(cell: str, decimal: str) -> str:
     other = "," if decimal == "." else "."
     if not np.isfinite(parse_number(cell, other)):
         return ""
-    return f'; decimal = {{ commands = "{other}" }} in the targets file declares it'
+    return (
+        f'; if this is a decimal mark, set decimal = {{ commands = "{other}" }} in '
+        "the targets file"
+    )
 
 
 def _factor(path: Path | str, name: str, column: str, robot: Robot) -> float:

@@ -31,7 +31,8 @@ _SCALED = 0.02  # largest relative scatter of distance ratios for a wrong unit
 _UNIT = 0.05
 # Distances are computed from each reading to this number of following readings.
 _PAIRED = 10
-# Relative to the declared distance of two targets; larger differences are reported.
+# Largest accepted difference between measured and declared distance of two targets,
+# relative to the declared distance.
 _APART = 0.1
 # Reversal of one axis; reversals of other axes differ only by a rotation.
 _MIRRORED = np.array([1.0, -1.0, 1.0])
@@ -114,7 +115,7 @@ def check_targets(
             raise BadInput(
                 f"{file}: targets: {remarks[0]}: all distances are {factor:.4g} "
                 f"times as large as declared{', ' if meant else ''}{meant}; "
-                "expected places in m"
+                "expected target positions in m"
             )
     return remarks
 

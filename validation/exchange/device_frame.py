@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 # Deviations above this multiple of the scatter of all readings are not caused by a
 # machine.
 _GROSS = 20.0
-# An exchange is accepted if it reduces the misfit to this fraction.
+# An exchange of targets is accepted if it reduces the misfit below this fraction of the
+# misfit without the exchange.
 _BETTER = 0.25
 _MOST = 6  # largest number of targets for which all 720 orders are tried
 
@@ -56,7 +57,7 @@ def spans_a_plane(points: NDArray) -> bool:
 
 
 def robust_frame(measured: NDArray, nominal: NDArray) -> tuple[DeviceFrame, float]:
-    """Fit a frame without gross errors, and return it with the scatter of the points.
+    """Fit the device's frame without grossly wrong points; return also the scatter.
 
     Args:
         measured: (N, 3) [m] points in device axes.

@@ -89,7 +89,7 @@ class _HeadedRows:
         header = self.values.header
         place = f"{self.values.sheet.file}: line {line}"
         while len(cells) > len(header.cells) and not cells[-1]:
-            cells = cells[:-1]  # trailing separator
+            cells = cells[:-1]  # the row ends with a separator
         if len(cells) != len(header.cells):
             raise BadInput(
                 f"{place}: found {len(cells)} cells, expected {len(header.cells)} as "

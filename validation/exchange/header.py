@@ -176,7 +176,7 @@ def _of_target(cell: str, targets: Sequence[str]) -> tuple[Column, str]:
 
 
 def _only(label: str, targets: Sequence[str]) -> str:
-    """Return the target that a label such as arm:SMR1 names; empty if there is none."""
+    """Return the target that a label such as arm:SMR1 names; empty if it names none."""
     words = re.split(r"[:./|\s]+", label)
     found = [target for target in targets if target in words or target == label]
     return found[0] if len(found) == 1 else ""

@@ -160,7 +160,7 @@ def turns_of(
 
 
 def _turns(read: NDArray, nominal: NDArray, mount: NDArray | None) -> Turns:
-    """Return the deviations for a declared or fitted mount; nothing is checked."""
+    """Return the deviations for a declared or fitted mount, without any check."""
     taken = np.isfinite(read).all(axis=(1, 2))
     seen = Rotation.from_matrix(np.swapaxes(nominal[taken], 1, 2) @ read[taken])
     if mount is None:

@@ -29,7 +29,7 @@ from forcefit.validation.exchange.targets_file import TargetsFile
 _ASTRAY = 0.1
 _HERE = DeviceFrame(np.eye(3), np.zeros(3))
 
-# Index of the command, and readings by target.
+# A row of the campaign: index of its command, and its readings by target.
 Rows = Sequence[tuple[int, Mapping[str, Reading]]]
 
 

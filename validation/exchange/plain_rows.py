@@ -123,7 +123,7 @@ def _of_all(
 def _reading(
     values: CellValues, line: int, xyz: list[str], names: tuple[str, ...]
 ) -> Reading:
-    """Return the reading with the coordinates in three cells."""
+    """Return the reading whose x, y and z are in three adjacent cells of a row."""
     position = nothing = np.full(3, np.nan)
     if not any(map(missing, xyz)):
         numbers = [values.number(line, a, c) for a, c in zip("xyz", xyz, strict=True)]

@@ -27,7 +27,8 @@ from forcefit.validation.exchange.placing import Placed, place
 from forcefit.validation.exchange.reading import Reading
 from forcefit.validation.exchange.targets_file import TargetsFile, read_targets
 
-# Largest fraction of readings that may be omitted; a larger fraction has another cause.
+# Largest accepted fraction of omitted readings.  If more readings do not fit, the input
+# files are probably wrong.
 _MOST_LEFT_OUT = 0.2
 
 
@@ -112,7 +113,7 @@ def import_readings(
         The campaign that was written.
 
     Raises:
-        BadInput: a file violates a rule, or too many readings would be omitted, or the
+        BadInput: a file violates a rule; too many readings would be omitted; or the
             readings fit far better in a different unit, mirrored or with exchanged
             targets.  In these cases no file is written.
     """

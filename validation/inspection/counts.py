@@ -7,7 +7,7 @@ from forcefit.validation.campaign.campaign import LOAD, READING, Campaign
 
 
 def row_counts(kinds: NDArray) -> dict:
-    """Return the number of kinds, and the least, median and largest number of rows."""
+    """Return the number of kinds; minimum, median and maximum of rows of a kind."""
     _, rows = np.unique(kinds, return_counts=True)
     return {"count": len(rows), "rows_each": [rows.min(), np.median(rows), rows.max()]}
 
@@ -28,7 +28,7 @@ def load_counts(c: Campaign) -> dict:
 
 
 def reading_counts(c: Campaign) -> dict:
-    """Return the number of cells, the size and the sigma of each reading component."""
+    """Return the number of cells, the deviation and sigma of each reading component."""
     counts = {}
     for k, name in enumerate(READING):
         cells = c.cells[:, k]
@@ -45,7 +45,7 @@ def reading_counts(c: Campaign) -> dict:
 
 
 def covariate_counts(c: Campaign) -> dict:
-    """Return the range, the levels and the correlated covariates of each covariate."""
+    """Return each covariate's range, number of levels and correlation with others."""
     return {
         name: {
             "range": [x.min(), x.max()],

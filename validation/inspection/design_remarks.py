@@ -45,7 +45,7 @@ def remarks_on(
 
 
 def _on_readings(campaign: Campaign) -> list[Remark]:
-    """Return remarks about unmeasured, constant, rounded and too large components."""
+    """Return remarks about unmeasured, constant, rounded and too large readings."""
     remarks = []
     measured, sigma = campaign.measured, campaign.sigma
     absent = ", ".join(campaign.not_measured)

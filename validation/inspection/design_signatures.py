@@ -122,7 +122,7 @@ def changes_between_repeats(
 
 
 def _one_each(every: list[Hypothesis]) -> dict[str, Hypothesis]:
-    """Return one hypothesis for each effect; of several shapes, the middle one."""
+    """Return one hypothesis per effect: of those with most slots, the middle one."""
     hypotheses: dict[str, Hypothesis] = {}
     for name in dict.fromkeys(h.effect for h in every):
         of = [h for h in every if h.effect == name]

@@ -66,11 +66,11 @@ class Inspection:
         """Return a data set over ``effect``: whether each effect is visible."""
         s, absent = self.separability, self.signatures.untestable
         no, unknown = [False] * len(absent), [np.nan] * len(absent)
-        size = number("norm of the change of the readings over sigma")
+        size = number("norm of the change of the readings, divided by sigma")
         rank = number("number of unknowns that the design distinguishes")
         values = {
             "testable": (flag("can be tested"), [*s.traced, *no]),
-            "shows": (flag("shows at plausible size"), [*s.visible, *no]),
+            "shows": (flag("detectable at plausible size"), [*s.visible, *no]),
             "strength": (size, [*s.strength, *unknown]),
             "rank": (rank, [*s.rank, *unknown]),
             "reason": (text("reason"), [*[""] * len(s.names), *absent.values()]),

@@ -39,11 +39,11 @@ from forcefit.validation.synthetic.design import (
 )
 from forcefit.validation.synthetic.generator import Synthetic
 
-_POOL = 600  # number of rows to choose from
+_POOL = 600  # number of candidate rows, of which some are chosen
 # Number of rows with the smallest and with the largest derivatives between which
 # exchanges are tried.
 _TRIED = 4
-_BETTER = 1e-3  # relative increase of the criterion that counts
+_BETTER = 1e-3  # smallest increase of the criterion for which rows are exchanged
 _AVERAGE = 20  # number of random plans for comparison
 _PACE = 60.0  # [s] assumed time to measure one row
 _SWING = 2400.0  # [s] assumed period of the temperature of a machine
@@ -136,7 +136,7 @@ def plan_rows(
 def _pool(
     robot: Robot, design: CampaignDesign, wanted: int, rng: np.random.Generator
 ) -> CampaignPlan:
-    """Return the rows to choose from, spread over the duration of the required rows."""
+    """Return the candidate rows, spread over the time needed for the planned rows."""
     # The temperature changes slowly, so rows at equal times have equal temperatures.
     plan = plan_campaign(robot, design, rng)
     time = np.array([row.covariates["time"] for row in plan.rows])
@@ -212,7 +212,7 @@ class _Criterion:
         self._X = np.hstack(blocks).reshape(rows, -1, begin[-1])
 
     def apart(self, chosen: NDArray) -> NDArray:
-        """Return (e, e) mean non-centralities of effects if another is fitted."""
+        """Return the (e, e) mean non-centrality of each effect if another is fitted."""
         return self._value(chosen)[0]
 
     def _value(self, chosen: NDArray) -> tuple[NDArray, NDArray]:
@@ -258,7 +258,7 @@ class _Criterion:
 
 
 def _told(apart: NDArray) -> float:
-    """Return the value of the criterion for given non-centralities."""
+    """Return the criterion, the sum of ln(1 + l_ef), for given non-centralities."""
     return float(np.nansum(np.log1p(apart)))
 
 

@@ -1,7 +1,8 @@
 """Define a sentence about a campaign, and its importance.
 
-There are three kinds of sentences: about lost information, which no analysis can
-recover; about aspects that need care; and about aspects in good order.
+The importance has three levels.  ``lost``: information that no analysis can recover.
+``careful``: an aspect of the campaign that needs care.  ``fine``: an aspect in good
+order.
 """
 
 from dataclasses import dataclass

@@ -10,7 +10,7 @@ from forcefit.validation.inspection.remark import CAREFUL, FINE, LOST, Remark
 from forcefit.validation.inspection.repeats import MOST, RepeatNoise
 
 _FEW = 20  # degrees of freedom below which the uncertainty of the noise exceeds 30 %
-_SEVERAL = 4  # so many suspect readings probably have a common cause
+_SEVERAL = 4  # smallest number of suspect readings that suggests a common cause
 
 
 def on_repeats(

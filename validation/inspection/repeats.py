@@ -2,16 +2,18 @@
 
 Rows of the same configuration and load form a set.  The residuals about the mean of a
 set contain noise and changes between the rows.  Slow changes with time, temperature and
-side of approach are fitted to all sets together and subtracted, so that drift does not
-count as noise.
+side of approach are fitted to all sets together.  They are subtracted, so that drift
+does not count as noise.
 
-======  =============  =========  ================================================
-symbol  code           shape      meaning
-======  =============  =========  ================================================
-z ``whitened`` (N,) readings / declared sigma, measured cells by row B ``slow`` (N, p)
-columns of slow changes / sigma e ``rest`` (N,) z minus the mean of its set and the
-fitted B x h ``leverage`` (N,) weight of a cell in its fitted value
-======  =============  =========  ================================================
+======  ============  ======  ========================================================
+symbol  code          shape   meaning
+======  ============  ======  ========================================================
+z       ``whitened``  (N,)    readings / declared sigma, measured cells by row
+B       ``slow``      (N, p)  columns of slow changes / sigma
+x                     (p,)    coefficients of the slow changes
+e       ``rest``      (N,)    z minus the mean of its set and the fitted B x
+h       ``leverage``  (N,)    weight of a cell in its fitted value
+======  ============  ======  ========================================================
 
 Sources:
     Cook, Weisberg (1982), Residuals and influence in regression: the deleted residual e
@@ -221,7 +223,7 @@ class _RepeatFit:
         )
 
     def noise(self, suspects: list[Suspect]) -> RepeatNoise:
-        """Return the noise computed without the suspects."""
+        """Return the noise computed from the repeats without the suspect readings."""
         free, rest = 1 - self.leverage, self.rest**2
         degrees = np.bincount(self.component, free, 6)
         cells = np.maximum(np.bincount(self.component, minlength=6), 1)

@@ -85,7 +85,7 @@ def _library(inspection: Inspection) -> int:
 
 
 def _good(inspection: Inspection) -> bool | None:
-    """Return True without warnings, None with any, False if no diagnosis can begin."""
+    """Return False if no diagnosis can begin, None if there are warnings, else True."""
     unregistered = bool(inspection.signatures.unregistered)
     if unregistered or not inspection.separability.visible.any():
         return False
@@ -122,7 +122,7 @@ def _remarks(inspection: Inspection) -> list[str]:
 
 
 def _effects(inspection: Inspection) -> str:
-    """Return a table of effects: smallest detectable size, or why not testable."""
+    """Return a table: each effect's smallest detectable size, or why it has none."""
     s = inspection.separability
     rows: Cells = [
         [name, "yes" if s.visible[i] else "if larger" if s.traced[i] else "no",

@@ -103,7 +103,7 @@ def _covariate_lines(c: Campaign) -> list[str]:
 
 
 def _noise_lines(c: Campaign, noise: RepeatNoise | None) -> list[str]:
-    """Return lines about the noise from repeats by component, and about suspects."""
+    """Return lines: each component's noise from repeats, and the suspect readings."""
     if noise is None:
         return []
     low, high = noise.interval

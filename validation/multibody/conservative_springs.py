@@ -73,8 +73,8 @@ def far_couple(screw: Sequence[float], force: Sequence[float]) -> list[float]:
     """Return the couple that Exudyn omits at a spring's far end.
 
     Exudyn applies the wrench at half of the screw's translation from either end.  These
-    two points coincide only without a rotation, because perpendicular to the rotation
-    axis a chord is shorter than its arc by the factor sin(t/2) / (t/2).  Therefore the
+    two points coincide only without a rotation.  Perpendicular to the rotation axis, a
+    chord is shorter than its arc by the factor sin(t/2) / (t/2).  Therefore the
     wrenches on the two ends are not exactly opposite.
 
     Args:

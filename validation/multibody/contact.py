@@ -1,8 +1,8 @@
 """Model joint clearances as smooth, conservative contacts.
 
-Joints move freely inside bounds (cones): discs for (TX, TY) and (RX, RY), intervals for
-TZ and RZ, or a ball for (TX, TY, TZ).  At distance r from the middle of a cone of size
-c,
+Joints move freely inside bounds, called cones.  (TX, TY) and (RX, RY) are bounded by
+discs, and TZ and RZ by intervals.  Alternatively, a ball bounds (TX, TY, TZ).  At
+distance r from the middle of a cone of size c,
 
     x = (r^2 - c^2) / 2c,   P = (x + sqrt(x^2 + w^2)) / 2,   energy = k P^2 / 2,
 

@@ -1,7 +1,7 @@
 """Extrapolate central differences to step zero, and estimate the uncertainty.
 
-The error of a central difference consists of a truncation error proportional to the
-square of the step and a rounding error proportional to the inverse of the step.  The
+The error of a central difference consists of two parts.  The truncation error is
+proportional to the square of the step, and the rounding error to its inverse.  The
 truncation error dominates for large steps, and the rounding error for small steps.
 Each pair of neighbouring steps is extrapolated to step zero.  The result is the
 extrapolated value that differs least from the preceding one.  This difference is the

@@ -71,7 +71,8 @@ def wrench(model: Model, part: Elastic) -> NDArray:
     force = model.mbs.ComputeItem(last, model.exu.ComputeItemType.ODE2LHS)[7:]
     total = model.exu.OutputVariableType.CoordinatesTotal
     a, b, c, d = model.mbs.GetNodeOutput(model.node(part.far), total)[3:7]
-    # Forces of Euler parameters are G^T times the moment, and G G^T = 4.
+    # The generalised forces of Euler parameters are G^T times the moment, with G G^T =
+    # 4 times the identity.
     G = 2 * np.array([[-b, a, -d, c], [-c, d, a, -b], [-d, -c, b, a]])
     R = pose(model, part.far)[:3, :3]
     return np.concatenate([R.T @ G @ force[3:] / 4, R.T @ force[:3]])

@@ -31,9 +31,10 @@ from forcefit.validation.multibody.exudyn_reading import (
 )
 from forcefit.validation.multibody.motion import exponential, inverse, logarithm
 
-_CLOSED = 1e-12  # [rad, m] smaller closure errors count as zero
+_CLOSED = 1e-12  # [rad, m] closure errors below this value count as zero
 _LOAD_STEPS = 4
-_RELEASING_STEPS = 4  # number of steps in which free motions are released
+# number of steps in which the springs on free motions are weakened
+_RELEASING_STEPS = 4
 # Number of steps, geometrically spaced, in which the smoothing of the contacts is
 # reduced.
 _NARROWING_STEPS = 30

@@ -42,8 +42,8 @@ from forcefit.validation.multibody.open_robot import OpenTree
 _STEPS, _CONTACT_STEPS = (2e-4, 1e-4, 5e-5), (1e-8, 3e-9, 1e-9, 3e-10)
 _GAP_STEP = 1e-5
 _RANK = 1e-7  # relative size below which a derivative of a closure error counts as zero
-# Relative to a joint's motion.  A motion with a smaller stiffness is resisted only by
-# the weak spring of the joint.
+# [-] Relative stiffness of a joint's motion, below which only the weak spring of the
+# joint resists the motion.
 _ROLLS = 1e-4
 # Number of Newton steps at the end, because rounding errors of closures move compliant
 # robots.
@@ -120,7 +120,7 @@ def _compliance(
         ahead, back = ([forces(q + sign * step * z) for z in Z.T] for sign in (1, -1))
         return Z.T @ (np.array(ahead) - np.array(back)).T / (2 * step)
 
-    # Contact forces change with pressure, so no Newton steps follow.
+    # Contact forces depend on the penetration, so no Newton steps follow.
     steps, polish = (_CONTACT_STEPS, 0) if tree.contacts else (_STEPS, _POLISH)
     q = np.array(model.mbs.systemData.GetODE2Coordinates())
     forces(q)

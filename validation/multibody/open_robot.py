@@ -1,9 +1,9 @@
 """Build the open robot without stress from bodies with geometric errors.
 
-At each frame, the geometric error is applied first, then the deformation of the link,
-then the motion of the joint, as in the paper.  Rotation vector and translation of an
-error are both in the frame's axes.  Passive joints without a spring move freely about
-or along their z axis.
+At each frame, three motions are applied in the order of the paper: the geometric error,
+the deformation of the link, and the motion of the joint.  Rotation vector and
+translation of an error are both in the frame's axes.  Passive joints without a spring
+move freely about or along their z axis.
 """
 
 from collections.abc import Mapping

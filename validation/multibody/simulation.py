@@ -1,17 +1,16 @@
 """Simulate the forced assembly as a multibody system, independently of the model.
 
 In the open robot, every body is placed without stress and with its full geometric
-error.  The loops are then closed by force, and Exudyn computes the static equilibrium
-with finite rotations.  Only the data of the robot and its joint coordinates are shared
-with the virtual-joint model.  Placement, beams and equilibrium are computed
-independently.
+error.  Forces then close the loops, and Exudyn computes the static equilibrium with
+finite rotations.  Only the data of the robot and its joint coordinates are shared with
+the virtual-joint model.  Placement, beams and equilibrium are computed independently.
 
-At each frame, the geometric error is applied first, then the deformation of the link,
-then the motion of the joint, as in the paper.  Rotation vector and translation of an
-error are both in the frame's axes.  Without clearances, passive joints move freely
-about or along their z axis.  A connector closes each loop.  The target of the connector
-is corrected until the closure error vanishes, so overconstrained rigid loops such as
-parallelograms need no special treatment.
+At each frame, three motions are applied in the order of the paper: the geometric error,
+the deformation of the link, and the motion of the joint.  Rotation vector and
+translation of an error are both in the frame's axes.  Without clearances, passive
+joints move freely about or along their z axis.  A connector closes each loop.  The
+target of the connector is corrected until the closure error vanishes, so
+overconstrained rigid loops such as parallelograms need no special treatment.
 
 Sources:
     Gerstmayr (2023), "Exudyn - a C++-based Python package for flexible multibody
@@ -302,7 +301,7 @@ def simulated_frequencies(
         meshes={}, elements=elements, clearances=False, bushes=False,
         load=np.zeros(6), gravity=np.zeros(3), couple=np.zeros(3),
     )  # fmt: skip
-    # The robot is built closed and without load, so it is in equilibrium.
+    # The robot is built with closed loops and without load, so it is in equilibrium.
     model = Model(
         *import_exudyn(), robot.name, Regularisation(math.inf, IDLE_STIFFNESS)
     )

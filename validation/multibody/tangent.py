@@ -37,8 +37,8 @@ _REGULARISATIONS = (
     Regularisation(1e8, 1e-8), Regularisation(1e8, 1e-6), Regularisation(1e10, 1e-6)
 )  # fmt: skip
 
-# Numbers of load steps, because a large step may pass a bifurcation and reach an
-# unstable equilibrium.
+# Numbers of load steps that are tried if the equilibrium is unstable.  A large step may
+# pass a bifurcation and reach an unstable equilibrium.
 _SMALLER_STEPS = (16, 64)
 
 

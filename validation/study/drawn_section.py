@@ -54,5 +54,5 @@ def drawn_tiles(found: dict[str, Any] | None, worst: dict[str, Any]) -> list[Til
 
 
 def _bounds(found: dict[str, float]) -> list[str | Value]:
-    """Return bounds of a rotation and of a translation as text."""
+    """Return the bounds of the rotation and of the translation error as text."""
     return rotation_and_translation(found["rotation"], found["translation"], 3)

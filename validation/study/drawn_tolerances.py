@@ -35,7 +35,8 @@ IN_BOUNDS = (
     "errors above alone, and the mean clearance of fits"
 )
 DRAWN_ERRORS = {key: f"drawn_{key}_error" for key in POSE_ERRORS}
-_MAP_TOLERANCE = 1e-3  # [-] accuracy of the bounds of a map
+# [-] relative accuracy of the certified bounds at each point of a map
+_MAP_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -67,21 +68,20 @@ def read_statistics(root: Table, robot: Robot) -> DrawnTolerances | None:
         if the table is absent and the study closes the loops of the robot.
 
     Raises:
-        BadInput: the table violates a rule, the robot has no tolerances, or the study
-            closes the loops of the robot, because the errors that close them are not
-            errors of parts.
+        BadInput: the table violates a rule; the robot has no tolerances; or the study
+            closes the loops of the robot by errors, which are not errors of parts.
     """
     drawn = bool(robot.callouts or robot.fits)
     closing = [key for key in ("rest", "mismatch") if root.has(key)]
     if not root.has("statistics"):
         return DrawnTolerances() if drawn and not closing else None
     if closing:
-        fault = f'found it together with "{closing[0]}", whose errors are not of parts'
-        raise root.bad("statistics", f"{fault}; expected one of them")
+        fault = f'found this table and "{closing[0]}", whose errors are not part errors'
+        raise root.bad("statistics", f"{fault}; expected only one of the two")
     table = root.table("statistics")
     if not drawn:
-        fault = "found one for a robot without [[tolerance]] and without fits"
-        raise root.bad("statistics", f"{fault}, expected none")
+        fault = "found this table for a robot without [[tolerance]] and without fits"
+        raise root.bad("statistics", f"{fault}, expected no such table")
     draws = _count(table, "draws", 1000, 2)
     importance = _count(table, "importance", 64, 0)
     if 0 < importance < _LEAST_BASE_DRAWS:

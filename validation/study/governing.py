@@ -64,7 +64,7 @@ def _by_translation(row: dict[str, Any]) -> tuple[float, float]:
 
 
 def _improved(robot: Robot) -> list[tuple[str, str, Robot]]:
-    """Yield copies of the robot, each without one of its imperfections."""
+    """Return copies of the robot, each without one of its imperfections."""
     cases = []
     declared = robot.declared_errors
     for i, frame in enumerate(robot.frames):
@@ -81,7 +81,7 @@ def _improved(robot: Robot) -> list[tuple[str, str, Robot]]:
 
 
 def _loose_parts(robot: Robot) -> dict[str, list[int]]:
-    """Rows of the frames with clearance, by joint: all contacts of one together."""
+    """Return the indices of frames with clearance, by joint (one or more frames)."""
     parts: dict[str, list[int]] = {}
     names = names_of(robot)
     for i, frame in enumerate(robot.frames):
@@ -93,7 +93,7 @@ def _loose_parts(robot: Robot) -> dict[str, list[int]]:
 
 
 def _finite_bounds(frame: Frame) -> dict[str, float]:
-    """Bounds of a joint's clearances; an infinite one is a free motion."""
+    """Return a joint's clearances; infinite ones are free motions and are omitted."""
     if frame.clearance is None:
         return {}
     own = own_cone(frame)

@@ -1,4 +1,4 @@
-"""Create the report section about the grid: maps and largest values."""
+"""Create the report section about the grid of poses: maps and largest values."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -120,7 +120,8 @@ def _drawn(maps: Any, first: Mapped) -> str:
     names = [str(d) for d in maps["energy"].dims if maps.sizes[d] > 1]
     if not names:
         return ""
-    # The axes with the most values; of axes with equally many values, the first.
+    # The map shows the two axes with the most values.  Of axes with equally many
+    # values, the first is shown.
     axes = sorted(sorted(names, key=lambda n: -maps.sizes[n])[:2], key=names.index)
     at = {name: i for name, i in _largest(first).items() if name not in axes}
     held = {name: i for name, i in at.items() if name in names}

@@ -52,5 +52,5 @@ def platform_section(stiffness: dict[str, Any]) -> str:
             "first."
         ),
         table(["part", *DIRECTIONS], blame),
-        share_chart(stiffness["shares"], "The parts of the table."),
+        share_chart(stiffness["shares"], "Contribution of each part of the table."),
     )

@@ -72,7 +72,7 @@ def compare_printed(
 
 
 def _energy_check(assembly: Assembly, energy: float) -> Check:
-    """Return the check of the energies; both are about zero in an assembly zone."""
+    """Return the check that both energies agree; they are about 0 in a zone."""
     tight = assembly.energy_without_clearance
     scale = max(assembly.energy, 1e-6 * tight, _NOISE_ENERGY / TOLERANCE)
     return Check(
@@ -82,7 +82,7 @@ def _energy_check(assembly: Assembly, energy: float) -> Check:
 
 
 def _margin_check(ours: float | None, theirs: float | None) -> Check:
-    """Return the check of a margin; it has no signal if a margin is missing."""
+    """Return the check that two margins agree; without a margin it has no signal."""
     if ours is None or theirs is None:
         value = 0.0 if ours is theirs else math.inf
         return Check(value, TOLERANCE, signal=False)

@@ -259,5 +259,5 @@ def _governing_tiles(results: StudyResults, worst: dict[str, float]) -> list[Til
 
 
 def _percent(ratio: float) -> str:
-    """Return the change by a factor as text in per cent."""
+    """Return the change that a factor causes, as text in per cent."""
     return f"{100 * (ratio - 1):+.0f} %"

@@ -105,7 +105,7 @@ def _change(one: dict[str, Any], worst: dict[str, float], part: str) -> list[Any
 
 
 def solution_section(results: StudyResults) -> str:
-    """Return the section on the assembly at the study's pose, with its certificate."""
+    """Return the section on the assembly at the study's pose and on its certificate."""
     solution = results.solution
     pose = [
         text
@@ -282,5 +282,5 @@ def crosscheck_section(results: StudyResults) -> str:
 
 
 def _number(value: float | None, unit: str, digits: int = 6) -> str | Value:
-    """Return a number with its unit, or "none"."""
+    """Return a number with its unit as text, or "none" if there is no number."""
     return "none" if value is None else Value(value, unit, digits)

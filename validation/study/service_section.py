@@ -26,7 +26,7 @@ def service_section(service: dict[str, Any] | None) -> str:
         parts += _loaded(service)
     if "frequencies" in service:
         parts.append(_frequencies(service["frequencies"]))
-    return section("The robot at work, at this pose", *parts) if parts else ""
+    return section("The robot under load, at this pose", *parts) if parts else ""
 
 
 def _loaded(service: dict[str, Any]) -> list[str]:

@@ -137,7 +137,7 @@ class StudyResults:
         if self.service is not None and self.service["status"] != OK:
             reasons["service"] = str(self.service.get("reason", NO_EQUILIBRIUM))
         if self.maps is not None and not points_solved(self.maps):
-            reasons["maps"] = "none of the grid's points has an answer"
+            reasons["maps"] = "none of the grid's points has a solution"
         return reasons
 
     @property

@@ -257,7 +257,7 @@ def _known(table: Table, key: str, robot: Robot, names: list[str]) -> tuple[str,
 
 
 def _links(root: Table, robot: Robot) -> tuple[str, dict[str, MeshLink], float]:
-    """Return the source of the links' stiffness, and meshes of beams for comparison."""
+    """Return the source of the links' stiffness, and the meshes compared with beams."""
     if not root.has("links"):
         return "beam", {}, 0.005
     table = root.table("links")

@@ -32,7 +32,8 @@ def with_delays(rows: Sequence[Row], time_constants: Iterable[float]) -> list[Ro
             step = (row.covariates["time"] - before["time"]) / late
             if step == 0.0:
                 warm = now
-            # Response to a ramp, plus the decay of the initial difference.
+            # Exact solution: the response to a ramp of the temperature, plus the
+            # exponential decay of the initial difference.
             else:
                 lag = (now - before["temperature"]) / step
                 start = warm - before["temperature"] + lag

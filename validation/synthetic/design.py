@@ -16,7 +16,7 @@ from forcefit.validation.synthetic.effects import Row
 TEMPERATURES = ("swing", "around", "constant")
 _PERIOD = 2400.0  # [s] period of the temperature
 _STEP = 60.0  # [s] time between measurements
-_DRAWS = 40  # largest ratio of draws to configurations
+_DRAWS = 40  # largest number of random draws per configuration
 _DIGITS = 6  # number of decimal digits of commanded coordinates
 
 
@@ -229,7 +229,7 @@ def _interleaved(design: CampaignDesign, rng: np.random.Generator) -> NDArray:
 
 
 def _loads(design: CampaignDesign, order: NDArray, rng: np.random.Generator) -> NDArray:
-    """Return (rows, 6) [N m, N] loads; two rows of each configuration repeat one."""
+    """Return (rows, 6) [N m, N] loads; each configuration repeats two of its loads."""
     loads = np.zeros((design.rows, 6))
     if design.levels == "one":
         loads[:, 3:] = (design.load * _direction(rng)).round(3)

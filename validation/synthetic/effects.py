@@ -1,12 +1,13 @@
 """Model the effects of a simulated machine by their physics.
 
 The machine is a tree of frames, and most effects are additional frames.  For example,
-an elastic drive is a spring after the joint, an encoder error is a finite rotation
-after the joint, and an elastic foundation is a spring below all frames.  Other effects
-change a body (length, compliance, clearance), the load (weight, or a load that differs
-from the recorded load), the measuring frame, or only the reading.
+an elastic drive is a spring after the joint.  An encoder error is a finite rotation
+after the joint.  An elastic foundation is a spring below all frames.  Other effects
+change a body (length, compliance, clearance) or the load (weight, or a load that
+differs from the recorded load).  Further effects change the measuring frame, or only
+the reading.
 
-The code of the effects that a diagnosis fits is not used here, because an error in that
+A diagnosis fits effects with its own code, which is not used here.  An error in that
 code must not affect the data with which it is tested.  Effects have their public names
 and parameters.  Springs, rotations and translations of joints act about or along the z
 axis of the joint.
@@ -127,7 +128,7 @@ def beam_length(robot: Robot, name: str) -> float:
 def lengthened(robot: Robot, name: str, change: float) -> Robot:
     """Return a robot with a body longer by ``change`` [m] along its actual axis."""
     frame = robot.frame(name)
-    if not isinstance(frame.link, BeamLink):  # along the line between its joints
+    if not isinstance(frame.link, BeamLink):  # lengthen the line between its joints
         longer = 1.0 + change / float(np.linalg.norm(frame.translation))
         return with_frame(robot, replace(frame, translation=longer * frame.translation))
     length, x = beam_span(frame, frame.link)
@@ -145,7 +146,7 @@ def with_frame(robot: Robot, frame: Frame) -> Robot:
 
 
 def misread(machine: Machine, name: str, suffix: str, change: float) -> Machine:
-    """Return a machine with a joint that deviates from its command by [rad or m]."""
+    """Return a machine with a joint displaced by ``change`` [rad or m]."""
     screw = along_own_axis(machine.robot.frame(name), change)
     robot = insert_after(machine.robot, name, suffix, geometric_error=screw)
     return replace(machine, robot=robot)
@@ -272,7 +273,7 @@ def _load_gain(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _body_mass(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Add a mass [kg] to a body, with its centre at the moment [kg m] over the mass."""
+    """Add a mass [kg] to a body; its centre is the moment [kg m] over the mass."""
     robot = machine.robot
     keys = ("mass", "moment.x", "moment.y", "moment.z")
     for name in dict.fromkeys(n for key in keys for n in named(given, key)):
@@ -335,12 +336,15 @@ CHANGES: dict[str, Change] = {
     "body_mass": _body_mass,
     "geometric_stiffening": _geometric_stiffening,
 }
-POSES: dict[str, Moved] = {  # effects on the pose (4, 4)
+# functions that change the measured pose (4, 4), by name of the effect
+POSES: dict[str, Moved] = {
     "registration": _registration,
     "device_scale": _device_scale,
 }
-READINGS: dict[str, Moved] = {"drift": _drift}  # effects on the reading (6,)
-COVARIATES: dict[str, tuple[str, ...]] = {  # covariates that change the machine
+# functions that change the reading (6,), by name of the effect
+READINGS: dict[str, Moved] = {"drift": _drift}
+# names of the covariates that change the machine, by name of the effect
+COVARIATES: dict[str, tuple[str, ...]] = {
     "thermal_expansion": ("temperature",),
     "friction_hysteresis": ("approach",),
 }

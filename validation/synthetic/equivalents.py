@@ -1,10 +1,11 @@
 """Find effects that a campaign's design cannot distinguish from the hidden effects.
 
-The first-order signature of every public effect, divided by the noise, is computed by
-the program of ``springs.py`` and not by the model under test.  A set of effects
-explains the data as well as the hidden effects if a combination of its signatures
-equals their contribution within the noise.  A diagnosis that names such a set is
-therefore not wrong.
+The signature of an effect is the first-order change of the readings, divided by the
+noise.  The program of ``springs.py`` computes the signatures of all public effects, not
+the model under test.  A set of effects explains the data as well as the hidden effects
+under one condition: a combination of its signatures equals the contribution of the
+hidden effects within the noise.  A diagnosis that names such a set is therefore not
+wrong.
 
 The signature of a rotated drive or a lengthened beam depends only on the configuration.
 The signatures of temperature, approach and contact follow from these signatures.  An
@@ -156,7 +157,7 @@ def _of_drives_and_lengths(
 def _of_loads(
     campaign: Synthetic, differences: "_FiniteDifferences"
 ) -> Iterator[tuple[str, NDArray]]:
-    """Return columns of effects that depend on loads: springs, weight, wrong loads."""
+    """Return columns of effects that depend on loads: springs, weight, load errors."""
     beams = [f for f in campaign.robot.frames if isinstance(f.link, BeamLink)]
     base = [
         differences.loaded("base_compliance", f"stiffness.{k}", _SOFT, 1 / _SOFT)

@@ -33,11 +33,9 @@ from forcefit.validation.synthetic.machine import Hidden, simulate_readings
 
 _GIVEN_STRENGTH = ("self_weight", "geometric_stiffening")
 _TRIES = 5
-_DRAWS = 6  # largest number of draws of an effect's parameters until it is visible
-_CLOSE = 0.05  # accepted relative error of a strength
-_MOST = (
-    1000.0  # times its plausible size: an effect that needs more is hardly observable
-)
+_DRAWS = 6  # largest number of random draws until an effect's parameters are visible
+_CLOSE = 0.05  # accepted relative error of an effect's requested strength
+_MOST = 1000.0  # largest accepted factor on the plausible size of an effect
 _SMALL = 1e-2  # scale of errors and load at which the machine is nearly linear
 _BLUNDER = 40.0  # [sigma] size of a blunder
 

@@ -18,7 +18,7 @@ class PowerLawSpring:
     exponent: float
 
     def secant(self, deflection: float) -> float:
-        """Return the secant stiffness [N m/rad or N/m] at a deflection."""
+        """Return the spring's secant stiffness [N m/rad or N/m] at a deflection."""
         bent = max(abs(deflection), 1e-9)
         return float(self.coefficient * bent ** (self.exponent - 1.0))
 
@@ -38,7 +38,7 @@ class TwoStepSpring:
     knee: float
 
     def secant(self, load: float) -> float:
-        """Return the secant stiffness [N m/rad or N/m] for a load."""
+        """Return the secant stiffness [N m/rad or N/m] of the spring under a load."""
         size = max(abs(load), 1e-6 * self.knee)
         more = max(size - self.knee, 0.0)
         return size / (self.below * (size - more) + self.above * more)

@@ -135,7 +135,7 @@ class _Placed:
 
 
 def _simulated(machines: Sequence[Machine]) -> Iterator[Rest]:
-    """Yield the equilibria, each computed by the multibody simulation."""
+    """Yield the equilibrium of each machine, computed by the multibody simulation."""
     for machine in machines:
         robot = machine.robot
         q = np.array([machine.coordinates.get(f.name, 0.0) for f in robot.frames])

@@ -140,7 +140,8 @@ def _spring_model(machines: Sequence[Machine], q: NDArray) -> _SpringModel:
     first, second = np.array(pairs, dtype=int).reshape(-1, 2).T
     closed = np.linalg.inv(nominal[:, first]) @ nominal[:, second]
     passive = [i for i, f in enumerate(robot.frames) if f.passive and not f.compliant]
-    known: dict[int, tuple[NDArray, NDArray]] = {}  # rows share frames
+    # machines share frames, which are computed once
+    known: dict[int, tuple[NDArray, NDArray]] = {}
     for frame in (f for m in machines for f in m.robot.frames):
         if id(frame) not in known:
             known[id(frame)] = _compliances(frame)
@@ -215,7 +216,7 @@ def _chain(robot: Robot, steps: NDArray, ends: NDArray, q: NDArray) -> NDArray:
 
 
 def _forward(parts: _SpringModel, q: NDArray, screws: NDArray) -> NDArray:
-    """Return (2, k, n, 4, 4) frames at the ends of bodies, and after joint springs."""
+    """Return (2, k, n, 4, 4) frames: at the ends of bodies, and after joint springs."""
     links, joints = _deflections(screws)
     before = _chain(parts.robot, parts.placed @ links, joints, q)
     return np.stack([before @ np.linalg.inv(joints), before])
@@ -239,7 +240,7 @@ def _axes(parts: _SpringModel, T: NDArray) -> NDArray:
 
 
 def _newton(parts: _SpringModel, q: NDArray) -> tuple[NDArray, float]:
-    """Return inverses of Newton's matrices, and the compliance for scaling wrenches."""
+    """Return the inverse Newton matrices, and the compliance that scales wrenches."""
     # Rows of one configuration with equal springs have equal matrices.
     distinct = np.hstack([
         q,

@@ -30,7 +30,7 @@ _UNITS = {
     "load_gain": "N",
     "drift": "rad",
 }
-_SLIDING = {  # units of the same parameters along an axis instead of about it
+_SLIDING = {  # units of the same parameters for sliding joints and translations
     "drive_compliance": "N/m",
     "base_compliance": "N/m",
     "encoder_offset": "m",

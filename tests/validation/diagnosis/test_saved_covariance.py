@@ -30,5 +30,5 @@ def test_damaged_covariance_file_is_refused_by_name(tmp_path, damage):
     robot = replace(load_robot("arm6"), diagnosis={"covariance": str(path)})
     assert read_covariance(robot).covariance.shape == (0, 0)
     path.write_bytes(damage(path.read_bytes()))
-    with pytest.raises(BadInput, match=r"saved\.npz: found other content, expected"):
+    with pytest.raises(BadInput, match=r"saved\.npz: found damaged content, expected"):
         read_covariance(robot)

@@ -166,10 +166,10 @@ def test_per_session_effects_are_read_from_the_campaign(tmp_path):
 
 
 @pytest.mark.parametrize(("given", "message"), [
-    ('["load_gian"]', 'expected effects of single rows; did you mean "load_gain"'),
-    ('["modulus_scale"]', "found 'modulus_scale', expected effects of single rows"),
+    ('["load_gian"]', 'can differ between sessions; did you mean "load_gain"'),
+    ('["modulus_scale"]', "found 'modulus_scale', expected an effect that can differ"),
     ('"load_gain"', "per_session: found"),
-    ("[3]", "found 3, expected effects"),
+    ("[3]", "found 3, expected an effect"),
 ])  # fmt: skip
 def test_wrong_per_session_effect_is_refused(given, message, tmp_path):
     folder = write_campaign(tmp_path / "days", toml={"per_session": given})

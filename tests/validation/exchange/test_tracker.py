@@ -225,7 +225,7 @@ def test_readings_are_joined_by_order_and_repeated_files_become_repeats(lab, run
     ("name;x;y;z;time\nA;1;2;3;noon", {}, "expected a time: seconds"),
     ("name;x;y;z;date\nA;1;2;3;3/4/2026 10:00:00", {}, 'expected dates = "day_fi'),
     ("name;x;y;z;U95 x\nA;1;2;3;-4", {}, "found -0.002 m, expected >= 0"),
-    ("", {}, "empty; expected a table"),
+    ("", {}, "found an empty file, expected a table"),
     ("A 1 2 3", {"unit": '"ft"'}, "unit: found 'ft'"),
     ("A 1 2 3", {"robot": None}, "robot: missing"),
     ("A 1 2 3", {"windw": 3}, 'unknown key "windw"; did you mean "window"?'),

@@ -149,7 +149,7 @@ def test_study_without_tolerances_has_no_statistics(tmp_path):
         end = text.index("mm", begin)
         text = text[:begin] + text[text.index("\n", end) :]
     assert study_of(tmp_path, robot=text).statistics is None
-    with pytest.raises(BadInput, match="statistics: found one for a robot without"):
+    with pytest.raises(BadInput, match="found this table for a robot without"):
         study_of(tmp_path, "", "[statistics]\n", text)
 
 
@@ -164,7 +164,7 @@ def test_study_without_tolerances_has_no_statistics(tmp_path):
         ),
         ("[statistics]\nlimits = { translation = -1 }\n", "translation: found -1"),
         ("[statistics]\ndraw = 5\n", 'statistics: unknown key "draw"; did you mean'),
-        ('mismatch = "spring"\n[statistics]\n', 'found it together with "mismatch"'),
+        ('mismatch = "spring"\n[statistics]\n', 'found this table and "mismatch"'),
     ],
 )
 def test_mistake_in_the_statistics_of_a_study_is_reported(tmp_path, table, message):

@@ -251,7 +251,7 @@ def test_study_without_a_reachable_point_in_its_map_does_not_pass(tmp_path):
     results = run_study(read_study(study_file(tmp_path, text), tmp_path / "out"))
     write_study(results)
     assert results.verdicts == {"reference": "passed"}
-    assert results.unchecked == {"maps": "none of the grid's points has an answer"}
+    assert results.unchecked == {"maps": "none of the grid's points has a solution"}
     assert not results.passed
     assert "No point has a solution" in (tmp_path / "out" / "report.html").read_text()
 
