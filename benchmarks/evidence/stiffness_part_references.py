@@ -194,10 +194,11 @@ def corners_of(shape):
 
 
 def forks(order, layers, finer=1.5):
-    """K_E of the link with forks and the largest system's unknowns.
+    """Return K_E of the link with forks, and the unknowns of the largest system.
 
-    Seen from the middle, the base moves by minus, the tip by plus half a unit screw:
-    no two of the six have the same symmetry, so K is diagonal there.
+    Relative to the middle of the link, the base moves by minus half a unit screw and
+    the tip by plus half of it.  The six motions have different symmetries, so that K is
+    diagonal at the middle.
     """
     mesh = eighth_of_forks(layers, finer)
     mesh.Curve(order)

@@ -1,10 +1,12 @@
 """K_E of the parts of ``stiffness_random_parts.py`` by NGSolve.
 
-Bodies of revolution by Fourier modes in their half section, order 8; what is made of
-bricks by bricks that shrink geometrically toward every edge, a half or a quarter of the
-part by its symmetry, order 3 and 4 or 4 and 5; the eye by a quarter of it in curved
-tetrahedra with layers of prisms along the edges of its interfaces, order 3 and 4.
-Nothing is shared with our elements, meshes or estimates.
+Bodies of revolution are solved by Fourier modes in their half section, with polynomials
+of order 8.  Parts that consist of bricks are meshed by bricks that become geometrically
+smaller toward every edge.  Their symmetry allows the program to solve a half or a
+quarter of them, with orders 3 and 4 or 4 and 5.  A quarter of the eye is meshed by
+curved tetrahedra, with layers of prisms along the edges of its interfaces, and solved
+with orders 3 and 4.  The program shares no code with forcefit's elements, meshes or
+error estimates.
 """
 
 import netgen.meshing as netgen
@@ -17,13 +19,13 @@ from stiffness_round_references import AXIS, BASE, FREE, TIP, half_section
 from stiffness_round_references import stiffness as round_stiffness
 
 SHRINK = 0.15
-MOST = 50e3  # unknowns of the highest order
+MOST = 50e3  # largest number of unknowns at the highest order
 # motions RX .. TZ about a point of the z axis: their own images in x = 0 and in y = 0
 EVEN = {"x": (1, 0, 0, 0, 1, 1), "y": (0, 1, 0, 1, 0, 1)}
 
 
 def independent_stiffness(part, young):
-    """K_E of a part, base held, at the tip's centre.
+    """Return K_E of a part at the centre of its tip; the base is held.
 
     Args:
         part: of ``stiffness_random_parts``.
@@ -47,7 +49,7 @@ def independent_stiffness(part, young):
 
 
 def round_part(part, lame):
-    """Modes 0 and 1 in the half section, orders 6 and 8."""
+    """Return K_E of a body of revolution from modes 0 and 1, with orders 6 and 8."""
     corners = list(part.profile)
     L = max(z for _, z in corners)
     kinds = []
@@ -117,7 +119,7 @@ def graded(places, thin, wide, cut, least):
 
 
 def center_of_tip(part):
-    """Centroid of the full bricks' ends at the largest z."""
+    """Return the centroid of the faces of full bricks at the largest z."""
     x, y, z = (np.array(p) for p in part.planes)
     area = np.outer(np.diff(x), np.diff(y)) * part.full[:, :, -1]
     middle = (x[1:] + x[:-1]) / 2
@@ -167,7 +169,7 @@ def brick_mesh(places, full, axis, mirrors):
 
 
 def by_symmetry(mesh, order, mirrors, tip, lame):
-    """K from motions that are even or odd in each mirror; one matrix serves all."""
+    """Return K from motions that are even or odd about each plane of symmetry."""
     (lam, mu), space = lame, ng.VectorH1(mesh, order=order)
     u, v = space.TnT()
     e, f = ng.Sym(ng.Grad(u)), ng.Sym(ng.Grad(v))
@@ -194,7 +196,7 @@ def by_symmetry(mesh, order, mirrors, tip, lame):
 
 
 def free_unknowns(mesh, order, mirrors, kind):
-    """Those that are not held by base, tip or a mirror, of condensed matrices."""
+    """Return the unknowns that neither an interface nor a symmetry plane holds."""
     held = {c: ["base", "tip"] for c in "xyz"}
     for cut, even in zip(mirrors, kind, strict=True):
         for c in "xyz":
@@ -206,7 +208,7 @@ def free_unknowns(mesh, order, mirrors, kind):
 
 
 def eye(part, lame):
-    """A quarter, x > 0 and y > 0."""
+    """Return K_E of the eye from its quarter x > 0, y > 0."""
     W, T, L, r = part.eye
     solid = Box(Pnt(0, 0, 0), Pnt(W / 2, T / 2, L)) + Cylinder(
         Pnt(0, 0, L), Y, W / 2, T / 2

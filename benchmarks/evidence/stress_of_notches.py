@@ -79,7 +79,7 @@ PARTS = (
 
 
 def outline(part: Part) -> NDArray:
-    """(k, 2) [m] radius and z of the rings of a shaft's outer side, and of its bore."""
+    """Return (k, 2) [m] radius and z of the rings of a shaft's surface and bore."""
     R, q, r, place, end = (
         v / 1e3 for v in (part.large / 2, part.small / 2, part.radius, part.place,
                           part.length)
@@ -102,7 +102,7 @@ def outline(part: Part) -> NDArray:
 
 
 def surface_of(part: Part) -> Surface:
-    """A shaft's surface, each ring turned by half a facet against the one before."""
+    """Return the surface of a shaft; successive rings are offset by half a facet."""
     profile = outline(part)
     if part.bore:  # closed: an even number of rings, so that the last meets the first
         profile = profile[:-1]
@@ -131,7 +131,7 @@ def surface_of(part: Part) -> Surface:
 
 
 def main() -> None:
-    """Print a line a part and how many are covered."""
+    """Print a line for each part, and the number of covered parts."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--accuracy", type=float, default=0.02)
     parser.add_argument("--parts", default="0:20")
