@@ -1,4 +1,4 @@
-"""Sound files of every kind, and sound commands that read them, for ``fuzz.py``."""
+"""Valid files of every kind, and valid commands that read them, for ``fuzz.py``."""
 
 from pathlib import Path
 
@@ -209,10 +209,10 @@ COMMANDS = [
 
 
 def write_seeds(folder: Path) -> None:
-    """All the files that the commands name, but those that commands make.
+    """Write all files that the commands read, except those that commands write.
 
     Args:
-        folder: empty.
+        folder: empty folder.
     """
     texts = {
         "bar.toml": BAR, "arm.toml": ARM + EFFECTS, "errors.toml": ERRORS,
@@ -229,7 +229,7 @@ def write_seeds(folder: Path) -> None:
 
 
 def _measurements() -> str:
-    """Eight rows of an arm, as read with noise."""
+    """Return eight rows of an arm's simulated readings with noise as CSV text."""
     rng = np.random.default_rng(4)
     lines = ["id,q.one,q.two,load.fx,meas.tx,meas.ty,meas.tz,cov.temperature,cov.time"]
     for i in range(8):
@@ -241,7 +241,7 @@ def _measurements() -> str:
 
 
 def _stl() -> bytes:
-    """A tetrahedron as binary STL."""
+    """Return a tetrahedron as the bytes of a binary STL file."""
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
     faces = corners[[[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]]
     record = np.zeros(4, dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)),

@@ -1,13 +1,14 @@
-"""Stores what every command answers, and tells what a change of the code did to it.
+"""Store the results of every command, and compare them after a change of the code.
 
     python benchmarks/unchanged.py store FOLDER     # before the change
     python benchmarks/unchanged.py compare FOLDER   # after it
 
-For all built-in robots with errors drawn once (and stored as robot files): ``solve``,
-its margins alone, its exact state, ``error``; and one sweep, one statistics run, one
-diagnosis, one cross-check, one K_E by finite elements and one by beams.  Numbers are
-equal to the last bit or the largest relative difference is printed; times, versions and
-certificates, which are rounding, are left out.
+All built-in robots receive random errors and are stored as robot files.  For each of
+them, the program runs ``solve``, its margins, its exact state and ``error``.  It also
+runs one sweep, one statistics run, one diagnosis, one cross-check, and one K_E by
+finite elements and by beams.  If numbers are not bit-identical, the largest relative
+difference is printed.  Times, versions and the rounding errors in certificates are not
+compared.
 """
 
 import json
@@ -29,7 +30,7 @@ SMALLEST = 1e-9  # in SI: an array without a larger number is rounding of zero
 
 
 def questions(folder: Path) -> dict[str, list[str]]:
-    """The words after ``forcefit`` for each answer; NetCDF goes to ``{out}``."""
+    """Return the words of each command; it writes NetCDF files to ``{out}``."""
     asked = {
         f"{question} {robot}": ["assembly", *words, str(folder / f"{robot}.toml")]
         for robot in (*ROBOTS, "arm6")
@@ -74,7 +75,7 @@ def questions(folder: Path) -> dict[str, list[str]]:
 
 
 def write_robots(folder: Path) -> None:
-    """Each built-in robot with one draw of errors, as a robot file."""
+    """Write each built-in robot with one draw of errors as a robot file."""
     from forcefit.assembly.files.robot_file import write_robot
     from forcefit.assembly.robots import load_robot
 
@@ -92,7 +93,7 @@ def write_robots(folder: Path) -> None:
 
 
 def answer(words: list[str]) -> Any:
-    """The exit status and the JSON of one command, and of its data set the arrays."""
+    """Return the exit status, the JSON and the arrays of the data set of a command."""
     with tempfile.TemporaryDirectory() as scratch:
         out = str(Path(scratch) / "out")
         words = [word.replace("{out}", out) for word in words]
@@ -114,7 +115,7 @@ def answer(words: list[str]) -> Any:
 
 
 def leaves(value: Any, place: str = "") -> dict[str, Any]:
-    """Numbers, words and truths with their places."""
+    """Yield the numbers, texts and booleans of a result with their places."""
     if isinstance(value, dict):
         left_out = (*PASSING, *CERTIFICATES)
         kept = {k: v for k, v in value.items() if not any(p in k for p in left_out)}
@@ -133,7 +134,7 @@ def leaves(value: Any, place: str = "") -> dict[str, Any]:
 
 
 def difference(was: Any, now: Any) -> tuple[float, list[str]]:
-    """Largest difference, relative to its array's largest number; what else differs."""
+    """Return the largest difference over its array's largest number, and other ones."""
     before, after = leaves(was), leaves(now)
     gap, other = 0.0, sorted(before.keys() ^ after.keys())
     sizes: dict[str, float] = {}
@@ -154,7 +155,7 @@ def difference(was: Any, now: Any) -> tuple[float, list[str]]:
 
 
 def main() -> None:
-    """Store, or compare: exit status 1 where more than rounding differs."""
+    """Store or compare results; return status 1 for more than rounding differences."""
     what, folder = sys.argv[1], Path(sys.argv[2]).resolve()
     if what == "store":
         write_robots(folder)

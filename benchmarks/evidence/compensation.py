@@ -53,7 +53,7 @@ ROBOTS = ("arm6", "hexapod", "delta")
 STRENGTH = 5.0
 TARGETS = 12
 TRIES = 20
-NEAR = 1.2  # multiple of the noise that the error should reach
+NEAR = 1.2  # largest error after compensation that counts as small, over the noise
 # weight and stiffening set the noise; clearance is left where the load pushes it
 NAMES = [
     name for name in (*LIBRARY, *OUTSIDE)

@@ -59,7 +59,7 @@ def machine(seed: int, hidden: str | None, common: float) -> Synthetic:
 
 
 def covered(found: Diagnosis, made: Synthetic) -> tuple[int, int]:
-    """Return how many of the 90 % intervals cover, and how many there are."""
+    """Return the number of 90 % intervals that contain the truth, and their number."""
     true = {e.name: e.parameters for e in made.effects}
     inside = [
         abs(p["value"] - true[e["name"]][p["name"]]) < 1.645 * p["std"]

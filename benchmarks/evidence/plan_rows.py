@@ -95,7 +95,7 @@ def is_right(campaign: Campaign, name: str, values: dict[str, float],
 
 
 def needed(right: list[bool]) -> int:
-    """Return the fewest rows from which on all are right, else twice the most."""
+    """Return the least number of rows from which on every result is right."""
     wrong = [k for k, good in enumerate(right) if not good]
     first = wrong[-1] + 1 if wrong else 0
     return ROWS[first] if first < len(ROWS) else 2 * ROWS[-1]
