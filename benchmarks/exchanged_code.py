@@ -54,11 +54,11 @@ class Session:
                 importlib.import_module(".".join(names).removesuffix(".__init__"))
         self.functions = defaultdict[str, list[FunctionType]](list)
         for found in gc.get_objects():
-            if type(found) is FunctionType:  # a proxy of what is gone has no class
+            if type(found) is FunctionType:  # isinstance fails for dead weak proxies
                 self.functions[found.__code__.co_filename].append(found)
             elif type(found) is functools._lru_cache_wrapper:
                 found.cache_clear()
-        # of forks that share what they do not change
+        # the forks share the memory of objects that they do not change
         gc.collect()
         gc.freeze()
 

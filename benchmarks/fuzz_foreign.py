@@ -98,7 +98,8 @@ C = [0.0, 0.07, 0.03]
 """
 NODES = "1,0,0,0\n2,0.3,0,0\n"
 
-# weight, command; names of files that come with the seeds, or that MADE_FOREIGN makes
+# probability weight and words of each command; its files are written by the functions
+# below or by the commands of MADE_FOREIGN
 FOREIGN = [
     (6, "convert five.urdf -o new.toml"),
     (3, "convert five.urdf --loops loops.yaml --overlay overlay.toml -o new.toml"),

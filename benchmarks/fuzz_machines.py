@@ -10,7 +10,7 @@ from pathlib import Path
 
 from fuzz_seeds import BAR, OBJECT
 
-# the parallelogram with a pin 20 um out of the plane: no loop of it closes
+# a parallelogram linkage with a pin 20 um out of its plane, so that no loop closes
 ROUNDED = BAR.replace(
     "translation = [0.5, 0.0, 0.0]", "translation = [0.5, 0.0, 2e-5]", 1
 )
@@ -61,7 +61,7 @@ MACHINES = [
     (3, "stiffness fea solid.msh --base z=0 --tip z=7 --young 7e10 --poisson 0.3"),
 ]  # fmt: skip
 
-# gmsh, which reads STEP, is an extra; without it these are left out
+# the optional package gmsh reads STEP files; without it these commands are left out
 STEP = [
     (4, "stiffness fea two.step --part list --json -"),
     (3, "stiffness fea two.step#solid1 --base z=0 --tip z=7 --young 7e10 --poisson "
@@ -127,7 +127,7 @@ def _exports(folder: Path) -> dict[str, str]:
 
 
 def _surfaces() -> dict[str, str]:
-    """Write the tetrahedron of the OBJ file in other formats."""
+    """Return the tetrahedron of the OBJ file in other formats, by file name."""
     lines = [line.split() for line in OBJECT.split("\n") if line]
     points = [" ".join(words[1:]) for words in lines if words[0] == "v"]
     faces = [[int(i) - 1 for i in w[1:]] for w in lines if w[0] == "f"]

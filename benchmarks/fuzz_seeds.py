@@ -6,7 +6,7 @@ import numpy as np
 
 from tests.robot_files_for_tests import FOUR_BAR
 
-# the parallelogram of the tests, which errors do not leave closed
+# the parallelogram linkage of the tests; its loop does not close if it has errors
 BAR = FOUR_BAR.replace(
     "mass = 1.2", "mass = 1.2\ngeometric_error = [1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5]"
 )
@@ -146,7 +146,7 @@ f 2 3 4
 f 1 4 3
 """
 
-# share of the inputs, then the command; what a command writes is called new...
+# share of the inputs and words of each command; names of output files begin with "new"
 COMMANDS = [
     (9, "assembly solve bar.toml --quantities margin"),
     (9, "assembly solve bar.toml --load fx=10,mz=1 --gravity y=-9.81 --json -"),
@@ -250,13 +250,14 @@ def _stl() -> bytes:
     return bytes(80) + np.uint32(4).tobytes() + record.tobytes()
 
 
-# what makes the files that other commands read
+# commands that write the files that other commands read
 MADE = [
     "stiffness library build links.toml",
     "assembly sweep bar.toml --grid q.crank=1:1.2:0.1 -o swept.nc --near 0.1",
     "assembly statistics bar.toml --errors errors.toml --draws 40 -o draws.nc",
 ]
-# the same, killed when all is solved and nothing written: their journals stay
+# commands that are killed after the solution and before the output, so that their
+# journals remain
 KILLED = [
     "assembly sweep bar.toml --grid q.crank=1:1.2:0.1 -o kept.nc --near 0.1",
     "assembly statistics bar.toml --errors errors.toml --draws 40 -o drawn.nc",

@@ -107,7 +107,7 @@ def start(words: list[str], limit: int | None = None) -> int:
         forcefit_command.main()
     except SystemExit as done:
         status = done.code if isinstance(done.code, int) else 98
-        if status not in {0, 130} and limit is None:  # or it may not write that
+        if status not in {0, 130} and limit is None:  # a full disk allows no message
             os.write(2, printed.getvalue()[-300:].encode())
     except BaseException:
         with suppress(OSError):
@@ -207,7 +207,7 @@ def spoil(path: Path, case: Case, random: Random, counts: Counter) -> int:
     counts["journals with a bit turned"] += 1
     content[at] ^= 1 << random.randrange(8)
     if not sound and (at <= content.find(b"\n") or b"\n" not in content):
-        path.unlink()  # nothing in it says whose it is: refused, and begun again
+        path.unlink()  # a journal without its header is refused and must be removed
         return 0
     path.write_bytes(content)
     return sum(points for start, end, points in sound if not start <= at < end)
@@ -222,7 +222,7 @@ def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
         if way == "full" and not small:
             largest = max(map(len, case.files.values()))
             limit = int(np.exp(random.uniform(0, np.log(1.2 * largest))))
-        before = {*Path().glob("*.part"), *Path().glob("*.lock")}  # of a killed one
+        before = {*Path().glob("*.part"), *Path().glob("*.lock")}  # of a killed child
         child = start(case.words, limit)
         if way == "full":
             status = finish(child)
@@ -233,7 +233,7 @@ def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
             os.kill(child, way)
             status = finish(child)
             counts[f"stopped by {way.name}"] += status != 0
-            right = {0, -way, 130} | ({2} if small else set())  # it may be full before
+            right = {0, -way, 130} | ({2} if small else set())  # 2: the disk is full
             counts["wrong exit status"] += wrong(status, right, case, way)
         counts["lost"] += solved_again(case, standing)
         counts["half-written"] += check(case, counts, status, before)
@@ -241,7 +241,7 @@ def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
             standing = 0
             counts["half-written"] += any(not Path(n).exists() for n in case.files)
             continue
-        if case.header:  # of the others' journals only the ends are compared
+        if case.header:  # without a header, only the final files are compared
             standing += counted(KEPT)
             counts["lost"] += max(0, standing - points_in(path, case))
         standing = spoil(path, case, random, counts) if path.exists() else 0

@@ -34,7 +34,7 @@ from benchmarks.exchanged_code import Session
 from benchmarks.faults import ROOT, Fault, all_in, drawn, files_of
 from benchmarks.traced_tests import Run, Trace, traced
 
-# imported once, before the forks
+# libraries that are imported once, before the process forks
 LIBRARIES = (
     "scipy.linalg", "scipy.optimize", "scipy.sparse.linalg", "scipy.spatial",
     "scipy.stats", "scipy.ndimage", "cvxpy", "clarabel", "skfem", "xarray", "pandas",
@@ -136,7 +136,7 @@ def main() -> None:
     began, survived = time.monotonic(), 0
     with tempfile.TemporaryDirectory() as scratch:
         tree = Path(scratch) / "forcefit"
-        # with the compiled modules
+        # the copy contains the compiled modules
         left_out = shutil.ignore_patterns(".git", ".venv", ".*_cache", "*_study")
         shutil.copytree(ROOT, tree, ignore=left_out)
         kept = asked.traced or Path(scratch)

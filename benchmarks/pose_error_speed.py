@@ -47,8 +47,8 @@ from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.solvers import conic
 from forcefit.assembly.solvers.cones import cone_sizes
 
-SAMPLE = 6  # points of the other solvers
-UNIT = 1e-3  # poses are in mrad and mm for them
+SAMPLE = 6  # number of points that the other solvers solve
+UNIT = 1e-3  # [rad, m] the other solvers receive poses in mrad and mm
 TOLERANCE = 1e-6  # [rad or m]
 LIMIT = 30.0  # [s] time limit for each point
 PARTS = {"rotation": slice(0, 3), "translation": slice(3, 6)}
@@ -193,7 +193,7 @@ def _secant_node(
     if v is None:
         return None
     x = c + X @ v
-    # the dual value, whatever the solver's status: an upper bound
+    # the dual value is an upper bound for every status of the solver
     dual = X.T @ slope - H.T @ z[: len(k)] - sides.T @ z[len(k) : len(k) + 6]
     value = b[: len(k) + 6] @ z[: len(k) + 6] + cone_sizes(dual, group).sum()
     return float(value + slope @ c - low @ high), x

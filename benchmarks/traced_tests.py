@@ -107,7 +107,7 @@ class Tracer:
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_call(self, item: pytest.Item) -> Any:
         """Measure the processor time [s] of a test."""
-        began = time.process_time()  # others may load the machine
+        began = time.process_time()  # wall time depends on other programs
         try:
             return (yield)
         finally:
@@ -128,7 +128,7 @@ class Trace:
 
     def of(self, path: Path, rows: range | set[int]) -> set[str]:
         """Return the tests that execute one of the given rows of a file."""
-        # traced in one copy of the tree or another
+        # the trace may contain paths of another copy of the source tree
         files = [f for f in self.lines.measured_files() if f.endswith(f"/{path}")]
         tests = {
             test.partition("|")[0]
@@ -157,7 +157,7 @@ class Trace:
             seconds = self.seconds[test] + 0.01
             if test.startswith(near):
                 return seconds / 10
-            if test.startswith(BESIDE):  # compare the most numbers
+            if test.startswith(BESIDE):  # these tests compare the most numbers
                 return seconds / 3
             return (
                 seconds if test.startswith(f"tests/{fault.chapter}/") else 3 * seconds

@@ -22,11 +22,11 @@ import numpy as np
 
 ROOT = Path(__file__).parents[1]
 ROBOTS = ("irsbot2", "four_bar", "five_bar", "3rrr", "hexapod", "delta", "orthoglide")
-# what differs from one run to the next
+# keys whose values differ between equal runs
 PASSING = ("seconds", "time", "version", "sha256", "created", "path", "file", "output")
-# rounding by their nature
+# keys of certificates, whose values are rounding errors
 CERTIFICATES = ("certificate", "residual", "gap", "excess", "linearisation_error")
-SMALLEST = 1e-9  # in SI: an array without a larger number is rounding of zero
+SMALLEST = 1e-9  # [SI] an array with only smaller numbers counts as rounded zeros
 
 
 def questions(folder: Path) -> dict[str, list[str]]:
@@ -82,12 +82,12 @@ def write_robots(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name in (*ROBOTS, "arm6"):
         if (folder / f"{name}.toml").exists():
-            continue  # of an earlier version, which is then asked the same
+            continue  # the file of the earlier version is used again
         robot = load_robot(name)
         rng = np.random.default_rng(sum(map(ord, name)))
         scales = [1e-3, 1e-3, 1e-3, 5e-4, 5e-4, 5e-4]
         errors = rng.uniform(-1, 1, (len(robot.frames), 6)) * scales
-        if name == "irsbot2":  # most of its bodies are rigid: nothing would close
+        if name == "irsbot2":  # with errors of its rigid bodies, no loop would close
             errors[[frame.link is None for frame in robot.frames]] = 0.0
         write_robot(robot.with_errors(errors), folder / f"{name}.toml")
 
@@ -166,7 +166,7 @@ def main() -> None:
     stored = json.loads((folder / "answers.json").read_text())
     worst = 0
     for name, words in questions(folder).items():
-        # as JSON writes it, NaN and infinity included
+        # values are compared in the form in which JSON stores NaN and infinity
         now = json.loads(json.dumps(answer(words)))
         gap, other = difference(stored[name], now)
         count = len(leaves(stored[name]))

@@ -34,7 +34,8 @@ from tests.points_for_tests import DEVICE, MACHINE, simulated, write_points
 sys.path.insert(0, str(Path(__file__).parent))
 from random_robots import draw_robot
 
-LEFT_OUT = {"joint_clearance", "geometric_stiffening", "self_weight"}  # of given size
+# effects that are not drawn, because their size cannot be scaled
+LEFT_OUT = {"joint_clearance", "geometric_stiffening", "self_weight"}
 TRIES = 12
 
 

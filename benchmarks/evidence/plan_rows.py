@@ -35,7 +35,8 @@ ROBOTS = ("arm6", "five_bar")
 ROWS = (8, 12, 16, 24, 32, 48)
 STRENGTH = 1.0  # [sigma]
 SIGMA = (1e-5, 5e-6)
-# the pose of the base is as declared; finite motions have no parameter
+# excluded: the pose of the base, which is as declared, and finite motions, which have
+# no parameter
 NOT_DRAWN = {"joint_clearance", "registration", "self_weight", "geometric_stiffening"}
 NAMES = [name for name in LIBRARY if name not in NOT_DRAWN]
 

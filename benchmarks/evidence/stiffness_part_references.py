@@ -44,7 +44,7 @@ def mode_stiffness(mesh, order, even, motions, held="", lame=(LAM, MU)):
     (lam, mu), fixed = lame, {c: ["tip", held] if held else ["tip"] for c in "xyz"}
     for cut, same in zip("xyz", even, strict=True):
         for c in "xyz":
-            # even: no motion across the cut; odd: none along it
+            # even: no motion normal to the cut; odd: no motion along the cut
             if (c == cut) == same:
                 fixed[c].append(PLANES[cut])
     x, y, z = ("|".join(fixed[c]) for c in "xyz")
@@ -216,7 +216,8 @@ def forks(order, layers, finer=1.5):
     for i, even in enumerate(evens):
         work, unknowns = mode_stiffness(mesh, order, even, [motions[i]])
         middle[i] = 8 / 4 * work[0, 0]
-    # a screw at the tip, read in the middle: turning about x and y moves it there
+    # a screw of the tip is read at the middle, where rotations about x and y add a
+    # translation
     A = np.eye(6)
     A[3, 1], A[4, 0] = -L / 2, L / 2
     return A.T @ np.diag(middle) @ A, unknowns

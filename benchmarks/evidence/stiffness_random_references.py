@@ -20,7 +20,8 @@ from stiffness_round_references import stiffness as round_stiffness
 
 SHRINK = 0.15
 MOST = 50e3  # largest number of unknowns at the highest order
-# motions RX .. TZ about a point of the z axis: their own images in x = 0 and in y = 0
+# for each motion RX .. TZ about a point of the z axis: whether it equals its mirror
+# image in x = 0 and in y = 0
 EVEN = {"x": (1, 0, 0, 0, 1, 1), "y": (0, 1, 0, 1, 0, 1)}
 
 
@@ -69,11 +70,11 @@ def bricks(part, lame):
     x, y, z = part.planes
     mirrors = "xy" if np.allclose(x, -np.array(x[::-1])) else "y"
     thin = min(np.diff(p).min() for p in part.planes)
-    # slender arms are cut into pieces not much longer than they are wide
+    # slender arms are divided into pieces that are not much longer than their width
     arm = x[1] - x[0]
     wide = max(arm if part.kind == "fork" else x[-1] - x[0], y[-1] - y[0])
     wide = 2 * arm if part.kind == "bracket" else wide
-    # an inner edge decides a bracket's K: one layer more
+    # the re-entrant edge of a bracket governs its K, so one more layer is used there
     least = 2 if part.kind == "bracket" else 1
     lines, kept = [], part.full
     for axis, places in zip("xyz", part.planes, strict=True):
@@ -88,7 +89,7 @@ def bricks(part, lame):
     owner = [np.repeat(np.arange(len(parts)), parts) for _, parts in lines]
     full = kept[np.ix_(*owner)]
     places = [p for p, _ in lines]
-    across = part.kind == "bracket"  # its tip is at the largest x
+    across = part.kind == "bracket"  # the tip of a bracket is at the largest x
     mesh = brick_mesh(places, full, 0 if across else 2, mirrors)
     tip = (x[-1], 0, (z[-2] + z[-1]) / 2) if across else center_of_tip(part)
     cells = int(full.sum())
@@ -101,9 +102,9 @@ def graded(places, thin, wide, cut, least):
     """Places between planes, geometrically closer toward each; how many in each gap."""
     found, counts = [places[0]], []
     for k, (a, b) in enumerate(zip(places, places[1:], strict=False)):
-        whole = cut and k == 0  # nothing happens at the cut
+        whole = cut and k == 0  # the fields are smooth at the cut
         size = (b - a) / (1 if whole else 2)
-        # layers at free edges decay like exp(-pi s / thin): several cells within them
+        # layers at free edges decay as exp(-pi s / thin), and need several cells each
         layers = max(least, round(np.log(size / (SHRINK * thin)) / np.log(4)))
         ends = [size * (0.25 if layers > 2 else SHRINK) ** n
                 for n in range(layers, 0, -1)]  # fmt: skip
@@ -200,7 +201,7 @@ def free_unknowns(mesh, order, mirrors, kind):
     held = {c: ["base", "tip"] for c in "xyz"}
     for cut, even in zip(mirrors, kind, strict=True):
         for c in "xyz":
-            # even: no motion across the cut; odd: none along it
+            # even: no motion normal to the cut; odd: no motion along the cut
             if (c == cut) == bool(even):
                 held[c].append(f"{cut}0")
     names = {f"dirichlet{c}": "|".join(held[c]) for c in "xyz"}

@@ -67,7 +67,8 @@ TIME_LIMIT = 20.0  # [s] of one simulation
 ERRORS = np.repeat([1e-3, 1e-4], 3)  # [rad, m] of the built-in robots
 _FAR, _MOVED = 0.1, 1e-3  # [rad or m] of drives; what counts as another pose
 _SIZE = np.repeat([1.0, 20.0], 3)  # [N m, N] of loads
-_STEPS = 0.5 * 0.2 ** np.arange(8)  # of the loads' sizes; contacts change within 1e-3
+# steps of the load, relative to its size; contacts may change within 1e-3 of it
+_STEPS = 0.5 * 0.2 ** np.arange(8)
 _MOVES = 0.03  # [rad or reference lengths] of a loaded platform
 _STIFF = 1e8  # [N m/rad, N/m]
 
@@ -83,7 +84,7 @@ def relative(C: NDArray, other: NDArray) -> float:
 def limit(steps: list[float], slopes: list[NDArray]) -> NDArray:
     """Return (6,) central differences, extrapolated to a step of zero."""
     better = without_squares(steps, slopes)
-    # rotations and translations of one column have the sizes they have
+    # rotations and translations of a column are scaled separately
     size = np.abs(better).max(axis=0) + 1e-300
     return steadiest(better, lambda change: float((change / size).max()))[0]
 
@@ -111,7 +112,7 @@ def slope_by(equilibrium: ExactAssembly, unit: NDArray) -> NDArray:
                 for sign in (1, -1)
             )  # fmt: skip
         except SolverFailed:
-            # a large step may leave what any equilibrium carries
+            # under a large step of the load there may be no equilibrium
             if step <= _STEPS[-3]:
                 raise
             steps.clear()

@@ -148,7 +148,7 @@ def stiffness(mesh, order, tip):
         if condense:
             field.vec.data += a.harmonic_extension * field.vec
         fields.append(field)
-    # energies of the fields: errors of the solution enter squared
+    # from the energy of the fields, in which solution errors enter squared
     full = ng.BilinearForm(space, symmetric=True)
     full += form * ng.dx
     K = np.empty((6, 6))

@@ -24,7 +24,7 @@ import numpy as np
 from stiffness_references import HERE, LAM, MU, scaled
 
 AXIS, FREE, BASE, TIP = "axis", "side", "base", "tip"
-# half sections: (r, z) [m] of the corners, and what the line from each to the next is
+# half sections: (r, z) [m] of each corner, and the kind of the line to the next corner
 LINKS = {
     "distal_plain": (
         [(0, 0), (0.040, 0), (0.040, 0.452), (0, 0.452)], [BASE, FREE, TIP, AXIS]
@@ -75,7 +75,7 @@ def mode_stiffness(mesh, order, m, motions, lame=(LAM, MU)):
     held = f"{BASE}|{TIP}"
     one = ng.H1(mesh, order=order, dirichlet=held)
     zero = ng.H1(mesh, order=order, dirichlet=f"{held}|{AXIS}")
-    # mode 0: U, V, W; mode 1: U + V, U - V, W; what vanishes on the axis
+    # unknowns of mode 0: U, V, W; of mode 1: U + V, U - V, W; some vanish on the axis
     space = zero * zero * one if m == 0 else zero * one * zero
 
     def parts(p, q, w):
@@ -117,7 +117,8 @@ def stiffness(mesh, order, lame=(LAM, MU)):
         mode_stiffness(mesh, order, 0, [motion], lame)[0, 0]
         for motion in ((0, ng.x, 0), (0, 0, 1))
     )
-    # turning about y lifts z by -r cos(a); moving along x is (cos a, -sin a, 0)
+    # a unit rotation about y moves points by -r cos(a) along z; a unit translation
+    # along x is (cos a, -sin a, 0) in the directions r, a, z
     bent = mode_stiffness(mesh, order, 1, [(0, 0, -ng.x), (1, -1, 0)], lame)
     K = np.diag([bent[0, 0], bent[0, 0], turned, bent[1, 1], bent[1, 1], stretched])
     K[1, 3] = K[3, 1] = bent[0, 1]

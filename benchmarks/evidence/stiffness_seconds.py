@@ -26,7 +26,7 @@ from forcefit.stiffness.fem.material import Material
 from forcefit.stiffness.surface.interface import parse_interface
 from forcefit.stiffness.surface.surface import Surface, check_surface
 
-FEWEST = 10_000  # triangles
+FEWEST = 10_000  # smallest number of triangles of a surface
 WHO = resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN
 
 

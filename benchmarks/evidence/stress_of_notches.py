@@ -23,7 +23,8 @@ from forcefit.stiffness.fem.stress import peak_stress
 from forcefit.stiffness.surface.interface import parse_interface
 from forcefit.stiffness.surface.surface import Surface, check_surface
 
-AROUND, ROWS, APART = 48, 8, 0.005  # facets, in a quarter of a fillet; [m] of rings
+# facets around the axis; rings in a quarter of a fillet; [m] largest distance of rings
+AROUND, ROWS, APART = 48, 8, 0.005
 COMPONENTS = {"tension": 5, "torsion": 2, "bending": 1}
 
 
@@ -104,7 +105,7 @@ def outline(part: Part) -> NDArray:
 def surface_of(part: Part) -> Surface:
     """Return the surface of a shaft; successive rings are offset by half a facet."""
     profile = outline(part)
-    if part.bore:  # closed: an even number of rings, so that the last meets the first
+    if part.bore:  # an even number of rings, so that the last one matches the first
         profile = profile[:-1]
         if len(profile) % 2:
             profile = np.insert(profile, 1, (profile[0] + profile[1]) / 2, axis=0)

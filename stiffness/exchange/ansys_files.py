@@ -64,7 +64,9 @@ def harwell_boeing(path: Path, text: str) -> csr_array:
             "assembled matrix in ASCII"
         )
     if not 0 < rows == columns <= LARGEST:
-        raise BadInput(f"{path}: found {rows} by {columns} numbers, expected a square")
+        raise BadInput(
+            f"{path}: found {rows} by {columns} numbers, expected a square matrix"
+        )
     begin = 5 if len(counts) > 4 and counts[4] > 0 else 4
     parts = []
     for count, width in zip(counts[1:4], widths, strict=False):
