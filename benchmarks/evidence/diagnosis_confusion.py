@@ -159,7 +159,7 @@ def truth_with_rivals(kind: str, campaign: Synthetic) -> dict[str, Any]:
     # if the hidden effects are hardly visible, the empty set explains the data too
     unseen = float(np.nansum((campaign.added / campaign.sigma) ** 2)) < SAME
     accept = [list(one) for one in sorted(same)] + ([[]] if unseen else [])
-    if kind == "none":  # near a singularity the declared errors may ask for them
+    if kind == "none":  # near a singularity, declared errors may cause finite motions
         chi2 = float(np.nansum((finite_part(campaign) / campaign.sigma) ** 2))
         accept += [["geometric_stiffening"]] if chi2 > SAME else []
     verdict = "ambiguous" if kind == "confounded" else None

@@ -18,20 +18,20 @@ EPS = 1e-4  # [mm] largest distance between positions that count as equal
 
 @dataclass
 class Part:
-    """A drawn part, in millimetres and N/mm^2.
+    """A random part, with lengths in mm and stresses in N/mm^2.
 
     Attributes:
         note: description of the part for the table.
         solid: the whole shape; base at z = 0.
-        L: [mm] where the tip is, along z.
-        mirrors: axes across which it is its own image.
-        size: [mm] of elements along the edges, about the smallest thickness.
-        maxh: [mm] of elements elsewhere.
+        L: [mm] position of the tip along z.
+        mirrors: axes that are normal to a plane of symmetry of the part.
+        size: [mm] size of elements along the edges, about the smallest thickness.
+        maxh: [mm] size of elements elsewhere.
         layers: (axis, from, to, Young's modulus, Poisson's ratio); one without an axis
             is the whole part.
         simple: [m] ``planes`` and ``full`` bricks or ``profile`` of a part for
             ``stiffness_random_references.independent_stiffness``.
-        orders: of the reference's polynomials.
+        orders: orders of the polynomials of the reference solution.
     """
 
     note: str
@@ -79,7 +79,7 @@ def plate(rng):
     def corners(low, high):
         return along(1, low, high) and (low[2] < EPS or low[2] > L - EPS)
 
-    count = int(rng.integers(3))  # of ribs; a step if there is none
+    count = int(rng.integers(3))  # number of ribs; a plate without ribs has a step
     if count == 0:
         step = L * float(rng.uniform(0.3, 0.6))
         body = body + block((-W / 2, 0, 0), (W / 2, T + height, step))

@@ -47,11 +47,11 @@ class Part:
     Attributes:
         kind: one of ``KINDS``.
         nu: [-] Poisson's ratio.
-        base: the held interface.
-        tip: the interface that moves.
-        planes: [m] places along x, y, z between which bricks are full or empty.
-        full: (nx, ny, nz) whether a brick is.
-        profile: (k, 2) [m] r and z of the half section's corners.
+        base: text of the held interface.
+        tip: text of the interface that moves.
+        planes: [m] positions along x, y, z of the faces of the bricks.
+        full: (nx, ny, nz) bool, True for a brick that is filled with material.
+        profile: (k, 2) [m] r and z of the corners of a half section.
         eye: [m] width, thickness, length up to the bore's axis, radius of the bore.
     """
 
@@ -230,12 +230,12 @@ def eye_surface(W: float, T: float, L: float, r: float) -> tuple[NDArray, NDArra
     angle = 2 * np.pi * np.arange(FACETS) / FACETS
     hole = r * np.column_stack([np.cos(angle), np.sin(angle)])
     rim = W / 2 * np.column_stack([np.cos(angle), np.sin(angle)])
-    # below the axis the outline is that of the bar: its sides, its foot
+    # below the bore's axis, the outline consists of the sides and the end of the bar
     low = np.arange(FACETS) > FACETS // 2
     way = np.minimum(W / 2 / np.maximum(np.abs(hole[:, 0] / r), 1e-9),
                      L / np.maximum(np.abs(hole[:, 1] / r), 1e-9))  # fmt: skip
     rim[low] = hole[low] / r * way[low, None]
-    for x in (-1, 1):  # the nearest points become the corners of the foot
+    for x in (-1, 1):  # the nearest points become the corners of the bar's end
         corner = np.array([x * W / 2, -L])
         toward = (hole / r) @ corner
         rim[np.where(low, toward, -np.inf).argmax()] = corner

@@ -66,7 +66,7 @@ def round_part(part, lame):
 
 
 def bricks(part, lame):
-    """A half (y > 0) or, where x has it too, a quarter, as high an order as pays."""
+    """Return K_E of a part of bricks from its half y > 0, or a quarter if symmetric."""
     x, y, z = part.planes
     mirrors = "xy" if np.allclose(x, -np.array(x[::-1])) else "y"
     thin = min(np.diff(p).min() for p in part.planes)
@@ -99,7 +99,7 @@ def bricks(part, lame):
 
 
 def graded(places, thin, wide, cut, least):
-    """Places between planes, geometrically closer toward each; how many in each gap."""
+    """Return positions graded toward each plane, and their number in each gap."""
     found, counts = [places[0]], []
     for k, (a, b) in enumerate(zip(places, places[1:], strict=False)):
         whole = cut and k == 0  # the fields are smooth at the cut
@@ -128,7 +128,7 @@ def center_of_tip(part):
 
 
 def brick_mesh(places, full, axis, mirrors):
-    """Hexahedra; the face at the end of an axis is the tip, at z = 0 the base."""
+    """Return a mesh of hexahedra; the base is at z = 0, the tip at an axis' end."""
     mesh = netgen.Mesh()
     mesh.dim = 3
     names = ["base", "tip", "x0", "y0", "side"]

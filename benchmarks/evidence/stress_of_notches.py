@@ -29,17 +29,17 @@ COMPONENTS = {"tension": 5, "torsion": 2, "bending": 1}
 
 
 class Part(NamedTuple):
-    """A shaft along z, lengths in mm.
+    """A shaft along z, with lengths in mm.
 
     Attributes:
         kind: ``"shoulder"`` or ``"groove"``.
-        large: diameter at the base, of a groove at both ends.
-        small: diameter beyond the shoulder, or at the groove's bottom.
-        radius: of the fillet, or of the groove.
-        bore: diameter; 0 without.
-        place: z of the shoulder, or of the groove's middle.
-        length: from base to tip.
-        load: of 1 N or 1 N m at the tip.
+        large: diameter at the base; for a groove, the diameter at both ends.
+        small: diameter beyond the shoulder, or at the bottom of the groove.
+        radius: radius of the fillet or of the groove.
+        bore: diameter of the bore; 0 if there is none.
+        place: position along z of the shoulder, or of the middle of the groove.
+        length: length from base to tip.
+        load: kind of the load at the tip, whose size is 1 N or 1 N m.
         peak: [Pa] largest von Mises stress at least half the diameter from both ends.
     """
 

@@ -12,7 +12,8 @@ from forcefit.inputs.table import Table
 
 # a file, and the keys that lead to a value in it; tables of a list are numbered from 1
 Place = tuple[str, tuple[str | int, ...]]
-_CHANGE = 0.07  # relative change of replaced numbers; no message rounds it away
+# relative change of replaced numbers; large enough to be visible in a rounded message
+_CHANGE = 0.07
 
 
 @dataclass

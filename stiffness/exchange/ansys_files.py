@@ -142,7 +142,8 @@ def read_mapping(path: Path) -> list[int] | list[tuple[int, int]]:
             continue  # the line is a heading
         if len(words) != 3:
             raise BadInput(
-                f"{path}: found {describe(line.strip())}, expected row, node and label"
+                f"{path}: found {describe(line.strip())}, expected the number of a "
+                "row, the number of a node and a label such as UX"
             )
         label = words[2].upper()
         if label not in LABELS:

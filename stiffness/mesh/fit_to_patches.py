@@ -78,7 +78,7 @@ def _positive_cells(points: NDArray, cells: NDArray) -> tuple[NDArray, NDArray]:
 def _nearest_patch(
     points: NDArray, faces: NDArray, surface: Surface, patches: Patches
 ) -> NDArray:
-    """Return the patch of each boundary face: the nearest patch of similar normal."""
+    """Return the patch of each boundary face: the nearest with a similar normal."""
     import pyvista
 
     mesh = pyvista.PolyData.from_regular_faces(surface.points, surface.triangles)
