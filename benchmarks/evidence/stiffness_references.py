@@ -32,7 +32,7 @@ def bar(radius, z0, z1):
 
 
 def ends(solid, base, tip):
-    """Name the two interfaces."""
+    """Name the faces of a solid that are its base and tip interfaces."""
     solid.faces.name = "side"
     for name, (axis, place) in {"base": base, "tip": tip}.items():
         face = solid.faces.Max(axis) if place > 0 else solid.faces.Min(axis)

@@ -61,7 +61,9 @@ def fit_to_patches(
         )
     for number, name in enumerate(("base", "tip")):
         if not (solid.patch == number).any():
-            raise MeshFailed(f"{surface.name}: no face of the mesh on the {name}")
+            raise MeshFailed(
+                f"{surface.name}: found no face of the mesh on the {name} interface"
+            )
     return solid
 
 
