@@ -128,7 +128,7 @@ def print_energies(robot: Robot, postures: list[Posture], kappa: float) -> None:
     scaled = robot.with_errors(kappa * robot.errors)
     own = [replace(p, robot=scaled) for p in postures]
     few = own[:: len(own) // SAMPLE][:SAMPLE]
-    for posture in own:  # load what a first call needs
+    for posture in own:  # the first calls import and compile code
         solve_assembly(posture)
     data = [closure_matrices(p) for p in few]
     rows = {

@@ -27,18 +27,18 @@ from benchmarks.faults import Fault
 from benchmarks.traced_tests import MEMORY, WORDS, places_of_tests, sources
 
 PASSED, FAILED, BROKEN = 0, 1, 2
-WAITS = 10  # seconds of the clock at most for one of the processor
+WAITS = 10  # largest ratio of wall time to processor time of a test
 
 
 class Session:
-    """A plugin: instead of the collected tests, what ``judge`` asks of this session."""
+    """A pytest plugin that runs the tests that ``judge`` selects."""
 
     def __init__(self, tree: Path, judge: Callable[["Session"], None]) -> None:
         self.tree, self.judge = tree, judge
         self.failed = ""
 
     def run(self) -> None:
-        """Collect the tests, import, load, and judge."""
+        """Collect the tests, import all modules, and call ``judge``."""
         os.chdir(self.tree)
         os.environ |= {"PYTHONPATH": str(self.tree), "PYTHONDONTWRITEBYTECODE": "1"}
         sys.dont_write_bytecode = True
@@ -46,7 +46,7 @@ class Session:
         pytest.main([*WORDS, "-s", *places_of_tests()], plugins=[self])
 
     def pytest_collection_finish(self, session: pytest.Session) -> None:
-        """Load everything that a test may load."""
+        """Import every module that a test may import."""
         self.items = {item.nodeid: item for item in session.items}
         for path in sources():
             if path.name not in {"__main__.py", "mesh_worker.py"}:
@@ -54,26 +54,26 @@ class Session:
                 importlib.import_module(".".join(names).removesuffix(".__init__"))
         self.functions = defaultdict[str, list[FunctionType]](list)
         for found in gc.get_objects():
-            if type(found) is FunctionType:  # a proxy of what is gone has no class
+            if type(found) is FunctionType:  # isinstance fails for dead weak proxies
                 self.functions[found.__code__.co_filename].append(found)
             elif type(found) is functools._lru_cache_wrapper:
                 found.cache_clear()
-        # of forks that share what they do not change
+        # the forks share the memory of objects that they do not change
         gc.collect()
         gc.freeze()
 
     def pytest_runtestloop(self) -> bool:
-        """Judge, in place of a run of all tests."""
+        """Call ``judge`` instead of running all tests."""
         self.judge(self)
         return True
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """The first test that fails."""
+        """Record the first test that fails."""
         if report.failed and not self.failed:
             self.failed = report.nodeid
 
     def seen(self, fault: Fault, tests: list[str], seconds: float) -> str | None:
-        """The first of these tests that fails, "" at a limit; None if all pass."""
+        """Return the first failing test, "" at a time limit, or None if all pass."""
         some = [self.items[test] for test in tests if test in self.items]
         if not some:
             return None
@@ -114,7 +114,7 @@ class Session:
         return None if status == 0 else failed
 
     def exchange(self, fault: Fault) -> None:
-        """Give the functions of a file the code that they have with the fault."""
+        """Replace the code of a file's functions by the code with the fault."""
         name = str(self.tree / fault.path)
         right = (self.tree / fault.path).read_text("utf-8")
         before, after = (
@@ -127,7 +127,7 @@ class Session:
 
 
 def within(code: CodeType) -> Iterator[CodeType]:
-    """A code object and all that are defined in it."""
+    """Yield a code object and all code objects that are defined in it."""
     yield code
     for constant in code.co_consts:
         if isinstance(constant, CodeType):

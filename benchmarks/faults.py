@@ -30,7 +30,7 @@ SWAPS: dict[type, type] = {
     ast.Eq: ast.NotEq, ast.NotEq: ast.Eq, ast.And: ast.Or, ast.Or: ast.And,
     ast.MatMult: ast.Add, ast.Pow: ast.Mult,
 }  # fmt: skip
-LARGE = 10  # numbers above it become one
+LARGE = 10  # numbers above this limit are replaced by one
 LEFT_OUT = {
     "report.py", "plot.py", "figures.py", "scene.py", "scenes.py",
 }  # fmt: skip
@@ -167,16 +167,16 @@ def statement(tree: ast.Module, row: int) -> tuple[range, str | None, bool]:
     end = body[0].lineno - 1 if body else last.end_lineno or row
     rows = range(last.lineno, max(end, row) + 1)
     functions = [n for n in within if isinstance(n, ast.FunctionDef)]
-    if functions and functions[-1] is last:  # a default value
+    if functions and functions[-1] is last:  # the row is a default value of an argument
         return range(last.body[0].lineno, (last.end_lineno or row) + 1), None, False
     if functions:
         return rows, None, True
     classes = [n.name for n in within if isinstance(n, ast.ClassDef)]
-    if classes:  # a field's default counts where one is made
+    if classes:  # the default of a field is used when an object is created
         return rows, classes[-1], False
     targets = getattr(last, "targets", None) or [getattr(last, "target", None)]
     names = [n.id for n in targets if isinstance(n, ast.Name)]
-    # a lambda's rows are passed later
+    # the body of a lambda is executed after the import
     return rows, names[0] if names else path_name(last), False
 
 

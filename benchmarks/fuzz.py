@@ -1,13 +1,13 @@
 """Give every reader and the options of every command invalid input; count failures.
 
 Run from the repository's root: ``python benchmarks/fuzz.py [COUNT] [--seed N]
-[--every-option]``. Each input is a sound command of ``fuzz_seeds.py``,
-``fuzz_foreign.py`` or ``fuzz_machines.py``, with its files or its words changed by
-``fuzz_mutations.py``, run in a process forked from one that has imported and compiled
-everything, and judged by ``fuzz_faults.py``. Input i of a seed is always the same;
-``--only I`` shows one.
-``--every-option`` draws nothing: each option that takes a value, of each command, gets
-each of EXTREMES once.
+[--every-option]``.  Each input is a valid command of ``fuzz_seeds.py``,
+``fuzz_foreign.py`` or ``fuzz_machines.py`` whose files or words are changed by
+``fuzz_mutations.py``.  The command runs in a fork of a process that has imported and
+compiled everything.  ``fuzz_faults.py`` checks the result.  The seed and the number of
+an input determine it; ``--only I`` runs the input with number I.
+With ``--every-option``, no input is random: each option with a value, of each command,
+is given each value of EXTREMES once.
 
 Requirements on each command: the exit status is 0, 1, 2 or 130; with status 2, stderr
 contains one line that begins with ``forcefit: ``, and no new file exists; stderr
@@ -46,10 +46,10 @@ from fuzz_machines import MACHINES, MADE_MACHINES, STEP, write_machines  # noqa:
 from fuzz_mutations import change_file, change_words  # noqa: E402
 from fuzz_seeds import COMMANDS, KILLED, MADE, write_seeds  # noqa: E402
 
-LIMIT = 2.0  # [s] of processor time, then Ctrl-C
-PATIENCE = 60.0  # [s] for one input, then SIGKILL: it hangs
-BATCH = 50  # inputs to a process
-MEMORY = 8 << 30  # [byte] of addresses
+LIMIT = 2.0  # [s] processor time after which a command receives Ctrl-C
+PATIENCE = 60.0  # [s] time after which a command is killed, because it hangs
+BATCH = 50  # number of inputs for each process
+MEMORY = 8 << 30  # [byte] largest address space of a process
 EXTREMES = [
     "nan", "inf", "-inf", "0", "-1", "1e300", "-1e300", "1e-300", "1e15", "9" * 400, "",
 ]  # fmt: skip
@@ -141,7 +141,7 @@ def prepare(folder: Path, commands: list[str]) -> None:
             took = time.process_time() - began
             if took > 0.5:
                 print(f"{took:6.1f} s  {command[:90]}", flush=True)
-            # some of them are refused for one word, to be quick
+            # a wrong word makes some of the commands stop early, which saves time
             if status not in {0, 1} and ",x" not in command and "solid" not in command:
                 print(f"not sound, {status}: {command}\n   {err[-300:]}")
     os.chdir(folder)

@@ -4,7 +4,7 @@ import json
 import re
 from pathlib import Path
 
-# progress, verdicts and what meshing says
+# lines of progress, verdicts, and messages of the mesher
 _OURS = re.compile(
     r"forcefit: |warning: |[^\n]*[━╸╺]|\s*$|[^\n]*: not written, |mesh \d"
     r"|([a-z -]+|\S+) *\d+/\d+|\S+ +\d+% |\d[\d,]* unknowns|[a-z -]+: \d+ of \d+"
@@ -51,7 +51,7 @@ def faults(words, status, out, err, before, after, left) -> list[str]:
         if status == 2 and not journal and not library:
             faults.append(f"written although refused: {name}")
         elif words[:2] == ["stiffness", "export"]:
-            pass  # text of another program, by whatever name was asked for
+            pass  # a text file for another program may have any ending
         elif not journal and not is_whole(name, content):
             faults.append(f"not whole: {name}")
     return faults

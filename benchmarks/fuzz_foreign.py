@@ -1,7 +1,7 @@
-"""Sound files of other programs and commands that read them: ``fuzz.py --foreign``.
+"""Valid files of other programs and commands that read them: ``fuzz.py --foreign``.
 
-Robots and matrices are written by forcefit itself, then in the words of the format;
-what a device exports is made here.
+Commands of forcefit write the robots and matrices.  This file creates the exports of
+measuring devices.
 """
 
 from pathlib import Path
@@ -98,7 +98,8 @@ C = [0.0, 0.07, 0.03]
 """
 NODES = "1,0,0,0\n2,0.3,0,0\n"
 
-# weight, command; names of files that come with the seeds, or that MADE_FOREIGN makes
+# probability weight and words of each command; its files are written by the functions
+# below or by the commands of MADE_FOREIGN
 FOREIGN = [
     (6, "convert five.urdf -o new.toml"),
     (3, "convert five.urdf --loops loops.yaml --overlay overlay.toml -o new.toml"),
@@ -139,10 +140,10 @@ MADE_FOREIGN = [
 
 
 def write_foreign(folder: Path) -> None:
-    """All foreign files but those that commands make.
+    """Write all foreign files except those that commands write.
 
     Args:
-        folder: with the robot ``arm.toml``.
+        folder: folder that contains the robot ``arm.toml``.
     """
     from forcefit.assembly.files.robot_file import read_robot
     from forcefit.assembly.kinematics.posture import place_robot

@@ -1,8 +1,8 @@
-"""Sound files of machines with loops, of measured ones, and commands that read them.
+"""Valid files of robots with loops and of measured robots, and their commands.
 
-Robots with loops, one that rounded dimensions leave open; a campaign, the robot
-and covariance that its diagnosis saves; what devices of several makers export; surfaces
-of every format.
+The files are: robots with loops, one of them with loops that rounded dimensions leave
+open; a campaign, with the robot and the covariance that its diagnosis saves; exports of
+several measuring devices; and surfaces in every format.
 """
 
 from importlib.util import find_spec
@@ -10,7 +10,7 @@ from pathlib import Path
 
 from fuzz_seeds import BAR, OBJECT
 
-# the parallelogram with a pin 20 um out of the plane: no loop of it closes
+# a parallelogram linkage with a pin 20 um out of its plane, so that no loop closes
 ROUNDED = BAR.replace(
     "translation = [0.5, 0.0, 0.0]", "translation = [0.5, 0.0, 2e-5]", 1
 )
@@ -61,7 +61,7 @@ MACHINES = [
     (3, "stiffness fea solid.msh --base z=0 --tip z=7 --young 7e10 --poisson 0.3"),
 ]  # fmt: skip
 
-# gmsh, which reads STEP, is an extra; without it these are left out
+# the optional package gmsh reads STEP files; without it these commands are left out
 STEP = [
     (4, "stiffness fea two.step --part list --json -"),
     (3, "stiffness fea two.step#solid1 --base z=0 --tip z=7 --young 7e10 --poisson "
@@ -77,10 +77,10 @@ MADE_MACHINES = [
 
 
 def write_machines(folder: Path) -> None:
-    """All files but those that commands make.
+    """Write all files except those that commands write.
 
     Args:
-        folder: with ``arm.toml``, ``smr.toml`` and ``campaign/robot.toml``.
+        folder: folder with ``arm.toml``, ``smr.toml`` and ``campaign/robot.toml``.
     """
     curved = (folder / "campaign/robot.toml").read_text() + (
         '[[effect]]\nname = "function"\nlabel = "gear"\nwhere = "two"\n'
@@ -102,7 +102,7 @@ def write_machines(folder: Path) -> None:
 
 
 def _exports(folder: Path) -> dict[str, str]:
-    """The readings of three targets in the words of four devices."""
+    """Return readings of three targets in the export formats of four devices."""
     rows = [line.split(",") for line in (folder / "timed.csv").read_text().split()]
     rows = [row for row in rows if len(row) > 4 and row[0] in VECTORS]
     leica = ["X  [mm],Y  [mm],Z  [mm],U(95)  [mm],Target,Temperature  [\xb0C],"
@@ -127,7 +127,7 @@ def _exports(folder: Path) -> dict[str, str]:
 
 
 def _surfaces() -> dict[str, str]:
-    """The tetrahedron of the OBJ file in other formats."""
+    """Return the tetrahedron of the OBJ file in other formats, by file name."""
     lines = [line.split() for line in OBJECT.split("\n") if line]
     points = [" ".join(words[1:]) for words in lines if words[0] == "v"]
     faces = [[int(i) - 1 for i in w[1:]] for w in lines if w[0] == "f"]
@@ -152,7 +152,7 @@ def _surfaces() -> dict[str, str]:
 
 
 def _write_step(path: Path) -> None:
-    """Two boxes in one STEP file."""
+    """Write two boxes to one STEP file."""
     import gmsh
 
     gmsh.initialize(interruptible=False)

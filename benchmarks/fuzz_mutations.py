@@ -1,4 +1,4 @@
-"""Changes to files and to words of a command, for ``fuzz.py``, by one ``Random``."""
+"""Random changes of the files and the words of a command, for ``fuzz.py``."""
 
 import csv
 import io
@@ -54,11 +54,11 @@ def change_file(path: Path, random: Random) -> str:
     """Change one file in place.
 
     Args:
-        path: of the file.
-        random: numbers.
+        path: path of the file.
+        random: generator of random numbers.
 
     Returns:
-        What was done, in a word.
+        A word that describes the change.
     """
     content = path.read_bytes()
     ways = [_bytes, _bytes, _cut]
@@ -76,7 +76,7 @@ def change_file(path: Path, random: Random) -> str:
 
 
 def _bytes(content: bytes, random: Random, _: str) -> bytes:
-    """Remove, repeat or replace a piece, or flip a bit."""
+    """Remove, repeat or replace some bytes, or flip a bit."""
     start = random.randrange(len(content) + 1)
     stop = min(len(content), start + random.choice([0, 1, 1, 4, 40]))
     piece = content[start:stop]
@@ -87,7 +87,7 @@ def _bytes(content: bytes, random: Random, _: str) -> bytes:
 
 
 def _cut(content: bytes, random: Random, _: str) -> bytes:
-    """Keep only the beginning."""
+    """Cut the file at a random place."""
     return content[: random.randrange(len(content) + 1)]
 
 
@@ -100,7 +100,7 @@ def _coded(text: str) -> bytes:
 
 
 def _token(content: bytes, random: Random, _: str) -> bytes:
-    """Replace a number, string or name by another of the file, or an unusual one."""
+    """Replace a number, string or name by another one of the file or an unusual one."""
     text = _text(content)
     tokens = list(_TOKEN.finditer(text))
     if not tokens:
@@ -221,7 +221,7 @@ def _places(value: Any, path: tuple = ()) -> Any:
 
 
 def _toml(data: dict) -> str:
-    """Tables as a TOML file; lists of tables at the root become blocks."""
+    """Return tables as TOML text; lists of tables at the root become blocks."""
     lines, blocks = [], []
     for key, value in data.items():
         if (
@@ -238,7 +238,7 @@ def _toml(data: dict) -> str:
 
 
 def _written(value: Any) -> str:
-    """A value in TOML."""
+    """Return a value as TOML text."""
     if isinstance(value, list):
         return "[" + ", ".join(map(_written, value)) + "]"
     if isinstance(value, dict):
@@ -278,12 +278,12 @@ def change_words(
     """Change one to three words of a command.
 
     Args:
-        words: of a sound command.
-        options: names of all that the command has, and whether they take a value.
-        random: numbers.
+        words: words of a valid command.
+        options: names of the command's options, and whether they require a value.
+        random: generator of random numbers.
 
     Returns:
-        Other words; the first two, which name the command, stay.
+        The changed words; the first two, which name the command, are not changed.
     """
     words = list(words)
     for _ in range(random.choice([1, 1, 1, 2, 3])):

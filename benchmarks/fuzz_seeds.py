@@ -1,4 +1,4 @@
-"""Sound files of every kind, and sound commands that read them, for ``fuzz.py``."""
+"""Valid files of every kind, and valid commands that read them, for ``fuzz.py``."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from tests.robot_files_for_tests import FOUR_BAR
 
-# the parallelogram of the tests, which errors do not leave closed
+# the parallelogram linkage of the tests; its loop does not close if it has errors
 BAR = FOUR_BAR.replace(
     "mass = 1.2", "mass = 1.2\ngeometric_error = [1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5]"
 )
@@ -146,7 +146,7 @@ f 2 3 4
 f 1 4 3
 """
 
-# share of the inputs, then the command; what a command writes is called new...
+# share of the inputs and words of each command; names of output files begin with "new"
 COMMANDS = [
     (9, "assembly solve bar.toml --quantities margin"),
     (9, "assembly solve bar.toml --load fx=10,mz=1 --gravity y=-9.81 --json -"),
@@ -209,10 +209,10 @@ COMMANDS = [
 
 
 def write_seeds(folder: Path) -> None:
-    """All the files that the commands name, but those that commands make.
+    """Write all files that the commands read, except those that commands write.
 
     Args:
-        folder: empty.
+        folder: empty folder.
     """
     texts = {
         "bar.toml": BAR, "arm.toml": ARM + EFFECTS, "errors.toml": ERRORS,
@@ -229,7 +229,7 @@ def write_seeds(folder: Path) -> None:
 
 
 def _measurements() -> str:
-    """Eight rows of an arm, as read with noise."""
+    """Return eight rows of an arm's simulated readings with noise as CSV text."""
     rng = np.random.default_rng(4)
     lines = ["id,q.one,q.two,load.fx,meas.tx,meas.ty,meas.tz,cov.temperature,cov.time"]
     for i in range(8):
@@ -241,7 +241,7 @@ def _measurements() -> str:
 
 
 def _stl() -> bytes:
-    """A tetrahedron as binary STL."""
+    """Return a tetrahedron as the bytes of a binary STL file."""
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
     faces = corners[[[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]]
     record = np.zeros(4, dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)),
@@ -250,13 +250,14 @@ def _stl() -> bytes:
     return bytes(80) + np.uint32(4).tobytes() + record.tobytes()
 
 
-# what makes the files that other commands read
+# commands that write the files that other commands read
 MADE = [
     "stiffness library build links.toml",
     "assembly sweep bar.toml --grid q.crank=1:1.2:0.1 -o swept.nc --near 0.1",
     "assembly statistics bar.toml --errors errors.toml --draws 40 -o draws.nc",
 ]
-# the same, killed when all is solved and nothing written: their journals stay
+# commands that are killed after the solution and before the output, so that their
+# journals remain
 KILLED = [
     "assembly sweep bar.toml --grid q.crank=1:1.2:0.1 -o kept.nc --near 0.1",
     "assembly statistics bar.toml --errors errors.toml --draws 40 -o drawn.nc",

@@ -1,12 +1,12 @@
-"""Kill commands at random moments until they are done, and count lost results.
+"""Interrupt commands at random moments, and count the results that are lost.
 
-Run from the repository's root: ``python benchmarks/kills.py [KILLS] [--seed N]``. Four
-commands, ``assembly sweep``, ``statistics``, ``tolerances`` and ``validation
-diagnose``, run in children forked from a process in which everything is imported and
-compiled. They are stopped by SIGKILL, SIGTERM or Ctrl-C, or their disk is full: files
-may not grow beyond a random size, or the folder is a small tmpfs where mounting one is
-allowed. Between, journals are cut or one of their bits is turned. Then the same command
-runs to its end, and its files are compared with those of an undisturbed run.
+Run from the repository's root: ``python benchmarks/kills.py [KILLS] [--seed N]``.  The
+four commands are ``assembly sweep``, ``statistics``, ``tolerances`` and ``validation
+diagnose``.  They run in forks of a process that has imported and compiled everything.
+They are stopped by SIGKILL, SIGTERM or Ctrl-C, or by a full disk.  A limit on the size
+of files simulates the full disk, or a small tmpfs if one may be mounted.  Between two
+runs, a journal is cut or one of its bits is flipped.  Finally the same command runs to
+its end, and its files are compared with those of an undisturbed run.
 
 A point is lost if a child had written it to the journal, no cut or flipped bit affected
 it, and it is missing or solved again.  A file is half-written if it exists under its
@@ -48,7 +48,7 @@ from forcefit.assembly.sweeps import journal
 WAYS = {signal.SIGKILL: 12, signal.SIGTERM: 2, signal.SIGINT: 3, "full": 3}
 
 
-SOLVED, KEPT = 0, 8  # places of two numbers that a child shares with its parent
+SOLVED, KEPT = 0, 8  # [byte] offsets of two numbers that a child and its parent share
 shared = mmap.mmap(-1, 16)
 
 
@@ -107,7 +107,7 @@ def start(words: list[str], limit: int | None = None) -> int:
         forcefit_command.main()
     except SystemExit as done:
         status = done.code if isinstance(done.code, int) else 98
-        if status not in {0, 130} and limit is None:  # or it may not write that
+        if status not in {0, 130} and limit is None:  # a full disk allows no message
             os.write(2, printed.getvalue()[-300:].encode())
     except BaseException:
         with suppress(OSError):
@@ -187,12 +187,12 @@ def undisturbed(command: str) -> Case:
 
 
 def points_in_all(case: Case) -> int:
-    """Points of a whole run: those of the last child and of the one before it."""
+    """Return the number of points of a complete run."""
     return {"sweep": 54 * 20, "statistics": 4000}[case.words[1]]
 
 
 def spoil(path: Path, case: Case, random: Random, counts: Counter) -> int:
-    """Cut a journal or turn a bit of it, or neither; points that should be left."""
+    """Cut a journal, flip a bit or do nothing; return the points that must remain."""
     content = bytearray(path.read_bytes())
     sound = records(bytes(content), case)
     everything = sum(points for *_, points in sound)
@@ -207,7 +207,7 @@ def spoil(path: Path, case: Case, random: Random, counts: Counter) -> int:
     counts["journals with a bit turned"] += 1
     content[at] ^= 1 << random.randrange(8)
     if not sound and (at <= content.find(b"\n") or b"\n" not in content):
-        path.unlink()  # nothing in it says whose it is: refused, and begun again
+        path.unlink()  # a journal without its header is refused and must be removed
         return 0
     path.write_bytes(content)
     return sum(points for start, end, points in sound if not start <= at < end)
@@ -222,7 +222,7 @@ def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
         if way == "full" and not small:
             largest = max(map(len, case.files.values()))
             limit = int(np.exp(random.uniform(0, np.log(1.2 * largest))))
-        before = {*Path().glob("*.part"), *Path().glob("*.lock")}  # of a killed one
+        before = {*Path().glob("*.part"), *Path().glob("*.lock")}  # of a killed child
         child = start(case.words, limit)
         if way == "full":
             status = finish(child)
@@ -233,7 +233,7 @@ def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
             os.kill(child, way)
             status = finish(child)
             counts[f"stopped by {way.name}"] += status != 0
-            right = {0, -way, 130} | ({2} if small else set())  # it may be full before
+            right = {0, -way, 130} | ({2} if small else set())  # 2: the disk is full
             counts["wrong exit status"] += wrong(status, right, case, way)
         counts["lost"] += solved_again(case, standing)
         counts["half-written"] += check(case, counts, status, before)
@@ -241,7 +241,7 @@ def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
             standing = 0
             counts["half-written"] += any(not Path(n).exists() for n in case.files)
             continue
-        if case.header:  # of the others' journals only the ends are compared
+        if case.header:  # without a header, only the final files are compared
             standing += counted(KEPT)
             counts["lost"] += max(0, standing - points_in(path, case))
         standing = spoil(path, case, random, counts) if path.exists() else 0
@@ -258,7 +258,7 @@ def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
 
 
 def wrong(status: int, right: set[int], case: Case, way: object) -> bool:
-    """Whether an exit status is none of the right ones; it is then told."""
+    """Return whether an exit status is wrong; print a wrong one."""
     if status in right:
         return False
     print(f"exit status {status} of {case.words[1]} after {way}")
@@ -266,18 +266,18 @@ def wrong(status: int, right: set[int], case: Case, way: object) -> bool:
 
 
 def removed(case: Case, standing: int) -> bool:
-    """Whether the journal is gone since the last child, or one before, was done."""
+    """Return whether all points were stored and the journal was removed."""
     everything = standing + counted(KEPT) == case.points
     return bool(case.header) and everything and not Path("out.nc.journal").exists()
 
 
 def solved_again(case: Case, standing: int) -> int:
-    """Points that the last child solved although they stood in the journal."""
+    """Return the points that the last child solved although the journal had them."""
     return max(0, counted(SOLVED) - (case.points - standing)) if case.header else 0
 
 
 def check(case: Case, counts: Counter, status: int, before: set[Path]) -> int:
-    """Files that are not whole; politely stopped, nothing may be beside one."""
+    """Return the number of files that differ from those of an undisturbed run."""
     different = 0
     for path in Path().glob("out.*"):
         if path.suffix in {".part", ".lock"}:

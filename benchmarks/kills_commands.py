@@ -36,11 +36,11 @@ class Case:
     """A command and the results of its undisturbed run.
 
     Attributes:
-        words: of the command.
-        seconds: that it takes.
-        files: by name, what it writes.
-        header: first line of its journal; empty without one.
-        points: in the journal at the end.
+        words: words of the command.
+        seconds: [s] duration of the command.
+        files: contents of the files that it writes, by name.
+        header: first line of its journal; empty if there is no journal.
+        points: number of points in the journal at the end.
     """
 
     words: list[str]

@@ -26,7 +26,8 @@ from forcefit.assembly.statistics.linear_response import LinearResponse, linear_
 FRAMES = ("elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip")
 PAPER = np.array([2e-2] * 3 + [2e-4] * 3)  # [rad, m]
 SHARES = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02)
-BLOCK, TARGET, GOAL = 4096, 1e7, 600.0  # draws, draws, s
+# number of draws in a block; number of draws and time [s] that are to be reached
+BLOCK, TARGET, GOAL = 4096, 1e7, 600.0
 
 
 def paper_sources(share: float) -> ErrorSources:

@@ -34,14 +34,14 @@ from benchmarks.exchanged_code import Session
 from benchmarks.faults import ROOT, Fault, all_in, drawn, files_of
 from benchmarks.traced_tests import Run, Trace, traced
 
-# imported once, before the forks
+# libraries that are imported once, before the process forks
 LIBRARIES = (
     "scipy.linalg", "scipy.optimize", "scipy.sparse.linalg", "scipy.spatial",
     "scipy.stats", "scipy.ndimage", "cvxpy", "clarabel", "skfem", "xarray", "pandas",
     "h5netcdf", "matplotlib.figure", "pyvista", "meshio", "typer.testing", "hypothesis",
     "hypothesis.extra.numpy",
 )  # fmt: skip
-LEAST_SECONDS = 15  # of processor time, for collecting tests
+LEAST_SECONDS = 15  # [s] processor time allowed for the collection of tests
 
 
 def chosen(tests: list[str], trace: Trace, seconds: float) -> list[str]:
@@ -57,7 +57,7 @@ def chosen(tests: list[str], trace: Trace, seconds: float) -> list[str]:
 
 
 def caught(fault: Fault, tree: Path, trace: Trace, seconds: float) -> str | None:
-    """The test that sees a fault, "" where it is none's name; None if none does."""
+    """Return the test that detects a fault, "" if it has no name, or None."""
     path = tree / fault.path
     whole, times = path.read_bytes(), path.stat()
     path.write_text(fault.put_into(whole.decode()), encoding="utf-8")
@@ -83,9 +83,9 @@ def seen(fault: Fault, tree: Path, trace: Trace, seconds: float) -> str | None:
 def judged(
     faults: list[Fault], tree: Path, trace: Trace, seconds: float
 ) -> Iterator[tuple[Fault, str | None]]:
-    """Each fault with the test that sees it; first those that can be exchanged."""
+    """Yield each fault and the test that detects it, exchangeable faults first."""
     some = [fault for fault in faults if fault.within]
-    # before the fork, which leaves the trace's data base behind
+    # chosen before the fork, because a child cannot use the data base of the trace
     tests = [chosen(trace.nearest(fault), trace, seconds) for fault in some]
     reading, writing = Pipe(duplex=False)
 
@@ -106,7 +106,7 @@ def judged(
 
 
 def asked_for(asked: argparse.Namespace) -> list[Fault]:
-    """All faults of the files asked for, or as many drawn as are asked for."""
+    """Return all faults of the given files, or the requested number of random ones."""
     files = files_of(asked.only)
     if asked.files:
         named = [(c, path) for c, path in files if path in asked.files]
@@ -136,7 +136,7 @@ def main() -> None:
     began, survived = time.monotonic(), 0
     with tempfile.TemporaryDirectory() as scratch:
         tree = Path(scratch) / "forcefit"
-        # with the compiled modules
+        # the copy contains the compiled modules
         left_out = shutil.ignore_patterns(".git", ".venv", ".*_cache", "*_study")
         shutil.copytree(ROOT, tree, ignore=left_out)
         kept = asked.traced or Path(scratch)

@@ -43,7 +43,7 @@ MOVES = {"irsbot2": ("tx", "tz"), "hexapod": POSE, "delta": ("tx", "ty", "tz")}
 
 
 def heavy(name: str) -> Robot:
-    """A built-in robot with beams of aluminium and a platform of 1 kg."""
+    """Return a built-in robot with aluminium beams and a platform of 1 kg."""
     robot = load_robot(name)
     frames = []
     for frame in robot.frames:
@@ -56,7 +56,7 @@ def heavy(name: str) -> Robot:
 
 
 def path_of(robot: Robot, names: tuple[str, ...]) -> Trajectory:
-    """0.1 m along x about home, at 20 G."""
+    """Return a path of 0.1 m along x about home, with an acceleration of 20 G."""
     pose = home_posture(robot).pose()
     rows = np.array([[pose[name] for name in names]] * 2)
     rows[:, 0] += [-0.05, 0.05]
@@ -86,13 +86,13 @@ def solve_instant(robot: Robot, path: Trajectory, row: int) -> None:
 
 
 def solve_some(robot: Robot, path: Trajectory) -> None:
-    """Solve some instants along a path one by one."""
+    """Solve selected instants of a path one by one."""
     for row in np.linspace(0, POINTS - 1, ONE_BY_ONE).astype(int).tolist():
         solve_instant(robot, path, row)
 
 
 def least(run: Callable[[], object], runs: int) -> tuple[float, float]:
-    """Least seconds of the clock and of the processor."""
+    """Return the least wall time and processor time [s] of several runs."""
     spent = []
     for _ in range(runs):
         start = time.perf_counter(), time.process_time()

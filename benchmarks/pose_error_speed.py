@@ -47,16 +47,16 @@ from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.solvers import conic
 from forcefit.assembly.solvers.cones import cone_sizes
 
-SAMPLE = 6  # points of the other solvers
-UNIT = 1e-3  # poses are in mrad and mm for them
+SAMPLE = 6  # number of points that the other solvers solve
+UNIT = 1e-3  # [rad, m] the other solvers receive poses in mrad and mm
 TOLERANCE = 1e-6  # [rad or m]
-LIMIT = 30.0  # [s] a point
+LIMIT = 30.0  # [s] time limit for each point
 PARTS = {"rotation": slice(0, 3), "translation": slice(3, 6)}
 
 
 @dataclass(frozen=True)
 class Answer:
-    """Bounds [rad or m] and the processor time they took [s]."""
+    """Bounds [rad or m] of a pose error, and the processor time [s] to compute them."""
 
     lower: float
     upper: float
@@ -66,14 +66,14 @@ class Answer:
 def scaled(
     reach: ReachableSet, part: slice
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """As x = c + X v with H v = k, poses in units of 1e-3: (c, X, H, k)."""
+    """Return (c, X, H, k) of x = c + X v with H v = k, poses in units of 1e-3."""
     X = reach.map[part] / UNIT
     c = reach.centre[part] / UNIT - X @ reach.start
     return c, X, reach.rows, reach.rows @ reach.start
 
 
 def box(c: NDArray, X: NDArray, group: NDArray) -> tuple[NDArray, NDArray]:
-    """Bounds of x if no closure held."""
+    """Return the bounds of x without the constraints of the closures."""
     reach = np.array([cone_sizes(row, group).sum() for row in X])
     return c - reach, c + reach
 
@@ -148,7 +148,7 @@ def by_gurobi(reach: ReachableSet, part: slice, near: float) -> Answer:
 
 
 def by_branching(reach: ReachableSet, part: slice, near: float) -> Answer:
-    """Branch and bound on x: above each square its secant, Clarabel at every node."""
+    """Maximise x.x by branch and bound, with secants above the squares."""
     c, X, H, k = scaled(reach, part)
     begin = time.process_time()
     low, high = box(c, X, reach.group)
@@ -180,7 +180,7 @@ def _secant_node(
     c: NDArray, X: NDArray, H: NDArray, k: NDArray, group: NDArray, low: NDArray,
     high: NDArray,
 ) -> tuple[float, NDArray] | None:  # fmt: skip
-    """Most of the secants above x.x within a box, and where; None if it is empty."""
+    """Return the maximum of the secants in a box, and its place; None if empty."""
     nu = len(group)
     slope = low + high
     limits, radii = conic._unit_cones(group, np.ones(nu))
@@ -193,7 +193,7 @@ def _secant_node(
     if v is None:
         return None
     x = c + X @ v
-    # the dual value, whatever the solver's status: an upper bound
+    # the dual value is an upper bound for every status of the solver
     dual = X.T @ slope - H.T @ z[: len(k)] - sides.T @ z[len(k) : len(k) + 6]
     value = b[: len(k) + 6] @ z[: len(k) + 6] + cone_sizes(dual, group).sum()
     return float(value + slope @ c - low @ high), x
@@ -203,7 +203,7 @@ def sampled(
     solve: Callable[[ReachableSet, slice, float], Answer],
     reaches: list[ReachableSet], part: slice, near: NDArray,
 ) -> tuple[float, list[Answer], str]:  # fmt: skip
-    """Mean time [ms], the answers, and what there is to say."""
+    """Return the mean time [ms], the results, and a remark for the table."""
     try:
         answers = [
             solve(reach, part, size)
@@ -221,7 +221,7 @@ def sampled(
 
 
 def print_case(title: str, robot: Robot, postures: list[Posture], reading: str) -> None:
-    """The table of one case."""
+    """Print the table of one case."""
     own = [replace(p, robot=robot) for p in postures]
     at = together(own)
     few = np.arange(0, len(own), len(own) // SAMPLE)[:SAMPLE]
@@ -262,7 +262,7 @@ def print_case(title: str, robot: Robot, postures: list[Posture], reading: str) 
 
 
 def print_study(robot: Robot, poses: NDArray) -> None:
-    """The whole study: margin, energy, two pose errors; compliant rigid and free."""
+    """Print the times of the study: margin, energy and two pose errors."""
     begin = time.process_time()
     postures = [p for p in place_many(robot, poses)[0] if p is not None]
     at = together(postures)
@@ -287,7 +287,7 @@ def print_study(robot: Robot, poses: NDArray) -> None:
 
 
 def main() -> None:
-    """Print everything."""
+    """Print the tables of both cases and of the study."""
     robot = paper_robot()
     postures = workspace(robot)
     perfect = robot.with_errors(0 * robot.errors)

@@ -23,7 +23,7 @@ SPREAD = np.repeat([1e-4, 5e-5], 3)  # [rad, m] standard deviation of the errors
 
 
 def plan_of(robot: Robot) -> Plan:
-    """Fixture at the platform, all closures, release."""
+    """Return the plan: hold the platform, join all closures, release the platform."""
     fixture = Fix("fixture", robot.platform, dict.fromkeys(SCREW, 0.0))
     joins = [Join(f"join {i}", part) for i, part in enumerate(robot.closures, 1)]
     return Plan((fixture, *joins, Release("release", ("fixture",))))

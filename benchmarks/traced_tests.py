@@ -1,4 +1,4 @@
-"""Tests run in forks of one process, traced: which test passes which line."""
+"""Run tests in forks of one process, and record which test executes which line."""
 
 import json
 import os
@@ -30,13 +30,13 @@ WORDS = [
 
 
 class Run:
-    """Some tests in a fork of this process, on a tree."""
+    """A run of tests on a source tree, in a fork of this process."""
 
     def __init__(self, tree: Path, seconds: float) -> None:
         self.tree, self.seconds = tree, seconds
 
     def __call__(self, tests: list[str], plugins: tuple[Any, ...] = ()) -> str | None:
-        """The first test that fails, "" where none can be named; None if all pass."""
+        """Return the first failing test, "" if it has no name, or None if all pass."""
         printed = self.tree.parent / "printed.txt"
         child = os.fork()
         if not child:
@@ -80,7 +80,7 @@ class Run:
 
 
 class Tracer:
-    """A plugin: lines that each test passes, and seconds of processor time it takes."""
+    """A pytest plugin that records the lines and the processor time of each test."""
 
     def __init__(self, data: Path) -> None:
         self.data = data
@@ -88,26 +88,26 @@ class Tracer:
         self.took = 0.0
 
     def start(self) -> None:
-        """Trace from here on."""
+        """Start the trace."""
         self.coverage = Coverage(str(self.data), source=["forcefit"])
         self.coverage.start()
 
     def stop(self) -> None:
-        """Write lines and seconds."""
+        """Stop the trace; write the executed lines and the processor times [s]."""
         self.coverage.stop()
         self.coverage.save()
         self.data.with_suffix(".json").write_text(json.dumps(self.seconds))
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Any:
-        """A context of its own for each test, fixtures included."""
+        """Record each test and its fixtures in a separate context of the trace."""
         self.coverage.switch_context(item.nodeid)
         return (yield)
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_call(self, item: pytest.Item) -> Any:
-        """How long it takes."""
-        began = time.process_time()  # others may load the machine
+        """Measure the processor time [s] of a test."""
+        began = time.process_time()  # wall time depends on other programs
         try:
             return (yield)
         finally:
@@ -121,14 +121,14 @@ class Tracer:
 
 @dataclass(frozen=True)
 class Trace:
-    """Which tests pass a line, and seconds that each test takes."""
+    """The tests that execute each line, and the processor time [s] of each test."""
 
     lines: CoverageData
     seconds: dict[str, float]
 
     def of(self, path: Path, rows: range | set[int]) -> set[str]:
-        """Tests that pass one of these rows of a file."""
-        # traced in one copy of the tree or another
+        """Return the tests that execute one of the given rows of a file."""
+        # the trace may contain paths of another copy of the source tree
         files = [f for f in self.lines.measured_files() if f.endswith(f"/{path}")]
         tests = {
             test.partition("|")[0]
@@ -139,7 +139,7 @@ class Trace:
         return tests & self.seconds.keys()
 
     def nearest(self, fault: Fault) -> list[str]:
-        """Tests that pass a fault, the nearest and shortest first."""
+        """Return the tests that execute a fault, the nearest and shortest first."""
         tests = self.of(fault.path, fault.rows)
         if fault.name:
             named = re.compile(rf"\b{fault.name}\b")
@@ -150,14 +150,14 @@ class Trace:
         return sorted(tests, key=self.cost(fault))
 
     def cost(self, fault: Fault) -> Callable[[str], float]:
-        """A test's seconds, less where it is nearer to a fault."""
+        """Return the time [s] of a test, reduced if the test is near the fault."""
         near = f"tests/{fault.path.parent}/test_{fault.path.stem}"
 
         def cost(test: str) -> float:
             seconds = self.seconds[test] + 0.01
             if test.startswith(near):
                 return seconds / 10
-            if test.startswith(BESIDE):  # compare the most numbers
+            if test.startswith(BESIDE):  # these tests compare the most numbers
                 return seconds / 3
             return (
                 seconds if test.startswith(f"tests/{fault.chapter}/") else 3 * seconds
@@ -167,14 +167,14 @@ class Trace:
 
 
 def sources() -> Iterator[Path]:
-    """Files of the packages."""
+    """Return the source files of the packages."""
     for folder in FOLDERS:
         for path in sorted((ROOT / folder).rglob("*.py")):
             yield path.relative_to(ROOT)
 
 
 def importers(path: Path) -> list[Path]:
-    """Files of the packages that import a file's names."""
+    """Return the files of the packages that import names from a file."""
     module = "forcefit." + ".".join(path.with_suffix("").parts).removeprefix(
         "forcefit."
     )
@@ -183,9 +183,9 @@ def importers(path: Path) -> list[Path]:
 
 
 def traced(tree: Path, kept: Path) -> Trace:
-    """The default tests of each folder, traced, or what an earlier call left of them.
+    """Return the trace of the default tests of each folder; use a stored trace.
 
-    A folder of which a test has changed since is traced again.
+    A folder is traced again if one of its tests has changed since the stored trace.
     """
     lines = CoverageData(no_disk=True)
     seconds: dict[str, float] = {}
@@ -205,7 +205,7 @@ def traced(tree: Path, kept: Path) -> Trace:
 
 
 def places_of_tests() -> list[str]:
-    """Folders of tests, files where one has folders within, and what else is asked."""
+    """Return the folders of tests, single files next to subfolders, and other tests."""
     tests, places = ROOT / "tests", set[Path]()
     for path in tests.glob("*/**/test_*.py"):
         folder = path.parent
@@ -214,6 +214,6 @@ def places_of_tests() -> list[str]:
 
 
 def tests_in(place: str) -> list[Path]:
-    """Python files of a folder of tests; of one file, those beside it."""
+    """Return the Python files in a folder of tests, or in the folder of a file."""
     path = ROOT / place
     return sorted(path.parent.glob("*.py") if path.is_file() else path.rglob("*.py"))

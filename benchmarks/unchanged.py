@@ -1,13 +1,14 @@
-"""Stores what every command answers, and tells what a change of the code did to it.
+"""Store the results of every command, and compare them after a change of the code.
 
     python benchmarks/unchanged.py store FOLDER     # before the change
     python benchmarks/unchanged.py compare FOLDER   # after it
 
-For all built-in robots with errors drawn once (and stored as robot files): ``solve``,
-its margins alone, its exact state, ``error``; and one sweep, one statistics run, one
-diagnosis, one cross-check, one K_E by finite elements and one by beams.  Numbers are
-equal to the last bit or the largest relative difference is printed; times, versions and
-certificates, which are rounding, are left out.
+All built-in robots receive random errors and are stored as robot files.  For each of
+them, the program runs ``solve``, its margins, its exact state and ``error``.  It also
+runs one sweep, one statistics run, one diagnosis, one cross-check, and one K_E by
+finite elements and by beams.  If numbers are not bit-identical, the largest relative
+difference is printed.  Times, versions and the rounding errors in certificates are not
+compared.
 """
 
 import json
@@ -21,15 +22,15 @@ import numpy as np
 
 ROOT = Path(__file__).parents[1]
 ROBOTS = ("irsbot2", "four_bar", "five_bar", "3rrr", "hexapod", "delta", "orthoglide")
-# what differs from one run to the next
+# keys whose values differ between equal runs
 PASSING = ("seconds", "time", "version", "sha256", "created", "path", "file", "output")
-# rounding by their nature
+# keys of certificates, whose values are rounding errors
 CERTIFICATES = ("certificate", "residual", "gap", "excess", "linearisation_error")
-SMALLEST = 1e-9  # in SI: an array without a larger number is rounding of zero
+SMALLEST = 1e-9  # [SI] an array with only smaller numbers counts as rounded zeros
 
 
 def questions(folder: Path) -> dict[str, list[str]]:
-    """The words after ``forcefit`` for each answer; NetCDF goes to ``{out}``."""
+    """Return the words of each command; it writes NetCDF files to ``{out}``."""
     asked = {
         f"{question} {robot}": ["assembly", *words, str(folder / f"{robot}.toml")]
         for robot in (*ROBOTS, "arm6")
@@ -74,25 +75,25 @@ def questions(folder: Path) -> dict[str, list[str]]:
 
 
 def write_robots(folder: Path) -> None:
-    """Each built-in robot with one draw of errors, as a robot file."""
+    """Write each built-in robot with one draw of errors as a robot file."""
     from forcefit.assembly.files.robot_file import write_robot
     from forcefit.assembly.robots import load_robot
 
     folder.mkdir(parents=True, exist_ok=True)
     for name in (*ROBOTS, "arm6"):
         if (folder / f"{name}.toml").exists():
-            continue  # of an earlier version, which is then asked the same
+            continue  # the file of the earlier version is used again
         robot = load_robot(name)
         rng = np.random.default_rng(sum(map(ord, name)))
         scales = [1e-3, 1e-3, 1e-3, 5e-4, 5e-4, 5e-4]
         errors = rng.uniform(-1, 1, (len(robot.frames), 6)) * scales
-        if name == "irsbot2":  # most of its bodies are rigid: nothing would close
+        if name == "irsbot2":  # with errors of its rigid bodies, no loop would close
             errors[[frame.link is None for frame in robot.frames]] = 0.0
         write_robot(robot.with_errors(errors), folder / f"{name}.toml")
 
 
 def answer(words: list[str]) -> Any:
-    """The exit status and the JSON of one command, and of its data set the arrays."""
+    """Return the exit status, the JSON and the arrays of the data set of a command."""
     with tempfile.TemporaryDirectory() as scratch:
         out = str(Path(scratch) / "out")
         words = [word.replace("{out}", out) for word in words]
@@ -114,7 +115,7 @@ def answer(words: list[str]) -> Any:
 
 
 def leaves(value: Any, place: str = "") -> dict[str, Any]:
-    """Numbers, words and truths with their places."""
+    """Yield the numbers, texts and booleans of a result with their places."""
     if isinstance(value, dict):
         left_out = (*PASSING, *CERTIFICATES)
         kept = {k: v for k, v in value.items() if not any(p in k for p in left_out)}
@@ -133,7 +134,7 @@ def leaves(value: Any, place: str = "") -> dict[str, Any]:
 
 
 def difference(was: Any, now: Any) -> tuple[float, list[str]]:
-    """Largest difference, relative to its array's largest number; what else differs."""
+    """Return the largest difference over its array's largest number, and other ones."""
     before, after = leaves(was), leaves(now)
     gap, other = 0.0, sorted(before.keys() ^ after.keys())
     sizes: dict[str, float] = {}
@@ -154,7 +155,7 @@ def difference(was: Any, now: Any) -> tuple[float, list[str]]:
 
 
 def main() -> None:
-    """Store, or compare: exit status 1 where more than rounding differs."""
+    """Store or compare results; return status 1 for more than rounding differences."""
     what, folder = sys.argv[1], Path(sys.argv[2]).resolve()
     if what == "store":
         write_robots(folder)
@@ -165,7 +166,7 @@ def main() -> None:
     stored = json.loads((folder / "answers.json").read_text())
     worst = 0
     for name, words in questions(folder).items():
-        # as JSON writes it, NaN and infinity included
+        # values are compared in the form in which JSON stores NaN and infinity
         now = json.loads(json.dumps(answer(words)))
         gap, other = difference(stored[name], now)
         count = len(leaves(stored[name]))

@@ -174,7 +174,10 @@ def turn_link(link: LinkStiffness, rotation: ArrayLike) -> LinkStiffness:
     R = np.asarray(rotation, dtype=float)
     proper = R.shape == (3, 3) and np.allclose(R @ R.T, np.eye(3), rtol=0, atol=1e-9)
     if not proper or np.linalg.det(R) < 0:
-        raise BadInput("turn_link: the 3 by 3 matrix is not a rotation")
+        raise BadInput(
+            "turn_link: found a 3 by 3 matrix that is not a rotation, expected a "
+            "rotation matrix"
+        )
     A = np.kron(np.eye(2), R)
     return replace(
         link,

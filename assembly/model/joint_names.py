@@ -8,10 +8,10 @@ finds the joints.
 """
 
 import re
-from collections.abc import Container
+from collections.abc import Container, Sequence
 
 from forcefit.assembly.model.frame_series import NamedJoint
-from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.model.robot import BASE, Robot
 from forcefit.stiffness.screws import SCREW
 
 # ends of the names of a joint's contacts (assembly/drawing/contacts.py)
@@ -152,6 +152,31 @@ def owner_of_contact(name: str, names: Container[str]) -> str:
     """
     stem, _, end = name.rpartition(".")
     return stem if stem in names and _CONTACT.fullmatch(end) else ""
+
+
+def closing_names(
+    closures: Sequence[Sequence[str]], names: Container[str]
+) -> dict[str, str]:
+    """Return the names under which the frames are shown that a drawing adds at a loop.
+
+    A drawn joint that closes a loop ends with a frame ``yrail.end``.  If the loop
+    closes at the base, the base has a frame ``yrail.base`` there.
+
+    Args:
+        closures: pairs of names of frames.
+        names: names of frames and joints.
+
+    Returns:
+        For each such frame, the name of the joint, or ``"base"``.
+    """
+    shown: dict[str, str] = {}
+    for last, seat in closures:
+        stem = last.removesuffix(".end")
+        if stem != last and stem in names:
+            shown[last] = stem
+            if seat == f"{stem}.{BASE}":
+                shown[seat] = BASE
+    return shown
 
 
 def moves(robot: Robot, name: str) -> bool:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from forcefit.assembly.linear.assembled import without_rounding
-from forcefit.assembly.model.joint_names import owner_of_contact
+from forcefit.assembly.model.joint_names import closing_names, owner_of_contact
 from forcefit.results.text import table_lines
 from forcefit.stiffness.screws import WRENCH
 
@@ -15,7 +15,7 @@ _HEAD = tuple(f"{name} [{'N m' if name[0] == 'M' else 'N'}]" for name in WRENCH)
 
 # first words of frame names that belong to a joint, following the joint's name
 _OF_JOINT = {
-    "first", "second", "third", "turn", "slide", "slide_x", "slide_y", "end"
+    "first", "second", "third", "turn", "slide", "slide_x", "slide_y"
 }  # fmt: skip
 
 
@@ -25,8 +25,10 @@ def wrench_lines(
     """Return the wrenches through all frames and closures as lines of text.
 
     A joint that consists of several frames has one row, at the joint's point in its
-    axes, because the wrench through its other frames is the same.  The contacts of a
-    clearance have no row: together they carry the wrench through their joint.
+    axes, because the wrench through its other frames is the same.  For the same reason,
+    the last frame of a joint that closes a loop has no row, and the table of closures
+    names the joint.  The contacts of a clearance have no row: together they carry the
+    wrench through their joint.
 
     Args:
         frames: wrenches by frame, from
@@ -37,17 +39,22 @@ def wrench_lines(
     Returns:
         Lines with one table for each kind of wrench.
     """
+    names = {*frames, *joints}
+    closing = closing_names([c["frames"] for c in closures], names)
     starts = {k: f["start_wrench"] for k, f in frames.items() if "start_wrench" in f}
     tables = {
         "wrenches through the bodies, at each frame's origin in its axes":
             ("frame", {
                 row: frame["wrench"] for name, frame in frames.items()
-                if not owner_of_contact(name, {*frames, *joints})
+                if name not in closing and not owner_of_contact(name, names)
                 and (row := _shown(name, joints))
             }),
         "wrenches at the start of links under their own weight": ("frame", starts),
         "wrenches of the closures, at the platform's origin, base axes":
-            ("closure", {" - ".join(c["frames"]): c["wrench"] for c in closures}),
+            ("closure", {
+                " - ".join(closing.get(name, name) for name in c["frames"]): c["wrench"]
+                for c in closures
+            }),
     }  # fmt: skip
     lines = []
     for title, (first, wrenches) in tables.items():

@@ -53,13 +53,14 @@ ROBOTS = ("arm6", "hexapod", "delta")
 STRENGTH = 5.0
 TARGETS = 12
 TRIES = 20
-NEAR = 1.2  # multiple of the noise that the error should reach
-# weight and stiffening set the noise; clearance is left where the load pushes it
+NEAR = 1.2  # largest error after compensation that counts as small, over the noise
+# excluded: self-weight and stiffening, whose size determines the noise, and clearance,
+# whose position follows from the load
 NAMES = [
     name for name in (*LIBRARY, *OUTSIDE)
     if acts_on_machine(name)
     and name not in {"joint_clearance", "geometric_stiffening", "body_mass"}
-    and name not in {"delayed_expansion", "_tilting"}  # they follow what is no command
+    and name not in {"delayed_expansion", "_tilting"}  # no command determines them
 ]  # fmt: skip
 
 
@@ -120,7 +121,7 @@ def run_case(seed: int, robots: tuple[str, ...]) -> dict[str, Any]:
                         ("before", targets.coordinates), ("after", answer.coordinates)
                     )
                 }  # fmt: skip
-            except SimulationFailed:  # of targets that springs do not come to rest at
+            except SimulationFailed:  # the simulation has no equilibrium at a target
                 continue
             break
         else:

@@ -23,7 +23,7 @@ from forcefit.validation.multibody.simulation import (
 
 
 def posture(name: str, seed: int) -> Posture:
-    """A case: for the paper's robot also at a random pose of its workspace."""
+    """Return the posture of a case; the paper's robot is at a random pose."""
     if name != "irsbot2":
         make = {"hexapod": hexapod, "three_rrr": three_rrr}[name]
         return home_posture(drawn(make(play=True), seed, 2e-3, 2e-4))

@@ -114,7 +114,7 @@ def row(
 
 
 def closures(name: str) -> Iterable[dict]:
-    """Yield (a) for several sizes of the errors, loads and slendernesses of links."""
+    """Yield errors of (a), linear closures, over errors, loads and slenderness."""
     kinds = (("as built", None, None), ("1 kN", None, DOWN), ("L / r = 40", 40.0, None))
     for case, slenderness, load in kinds:
         cases = postures(name, slenderness)
@@ -124,7 +124,7 @@ def closures(name: str) -> Iterable[dict]:
 
 
 def beams(name: str) -> Iterable[dict]:
-    """Yield (b) over slenderness: the paper's errors, and 1 kN without errors."""
+    """Yield errors of (b), beams for solids, over slenderness of the links."""
     for slenderness in BARS:
         cases = postures(name, slenderness)
         none = free_of_errors(cases)
@@ -136,7 +136,7 @@ def beams(name: str) -> Iterable[dict]:
 
 
 def weights(name: str) -> Iterable[dict]:
-    """Yield (c) over slenderness: weight at links' ends, with and without moments."""
+    """Yield errors of (c), weight at the ends of links, over their slenderness."""
     for slenderness in WEIGHT_BARS:
         cases = postures(name, slenderness)
         none = free_of_errors(cases)
@@ -151,7 +151,7 @@ def weights(name: str) -> Iterable[dict]:
 
 
 def discs(name: str) -> Iterable[dict]:
-    """Yield (d) over the size of the errors and the load."""
+    """Yield errors of (d), disc and cone, over the size of the errors and the load."""
     cases = postures(name, play=True)
     for case, load in (("no load", None), ("1 kN", DOWN)):
         for size in SIZES:
@@ -174,7 +174,7 @@ def print_margins(name: str) -> None:
 
 
 def forks() -> Iterable[dict]:
-    """Yield (b) for realistic links: tubes with forks and bearing bores."""
+    """Yield errors of (b) for realistic links: tubes with forks and bearing bores."""
     mesh = MeshLink(FORKS, *BORES, 60e9, 0.3)
     cases = postures("irsbot2")
     names = [f.name for f in cases[0].robot.frames if f.link is not None]

@@ -96,7 +96,7 @@ def _measure(kind: str, rng: np.random.Generator) -> Synthetic:
     kinds |= dict.fromkeys(("joint_clearance", "_torque_backlash"), "arm")
     drawn = draw_robot(rng, next((kinds[n] for n in names if n in kinds), None))
     robot, load = drawn.robot, drawn.load
-    # robots of many legs take long: half as many rows
+    # robots with many legs are slow, so half as many rows are simulated
     many = len(robot.frames) > 20
     design = CampaignDesign(
         configurations=12 if many else 24,
@@ -108,13 +108,13 @@ def _measure(kind: str, rng: np.random.Generator) -> Synthetic:
     )
     design = varied_for(design, names)
     wanted = {name: float(rng.choice(STRENGTHS)) for name in names}
-    if "geometric_stiffening" in names:  # first of all it needs large errors
+    if "geometric_stiffening" in names:  # this effect is small without large errors
         robot = robot.with_errors(30 * robot.errors)
     if kind != "confounded":
         return generate_campaign(
             robot, wanted, design, Noise(), int(rng.integers(2**31)), "springs"
         )
-    # a beam that is longer, or warmer by always the same: nothing can tell them apart
+    # a longer beam cannot be distinguished from a beam that is always warmer
     hidden = Hidden(names[0], _one_beam(names[0], robot, rng))
     fixed = replace(design, temperature="constant")
     return generate_campaign(
@@ -148,7 +148,7 @@ def _one_beam(name: str, robot: Any, rng: np.random.Generator) -> Parameters:
 def truth_with_rivals(kind: str, campaign: Synthetic) -> dict[str, Any]:
     """Return the hidden effects, and other sets that explain the data equally well."""
     names = sorted(effect.name for effect in campaign.effects)
-    # two public effects may do what one that is not public does
+    # two public effects together may explain an effect that is not public
     most = 2 if len(names) == 2 or kind == "outside" else 1
     rivals = alternatives(campaign, most) if names else []
     same = {
@@ -156,10 +156,10 @@ def truth_with_rivals(kind: str, campaign: Synthetic) -> dict[str, Any]:
         for one in rivals
         if one.residual < SAME and tuple(sorted(_plain(one))) != tuple(names)
     }
-    # nothing at all is a rival too, if the effects hardly show
+    # if the hidden effects are hardly visible, the empty set explains the data too
     unseen = float(np.nansum((campaign.added / campaign.sigma) ** 2)) < SAME
     accept = [list(one) for one in sorted(same)] + ([[]] if unseen else [])
-    if kind == "none":  # near a singularity the declared errors may ask for them
+    if kind == "none":  # near a singularity, declared errors may cause finite motions
         chi2 = float(np.nansum((finite_part(campaign) / campaign.sigma) ** 2))
         accept += [["geometric_stiffening"]] if chi2 > SAME else []
     verdict = "ambiguous" if kind == "confounded" else None
@@ -169,7 +169,7 @@ def truth_with_rivals(kind: str, campaign: Synthetic) -> dict[str, Any]:
         truth["accept_effects"] = [[]]
         truth["hidden_from_library"] = least
         truth["accept_verdicts"] = ["outside_library"]
-        if least < VISIBLE:  # a public effect does nearly the same
+        if least < VISIBLE:  # a public effect explains nearly all of the hidden one
             truth["accept_verdicts"] = list(VERDICTS)
             hidden = [one for one in rivals if one.residual < VISIBLE]
             truth["accept_effects"] += [_plain(one) for one in hidden]
@@ -222,7 +222,7 @@ def answer(folder: Path, seed: int) -> None:
     try:
         found = diagnose(campaign)
         diagnosis = table(found) | _saved(found, campaign)
-    except Exception:  # a crash is an answer too, and is counted
+    except Exception:  # a crash is stored as a result and counted
         diagnosis = {"verdict": "crashed", "why": traceback.format_exc()}
     diagnosis["seconds"] = time.process_time() - started
     write_json(diagnosis, str(target))
@@ -251,14 +251,15 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--kind", choices=MIX, help="campaigns of one kind alone")
-    parser.add_argument("--step", type=int, default=1, help="for several at a time")
+    parser.add_argument("--kind", choices=MIX, help="make only this kind of campaign")
+    parser.add_argument("--step", type=int, default=1, help="take each STEP-th case")
     parser.add_argument(
-        "--understated", type=float, default=1.0, help="sigma stated too small by it"
-    )
+        "--understated", type=float, default=1.0,
+        help="factor by which the stated sigma is too small",
+    )  # fmt: skip
     parser.add_argument("--make", action="store_true", help="make campaigns only")
-    parser.add_argument("--answer", action="store_true", help="of those made already")
-    parser.add_argument("--score", action="store_true", help="score answers only")
+    parser.add_argument("--answer", action="store_true", help="only diagnose campaigns")
+    parser.add_argument("--score", action="store_true", help="only score results")
     asked = parser.parse_args()
     for name in ("campaigns", "truths", "answers"):
         (asked.folder / name).mkdir(parents=True, exist_ok=True)

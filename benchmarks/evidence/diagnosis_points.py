@@ -34,7 +34,8 @@ from tests.points_for_tests import DEVICE, MACHINE, simulated, write_points
 sys.path.insert(0, str(Path(__file__).parent))
 from random_robots import draw_robot
 
-LEFT_OUT = {"joint_clearance", "geometric_stiffening", "self_weight"}  # of given size
+# effects that are not drawn, because their size cannot be scaled
+LEFT_OUT = {"joint_clearance", "geometric_stiffening", "self_weight"}
 TRIES = 12
 
 
@@ -59,7 +60,7 @@ def machine(seed: int, hidden: str | None, common: float) -> Synthetic:
 
 
 def covered(found: Diagnosis, made: Synthetic) -> tuple[int, int]:
-    """Return how many of the 90 % intervals cover, and how many there are."""
+    """Return the number of 90 % intervals that contain the truth, and their number."""
     true = {e.name: e.parameters for e in made.effects}
     inside = [
         abs(p["value"] - true[e["name"]][p["name"]]) < 1.645 * p["std"]

@@ -19,7 +19,7 @@ VERDICTS = (
     "explained", "learned", "none_needed", "ambiguous", "outside_library",
     "not_enough_rows",
 )  # fmt: skip
-UNNAMED = ("geometric_errors", "springs")  # listed where no effect is named
+UNNAMED = ("geometric_errors", "springs")  # parts of a model that are not effects
 
 
 def score(folder: Path) -> dict[str, Any]:

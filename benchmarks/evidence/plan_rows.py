@@ -35,7 +35,8 @@ ROBOTS = ("arm6", "five_bar")
 ROWS = (8, 12, 16, 24, 32, 48)
 STRENGTH = 1.0  # [sigma]
 SIGMA = (1e-5, 5e-6)
-# the pose of the base is as declared; finite motions have no parameter
+# excluded: the pose of the base, which is as declared, and finite motions, which have
+# no parameter
 NOT_DRAWN = {"joint_clearance", "registration", "self_weight", "geometric_stiffening"}
 NAMES = [name for name in LIBRARY if name not in NOT_DRAWN]
 
@@ -95,7 +96,7 @@ def is_right(campaign: Campaign, name: str, values: dict[str, float],
 
 
 def needed(right: list[bool]) -> int:
-    """Return the fewest rows from which on all are right, else twice the most."""
+    """Return the least number of rows from which on every result is right."""
     wrong = [k for k, good in enumerate(right) if not good]
     first = wrong[-1] + 1 if wrong else 0
     return ROWS[first] if first < len(ROWS) else 2 * ROWS[-1]

@@ -118,7 +118,7 @@ def reference(part):
         known = SimpleNamespace(**empty | part.simple, nu=part.layers[0][4])
         found = independent_stiffness(known, 1e6 * part.layers[0][3])
         return np.array(found["stiffness"]), found["unsure"]
-    # an interface that ends tangentially in a rounding: the field is that of a crack
+    # where an interface ends tangentially at a fillet, the field is that of a crack tip
     rows = 3 if part.mirrors == "x" else 2
     mesh = mesh_of(part, 1.0, rows)
     low, high = (stiffness(part, mesh, order) for order in part.orders)

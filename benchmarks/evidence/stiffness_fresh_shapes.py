@@ -13,25 +13,25 @@ from stiffness_part_references import corners_of
 
 SEED = 20261126
 KINDS = ("plate", "layers", "shaft", "thin")
-EPS = 1e-4  # [mm] between places that are the same
+EPS = 1e-4  # [mm] largest distance between positions that count as equal
 
 
 @dataclass
 class Part:
-    """A drawn part, in millimetres and N/mm^2.
+    """A random part, with lengths in mm and stresses in N/mm^2.
 
     Attributes:
-        note: what it is, for the table.
+        note: description of the part for the table.
         solid: the whole shape; base at z = 0.
-        L: [mm] where the tip is, along z.
-        mirrors: axes across which it is its own image.
-        size: [mm] of elements along the edges, about the smallest thickness.
-        maxh: [mm] of elements elsewhere.
+        L: [mm] position of the tip along z.
+        mirrors: axes that are normal to a plane of symmetry of the part.
+        size: [mm] size of elements along the edges, about the smallest thickness.
+        maxh: [mm] size of elements elsewhere.
         layers: (axis, from, to, Young's modulus, Poisson's ratio); one without an axis
             is the whole part.
         simple: [m] ``planes`` and ``full`` bricks or ``profile`` of a part for
             ``stiffness_random_references.independent_stiffness``.
-        orders: of the reference's polynomials.
+        orders: orders of the polynomials of the reference solution.
     """
 
     note: str
@@ -46,28 +46,28 @@ class Part:
 
 
 def between(rng, low, high):
-    """A number whose logarithm is uniform, to three digits."""
+    """Return a number with a uniform logarithm, rounded to three digits."""
     return float(f"{np.exp(rng.uniform(np.log(low), np.log(high))):.3g}")
 
 
 def block(low, high):
-    """A box between two corners."""
+    """Return the box between two corners."""
     return Box(Pnt(*low), Pnt(*high))
 
 
 def rounded(solid, radius, chosen):
-    """A solid with a fillet on the edges whose lowest and highest corner are chosen."""
+    """Return a solid with fillets on the edges that ``chosen`` selects by corners."""
     return solid.MakeFillet([e for e in solid.edges if chosen(*corners_of(e))], radius)
 
 
 def along(axis, low, high):
-    """Whether an edge is parallel to an axis."""
+    """Return whether an edge is parallel to an axis."""
     extent = high - low
     return np.all(np.delete(extent, axis) < EPS) and extent[axis] > EPS
 
 
 def plate(rng):
-    """A plate with rounded corners, with a step across it or one or two ribs on it."""
+    """Return a plate with rounded corners and a step across it or one or two ribs."""
     L = between(rng, 60, 140)
     W = L * between(rng, 0.3, 0.8)
     T = W * between(rng, 0.07, 0.16)
@@ -79,7 +79,7 @@ def plate(rng):
     def corners(low, high):
         return along(1, low, high) and (low[2] < EPS or low[2] > L - EPS)
 
-    count = int(rng.integers(3))  # of ribs; a step if there is none
+    count = int(rng.integers(3))  # number of ribs; a plate without ribs has a step
     if count == 0:
         step = L * float(rng.uniform(0.3, 0.6))
         body = body + block((-W / 2, 0, 0), (W / 2, T + height, step))
@@ -104,7 +104,7 @@ def plate(rng):
 
 
 def layers(rng):
-    """A block or a rod in layers across z, or a sandwich whose core is along z."""
+    """Return a block or rod in layers across z, or a sandwich with a core along z."""
     L = between(rng, 25, 60)
     W = L * between(rng, 0.4, 1.1)
     D = W * between(rng, 0.6, 1)
@@ -130,7 +130,7 @@ def layers(rng):
 
 
 def shaft(rng):
-    """A shaft with one or two filleted shoulders; some have a bore."""
+    """Return a shaft with one or two filleted shoulders; some shafts have a bore."""
     r = between(rng, 8, 20)
     L = r * between(rng, 3.5, 9)
     radii = [r, r * float(rng.uniform(0.55, 0.85))]
@@ -154,7 +154,7 @@ def shaft(rng):
 
 
 def thin(rng):
-    """A tube of square or round section, or a channel, of thin walls."""
+    """Return a thin-walled tube of square or round section, or a channel."""
     W = between(rng, 25, 50)
     H = W * between(rng, 0.6, 1)
     L = W * between(rng, 1.2, 2.6)
@@ -189,7 +189,7 @@ def thin(rng):
 
 
 def draw_part(number):
-    """The part of a number."""
+    """Return the part with a given number."""
     rng = np.random.default_rng([SEED, number])
     nu = round(float(rng.uniform(0.2, 0.4)), 3)
     kind = KINDS[number % len(KINDS)]

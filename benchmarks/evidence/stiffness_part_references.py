@@ -44,7 +44,7 @@ def mode_stiffness(mesh, order, even, motions, held="", lame=(LAM, MU)):
     (lam, mu), fixed = lame, {c: ["tip", held] if held else ["tip"] for c in "xyz"}
     for cut, same in zip("xyz", even, strict=True):
         for c in "xyz":
-            # even: no motion across the cut; odd: none along it
+            # even: no motion normal to the cut; odd: no motion along the cut
             if (c == cut) == same:
                 fixed[c].append(PLANES[cut])
     x, y, z = ("|".join(fixed[c]) for c in "xyz")
@@ -194,10 +194,11 @@ def corners_of(shape):
 
 
 def forks(order, layers, finer=1.5):
-    """K_E of the link with forks and the largest system's unknowns.
+    """Return K_E of the link with forks, and the unknowns of the largest system.
 
-    Seen from the middle, the base moves by minus, the tip by plus half a unit screw:
-    no two of the six have the same symmetry, so K is diagonal there.
+    Relative to the middle of the link, the base moves by minus half a unit screw and
+    the tip by plus half of it.  The six motions have different symmetries, so that K is
+    diagonal at the middle.
     """
     mesh = eighth_of_forks(layers, finer)
     mesh.Curve(order)
@@ -215,7 +216,8 @@ def forks(order, layers, finer=1.5):
     for i, even in enumerate(evens):
         work, unknowns = mode_stiffness(mesh, order, even, [motions[i]])
         middle[i] = 8 / 4 * work[0, 0]
-    # a screw at the tip, read in the middle: turning about x and y moves it there
+    # a screw of the tip is read at the middle, where rotations about x and y add a
+    # translation
     A = np.eye(6)
     A[3, 1], A[4, 0] = -L / 2, L / 2
     return A.T @ np.diag(middle) @ A, unknowns

@@ -32,7 +32,8 @@ from forcefit.stiffness.surface.interface import parse_interface
 from forcefit.stiffness.surface.surface import Surface, check_surface
 
 YOUNG = 60e9  # [Pa]; errors do not depend on it
-SEEDS = {"training": 1, "test": 2, "middle": 1142}  # factors are set on the first
+# seed of each set of parts; the factors of the error estimate were fitted to "training"
+SEEDS = {"training": 1, "test": 2, "middle": 1142}
 KINDS = ("plate", "bar", "box", "channel", "bracket", "fork",
          "rod", "tube", "cone", "stepped", "eye")  # fmt: skip
 FACETS = 64
@@ -41,16 +42,16 @@ REFERENCES = Path(__file__).with_suffix(".json")
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A part: bricks between planes, a body of revolution, or a bar with a bore.
+    """A part that consists of bricks, a body of revolution, or a bar with a bore.
 
     Attributes:
         kind: one of ``KINDS``.
         nu: [-] Poisson's ratio.
-        base: the held interface.
-        tip: the interface that moves.
-        planes: [m] places along x, y, z between which bricks are full or empty.
-        full: (nx, ny, nz) whether a brick is.
-        profile: (k, 2) [m] r and z of the half section's corners.
+        base: text of the held interface.
+        tip: text of the interface that moves.
+        planes: [m] positions along x, y, z of the faces of the bricks.
+        full: (nx, ny, nz) bool, True for a brick that is filled with material.
+        profile: (k, 2) [m] r and z of the corners of a half section.
         eye: [m] width, thickness, length up to the bore's axis, radius of the bore.
     """
 
@@ -65,11 +66,11 @@ class Part:
 
 
 def draw_part(seed: int, number: int) -> Part:
-    """The part of a number.
+    """Return the part with a given number.
 
     Args:
-        seed: of its set.
-        number: tells the kind, and draws the dimensions.
+        seed: seed of the set of parts.
+        number: number of the part, which determines its kind and its dimensions.
 
     Returns:
         The part.
@@ -105,31 +106,31 @@ def draw_part(seed: int, number: int) -> Part:
 
 
 def between(rng: np.random.Generator, low: float, high: float) -> float:
-    """A number whose logarithm is uniform."""
+    """Return a random number whose logarithm is uniformly distributed."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def symmetric(*places: float) -> list[float]:
-    """Places and their mirror images, in order."""
+    """Return positions and their mirror images in ascending order."""
     return sorted([*(-p for p in places), *places])
 
 
 def plate(rng: np.random.Generator, L: float) -> tuple:
-    """Wide and thin."""
+    """Return a wide, thin plate."""
     W = L * between(rng, 0.3, 1.2)
     T = max(W * between(rng, 0.02, 0.12), np.hypot(L, W) / 60)
     return (symmetric(W / 2), symmetric(T / 2), [0, L]), [[[1]]]
 
 
 def bar(rng: np.random.Generator, L: float) -> tuple:
-    """A rectangle, stubby to slender."""
+    """Return a bar of rectangular section, from stubby to slender."""
     W = L / between(rng, 1.5, 12)
     T = W * between(rng, 0.3, 1)
     return (symmetric(W / 2), symmetric(T / 2), [0, L]), [[[1]]]
 
 
 def box(rng: np.random.Generator, L: float) -> tuple:
-    """A hollow rectangle."""
+    """Return a bar of hollow rectangular section."""
     W = L / between(rng, 2, 8)
     H = W * between(rng, 0.5, 1)
     t = H * between(rng, 0.07, 0.25)
@@ -138,7 +139,7 @@ def box(rng: np.random.Generator, L: float) -> tuple:
 
 
 def channel(rng: np.random.Generator, L: float) -> tuple:
-    """A web at small x and two flanges."""
+    """Return a channel with its web at the smallest x and two flanges."""
     H = L / between(rng, 2, 7)
     W = H * between(rng, 0.4, 0.9)
     t = H * between(rng, 0.08, 0.2)
@@ -147,7 +148,7 @@ def channel(rng: np.random.Generator, L: float) -> tuple:
 
 
 def fork(rng: np.random.Generator, L: float) -> tuple:
-    """A block and two prongs, whose ends are the tip."""
+    """Return a block with two prongs; the ends of the prongs are the tip."""
     W = L / between(rng, 1, 4)
     w, T = W * between(rng, 0.1, 0.35), W * between(rng, 0.15, 1)
     block = L * between(rng, 0.15, 0.6)
@@ -156,7 +157,7 @@ def fork(rng: np.random.Generator, L: float) -> tuple:
 
 
 def bracket(rng: np.random.Generator, L: float) -> tuple:
-    """Two arms across each other, as thick as each other."""
+    """Return an L-bracket of two perpendicular arms of equal thickness."""
     t = L * between(rng, 0.07, 0.35)
     D = t * between(rng, 0.5, 4)
     arm = t + (L - t) * between(rng, 0.4, 1)
@@ -165,7 +166,7 @@ def bracket(rng: np.random.Generator, L: float) -> tuple:
 
 
 def surface_of(part: Part) -> Surface:
-    """The part's surface, curved sides in facets.
+    """Return the surface of a part; curved sides consist of plane facets.
 
     Args:
         part: any.
@@ -186,7 +187,7 @@ def surface_of(part: Part) -> Surface:
 def brick_surface(
     planes: tuple[list[float], ...], full: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Faces between full and empty bricks, two triangles each."""
+    """Return the faces between full and empty bricks, each as two triangles."""
     counts = [len(p) for p in planes]
     points = np.stack(np.meshgrid(*planes, indexing="ij"), axis=-1).reshape(-1, 3)
     around = np.pad(full, 1)
@@ -207,7 +208,7 @@ def brick_surface(
 
 
 def revolved(profile: tuple[tuple[float, float], ...]) -> tuple[NDArray, NDArray]:
-    """A half section turned about z; corners on the axis are one point."""
+    """Return the surface that a half section describes when it turns about z."""
     angle = 2 * np.pi * np.arange(FACETS) / FACETS
     rings, points = [], []
     for r, z in profile:
@@ -225,16 +226,16 @@ def revolved(profile: tuple[tuple[float, float], ...]) -> tuple[NDArray, NDArray
 
 
 def eye_surface(W: float, T: float, L: float, r: float) -> tuple[NDArray, NDArray]:
-    """A bar whose end is half round about a bore along y."""
+    """Return a bar with a half-round end about a bore along y."""
     angle = 2 * np.pi * np.arange(FACETS) / FACETS
     hole = r * np.column_stack([np.cos(angle), np.sin(angle)])
     rim = W / 2 * np.column_stack([np.cos(angle), np.sin(angle)])
-    # below the axis the outline is that of the bar: its sides, its foot
+    # below the bore's axis, the outline consists of the sides and the end of the bar
     low = np.arange(FACETS) > FACETS // 2
     way = np.minimum(W / 2 / np.maximum(np.abs(hole[:, 0] / r), 1e-9),
                      L / np.maximum(np.abs(hole[:, 1] / r), 1e-9))  # fmt: skip
     rim[low] = hole[low] / r * way[low, None]
-    for x in (-1, 1):  # the nearest points become the corners of the foot
+    for x in (-1, 1):  # the nearest points become the corners of the bar's end
         corner = np.array([x * W / 2, -L])
         toward = (hole / r) @ corner
         rim[np.where(low, toward, -np.inf).argmax()] = corner
@@ -253,7 +254,7 @@ def eye_surface(W: float, T: float, L: float, r: float) -> tuple[NDArray, NDArra
 
 
 def answer(part: Part) -> dict:
-    """K as ``fea`` gives it, with what it tells of its error."""
+    """Return K of the command ``stiffness fea`` and its error estimates."""
     start = time.process_time()
     faces = [parse_interface(text) for text in (part.base, part.tip)]
     solved = solve_link(surface_of(part), *faces, [Material(YOUNG, part.nu)])
@@ -269,7 +270,7 @@ def answer(part: Part) -> dict:
 
 
 def kept(path: Path, key: str, make) -> dict:
-    """What a cache holds under a key; made and written there if it is not."""
+    """Return the value that a JSON file stores under a key; compute it if absent."""
     stored = json.loads(path.read_text()) if path.exists() else {}
     if key not in stored:
         made = make()
@@ -280,7 +281,7 @@ def kept(path: Path, key: str, make) -> dict:
 
 
 def reference(part: Part) -> dict:
-    """K by another solver, and how well it is known."""
+    """Return K by another solver, and the uncertainty of this K."""
     from stiffness_random_references import independent_stiffness
 
     return independent_stiffness(part, YOUNG)
@@ -289,7 +290,7 @@ def reference(part: Part) -> dict:
 def judge(
     name: str, number: int, references: Path, answers: Path
 ) -> tuple[float, float, float]:
-    """One row: told over true, true error and that of the mesh's own K."""
+    """Print a row of one part: effectivity, true error, true error of the mesh's K."""
     part = draw_part(SEEDS[name], number)
     known = kept(references, f"{name}-{number}", lambda: reference(part))
     kept_rows = kept(answers, f"{name}-{number}",

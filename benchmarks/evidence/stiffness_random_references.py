@@ -1,10 +1,12 @@
 """K_E of the parts of ``stiffness_random_parts.py`` by NGSolve.
 
-Bodies of revolution by Fourier modes in their half section, order 8; what is made of
-bricks by bricks that shrink geometrically toward every edge, a half or a quarter of the
-part by its symmetry, order 3 and 4 or 4 and 5; the eye by a quarter of it in curved
-tetrahedra with layers of prisms along the edges of its interfaces, order 3 and 4.
-Nothing is shared with our elements, meshes or estimates.
+Bodies of revolution are solved by Fourier modes in their half section, with polynomials
+of order 8.  Parts that consist of bricks are meshed by bricks that become geometrically
+smaller toward every edge.  Their symmetry allows the program to solve a half or a
+quarter of them, with orders 3 and 4 or 4 and 5.  A quarter of the eye is meshed by
+curved tetrahedra, with layers of prisms along the edges of its interfaces, and solved
+with orders 3 and 4.  The program shares no code with forcefit's elements, meshes or
+error estimates.
 """
 
 import netgen.meshing as netgen
@@ -17,13 +19,14 @@ from stiffness_round_references import AXIS, BASE, FREE, TIP, half_section
 from stiffness_round_references import stiffness as round_stiffness
 
 SHRINK = 0.15
-MOST = 50e3  # unknowns of the highest order
-# motions RX .. TZ about a point of the z axis: their own images in x = 0 and in y = 0
+MOST = 50e3  # largest number of unknowns at the highest order
+# for each motion RX .. TZ about a point of the z axis: whether it equals its mirror
+# image in x = 0 and in y = 0
 EVEN = {"x": (1, 0, 0, 0, 1, 1), "y": (0, 1, 0, 1, 0, 1)}
 
 
 def independent_stiffness(part, young):
-    """K_E of a part, base held, at the tip's centre.
+    """Return K_E of a part at the centre of its tip; the base is held.
 
     Args:
         part: of ``stiffness_random_parts``.
@@ -47,7 +50,7 @@ def independent_stiffness(part, young):
 
 
 def round_part(part, lame):
-    """Modes 0 and 1 in the half section, orders 6 and 8."""
+    """Return K_E of a body of revolution from modes 0 and 1, with orders 6 and 8."""
     corners = list(part.profile)
     L = max(z for _, z in corners)
     kinds = []
@@ -63,15 +66,15 @@ def round_part(part, lame):
 
 
 def bricks(part, lame):
-    """A half (y > 0) or, where x has it too, a quarter, as high an order as pays."""
+    """Return K_E of a part of bricks from its half y > 0, or a quarter if symmetric."""
     x, y, z = part.planes
     mirrors = "xy" if np.allclose(x, -np.array(x[::-1])) else "y"
     thin = min(np.diff(p).min() for p in part.planes)
-    # slender arms are cut into pieces not much longer than they are wide
+    # slender arms are divided into pieces that are not much longer than their width
     arm = x[1] - x[0]
     wide = max(arm if part.kind == "fork" else x[-1] - x[0], y[-1] - y[0])
     wide = 2 * arm if part.kind == "bracket" else wide
-    # an inner edge decides a bracket's K: one layer more
+    # the re-entrant edge of a bracket governs its K, so one more layer is used there
     least = 2 if part.kind == "bracket" else 1
     lines, kept = [], part.full
     for axis, places in zip("xyz", part.planes, strict=True):
@@ -86,7 +89,7 @@ def bricks(part, lame):
     owner = [np.repeat(np.arange(len(parts)), parts) for _, parts in lines]
     full = kept[np.ix_(*owner)]
     places = [p for p, _ in lines]
-    across = part.kind == "bracket"  # its tip is at the largest x
+    across = part.kind == "bracket"  # the tip of a bracket is at the largest x
     mesh = brick_mesh(places, full, 0 if across else 2, mirrors)
     tip = (x[-1], 0, (z[-2] + z[-1]) / 2) if across else center_of_tip(part)
     cells = int(full.sum())
@@ -96,12 +99,12 @@ def bricks(part, lame):
 
 
 def graded(places, thin, wide, cut, least):
-    """Places between planes, geometrically closer toward each; how many in each gap."""
+    """Return positions graded toward each plane, and their number in each gap."""
     found, counts = [places[0]], []
     for k, (a, b) in enumerate(zip(places, places[1:], strict=False)):
-        whole = cut and k == 0  # nothing happens at the cut
+        whole = cut and k == 0  # the fields are smooth at the cut
         size = (b - a) / (1 if whole else 2)
-        # layers at free edges decay like exp(-pi s / thin): several cells within them
+        # layers at free edges decay as exp(-pi s / thin), and need several cells each
         layers = max(least, round(np.log(size / (SHRINK * thin)) / np.log(4)))
         ends = [size * (0.25 if layers > 2 else SHRINK) ** n
                 for n in range(layers, 0, -1)]  # fmt: skip
@@ -117,7 +120,7 @@ def graded(places, thin, wide, cut, least):
 
 
 def center_of_tip(part):
-    """Centroid of the full bricks' ends at the largest z."""
+    """Return the centroid of the faces of full bricks at the largest z."""
     x, y, z = (np.array(p) for p in part.planes)
     area = np.outer(np.diff(x), np.diff(y)) * part.full[:, :, -1]
     middle = (x[1:] + x[:-1]) / 2
@@ -125,7 +128,7 @@ def center_of_tip(part):
 
 
 def brick_mesh(places, full, axis, mirrors):
-    """Hexahedra; the face at the end of an axis is the tip, at z = 0 the base."""
+    """Return a mesh of hexahedra; the base is at z = 0, the tip at an axis' end."""
     mesh = netgen.Mesh()
     mesh.dim = 3
     names = ["base", "tip", "x0", "y0", "side"]
@@ -167,7 +170,7 @@ def brick_mesh(places, full, axis, mirrors):
 
 
 def by_symmetry(mesh, order, mirrors, tip, lame):
-    """K from motions that are even or odd in each mirror; one matrix serves all."""
+    """Return K from motions that are even or odd about each plane of symmetry."""
     (lam, mu), space = lame, ng.VectorH1(mesh, order=order)
     u, v = space.TnT()
     e, f = ng.Sym(ng.Grad(u)), ng.Sym(ng.Grad(v))
@@ -194,11 +197,11 @@ def by_symmetry(mesh, order, mirrors, tip, lame):
 
 
 def free_unknowns(mesh, order, mirrors, kind):
-    """Those that are not held by base, tip or a mirror, of condensed matrices."""
+    """Return the unknowns that neither an interface nor a symmetry plane holds."""
     held = {c: ["base", "tip"] for c in "xyz"}
     for cut, even in zip(mirrors, kind, strict=True):
         for c in "xyz":
-            # even: no motion across the cut; odd: none along it
+            # even: no motion normal to the cut; odd: no motion along the cut
             if (c == cut) == bool(even):
                 held[c].append(f"{cut}0")
     names = {f"dirichlet{c}": "|".join(held[c]) for c in "xyz"}
@@ -206,7 +209,7 @@ def free_unknowns(mesh, order, mirrors, kind):
 
 
 def eye(part, lame):
-    """A quarter, x > 0 and y > 0."""
+    """Return K_E of the eye from its quarter x > 0, y > 0."""
     W, T, L, r = part.eye
     solid = Box(Pnt(0, 0, 0), Pnt(W / 2, T / 2, L)) + Cylinder(
         Pnt(0, 0, L), Y, W / 2, T / 2

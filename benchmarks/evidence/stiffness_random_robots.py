@@ -2,27 +2,32 @@
 
 ``python -m benchmarks.evidence.stiffness_random_robots``
 
-100 random robots of one to three legs, with play, errors and loads, each at home and at
-two more poses to which its drives take it; random robots are drawn until so many can
-move.  Then the built-in ones, at three sizes of their errors where they cannot.  The
-exact tangent against differences of the exact equilibrium by the load; the classical
-matrix against the least energy (22) without play, against the compiled one, and against
-Exudyn, links as springs, by load steps and by its linearised system; and the exact
-tangent with errors and under a load against that linearised system.  Every robot has a
-matrix or a reason; differences are entries over sqrt(C_ii C_jj).
-``--seed 10000 --robots 100`` draws others.
+The program draws 100 random robots that can move, with one to three legs, clearances,
+errors and loads.  Each robot is evaluated at home and at two other poses that its
+drives reach.  The built-in robots follow; those that cannot move are evaluated at three
+sizes of their errors.  ``--seed 10000 --robots 100`` draws other robots.  The
+comparisons are:
 
-Differences by the load are extrapolated from several steps, and that is taken which
-differs least from its neighbours: small steps leave the rounding of positions, 1e-14 m,
-beside a small motion, large ones meet other contacts or no equilibrium.  The compared
-tangent has no part in the choice.
+- the exact tangent with finite differences of the exact equilibrium;
+- the classical matrix with the least energy (22) without clearances, with the compiled
+  matrix, and with Exudyn (links as springs; load steps, and its linearised system);
+- the exact tangent with errors and a load with Exudyn's linearised system.
 
-Under load joints that are locked about some axes and elastic about others are elastic
-about all, 1e8 where they were locked: how such a joint turns far has no one law (see
+For each robot, the program prints the differences of the matrices, as entries over
+sqrt(C_ii C_jj), or the reason why there is no matrix.
+
+The finite differences are extrapolated from several steps of the load.  The result that
+differs least from its neighbours is used: small steps suffer from the rounding of
+positions (1e-14 m), and large steps change the contacts or have no equilibrium.  The
+compared tangent does not influence this choice.
+
+For the comparison under load, a joint that is locked about some axes and elastic about
+others becomes elastic about all axes, with a stiffness of 1e8 about the locked ones.
+The reason is that large rotations of such a joint are not defined uniquely (see
 ``forcefit.validation.crosscheck.stiffness_check``).  The load moves the platform by
-0.03 rad or reference lengths, or a tenth, or a hundredth of it where that is too much.
-Where the two platforms then stand in different equilibria that is said, and nothing is
-compared.
+0.03 rad or 0.03 reference lengths, or by a tenth or a hundredth of this if there is no
+equilibrium.  If the two programs find different equilibria, the program prints this and
+compares nothing.
 """
 
 import argparse
@@ -62,13 +67,14 @@ TIME_LIMIT = 20.0  # [s] of one simulation
 ERRORS = np.repeat([1e-3, 1e-4], 3)  # [rad, m] of the built-in robots
 _FAR, _MOVED = 0.1, 1e-3  # [rad or m] of drives; what counts as another pose
 _SIZE = np.repeat([1.0, 20.0], 3)  # [N m, N] of loads
-_STEPS = 0.5 * 0.2 ** np.arange(8)  # of the loads' sizes; contacts change within 1e-3
+# steps of the load, relative to its size; contacts may change within 1e-3 of it
+_STEPS = 0.5 * 0.2 ** np.arange(8)
 _MOVES = 0.03  # [rad or reference lengths] of a loaded platform
 _STIFF = 1e8  # [N m/rad, N/m]
 
 
 def relative(C: NDArray, other: NDArray) -> float:
-    """Largest difference of finite entries over sqrt(C_ii C_jj)."""
+    """Return the largest difference of finite entries over sqrt(C_ii C_jj)."""
     size = np.sqrt(np.abs(np.diag(C)))
     with np.errstate(divide="ignore", invalid="ignore"):
         off = np.abs(C - other) / np.outer(size, size)
@@ -76,15 +82,15 @@ def relative(C: NDArray, other: NDArray) -> float:
 
 
 def limit(steps: list[float], slopes: list[NDArray]) -> NDArray:
-    """(6,) central differences at step zero."""
+    """Return (6,) central differences, extrapolated to a step of zero."""
     better = without_squares(steps, slopes)
-    # rotations and translations of one column have the sizes they have
+    # rotations and translations of a column are scaled separately
     size = np.abs(better).max(axis=0) + 1e-300
     return steadiest(better, lambda change: float((change / size).max()))[0]
 
 
 def carried(posture: Posture, load: NDArray) -> tuple[ExactAssembly, float]:
-    """The equilibrium under a load, or under the tenth or hundredth it carries."""
+    """Return the equilibrium under a load, or under a tenth or hundredth of it."""
     for share in (1.0, 0.1):
         try:
             return solve_exact(posture, share * load), share
@@ -94,7 +100,7 @@ def carried(posture: Posture, load: NDArray) -> tuple[ExactAssembly, float]:
 
 
 def slope_by(equilibrium: ExactAssembly, unit: NDArray) -> NDArray:
-    """(6,) derivative along a load, by differences at falling steps."""
+    """Return the (6,) derivative by a load, from differences with decreasing steps."""
     steps, slopes = list[float](), list[NDArray]()
     for step in _STEPS:
         try:
@@ -106,7 +112,7 @@ def slope_by(equilibrium: ExactAssembly, unit: NDArray) -> NDArray:
                 for sign in (1, -1)
             )  # fmt: skip
         except SolverFailed:
-            # a large step may leave what any equilibrium carries
+            # under a large step of the load there may be no equilibrium
             if step <= _STEPS[-3]:
                 raise
             steps.clear()
@@ -118,7 +124,7 @@ def slope_by(equilibrium: ExactAssembly, unit: NDArray) -> NDArray:
 
 
 def by_differences(posture: Posture, load: NDArray) -> tuple[float, str]:
-    """Exact tangent against central differences, or why there is none."""
+    """Compare the exact tangent with central differences, or return a reason."""
     try:
         equilibrium, share = carried(posture, load)
         C = exact_tangent(equilibrium).compliance
@@ -143,7 +149,7 @@ def by_differences(posture: Posture, load: NDArray) -> tuple[float, str]:
 
 
 def by_least_energy(posture: Posture) -> float:
-    """The classical matrix against (22) of the robot without play and errors."""
+    """Compare the classical matrix with (22) without clearances and errors."""
     robot = posture.robot
     frames = tuple(replace(f, clearance=None) for f in robot.frames)
     tight = replace(robot, frames=frames).with_errors(np.zeros_like(robot.errors))
@@ -158,7 +164,7 @@ def by_least_energy(posture: Posture) -> float:
 
 
 def by_simulation(posture: Posture) -> tuple[dict[str, float], str]:
-    """The classical matrix against Exudyn, of the robot without errors."""
+    """Compare the classical matrix with Exudyn for the robot without errors."""
     robot = unplayed(posture.robot)
     posture = replace(posture, robot=robot.with_errors(np.zeros_like(robot.errors)))
     C = without_clearance(posture)
@@ -178,7 +184,7 @@ def by_simulation(posture: Posture) -> tuple[dict[str, float], str]:
 
 
 def loaded_by_simulation(posture: Posture, load: NDArray) -> tuple[float, str]:
-    """The exact tangent of errors and a load against Exudyn's linearised system."""
+    """Compare the exact tangent under errors and a load with Exudyn's linear system."""
     robot = replace(posture.robot, frames=tuple(map(all_elastic, posture.robot.frames)))
     posture = replace(posture, robot=unplayed(robot))
     classical = without_clearance(posture)
@@ -218,7 +224,7 @@ def loaded_by_simulation(posture: Posture, load: NDArray) -> tuple[float, str]:
 def stands_elsewhere(
     posture: Posture, length: float, screw: NDArray, platform: NDArray
 ) -> bool:
-    """Whether two platforms stand a tenth of the way apart that they have moved."""
+    """Return whether two platform poses differ by a tenth of the motion."""
     nominal = posture.platform
     turn = rotation_vector(platform[:3, :3] @ nominal[:3, :3].T)
     other = np.concatenate([turn, platform[:3, 3] - nominal[:3, 3]])
@@ -228,7 +234,7 @@ def stands_elsewhere(
 
 
 def all_elastic(frame: Frame) -> Frame:
-    """A frame whose joint, if it is both elastic and locked, is stiff instead."""
+    """Return the frame; a joint elastic about some axes becomes stiff about others."""
     if frame.springs is None:
         return frame
     K = np.diag(frame.springs).copy()
@@ -239,7 +245,7 @@ def all_elastic(frame: Frame) -> Frame:
 
 
 def moved_postures(robot: Robot, rng: np.random.Generator) -> list[Posture]:
-    """Home and two poses to which the drives take a robot; fewer if they cannot."""
+    """Return home and at most two other postures that the drives reach."""
     home = home_posture(robot)
     driven = np.array([frame.actuated for frame in robot.frames])
     steps = rng.uniform(-_FAR, _FAR, (8, len(driven)))
@@ -253,7 +259,7 @@ def moved_postures(robot: Robot, rng: np.random.Generator) -> list[Posture]:
 
 
 def built_in() -> Iterator[tuple[str, list[Posture], NDArray]]:
-    """Postures and loads of the built-in robots, errors up to a mrad and 0.1 mm."""
+    """Yield postures and loads of built-in robots, errors up to 1 mrad and 0.1 mm."""
     for seed, name in enumerate(BUILT_IN):
         rng, robot = np.random.default_rng(seed), load_robot(name)
         errors = rng.uniform(-1, 1, (len(robot.frames), 6)) * ERRORS
@@ -267,7 +273,7 @@ def built_in() -> Iterator[tuple[str, list[Posture], NDArray]]:
 
 
 def random_ones(seed: int, robots: int) -> Iterator[tuple[str, list[Posture], NDArray]]:
-    """Postures and loads of random robots that can move."""
+    """Yield postures and loads of random robots that can move."""
     drawn, kept, loops = 0, 0, 0
     while kept < robots:
         rng = np.random.default_rng(seed + drawn)
@@ -283,7 +289,7 @@ def random_ones(seed: int, robots: int) -> Iterator[tuple[str, list[Posture], ND
 
 
 def compare(robots: Iterable[tuple[str, list[Posture], NDArray]]) -> None:
-    """Print the comparisons of some robots."""
+    """Print the comparisons for the given robots."""
     reasons: dict[str, Counter[str]] = {
         "exact": Counter(), "Exudyn": Counter(), "Exudyn, loaded": Counter()
     }  # fmt: skip
@@ -322,7 +328,7 @@ def compare(robots: Iterable[tuple[str, list[Posture], NDArray]]) -> None:
 
 
 def main() -> None:
-    """Print the comparisons."""
+    """Print the comparisons for random and built-in robots."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--seed", type=int, default=10_000)
     parser.add_argument("--robots", type=int, default=100)

@@ -27,12 +27,12 @@ L = 0.452  # [m] of the distal link
 
 
 def bar(radius, z0, z1):
-    """Round bar along z."""
+    """Return a round bar along z."""
     return Cylinder(Pnt(0, 0, z0), Z, radius, z1 - z0)
 
 
 def ends(solid, base, tip):
-    """Name the two interfaces."""
+    """Name the faces of a solid that are its base and tip interfaces."""
     solid.faces.name = "side"
     for name, (axis, place) in {"base": base, "tip": tip}.items():
         face = solid.faces.Max(axis) if place > 0 else solid.faces.Min(axis)
@@ -41,7 +41,7 @@ def ends(solid, base, tip):
 
 
 def fork():
-    """End plug, two lugs and their bores, which are called ``bore``."""
+    """Return a fork: an end plug and two lugs with bores; name the faces ``bore``."""
     solid = bar(0.040, 0.042, 0.060) - bar(0.015, 0.03, 0.07)
     for y0, y1 in ((0.016, 0.030), (-0.030, -0.016)):
         lug = Box(Pnt(-0.025, y0, 0), Pnt(0.025, y1, 0.045))
@@ -51,7 +51,7 @@ def fork():
 
 
 def distal_forks():
-    """Tube with a fork at each end."""
+    """Return a tube with a fork at each end."""
     tube = bar(0.040, 0.060, L - 0.060) - bar(0.034, 0.0, L)
     upper = fork().Rotate(Axis((0, 0, 0), X), 180).Move((0, 0, L))
     solid = fork() + tube + upper
@@ -70,19 +70,19 @@ def distal_forks():
 
 
 def head_and_rod():
-    """Tube with solid heads."""
+    """Return a tube with solid heads."""
     rod = bar(0.007, 0.030, 0.370) - bar(0.005, 0.030, 0.370)
     return bar(0.012, 0.0, 0.030) + rod + bar(0.012, 0.370, 0.4)
 
 
 def l_bracket():
-    """Two bars across each other."""
+    """Return an L-bracket of two perpendicular bars."""
     leg = Box(Pnt(-0.02, -0.02, 0), Pnt(0.02, 0.02, 0.22))
     return leg + Box(Pnt(-0.02, -0.02, 0.18), Pnt(0.15, 0.02, 0.22))
 
 
 def tapered_arm():
-    """Cone."""
+    """Return a conical arm."""
     return Cone(gp_Ax2(Pnt(0, 0, 0), Z), 0.045, 0.025, 0.35, 2 * np.pi)
 
 
@@ -105,7 +105,7 @@ INNER_EDGES = {"l_bracket": [(0.02, 0.0, 0.18)], "distal_forks": None}
 
 
 def netgen_mesh(name, layers=2, finer=1.0):
-    """A link's mesh of straight elements, still to be curved, and its solid."""
+    """Return a link's mesh of straight elements, before curving, and its solid."""
     make, _, size = LINKS[name]
     solid = make()
     for face in solid.faces:
@@ -124,7 +124,7 @@ def netgen_mesh(name, layers=2, finer=1.0):
 
 
 def stiffness(mesh, order, tip):
-    """K_E and unknowns; inner unknowns of the elements are condensed."""
+    """Return K_E and the number of unknowns; element interiors are condensed."""
     condense = order > 2
     space = ng.VectorH1(mesh, order=order, dirichlet="base|tip")
     u, v = space.TnT()
@@ -148,7 +148,7 @@ def stiffness(mesh, order, tip):
         if condense:
             field.vec.data += a.harmonic_extension * field.vec
         fields.append(field)
-    # energies of the fields: errors of the solution enter squared
+    # from the energy of the fields, in which solution errors enter squared
     full = ng.BilinearForm(space, symmetric=True)
     full += form * ng.dx
     K = np.empty((6, 6))
@@ -160,13 +160,13 @@ def stiffness(mesh, order, tip):
 
 
 def scaled(difference, K):
-    """Entries divided by sqrt(K_ii K_jj)."""
+    """Return the entries divided by sqrt(K_ii K_jj)."""
     size = np.sqrt(np.diag(K))
     return difference / np.outer(size, size)
 
 
 def report(name, orders, finer):
-    """K of rising orders, and how far each is from the stored reference."""
+    """Print K for increasing orders, and its difference from the stored reference."""
     stored = json.loads((HERE / "stiffness_references.json").read_text())[name]
     mesh, solid = netgen_mesh(name, finer=finer)
     print(f"{name}: {mesh.ne} elements, {solid.mass:.9g} m^3", flush=True)

@@ -24,7 +24,7 @@ import numpy as np
 from stiffness_references import HERE, LAM, MU, scaled
 
 AXIS, FREE, BASE, TIP = "axis", "side", "base", "tip"
-# half sections: (r, z) [m] of the corners, and what the line from each to the next is
+# half sections: (r, z) [m] of each corner, and the kind of the line to the next corner
 LINKS = {
     "distal_plain": (
         [(0, 0), (0.040, 0), (0.040, 0.452), (0, 0.452)], [BASE, FREE, TIP, AXIS]
@@ -44,7 +44,7 @@ LINKS = {
 
 
 def half_section(corners, lines, size, layers=8):
-    """Triangles and quadrilaterals, geometrically finer toward every corner."""
+    """Return a mesh of the half section, geometrically finer toward every corner."""
     geometry = plane.SplineGeometry()
     points = [geometry.AppendPoint(r, z, hpref=float(r > 0)) for r, z in corners]
     for k, name in enumerate(lines):
@@ -56,7 +56,7 @@ def half_section(corners, lines, size, layers=8):
 
 
 def energy(u, v, m, lame=(LAM, MU)):
-    """Work of the stresses of one field on the strains of another, times 1 / r."""
+    """Return the work of one field's stresses on another's strains, times 1 / r."""
     r, (lam, mu) = ng.x, lame
     (U, V, W, dU, dV, dW), (S, T, X, dS, dT, dX) = u, v
     e, f = (
@@ -71,11 +71,11 @@ def energy(u, v, m, lame=(LAM, MU)):
 
 
 def mode_stiffness(mesh, order, m, motions, lame=(LAM, MU)):
-    """Stiffness between motions (U, V, W) of the tip in mode m."""
+    """Return the stiffness between motions (U, V, W) of the tip in mode m."""
     held = f"{BASE}|{TIP}"
     one = ng.H1(mesh, order=order, dirichlet=held)
     zero = ng.H1(mesh, order=order, dirichlet=f"{held}|{AXIS}")
-    # mode 0: U, V, W; mode 1: U + V, U - V, W; what vanishes on the axis
+    # unknowns of mode 0: U, V, W; of mode 1: U + V, U - V, W; some vanish on the axis
     space = zero * zero * one if m == 0 else zero * one * zero
 
     def parts(p, q, w):
@@ -112,12 +112,13 @@ def mode_stiffness(mesh, order, m, motions, lame=(LAM, MU)):
 
 
 def stiffness(mesh, order, lame=(LAM, MU)):
-    """K_E (6, 6) at the tip's centre, base held."""
+    """Return (6, 6) K_E at the centre of the tip; the base is held."""
     turned, stretched = (
         mode_stiffness(mesh, order, 0, [motion], lame)[0, 0]
         for motion in ((0, ng.x, 0), (0, 0, 1))
     )
-    # turning about y lifts z by -r cos(a); moving along x is (cos a, -sin a, 0)
+    # a unit rotation about y moves points by -r cos(a) along z; a unit translation
+    # along x is (cos a, -sin a, 0) in the directions r, a, z
     bent = mode_stiffness(mesh, order, 1, [(0, 0, -ng.x), (1, -1, 0)], lame)
     K = np.diag([bent[0, 0], bent[0, 0], turned, bent[1, 1], bent[1, 1], stretched])
     K[1, 3] = K[3, 1] = bent[0, 1]
@@ -126,7 +127,7 @@ def stiffness(mesh, order, lame=(LAM, MU)):
 
 
 def reference(name, orders):
-    """K of the highest order and how far the one before is from it."""
+    """Return K of the highest order, and its difference from the previous order."""
     corners, lines = LINKS[name]
     wall = min(abs(a - b) for a, _ in corners for b, _ in corners if a != b)
     mesh = half_section(corners, lines, max(wall, 0.004))

@@ -26,12 +26,12 @@ from forcefit.stiffness.fem.material import Material
 from forcefit.stiffness.surface.interface import parse_interface
 from forcefit.stiffness.surface.surface import Surface, check_surface
 
-FEWEST = 10_000  # triangles
+FEWEST = 10_000  # smallest number of triangles of a surface
 WHO = resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN
 
 
 def finer(surface: Surface) -> Surface:
-    """Each triangle divided into four until there are many."""
+    """Return a surface with each triangle divided into four, repeatedly."""
     points, triangles = surface.points, surface.triangles
     while len(triangles) < FEWEST:
         edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
@@ -45,13 +45,13 @@ def finer(surface: Surface) -> Surface:
 
 
 def spent() -> float:
-    """Processor seconds of this process and its children."""
+    """Return the processor time [s] of this process and its children."""
     used = [resource.getrusage(who) for who in WHO]
     return sum(one.ru_utime + one.ru_stime for one in used)
 
 
 def run_part(seed: int, number: int, accuracy: float) -> dict[str, float | str]:
-    """One part's seconds."""
+    """Return triangles, unknowns, error and times [s] of one part."""
     part = draw_part(seed, number)
     surface = finer(surface_of(part))
     faces = [parse_interface(text) for text in (part.base, part.tip)]
@@ -69,7 +69,7 @@ def run_part(seed: int, number: int, accuracy: float) -> dict[str, float | str]:
 
 
 def main() -> None:
-    """Print every part, then quantiles."""
+    """Print a row for each part, and then the quantiles of the times."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
     parser.add_argument("--count", type=int, default=50)

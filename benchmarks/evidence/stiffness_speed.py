@@ -52,7 +52,7 @@ CASES = [
 
 
 def true_error(name, K):
-    """Largest entry of K - K_ref over sqrt(K_ii K_jj)."""
+    """Return the largest entry of K - K_ref over sqrt(K_ii K_jj)."""
     stored = json.loads((HERE / "stiffness_references.json").read_text())
     K, exact = (
         np.asarray(getattr(K, "stiffness", K)),
@@ -63,7 +63,7 @@ def true_error(name, K):
 
 
 def given(name):
-    """A link's surface, interfaces and their centres."""
+    """Return the surface of a link, its interfaces and their centres."""
     from forcefit.stiffness.fem.fea import interface_center
     from forcefit.stiffness.surface.interface import parse_interface
     from forcefit.stiffness.surface.surface import read_surface
@@ -75,7 +75,7 @@ def given(name):
 
 
 def ours(name, accuracy):
-    """From the surface to K, and the last mesh again by itself."""
+    """Measure forcefit from the surface to K, and then the last mesh separately."""
     from forcefit.stiffness.fem.condensation import condense
     from forcefit.stiffness.fem.fea import Budget, FemOptions, solve_link
     from forcefit.stiffness.fem.material import Material
@@ -93,13 +93,13 @@ def ours(name, accuracy):
 
 
 def used():
-    """Processor seconds of this process and the ones it started."""
+    """Return the processor time [s] of this process and its children."""
     uses = [resource.getrusage(w) for w in WHO]
     return sum(u.ru_utime + u.ru_stime for u in uses)
 
 
 def ngsolve(name, order, layers, finer):
-    """From the exact geometry to K."""
+    """Measure NGSolve from the exact geometry to K."""
     sys.path.insert(0, str(HERE))
     import stiffness_references as references
 
@@ -110,7 +110,7 @@ def ngsolve(name, order, layers, finer):
 
 
 def quadratic(name, accuracy):
-    """Quadratic elements whose true error is as asked, their K and unknowns."""
+    """Return a quadratic mesh with the required true error, its K and unknowns."""
     from forcefit.stiffness.fem.adaptive_step import refine_level, solve_level
     from forcefit.stiffness.fem.condensation import condense
     from forcefit.stiffness.fem.elements import isoparametric
@@ -131,7 +131,7 @@ def quadratic(name, accuracy):
 
 
 def ccx(name, accuracy):
-    """One load case on our mesh; only CalculiX itself is counted."""
+    """Measure one load case of CalculiX on a mesh of forcefit, without meshing."""
     with tempfile.TemporaryDirectory() as folder:
         mesh, solved = quadratic(name, float(accuracy))
         points = mesh.nodes[mesh.cells[:, :4]]
@@ -168,7 +168,7 @@ def ccx(name, accuracy):
 
 
 def run_case(words):
-    """One case in this process, as JSON on its last line."""
+    """Run one case in this process; print its result as JSON on the last line."""
     kind, name, *options = words
     K, unknowns, more = {"ours": ours, "ngsolve": ngsolve, "ccx": ccx}[kind](
         name, *options

@@ -23,22 +23,23 @@ from forcefit.stiffness.fem.stress import peak_stress
 from forcefit.stiffness.surface.interface import parse_interface
 from forcefit.stiffness.surface.surface import Surface, check_surface
 
-AROUND, ROWS, APART = 48, 8, 0.005  # facets, in a quarter of a fillet; [m] of rings
+# facets around the axis; rings in a quarter of a fillet; [m] largest distance of rings
+AROUND, ROWS, APART = 48, 8, 0.005
 COMPONENTS = {"tension": 5, "torsion": 2, "bending": 1}
 
 
 class Part(NamedTuple):
-    """A shaft along z, lengths in mm.
+    """A shaft along z, with lengths in mm.
 
     Attributes:
         kind: ``"shoulder"`` or ``"groove"``.
-        large: diameter at the base, of a groove at both ends.
-        small: diameter beyond the shoulder, or at the groove's bottom.
-        radius: of the fillet, or of the groove.
-        bore: diameter; 0 without.
-        place: z of the shoulder, or of the groove's middle.
-        length: from base to tip.
-        load: of 1 N or 1 N m at the tip.
+        large: diameter at the base; for a groove, the diameter at both ends.
+        small: diameter beyond the shoulder, or at the bottom of the groove.
+        radius: radius of the fillet or of the groove.
+        bore: diameter of the bore; 0 if there is none.
+        place: position along z of the shoulder, or of the middle of the groove.
+        length: length from base to tip.
+        load: kind of the load at the tip, whose size is 1 N or 1 N m.
         peak: [Pa] largest von Mises stress at least half the diameter from both ends.
     """
 
@@ -79,7 +80,7 @@ PARTS = (
 
 
 def outline(part: Part) -> NDArray:
-    """(k, 2) [m] radius and z of the rings of a shaft's outer side, and of its bore."""
+    """Return (k, 2) [m] radius and z of the rings of a shaft's surface and bore."""
     R, q, r, place, end = (
         v / 1e3 for v in (part.large / 2, part.small / 2, part.radius, part.place,
                           part.length)
@@ -102,9 +103,9 @@ def outline(part: Part) -> NDArray:
 
 
 def surface_of(part: Part) -> Surface:
-    """A shaft's surface, each ring turned by half a facet against the one before."""
+    """Return the surface of a shaft; successive rings are offset by half a facet."""
     profile = outline(part)
-    if part.bore:  # closed: an even number of rings, so that the last meets the first
+    if part.bore:  # an even number of rings, so that the last one matches the first
         profile = profile[:-1]
         if len(profile) % 2:
             profile = np.insert(profile, 1, (profile[0] + profile[1]) / 2, axis=0)
@@ -131,7 +132,7 @@ def surface_of(part: Part) -> Surface:
 
 
 def main() -> None:
-    """Print a line a part and how many are covered."""
+    """Print a line for each part, and the number of covered parts."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--accuracy", type=float, default=0.02)
     parser.add_argument("--parts", default="0:20")

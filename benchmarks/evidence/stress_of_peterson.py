@@ -41,7 +41,9 @@ FITS = {
 
 
 def shoulder_factor(load: str, wide: float, radius: float) -> float:
-    """Factor of a shoulder fillet by the formulas of Tipton, Sorem & Rolovic (1996).
+    """Return the stress concentration factor of a shoulder fillet.
+
+    Source: the formulas of Tipton, Sorem & Rolovic (1996).
 
     The older charts of shafts in tension are up to 10 % too low.
 
@@ -70,7 +72,7 @@ KINDS = [("shoulder", "tension"), ("shoulder", "bending"), ("shoulder", "torsion
 
 
 def draw(number: int) -> tuple[Part, float]:
-    """A part, lengths in mm, and the thickness of a plate."""
+    """Return a random part with lengths in mm, and the thickness of a plate."""
     rng = np.random.default_rng([SEED, number])
     kind, load = KINDS[number % len(KINDS)]
     if kind == "hole":
@@ -89,7 +91,7 @@ def draw(number: int) -> tuple[Part, float]:
 
 
 def expected(part: Part, thick: float) -> float:
-    """[Pa] the largest principal stress of 1 N or 1 N m."""
+    """Return the largest principal stress [Pa] under a load of 1 N or 1 N m."""
     D, d = part.large / 1e3, part.small / 1e3
     if part.kind == "hole":
         share = d / D
@@ -108,7 +110,7 @@ def expected(part: Part, thick: float) -> float:
 
 
 def plate(part: Part, thick: float) -> Surface:
-    """A plate in the plane of y and z with a hole in its middle."""
+    """Return a plate in the plane of y and z with a hole in its middle."""
     half, end, r = part.large / 2e3, part.length / 1e3, part.small / 2e3
     corner = np.arctan2(half, end / 2)
     quarter = np.r_[np.linspace(0, corner, 7), np.linspace(corner, np.pi / 2, 11)[1:]]
@@ -133,7 +135,7 @@ def plate(part: Part, thick: float) -> Surface:
 
 
 def largest_principal(stresses: NDArray) -> float:
-    """[Pa] of stresses (p, 6) xx yy zz yz xz xy."""
+    """Return the largest principal stress [Pa] of (p, 6) xx yy zz yz xz xy."""
     x, y, z, yz, xz, xy = stresses.T
     rows = [[x, xy, xz], [xy, y, yz], [xz, yz, z]]
     tensors = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
@@ -141,7 +143,7 @@ def largest_principal(stresses: NDArray) -> float:
 
 
 def main() -> None:
-    """Print a line a part and how many are covered."""
+    """Print a line for each part, and the number of covered parts."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--accuracy", type=float, default=0.02)
     parser.add_argument("--parts", default="0:10")

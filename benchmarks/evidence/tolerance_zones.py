@@ -25,7 +25,7 @@ COUNT = 3000
 
 
 def drawn(zone: Zone) -> np.ndarray:
-    """(k, 6) uniform draws."""
+    """Return (k, 6) uniform random screws in a zone."""
 
     def numbers(attempt: int) -> np.ndarray:
         return np.random.default_rng([1, attempt]).random((COUNT, zone.words))

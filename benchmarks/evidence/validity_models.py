@@ -23,7 +23,7 @@ from forcefit.validation.crosscheck.spread_weight import (
 
 
 def with_bars(robot: Robot, slenderness: float, density: float | None = None) -> Robot:
-    """A robot whose beams are solid round bars of one slenderness.
+    """Return the robot with its beams replaced by round bars of one slenderness.
 
     Args:
         robot: any.
@@ -45,7 +45,7 @@ def with_bars(robot: Robot, slenderness: float, density: float | None = None) ->
 
 
 def bush_margin(posture: Posture, compliant: Compliant = "rigid") -> float:
-    """Factor on all clearances at which a rigid manipulator on bushes just assembles.
+    """Return the factor on all clearances at which a robot on bushes just assembles.
 
     Args:
         posture: where the robot stands.
@@ -63,7 +63,7 @@ def bush_margin(posture: Posture, compliant: Compliant = "rigid") -> float:
 
 
 def half_weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
-    """Half of each beam's weight at either end, without the moments.
+    """Return the loads of half of each beam's weight at each end, without moments.
 
     Args:
         posture: where the robot stands, of n frames.
@@ -86,7 +86,7 @@ def half_weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray
 def halves_cost(
     posture: Posture, gravity: ArrayLike, load: ArrayLike | None = None
 ) -> Cost:
-    """What it would cost to put half of each weight at either end, without couples.
+    """Return the error due to half of each weight at each end, without moments.
 
     Args:
         posture: where the robot stands.

@@ -75,7 +75,8 @@ def forcefit(
 ) -> None:
     """Forced assembly of parallel manipulators, with certified results.
 
-    Stiffness, energy, pose error. SI units; screws [R T], wrenches [M F].
+    The commands compute stiffness, energy and pose error in SI units.  Screws are
+    ordered [R T] and wrenches [M F]: rotations and moments first.
     """
 
 

@@ -37,8 +37,8 @@ def check(
 ) -> None:
     """Print all mistakes in files, not only the first.
 
-    No result is computed.  The messages are those of the commands that read the files.
-    The exit status is 2 if a mistake is found.
+    No result is computed.  Each message is the one that a command prints when it reads
+    the file.  The exit status is 2 if a mistake is found.
     """
     results = [_checked(file, robot) for file in files]
     passed = not any(one["messages"] for one in results)

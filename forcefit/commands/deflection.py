@@ -137,7 +137,10 @@ def parse_along(text: str) -> tuple[int, list[float]]:
     if not all(abs(value) <= LARGEST for value in (start, stop, step)):
         raise BadInput(f"--along: found {describe(text)}, expected finite numbers")
     if step == 0.0 or start == stop:
-        raise BadInput(f"--along: found {describe(text)}, expected a change and a step")
+        raise BadInput(
+            f"--along: found {describe(text)}, expected two different loads and a step "
+            "that is not 0"
+        )
     count = math.floor(abs(stop - start) / abs(step) + 1e-9)
     if count >= _MOST:
         raise BadInput(f"--along: found {count + 1} loads, expected at most {_MOST}")

@@ -39,8 +39,8 @@ def diagnose(
     without: Annotated[
         list[str] | None,
         typer.Option(
-            help="Name of an effect to leave out, or function (all functions), "
-            "geometry, springs."
+            help="Name of an effect that is left out; or function (all functions), "
+            "geometry (geometric errors), springs (stiffnesses)."
         ),
     ] = None,
     only: Annotated[

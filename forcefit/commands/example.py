@@ -120,7 +120,8 @@ def example(
     names: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[NAME]...", help="Names of examples; without one all are listed."
+            metavar="[NAME]...",
+            help="Names of examples; without a name, all are listed.",
         ),
     ] = None,
     output: Annotated[

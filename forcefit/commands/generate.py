@@ -47,9 +47,11 @@ def parse_effects(texts: list[str] | None) -> dict[str, float]:
         given = parse_assignments([text], "--effect") if equals else {}
         multiple = given.get(name, DEFAULT_STRENGTH)
         if not multiple > 0:
-            raise BadInput(f'--effect {name}: found "{strength}", expected > 0')
+            raise BadInput(
+                f'--effect {name}: found "{strength}", expected a number > 0'
+            )
         if name in wanted:
-            raise BadInput(f'--effect: "{name[:60]}" is given twice')
+            raise BadInput(f'--effect: found "{name[:60]}" twice, expected it once')
         wanted[name] = multiple
     return wanted
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from forcefit.inputs.errors import BadInput
 
-# replaced command: the words that now select the same function
+# for each replaced command, the words that now select the same function
 COMMANDS: dict[str, tuple[str, ...]] = {
     "assembly exact": ("assembly", "solve", "--state", "exact"),
     "assembly zone": ("assembly", "solve", "--quantities", "margin"),

@@ -175,7 +175,9 @@ def statistics(
     if state is not None:
         _check_word("--state", state, ("contact", "exact"))
     if not 0 < confidence < 1:
-        raise BadInput(f"--confidence: found {confidence}, expected between 0 and 1")
+        raise BadInput(
+            f"--confidence: found {confidence}, expected a number between 0 and 1"
+        )
     if yield_strength is not None and not 0 < yield_strength < float("inf"):
         raise BadInput(f"--yield-strength: found {yield_strength}, expected > 0")
     limits = dict(map(parse_limit, limit or ()))

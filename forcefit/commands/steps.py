@@ -37,7 +37,7 @@ def steps(
     best: Annotated[
         str | None,
         typer.Option(
-            help="Search the order of the joining steps with the least force (the "
+            help="Find the order of the joining steps that minimises: force (the "
             "largest closing force) | energy (at the end) | error (translation of the "
             "platform at the end)."
         ),
@@ -47,9 +47,12 @@ def steps(
         typer.Option(help="Distributions of errors of many machines (TOML)."),
     ] = None,
     draws: Annotated[
-        int | None, typer.Option(help="Number of machines.", min=1, max=10**7)
+        int | None,
+        typer.Option(help="Number of machines with random errors.", min=1, max=10**7),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed.", min=0, max=2**63 - 1)] = 1,
+    seed: Annotated[
+        int, typer.Option(help="Seed of the random errors.", min=0, max=2**63 - 1)
+    ] = 1,
     report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:

@@ -81,7 +81,8 @@ def beam(
     along: Annotated[
         str | None,
         typer.Option(
-            help="Direction from base to tip: x (the default), y, z or 1,0,2."
+            help="Direction from base to tip: x (the default), y, z, or a vector such "
+            "as 1,0,2."
         ),
     ] = None,
     up: Up = None,

@@ -122,7 +122,7 @@ def sweep(
     yield_strength: Annotated[
         float | None,
         typer.Option(
-            help="[Pa] Yield strength of the links, for their stress and safety."
+            help="[Pa] Yield strength of the links, for stress and safety factor."
         ),
     ] = None,
     load: LoadOption = None,

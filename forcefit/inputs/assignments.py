@@ -50,7 +50,7 @@ def parse_assignments(
         if not (name and equals):
             raise BadInput(f'{option}: found "{part[:60]}", expected NAME=NUMBER')
         if name in values:
-            raise BadInput(f'{option}: "{name[:60]}" is given twice')
+            raise BadInput(f'{option}: found "{name[:60]}" twice, expected it once')
         if not math.isfinite(value):
             raise BadInput(
                 f"{option} {name[:60]}: found {value}, expected a finite number"

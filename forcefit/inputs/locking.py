@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-# errors on network disks that do not support locks
+# error numbers that network disks without support for locks return
 _NO_LOCKS = {errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP}
 _POLL = 0.01  # [s] time between two attempts to lock a file
 

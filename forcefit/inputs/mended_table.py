@@ -1,7 +1,7 @@
 """Tables that record which values a reader would accept; see ``mending.py``."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,6 +12,8 @@ from forcefit.inputs.table import Table
 
 # a file, and the keys that lead to a value in it; tables of a list are numbered from 1
 Place = tuple[str, tuple[str | int, ...]]
+# relative change of replaced numbers; large enough to be visible in a rounded message
+_CHANGE = 0.07
 
 
 @dataclass
@@ -123,3 +125,28 @@ def _in_general_position(shape: tuple[int, ...]) -> NDArray:
     if len(shape) == 2 and shape[0] == shape[1]:
         return np.diag(np.linspace(1.0, 2.0, shape[0]))
     return np.linspace(0.11, 0.37, math.prod(shape)).reshape(shape)
+
+
+def changed_numbers(value: Any, k: int) -> Any:
+    """Return a value with each of its numbers changed by a different factor."""
+    if isinstance(value, list):
+        return [changed_numbers(one, k + 3 * i) for i, one in enumerate(value)]
+    return value * (1 + _CHANGE / (1 + k)) if isinstance(value, float) else value
+
+
+def is_numeric(value: Any) -> bool:
+    """Return whether a value is a float or consists of floats, which can be changed."""
+    if isinstance(value, list):
+        return bool(value) and all(map(is_numeric, value))
+    return isinstance(value, float)
+
+
+def texts_of(value: Any) -> Iterator[str]:
+    """Yield all texts in nested tables and lists, except the names of the tables."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict):
+        yield from texts_of([one for key, one in value.items() if key != "name"])
+    elif isinstance(value, list):
+        for one in value:
+            yield from texts_of(one)

@@ -6,9 +6,9 @@ message suggests or a value of the required type.  If neither is known, the row 
 is left out.  All messages therefore come from the reader, and its rules are not
 repeated here.
 
-Some messages, such as that of a closure with a gap, name no place in the file.  Such a
-message is reported only if it is the first one, because later it could be caused by a
-replaced value.
+Some messages, such as that of a closure with a gap, name no value in the file.  A
+replaced value could cause such a message.  It is therefore reported only if it is the
+first one, or if the reader repeats it after all replaced numbers were changed again.
 """
 
 import re
@@ -16,7 +16,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from forcefit.inputs.mended_table import MendedTable, Place, Reading
+from forcefit.inputs.mended_table import (
+    MendedTable,
+    Place,
+    Reading,
+    changed_numbers,
+    is_numeric,
+    texts_of,
+)
 from forcefit.inputs.table import MENDING, BadInput, Table
 
 MOST_MESSAGES = 50  # limit, because a wrong unit may cause a message for each row
@@ -38,12 +45,15 @@ class _Mended:
             key is left out.
         lines: files and numbers of the lines that are replaced by blank lines.
         reading: record of the present run, including the tables that are left out.
+        guessed: whether a value was replaced by a text that no message suggests, or was
+            left out, so that later messages may follow from it.
     """
 
     renamed: dict[Place, str] = field(default_factory=dict)
     values: dict[Place, list[Any]] = field(default_factory=dict)
     lines: set[tuple[str, int]] = field(default_factory=set)
     reading: Reading = field(default_factory=Reading)
+    guessed: bool = False
 
     def text(self, path: str, text: str) -> str:
         """Return the text of a file with its faulty lines replaced by blank lines."""
@@ -86,6 +96,11 @@ class _Mended:
                 return self._mend_key(table, rest)
         return self._mend_line(message)
 
+    def change_numbers(self) -> None:
+        """Change every replacement value that is a number or a list of numbers."""
+        for k, tried in enumerate(self.values.values()):
+            tried[-1] = changed_numbers(tried[-1], k)
+
     def _mend_line(self, message: str) -> tuple[bool, bool]:
         """Replace the table row that a message names by a blank line."""
         file, _, rest = message.partition(": ")
@@ -95,6 +110,7 @@ class _Mended:
         place = file, int(line[1])
         again = place in self.lines
         self.lines.add(place)
+        self.guessed = True
         return not again, again
 
     def _mend_key(self, table: MendedTable, rest: str) -> tuple[bool, bool]:
@@ -128,6 +144,7 @@ class _Mended:
         if again and not self.renamed[place]:
             return False, again
         self.renamed[place] = "" if again else name
+        self.guessed = self.guessed or not self.renamed[place]
         return True, again
 
     def _replace(self, place: Place, value: Any) -> tuple[bool, bool]:
@@ -138,6 +155,8 @@ class _Mended:
         for one in [*(v for v in known if v is not None), None]:
             if one not in tried and len(tried) < 3:
                 tried.append(one)
+                if one is None or (one != value and not is_numeric(one)):
+                    self.guessed = True
                 return True, again
         return self._leave_out(place)[0], again
 
@@ -146,7 +165,9 @@ class _Mended:
         file, path = place
         while path and not isinstance(path[-1], int):
             path = path[:-1]
-        if not path or path[-2] in _NAMED or (file, path) in self.reading.left_out:
+        unused = bool(path) and self._is_unused(file, path)
+        named = bool(path) and path[-2] in _NAMED and not unused
+        if not path or named or (file, path) in self.reading.left_out:
             return False, False
         of_list = {
             (t.file, t.path) for t in self.reading.tables
@@ -155,7 +176,18 @@ class _Mended:
         if of_list <= self.reading.left_out | {(file, path)}:
             return False, False  # the reader would refuse a file without any such table
         self.reading.left_out.add((file, path))
+        self.guessed = self.guessed or not unused or path[-2] == "joint"
         return True, False
+
+    def _is_unused(self, file: str, path: tuple[str | int, ...]) -> bool:
+        """Return whether the name of a body or joint is nowhere else in the file."""
+        tables = {t.path: t.content for t in self.reading.tables if t.file == file}
+        if path[-2] not in {"body", "joint"} or path not in tables:
+            return False
+        name = str(tables[path].get("name"))
+        return not any(
+            text == name or text.endswith(f".{name}") for text in texts_of(tables[()])
+        )
 
 
 def all_messages(read: Callable[[], object]) -> list[str]:
@@ -182,13 +214,33 @@ def all_messages(read: Callable[[], object]) -> list[str]:
             else:
                 break
             placed, again = mended.mend(message)
-            if not messages or (placed and not again):
+            if not messages or (
+                not again if placed else _is_repeated(read, mended, message)
+            ):
                 messages.append(message)
             if not placed:
                 break
     finally:
         MENDING.reset(token)
     return messages
+
+
+def _is_repeated(
+    read: Callable[[], object], mended: _Mended, message: str
+) -> bool:  # fmt: skip
+    """Return whether a message does not depend on the numbers that were replaced."""
+    if mended.guessed:
+        return False
+    before = {place: list(tried) for place, tried in mended.values.items()}
+    mended.change_numbers()
+    try:
+        read()
+    except BadInput as error:
+        return str(error) == message
+    else:
+        return False
+    finally:
+        mended.values = before
 
 
 def _owner(content: dict[str, Any], path: tuple[str | int, ...]) -> Any:

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 from forcefit.inputs.errors import BadInput
 
-# extra of pyproject.toml that installs each optional package
+# for each optional package, the extra of pyproject.toml that installs it
 _EXTRAS = {
     "dask": "sweeps",
     "distributed": "sweeps",

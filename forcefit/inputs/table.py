@@ -43,7 +43,7 @@ __all__ = [
 
 # [byte] largest accepted file; the file of a robot with a million frames is smaller
 _LARGEST_FILE = 64 << 20
-# a key with at least 100 dots, such as a.a.a. ...
+# pattern of a key that consists of more than 100 names, such as a.a.a. ...
 _DEEP_KEY = re.compile(r"(?<![\w-])(?:[\w-]+\s*\.\s*){100}")
 
 

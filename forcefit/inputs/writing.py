@@ -153,7 +153,7 @@ def whole_file(path: Path | str) -> Generator[Path, None, None]:
         with locked_file(part):
             try:
                 yield part
-                with part.open("r+b") as file:  # for fsync on Windows
+                with part.open("r+b") as file:  # Windows allows fsync only if writable
                     os.fsync(file.fileno())
                 if real.exists():
                     shutil.copymode(real, part)

@@ -148,9 +148,10 @@ def results_in(text: str, where: str) -> dict[str, Any]:
         text = rest.partition("</script>")[0]
     try:
         results = json.loads(text, parse_int=_whole)
-    except (ValueError, RecursionError):  # too deep brackets
+    except (ValueError, RecursionError):  # brackets may be nested too deeply
         expected = "a report of forcefit or the JSON file of a command"
-        raise BadInput(f"{where}: found other text, expected {expected}") from None
+        found = "text that is neither HTML nor JSON"
+        raise BadInput(f"{where}: found {found}, expected {expected}") from None
     if not isinstance(results, dict):
         raise BadInput(f"{where}: found a JSON list or value, expected results")
     return results

@@ -46,7 +46,7 @@ def show(self: Any, **options: Any) -> Any:
     Returns:
         The picture of ``forcefit.show``.
     """
-    import forcefit  # whose public names are imported at their first use
+    import forcefit  # its public names are imported at their first use
 
     return forcefit.show(self, **options)
 

@@ -81,9 +81,11 @@ QUANTITIES: Mapping[str, Quantity] = {
     # robot, posture, load
     "robot": text("robot"),
     "status": text("status", meaning="ok, or the kind of failure"),
-    "reason": text("reason", meaning="explanation where the status is not ok"),
+    "reason": text("reason", meaning="explanation of a status other than ok"),
     "remarks": text("note", "remark"),
-    "pose": Quantity("pose", "m, rad", meaning="nominal, of the platform, base axes"),
+    "pose": Quantity(
+        "pose", "m, rad", meaning="nominal pose of the platform in base axes"
+    ),
     "rx": Quantity("rotation vector x", "rad"),
     "ry": Quantity("rotation vector y", "rad"),
     "rz": Quantity("rotation vector z", "rad"),
@@ -91,19 +93,22 @@ QUANTITIES: Mapping[str, Quantity] = {
     "ty": Quantity("position y", "m"),
     "tz": Quantity("position z", "m"),
     "joint_coordinate": Quantity(
-        "joint coordinate", "rad or m", ("joint",), "nominal, of every joint, also "
-        "where the status is not ok", "q",
+        "joint coordinate", "rad or m", ("joint",), "nominal coordinate of every "
+        "joint, also where the status is not ok", "q",
     ),
     "nominal_mismatch": Quantity(
-        "nominal closure error", meaning="largest closure error of the nominal robot, "
-        "rad or m, due to rounded numbers of its file",
+        "nominal closure error", meaning="largest closure error [rad or m] of the "
+        "nominal robot, due to rounded numbers in its file",
     ),
-    "state": text("state", meaning="nominal, contact or exact"),
+    "state": text("state", meaning="state of the robot: nominal, contact or exact"),
     "load": Quantity(
-        "load", "N m, N", _WRENCH, "on the platform at its origin, base axes", "w"
+        "load", "N m, N", _WRENCH,
+        "wrench on the platform, at the platform's origin in base axes", "w"
     ),
-    "gravity": Quantity("gravity", "m/s^2", ("axis",), "base axes", "g"),
-    "freedoms": count("degrees of freedom", meaning="drives free"),
+    "gravity": Quantity("gravity", "m/s^2", ("axis",), "gravity in base axes", "g"),
+    "freedoms": count(
+        "degrees of freedom", meaning="degrees of freedom with free drives"
+    ),
     "platform_freedoms": count("degrees of freedom of the platform"),
     "freedoms_drives_locked": count("degrees of freedom with locked drives"),
     "platform_freedoms_drives_locked": count(
@@ -114,60 +119,70 @@ QUANTITIES: Mapping[str, Quantity] = {
     "locked_freedoms": count("degrees of freedom with locked drives"),
     "overconstraint": count("redundant closure equations"),
     "smallest_singular_value": Quantity(
-        "smallest singular value of the constraints", meaning="smallest nonzero one of "
-        "the constraint matrix, lengths over the robot's size",
+        "smallest singular value of the constraints", meaning="smallest nonzero "
+        "singular value of the constraint matrix, with lengths divided by the robot's "
+        "size",
     ),
     "local_freedoms": count(
-        "degrees of freedom of legs alone", meaning="with the platform at rest"
+        "degrees of freedom of legs alone",
+        meaning="degrees of freedom of the legs with the platform at rest"
     ),
     "actuation_redundancy": count(
-        "redundant drives", meaning="drives minus the degrees of freedom they lock"
+        "redundant drives",
+        meaning="number of drives minus the degrees of freedom that they lock"
     ),
     "singular_value_gap": Quantity(
-        "gap of the singular values", meaning="least one that counts over the largest "
-        "that does not, or over rounding; null where none counts",
+        "gap of the singular values", meaning="smallest singular value that counts as "
+        "nonzero, divided by the largest that counts as zero, or by the rounding "
+        "error; null if all count as zero",
     ),
     "counts_certain": flag("gap of the singular values of at least 100"),
     "singular": flag("more degrees of freedom than at nearby poses"),
     "finite_freedoms": count(
-        "degrees of freedom at nearby poses", meaning="0 where the motions at the pose "
-        "are infinitesimal only",
+        "degrees of freedom at nearby poses", meaning="degrees of freedom at nearby "
+        "poses; 0 if the motions at the pose are only infinitesimal",
     ),
     "words": text("mobility in words"),
     "point": Quantity(
-        "point", "m", ("axis",), "at which screws and wrenches are read; base axes for "
-        "a stiffness, platform axes for a pose error",
+        "point", "m", ("axis",), "point at which screws and wrenches are read; in base "
+        "axes for a stiffness, in platform axes for a pose error",
     ),
-    "direction": Quantity("direction", dims=_SCREW, meaning="unit screw, base axes"),
+    "direction": Quantity(
+        "direction", dims=_SCREW, meaning="unit screw in base axes"
+    ),
     "near_singularity": text(
         "nearby singularity", meaning="nearby singularities, with the joints that move",
     ),
     "singular_distance": Quantity(
         "distance from singularity", dims=("kind",),
-        meaning="0 at a singularity of the kind, at most 1",
+        meaning="distance from a singularity of each kind: 0 at the singularity, at "
+        "most 1",
     ),
     "condition": Quantity(
-        "condition number", meaning="of the map from drives to platform"
+        "condition number",
+        meaning="condition number of the map from drive rates to platform velocity"
     ),
     # forced assembly, problems (21), (22) and (27)
     "assemblable": flag("assembles, compliant joints rigid"),
     "assemblable_free": flag("assembles, compliant joints free"),
     "margin": Quantity(
         "zone margin, compliant joints rigid", meaning="factor on all clearances at "
-        "which it just assembles without force, compliant joints rigid",
+        "which the robot just assembles without force, with rigid compliant joints",
         symbol="lambda",
     ),
     "margin_free": Quantity(
         "zone margin, compliant joints free", meaning="factor on all clearances at "
-        "which it just assembles without force, compliant joints free about their "
-        "own axis",
+        "which the robot just assembles without force, with compliant joints free "
+        "about their own axis",
         symbol="lambda",
     ),
     "margin_bound": Quantity(
-        "bound of the margin, rigid", meaning="certified: the margin is at least this"
+        "bound of the margin, rigid",
+        meaning="certified lower bound of the zone margin, compliant joints rigid"
     ),
     "margin_free_bound": Quantity(
-        "bound of the margin, free", meaning="certified: the margin is at least this"
+        "bound of the margin, free",
+        meaning="certified lower bound of the zone margin, compliant joints free"
     ),
     "energy": Quantity(
         "assembly energy", "J", meaning="least elastic energy of the closed robot, "
@@ -179,7 +194,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "energy_without_clearance": Quantity(
         "energy without clearances", "J",
-        meaning="least elastic energy of the closed robot if no joint had clearance",
+        meaning="least elastic energy of the closed robot with all clearances at zero",
     ),
     "platform_screw": Quantity(
         "platform error", "rad, m", _SCREW,
@@ -194,36 +209,44 @@ QUANTITIES: Mapping[str, Quantity] = {
         "motions of passive joints", "delta c", shown="mrad, mm"
     ),
     "link": Quantity(
-        "deformation of the link", "rad, m", _SCREW, "at the frame in its axes", "e",
+        "deformation of the link", "rad, m", _SCREW,
+        "deformation of the link, at the frame's origin in its axes", "e",
         shown="mrad, mm"
     ),
     "joint": Quantity(
-        "deformation of the joint", "rad, m", _SCREW, "at the frame in its axes",
+        "deformation of the joint", "rad, m", _SCREW,
+        "deformation of the joint, at the frame's origin in its axes",
         shown="mrad, mm"
     ),
     "geometric_error": Quantity(
-        "geometric error", "rad, m", _SCREW, "at the frame in its axes", "delta l",
+        "geometric error", "rad, m", _SCREW,
+        "geometric error, at the frame's origin in its axes", "delta l",
         shown="mrad, mm"
     ),
     "wrench": Quantity(
         "wrench", "N m, N", _WRENCH,
-        "exerted by the outer part on the inner, at the frame in its axes", "w",
+        "wrench that the part farther from the base exerts on the nearer part, at the "
+        "frame's origin in its axes", "w",
     ),
     "joint_wrench": Quantity(
         "wrench through the joint", "N m, N", _WRENCH,
-        "exerted by the outer part on the inner, at the frame in its axes",
+        "wrench that the part farther from the base exerts on the nearer part, at the "
+        "frame's origin in its axes",
     ),
     "start_wrench": Quantity(
         "wrench at the start of the link", "N m, N", _WRENCH,
-        "of a link under its own weight, at the frame in its axes",
+        "wrench at the start of a link under its own weight, at the frame's origin in "
+        "its axes",
     ),
     "closure_wrench": Quantity(
         "wrench of the closure", "N m, N", _WRENCH,
-        "exerted by the second chain on the first, at the platform's origin, base axes",
+        "wrench that the second chain exerts on the first, at the platform's origin in "
+        "base axes",
     ),
     "frames": text("frames", "frame"),
     "closure_residual": Quantity(
-        "closure residual", meaning="largest closure error, rad or reference lengths",
+        "closure residual",
+        meaning="largest closure error, in rad or in reference lengths",
         digits=2
     ),
     "reference_length": Quantity("reference length", "m"),
@@ -232,8 +255,8 @@ QUANTITIES: Mapping[str, Quantity] = {
         digits=2
     ),
     "duality_gap": Quantity(
-        "duality gap", "J", meaning="certified: the energy exceeds the minimum by at "
-        "most this",
+        "duality gap", "J", meaning="certified bound of the difference between the "
+        "energy and its minimum",
         digits=2
     ),
     "relative_gap": Quantity("relative duality gap", digits=2),
@@ -255,15 +278,19 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "screw_rotation_error": Quantity(
         "certified rotation error", "rad",
-        meaning="of the platform, without the undetermined rotation", shown="mrad",
+        meaning="certified error of the platform's rotation, without the undetermined "
+        "rotation", shown="mrad",
         digits=2
     ),
     "screw_translation_error": Quantity(
         "certified translation error", "m",
-        meaning="of the platform, without the undetermined translation", shown="um",
+        meaning="certified error of the platform's translation, without the "
+        "undetermined translation", shown="um",
         digits=2
     ),
-    "stationarity": Quantity("equilibrium residual", meaning="relative", digits=2),
+    "stationarity": Quantity(
+        "equilibrium residual", meaning="relative residual of the equilibrium", digits=2
+    ),
     "iterations": count("iterations"),
     "method": text("method", meaning="numerical method that found the result"),
     "free": count("free motions eliminated"),
@@ -291,11 +318,12 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "rotation_screw": Quantity(
         "platform error of largest rotation", "rad, m", _SCREW,
-        "attains the lower bound of the rotation", shown="mrad, mm"
+        "platform error that attains the lower bound of the rotation", shown="mrad, mm"
     ),
     "translation_screw": Quantity(
         "platform error of largest translation", "rad, m", _SCREW,
-        "attains the lower bound of the translation", shown="mrad, mm"
+        "platform error that attains the lower bound of the translation",
+        shown="mrad, mm"
     ),
     "cuts": count("cutting planes"),
     "linearisation_rotation": Quantity(
@@ -317,8 +345,9 @@ QUANTITIES: Mapping[str, Quantity] = {
         shown="MPa"
     ),
     "stress_error": Quantity(
-        "estimated relative error of the stress", meaning="due to the mesh; 0 for beam "
-        "formulas, infinite for links with an inner edge without a fillet",
+        "estimated relative error of the stress", meaning="estimated relative error of "
+        "the stress due to the mesh; 0 for beam formulas, infinite for links with a "
+        "re-entrant edge without a fillet",
     ),
     "safety": Quantity("safety", meaning="yield strength over the largest stress"),
     "rotation": Quantity(
@@ -333,11 +362,11 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "rotation_lower": Quantity(
         "bound of the rotation", "rad",
-        meaning="certified: the largest rotation error is at least this", shown="mrad"
+        meaning="certified lower bound of the largest rotation error", shown="mrad"
     ),
     "translation_lower": Quantity(
         "bound of the translation", "m",
-        meaning="certified: the largest translation error is at least this", shown="um"
+        meaning="certified lower bound of the largest translation error", shown="um"
     ),
     "position": Quantity("position error", "m", shown="um"),
     "normalised": Quantity("normalised error", meaning="error over the stated noise"),
@@ -348,15 +377,17 @@ QUANTITIES: Mapping[str, Quantity] = {
     # stiffness of links and of the platform
     "compliance": Quantity(
         "compliance", "rad/(N m) .. m/N", _MATRIX,
-        "of the platform, base axes", "C",
+        "compliance of the platform in base axes", "C",
     ),
     "stiffness": Quantity(
         "stiffness", "N m/rad .. N/m", ("wrench_component", "screw"),
-        "null where a free motion makes it zero or a constraint infinite", "K_C",
+        "stiffness; null where a free motion makes an entry zero or a constraint makes "
+        "it infinite", "K_C",
     ),
     "axis_stiffness": Quantity(
         "stiffness along an axis", "N m/rad, N/m", _WRENCH,
-        "of the platform along each axis, the others free; 0 where free",
+        "stiffness of the platform along each axis while it is free along the others; "
+        "0 along a free motion",
     ),
     "free_motions": Quantity(
         "free motions", "rad, m", ("motion", "screw"), "unit screws without resistance"
@@ -368,7 +399,8 @@ QUANTITIES: Mapping[str, Quantity] = {
     "characteristic_length": Quantity("characteristic length", "m"),
     "eigen_stiffness": Quantity(
         "eigenstiffness", "N/m", ("eigen",),
-        "in ascending order; angles multiplied by the characteristic length",
+        "eigenstiffnesses in ascending order, with angles multiplied by the "
+        "characteristic length",
     ),
     "stiffness_condition": Quantity(
         "condition of the stiffness", meaning="largest over smallest eigenstiffness"
@@ -378,24 +410,26 @@ QUANTITIES: Mapping[str, Quantity] = {
     "centre": Quantity("centre of stiffness", "m", ("axis",)),
     "share": Quantity(
         "share of a part", dims=("part", "wrench_component"),
-        meaning="of every link and joint in the compliance along each axis",
+        meaning="share of every link and joint in the compliance along each axis",
     ),
     "frequency": Quantity(
         "natural frequency", "Hz", ("mode",),
-        "lowest first, drives held, without load and gravity",
+        "natural frequencies, lowest first, with the drives held and without load and "
+        "gravity",
     ),
     "idle_motions": count("free motions that leave the platform at rest"),
     "von_mises": Quantity("largest von Mises stress", "Pa", shown="MPa"),
-    "tip": Quantity("tip", "m", ("axis",), "where the stiffness is read"),
+    "tip": Quantity("tip", "m", ("axis",), "point at which the stiffness is read"),
     "base": Quantity("base", "m", ("axis",)),
     "length": Quantity("length", "m"),
     "slenderness": Quantity("slenderness L / r"),
     "relative_error_estimate": Quantity(
-        "estimated relative error", meaning="largest entry, scaled by sqrt(K_ii K_jj)"
+        "estimated relative error",
+        meaning="largest estimated error of an entry, scaled by sqrt(K_ii K_jj)"
     ),
     "relative_errors": Quantity(
         "estimated relative errors", dims=("row", "column"),
-        meaning="scaled by sqrt(K_ii K_jj)",
+        meaning="estimated errors of the entries, scaled by sqrt(K_ii K_jj)",
     ),
     "stiffness_error": Quantity(
         "estimated error of the stiffness", "N m/rad .. N/m", ("row", "column")
@@ -407,7 +441,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     "mass": Quantity("mass", "kg"),
     "center_of_mass": Quantity("centre of mass", "m", ("axis",)),
     "inertia": Quantity(
-        "inertia", "kg m^2", ("row", "column"), "at the centre of mass"
+        "inertia", "kg m^2", ("row", "column"), "inertia about the centre of mass"
     ),
     "volume": Quantity("volume", "m^3"),
     "area": Quantity("area", "m^2"),
@@ -430,10 +464,11 @@ QUANTITIES: Mapping[str, Quantity] = {
     "contact_length": Quantity("contact length", "m"),
     "free_motion": Quantity(
         "free motion", "rad, m", _SCREW,
-        "unit screw of the platform without resistance; NaN without one",
+        "unit screw of a platform motion without resistance; NaN if there is none",
     ),
     "clearance_mixed": Quantity(
-        "clearance mixed", meaning="1 where the random walk of the clearances mixed"
+        "clearance mixed",
+        meaning="1 where the random walk within the clearances has mixed, else 0"
     ),
     "yield": Quantity("yield"),
     "price": Quantity("price of the tolerances"),
@@ -447,8 +482,8 @@ QUANTITIES: Mapping[str, Quantity] = {
         meaning="share of the variance that involves a group",
     ),
     "failed_share": Quantity(
-        "share left out", meaning="share of base draws left out because a compared "
-        "draw has no answer",
+        "share left out", meaning="share of the base draws that are left out because a "
+        "compared draw has no result",
     ),
     "part": Quantity(
         "deviation of the platform", "rad, m", ("component",),
@@ -472,11 +507,12 @@ QUANTITIES: Mapping[str, Quantity] = {
         "second derivative of every joint coordinate",
     ),
     "platform_velocity": Quantity(
-        "platform velocity", "rad/s, m/s", _SCREW, "of the platform's origin, base axes"
+        "platform velocity", "rad/s, m/s", _SCREW,
+        "velocity of the platform at its origin, in base axes"
     ),
     "platform_acceleration": Quantity(
         "platform acceleration", "rad/s^2, m/s^2", _SCREW,
-        "of the platform's origin, base axes",
+        "acceleration of the platform at its origin, in base axes",
     ),
     "inertial_screw": Quantity(
         "deflection by acceleration", "rad, m", _SCREW, "change of the pose error at "
@@ -484,11 +520,12 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "drive_force": Quantity(
         "drive force", "N m or N", ("drive",),
-        "of each drive on the part that it carries",
+        "force or moment of each drive on the part that it carries",
     ),
     "first_frequency": Quantity(
         "first natural frequency", "Hz",
-        meaning="least along the path, drives held, without load and gravity",
+        meaning="lowest natural frequency along the path, with the drives held and "
+        "without load and gravity",
     ),
     "periods": Quantity(
         "path time in periods", meaning="path time times the first natural frequency"
@@ -508,7 +545,9 @@ QUANTITIES: Mapping[str, Quantity] = {
     "names": text("names", "name"),
     "where": text("frames", "frame"),
     "registration": text("registration"),
-    "reference_point": Quantity("reference point", "m", ("axis",), "platform axes"),
+    "reference_point": Quantity(
+        "reference point", "m", ("axis",), "reference point in platform axes"
+    ),
     "not_measured": text("components not measured", "component"),
     "beyond_learned_range": text("rows outside the learned range", "row"),
     "rms": Quantity("root mean square"),

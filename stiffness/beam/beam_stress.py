@@ -144,7 +144,7 @@ def _on_sections(
     share = s / length if length else np.zeros_like(s)
     # mean force between tip and section: half of the weight of this length is added
     middle = wrench[:, None, 3:] + share[..., None] * weight[:, None] / 2
-    on[..., 1] -= s * middle[..., 2]  # lever arm times force
+    on[..., 1] -= s * middle[..., 2]  # moment: distance from the tip times mean force
     on[..., 2] += s * middle[..., 1]
     on[..., 3:] += share[..., None] * weight[:, None]
     return on

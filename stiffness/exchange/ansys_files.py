@@ -64,7 +64,9 @@ def harwell_boeing(path: Path, text: str) -> csr_array:
             "assembled matrix in ASCII"
         )
     if not 0 < rows == columns <= LARGEST:
-        raise BadInput(f"{path}: found {rows} by {columns} numbers, expected a square")
+        raise BadInput(
+            f"{path}: found {rows} by {columns} numbers, expected a square matrix"
+        )
     begin = 5 if len(counts) > 4 and counts[4] > 0 else 4
     parts = []
     for count, width in zip(counts[1:4], widths, strict=False):
@@ -140,7 +142,8 @@ def read_mapping(path: Path) -> list[int] | list[tuple[int, int]]:
             continue  # the line is a heading
         if len(words) != 3:
             raise BadInput(
-                f"{path}: found {describe(line.strip())}, expected row, node and label"
+                f"{path}: found {describe(line.strip())}, expected the number of a "
+                "row, the number of a node and a label such as UX"
             )
         label = words[2].upper()
         if label not in LABELS:

@@ -128,7 +128,7 @@ def interface_rows(
         if min(rows) < 0:
             has = sorted(d for n, d in matrix.freedoms if n == node)
             raise BadInput(
-                f"{option}: node {node} of {matrix.file} has the freedoms "
+                f"{option}: node {node} of {matrix.file} has the degrees of freedom "
                 f"{has or 'none'}, expected 1 to 6, or an interface such as z=0 "
                 "with --nodes"
             )
@@ -154,7 +154,10 @@ def interface_rows(
     for node, place in zip(np.array(known)[near].tolist(), places[near], strict=True):
         for direction in (1, 2, 3):
             if (node, direction) not in row:
-                raise BadInput(f"{option}: node {node} has no freedom {direction}")
+                raise BadInput(
+                    f"{option}: node {node} has no degree of freedom {direction}, "
+                    "expected the translations 1 to 3"
+                )
             unit = np.eye(3)[direction - 1]
             rows.append(row[node, direction])
             # u = t + w x arm
@@ -208,7 +211,7 @@ def condensed(
         if loose.any():
             node, direction = np.array(matrix.freedoms)[free][int(np.argmax(loose))]
             raise BadInput(
-                f"{matrix.file}: freedom {direction} of node {node} has no "
+                f"{matrix.file}: degree of freedom {direction} of node {node} has no "
                 "stiffness; expected a body in one piece, whose nodes are all "
                 "connected"
             )

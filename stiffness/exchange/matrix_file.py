@@ -146,7 +146,9 @@ def _checked(
     """Return the matrix after checking that it is square, finite and symmetric."""
     n = matrix.shape[0]
     if matrix.shape != (n, n) or not n:
-        raise BadInput(f"{path}: found {matrix.shape} numbers, expected a square")
+        raise BadInput(
+            f"{path}: found an array of shape {matrix.shape}, expected a square matrix"
+        )
     # products of these numbers must not overflow
     if not (np.abs(matrix.data) < 1e100).all():
         raise BadInput(f"{path}: found a number that is not finite, or above 1e100")
@@ -190,7 +192,10 @@ def _numpy(path: Path) -> csr_array:
             return csr_array(load_npz(path).astype(float))
         dense = np.load(path, allow_pickle=False)
         if dense.ndim != 2 or dense.dtype.kind not in "fiu":
-            raise BadInput(f"{path}: found {dense.shape}, expected a square of numbers")
+            raise BadInput(
+                f"{path}: found an array of shape {dense.shape}, expected a square "
+                "matrix of numbers"
+            )
         return csr_array(dense.astype(float))
     except OSError as error:
         reason = error.strerror or one_line(str(error), 100)
@@ -228,7 +233,10 @@ def _user_element(path: Path, text: str, which: str) -> tuple[csr_array, list[Fr
             words = re.split(r"[,\s]+", upper.strip(" ,"))
             values[part] += [real(path, word) for word in words]
     if not nodes or not lines or not lines[0]:
-        raise BadInput(f"{path}: found no ** ELEMENT NODES and their freedoms")
+        raise BadInput(
+            f"{path}: found no ** ELEMENT NODES with their degrees of freedom, "
+            "expected these lines in *USER ELEMENT"
+        )
     changes = {1: lines[0], **{row[0]: row[1:] for row in lines[1:]}}
     freedoms: list[Freedom] = []
     now: list[int] = []

@@ -93,6 +93,6 @@ def _size(path: Path, sizes: NDArray) -> int:
     rows, columns = (*sizes.tolist(), 0.0, 0.0)[:2]
     if not rows == columns == round(min(rows, 2.0 * LARGEST)) > 0 or rows > LARGEST:
         raise BadInput(
-            f"{path}: found {rows:g} by {columns:g} numbers, expected a square"
+            f"{path}: found {rows:g} by {columns:g} numbers, expected a square matrix"
         )
     return int(rows)

@@ -61,7 +61,9 @@ def fit_to_patches(
         )
     for number, name in enumerate(("base", "tip")):
         if not (solid.patch == number).any():
-            raise MeshFailed(f"{surface.name}: no face of the mesh on the {name}")
+            raise MeshFailed(
+                f"{surface.name}: found no face of the mesh on the {name} interface"
+            )
     return solid
 
 
@@ -78,7 +80,7 @@ def _positive_cells(points: NDArray, cells: NDArray) -> tuple[NDArray, NDArray]:
 def _nearest_patch(
     points: NDArray, faces: NDArray, surface: Surface, patches: Patches
 ) -> NDArray:
-    """Return the patch of each boundary face: the nearest patch of similar normal."""
+    """Return the patch of each boundary face: the nearest with a similar normal."""
     import pyvista
 
     mesh = pyvista.PolyData.from_regular_faces(surface.points, surface.triangles)

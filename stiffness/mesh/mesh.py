@@ -88,7 +88,7 @@ def mesh_solid(
 
 
 def _from_cache(path: Path) -> tuple[NDArray, NDArray] | None:
-    """Return the points and cells of a stored mesh, or None if absent or damaged."""
+    """Return points and cells of a stored mesh; None for a missing or damaged file."""
     try:
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as stored:
             points, cells = stored["points"], stored["cells"]

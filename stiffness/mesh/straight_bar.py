@@ -103,7 +103,7 @@ def _round(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
 
 
 def _angular(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
-    """Return the points and triangles of a rectangle, a box or an I."""
+    """Return the points and triangles of a rectangle, a box or an I-section."""
     width, height = section["width"], section["height"]
     x_cuts, y_cuts = [width / 2], [height / 2]
     if "wall" in section:

@@ -81,7 +81,7 @@ def _entry(file: Path) -> Entry:
             )
         if about["screw"] != list(SCREW) or about["wrench"] != list(WRENCH):
             raise BadInput(
-                f"{file}: found another order of the components, expected "
+                f"{file}: found the components in another order, expected "
                 f"{' '.join(SCREW)}"
             )
         arrays = [
@@ -99,9 +99,11 @@ def _entry(file: Path) -> Entry:
         raise BadInput(f"{file}: damaged entry ({type(error).__name__})") from None
     K, error_matrix, tip = arrays
     if K.shape != (6, 6) or error_matrix.shape != (6, 6) or tip.shape != (3,):
-        raise BadInput(f"{file}: found a matrix of another shape, expected 6 by 6")
+        raise BadInput(f"{file}: found a matrix that is not 6 by 6, expected 6 by 6")
     if not all(np.isfinite(array).all() for array in arrays):
-        raise BadInput(f"{file}: a number is not finite")
+        raise BadInput(
+            f"{file}: found a number that is not finite, expected finite numbers"
+        )
     check_definite(f"{file}: stiffness", K)
     return Entry(file.stem, K, error_matrix, tip, parameters, about)
 

@@ -105,7 +105,7 @@ def read_spec(path: Path | str) -> Spec:
         if not given or not all(_is_number(v) for v in given):
             raise grid_table.bad(name, "expected a finite number, or a list of them")
         if len(set(given)) != len(given):
-            raise grid_table.bad(name, "a value is given twice")
+            raise grid_table.bad(name, "found a value twice, expected different values")
         grid[name] = tuple(sorted(float(v) for v in given))
     shape = table.text("shape")
     spec = Spec(
@@ -204,7 +204,7 @@ def _make_folder(folder: Path, write: bool = True) -> None:
         made = [one for one in (folder, *folder.parents) if not one.exists()]
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise BadInput(f"{folder}: cannot be made: {error.strerror}") from None
+        raise BadInput(f"{folder}: cannot be created: {error.strerror}") from None
     if not write:
         for one in made:
             one.rmdir()

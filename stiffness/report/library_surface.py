@@ -225,7 +225,7 @@ def family_of(common: SurfaceLink, file: Path) -> list[SurfaceLink]:
         links.append(replace(common, name=f"{common.name}-{own}", surface=surface,
                              family=common.name, sizes=sizes, **ends))  # fmt: skip
     if not links:
-        raise BadInput(f"{file}: no rows, expected one for each part")
+        raise BadInput(f"{file}: found no rows, expected a row for each part")
     return links
 
 

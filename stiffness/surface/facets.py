@@ -53,7 +53,7 @@ class Facets:
         return total / np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None]
 
     def edge_lifts(self, edges: NDArray) -> NDArray:
-        """Return (e,) [m] lifts at the midpoints of edges (e, 2), from end planes."""
+        """Return (e,) [m] lifts at the midpoints of edges, from their ends' planes."""
         rises = _rises(self.points[edges], self.normals[edges], limited=False)
         return np.asarray(np.linalg.norm(rises, axis=1) / 4)
 

@@ -50,7 +50,10 @@ def find_patches(surface: Surface, base: Interface, tip: Interface) -> Patches:
     for number, (name, interface) in enumerate((("base", base), ("tip", tip))):
         members = triangles_on(surface, interface, name)
         if (patch[members] >= 0).any():
-            raise BadInput(f"{surface.name}: base and tip are the same faces")
+            raise BadInput(
+                f"{surface.name}: found the same faces for base and tip, expected two "
+                "different interfaces"
+            )
         patch[members] = number
         shapes.append(interface_shape(interface))
     graph = TriangleGraph(surface)

@@ -20,7 +20,7 @@ S = TypeVar("S", bound="Shape")
 _CALLS = (25, 100)
 # largest residual of a fit that may still succeed, relative to the size of the points
 _MAY_FIT = 0.02
-_FITS = 1e-9  # largest residual of a shape that fits, relative to size
+_FITS = 1e-9  # largest residual of a shape that fits, relative to the points' size
 _TINY = 1e-300  # prevents division by zero on the axis of a shape
 
 

@@ -166,7 +166,7 @@ def _even(angles: NDArray) -> bool:
 def _pieces(
     graph: TriangleGraph, lifts: _Lifts, part: NDArray, strips: bool, most: int
 ) -> list[tuple[NDArray, Shape]]:
-    """Return a part's pieces that are shapes; ``strips``: only planes and cones."""
+    """Return pieces of recognised shape; with ``strips`` only planes and cones."""
     inside = np.zeros(len(graph.triangles), dtype=bool)
     inside[part] = True
     waiting, flat = inside.copy(), graph.flat_faces(part)

@@ -164,8 +164,8 @@ def chosen_solids(model: Any, path: Path, solid: str) -> dict[str, int]:
     if not solid and len(solids) > 1:
         names = ", ".join(list(solids)[:20])
         raise BadInput(
-            f"{path}: found {len(solids)} solids ({names}), expected which one, such "
-            f"as {path.name}#{next(iter(solids))}, or {path.name}#{_ALL} for all of "
+            f"{path}: found {len(solids)} solids ({names}), expected the name of one, "
+            f"as in {path.name}#{next(iter(solids))}, or {path.name}#{_ALL} for all of "
             f"them as one; forcefit stiffness fea {path.name} --part list lists them"
         )
     if not solid:

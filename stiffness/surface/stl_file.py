@@ -74,7 +74,7 @@ def _binary(path: Path, content: bytes) -> NDArray:
 def _text(path: Path, content: bytes) -> NDArray:
     """Return the (m, 3, 3) corners of the triangles in a text file."""
     words = _NAME.sub(b" ", content.removeprefix(b"\xef\xbb\xbf")).lower().split()
-    found = np.array(words, dtype=object)  # saves memory
+    found = np.array(words, dtype=object)  # an array of str would need more memory
     facets = np.flatnonzero(found == b"facet")
     vertices = np.flatnonzero(found == b"vertex")
     owner = np.searchsorted(facets, vertices)  # 0 means before the first facet

@@ -194,8 +194,8 @@ def check_surface(
     if len(crossing):
         where = points[triangles[crossing[0]]].reshape(-1, 3).mean(axis=0)
         raise BadInput(
-            f"{name}: the surface cuts itself at {len(crossing)} pairs of triangles, "
-            f"first near {_place(where)}; unite the parts before meshing"
+            f"{name}: the surface intersects itself at {len(crossing)} pairs of "
+            f"triangles, first near {_place(where)}; unite the parts before meshing"
         )
     return Surface(points, triangles, name, (*repairs, *turned))
 

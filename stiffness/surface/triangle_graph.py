@@ -36,7 +36,7 @@ class TriangleGraph:
         )
 
     def connected_parts(self, members: NDArray, bend: float) -> NDArray:
-        """Number connected parts; edges with a cosine below ``bend`` separate them."""
+        """Number connected parts; an edge with a cosine <= ``bend`` is a border."""
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
 

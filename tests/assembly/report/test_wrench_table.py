@@ -40,3 +40,41 @@ def test_table_of_wrenches_has_one_row_for_a_joint_with_contacts(tmp_path):
     assert set(rows) == {"rail", "tool"}
     found = [float(number) for number in rows["rail"]]
     assert found == pytest.approx([7.5, 0, 0, 0, -50, 0])
+
+
+GANTRY = """
+format = 2
+name = "gantry"
+platform = "table"
+platform_at = [0, 0, 0]
+[[body]]
+name = "table"
+[[joint]]
+name = "left"
+type = "prismatic"
+between = ["base", "table"]
+at = [-0.1, 0, 0]
+axis = [0, 1, 0]
+actuated = true
+[[joint]]
+name = "yrail"
+type = "TYPE"
+between = ["base", "table"]
+at = [0.1, 0, 0]
+axis = [0, 1, 0]
+"""
+
+
+@pytest.mark.parametrize("kind", ["prismatic", "cylindrical"])
+def test_tables_of_wrenches_name_the_drawn_joint_that_closes_a_loop(tmp_path, kind):
+    """The public keys keep the names of the frames."""
+    path = tmp_path / "gantry.toml"
+    path.write_text(GANTRY.replace("TYPE", kind))
+    results = solution_of(home_posture(read_robot(path)), [0, 0, 0, 0, -50, 0])
+    assert [c["frames"] for c in results["closures"]] == [["yrail.end", "table"]]
+    text = solution_text(results)
+    assert ".end" not in text
+    bodies, closures = text.split("wrenches ")[1:]
+    rows = [row.split()[0] for row in bodies.splitlines()[2:] if row.strip()]
+    assert sorted(rows) == ["left", "table", "yrail"]
+    assert closures.splitlines()[2].startswith("yrail - table ")

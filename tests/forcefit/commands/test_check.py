@@ -203,6 +203,83 @@ def test_open_closure_is_not_reported_after_a_length_was_replaced(tmp_path):
     assert len(all_messages(lambda: load_robot(file))) == 1
 
 
+MAST = """
+format = 2
+name = "mast"
+platform = "tool"
+platform_at = [0, 0, 0.15]
+[[body]]
+name = "tool"
+[[joint]]
+name = "cross"
+type = "universal"
+between = ["base", "tool"]
+at = [0, 0, 0]
+axis = [0, 0, 1]
+axis2 = [1, 0, 0]
+"""
+PARALLEL = ("axis2 = [1, 0, 0]", "axis2 = [0, 0, 1]")
+ALONE = '[[body]]\nname = "{0}"\n'
+PAIR = """
+[[joint]]
+name = "pin"
+type = "revolute"
+between = ["tool", "tool"]
+at = [0, 0, 0]
+axis = [0, 0, 1]
+"""
+LEG = """
+[[leg]]
+name = "leg"
+[leg.repeat]
+count = 2
+about = [0, 0, 1]
+[[leg.body]]
+name = "spare"
+"""
+# by name: a change of the sound file and the end of the message's place
+OF_MAST = {
+    "parallel axes": (PARALLEL, 'joint "cross".axis2'),
+    "first body without a joint": (ALONE.format("spare"), 'body "spare"'),
+    "second body without a joint": (ALONE.format("wheel"), 'body "wheel"'),
+    "body of a leg without a joint": (LEG, 'body "leg1.spare"'),
+    "joint from a body to itself": (PAIR, 'joint "pin".between'),
+    "negative mass": (('"tool"\n[[', '"tool"\nmass = -1\n[['), 'body "tool".mass'),
+}
+
+
+def mast(folder, mistakes):
+    """A drawn robot with mistakes."""
+    text = MAST
+    for change, _ in (OF_MAST[name] for name in mistakes):
+        text = text + change if isinstance(change, str) else text.replace(*change)
+    file = folder / "mast.toml"
+    file.write_text(text, "utf-8")
+    return file
+
+
+@pytest.mark.parametrize("pair", [
+    pair for pair in itertools.combinations(OF_MAST, 2)
+    # without the refused joint, the reader cannot tell whether the body is connected
+    if pair != ("body of a leg without a joint", "joint from a body to itself")
+])  # fmt: skip
+def test_drawn_robot_with_two_mistakes_has_both_messages(tmp_path, pair):
+    file = mast(tmp_path, pair)
+    places = [f"{file}: {OF_MAST[name][1]}: found" for name in pair]
+    found = all_messages(lambda: load_robot(file))
+    assert len(found) == 2, found
+    assert all(any(m.startswith(place) for m in found) for place in places), found
+
+
+def test_body_that_a_joint_names_is_not_missing_after_a_mistake_in_its_link(tmp_path):
+    rod = '[[body]]\nname = "rod"\nlink = { beam = 3 }\n'
+    pin = PAIR.replace('["tool", "tool"]', '["base", "rod"]')
+    file = tmp_path / "mast.toml"
+    file.write_text(MAST + rod + pin, "utf-8")
+    found = all_messages(lambda: load_robot(file))
+    assert all('body "rod".link' in message for message in found), found
+
+
 def test_reader_reads_the_unmodified_file_after_a_check(tmp_path):
     file = written(tmp_path, "robot of frames", KINDS["robot of frames"][3][:1])
     before = first_message(load_robot, file)

@@ -70,7 +70,7 @@ def test_follow_option_is_refused_together_with_back(run):
     [
         ("fz", "--along: found 'fz', expected COMPONENT=FROM:TO:STEP"),
         ("fq=0:1:1", '--along: unknown component "fq"'),
-        ("fz=0:1:0", "expected a change and a step"),
+        ("fz=0:1:0", "expected two different loads and a step"),
         ("fz=0:inf:1", "expected finite numbers"),
         ("fz=0:1e9:1", "expected at most 10000"),
     ],

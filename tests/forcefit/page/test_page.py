@@ -155,8 +155,8 @@ def test_page_states_the_command_and_digests_of_its_input_files(tmp_path):
     ("text", "message"),
     [
         ("<!doctype html><p>", "x: found a page without results of forcefit"),
-        ("hello", "x: found other text, expected a report of forcefit or the JSON"),
-        ("[" * 100_000, "x: found other text, expected a report of forcefit"),
+        ("hello", "neither HTML nor JSON, expected a report of forcefit or the JSON"),
+        ("[" * 100_000, "x: found text that is neither HTML nor JSON, expected"),
         ("[1]", "x: found a JSON list or value, expected results"),
     ],
 )

@@ -133,7 +133,7 @@ def test_mapping_of_six_freedoms_per_node_is_read(tmp_path):
     (node_vector([1, 2, 3, 4, 5]), "expected those of a matrix with 12 rows"),
     ("1 1 UX\n2 1 UQ\n", "found the label 'UQ'"),
     ("1 1 UX\n3 1 UY\n", "expected rows numbered from 1"),
-    ("1 1\n", "expected row, node and label"),
+    ("1 1\n", "expected the number of a row, the number of a node and a label"),
     ("Matrix Eqn\n", "expected rows numbered from 1"),
 ])  # fmt: skip
 def test_wrong_mapping_is_refused_in_one_line(text, message, tmp_path):

@@ -241,7 +241,7 @@ def test_chain_of_two_half_beams_is_condensed_to_one_beam(tmp_path):
     (lambda K: K, ["--tip", "q"], "--tip: found 'q', expected"),
     (lambda K: K, ["--unit", "ft"], '--unit: found "ft"'),
     (lambda K: K, ["--order", "x"], '--order: found "x"'),
-    (lambda K: np.array(["a"]), [], "expected a square of numbers"),
+    (lambda K: np.array(["a"]), [], "expected a square matrix of numbers"),
 ])  # fmt: skip
 def test_matrix_that_is_not_the_stiffness_of_a_link_is_refused_in_one_line(
     run, matrix, options, message, tmp_path

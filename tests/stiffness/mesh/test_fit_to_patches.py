@@ -45,7 +45,7 @@ def test_a_mesh_without_a_face_on_an_interface_is_refused(other, missing):
     made = box_solid((2, 2, 2), (0.1, 0.1, 0.1))
     far = Plane(50 * Z, Z)  # out of every corner's reach
     patches = Patches(np.full(len(CUBE_TRIANGLES), other), (far, far, far))
-    with pytest.raises(BadInput, match=f"cube: no face of the mesh on the {missing}"):
+    with pytest.raises(BadInput, match=f"no face of the mesh on the {missing}"):
         fit_to_patches(made.points, made.cells, SURFACE, patches)
 
 

@@ -174,7 +174,7 @@ WRONG_ENTRIES = [
     (lambda _: '{"format": "forcefit link 1"}', "damaged entry (KeyError)"),
     (
         changed(lambda entry: entry.update(wrench=FORCES_FIRST)),
-        "another order of the components, expected RX",
+        "the components in another order, expected RX",
     ),
     (
         changed(lambda entry: entry["stiffness"][0].__setitem__(0, -1.0)),
@@ -209,7 +209,7 @@ def test_missing_entry_or_library_is_refused_by_name(spec, tmp_path):
         (("radius", "radios"), 'unknown length "radios"'),
         (("0.01", "-0.01"), "radius: found -0.01, expected a length > 0"),
         (("0.01", '"a"'), "expected a finite number, or a list"),
-        (("[0.2, 0.3]", "[0.2, 0.2]"), "a value is given twice"),
+        (("[0.2, 0.3]", "[0.2, 0.2]"), "found a value twice"),
         (("young = 6e10", ""), "young: missing"),
         (('"beam"', '"bem"'), '"beam"'),
         (('shape = "round"', 'shape = "tube"'), "inner_radius: missing"),

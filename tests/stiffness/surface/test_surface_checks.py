@@ -189,7 +189,7 @@ def test_place_where_a_surface_intersects_itself_is_reported():
     up = np.concatenate([CUBE, [[0.06, 0.03, 0.15]]])
     assert check_surface(up, triangles, "spike").volume == pytest.approx(7e-3 / 6)
     down = np.concatenate([CUBE, [[0.06, 0.03, -0.05]]])
-    with pytest.raises(BadInput, match=r"cuts itself at \d+ pairs of triangles") as no:
+    with pytest.raises(BadInput, match=r"intersects itself at \d+ pairs") as no:
         check_surface(down, triangles, "spike")
     named = re.search(r"first near \((.*)\) m; unite the parts", str(no.value))
     place = [float(v) for v in named[1].split(", ")]

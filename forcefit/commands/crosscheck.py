@@ -1,0 +1,243 @@
+"""The command ``forcefit validation crosscheck``, against a multibody simulation."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from forcefit.commands.errors_options import ErrorsOption, SeedOption, with_errors
+from forcefit.commands.options import (
+    DriveForceOption,
+    FigureOption,
+    GravityOption,
+    JointOption,
+    JsonOption,
+    LoadOption,
+    MismatchOption,
+    PoseOption,
+    RestOption,
+    RobotArgument,
+    UnderOption,
+    declared_posture,
+    parse_covariates,
+    parse_gravity,
+    parse_load,
+    parse_state,
+)
+from forcefit.commands.progress import progress_bars
+from forcefit.commands.report import ReportOption, provenance
+from forcefit.inputs.errors import BadInput
+from forcefit.inputs.writing import (
+    PICTURE,
+    check_writable,
+    save_figure,
+    write_json,
+    write_text,
+)
+
+if TYPE_CHECKING:
+    from forcefit.assembly.kinematics.posture import Posture
+    from forcefit.assembly.model.robot import Robot
+    from forcefit.page.page import Provenance
+    from forcefit.validation.crosscheck.crosscheck import Crosscheck
+    from forcefit.validation.crosscheck.stiffness_check import StiffnessCheck
+
+
+def parse_scales(text: str) -> list[float]:
+    """Return the factors on the errors and loads that ``--scale`` lists.
+
+    Args:
+        text: text such as ``"1,0.5,0.25"``.
+
+    Returns:
+        The factors.
+
+    Raises:
+        BadInput: a value is not a number > 0, or fewer than two values are given.
+    """
+    try:
+        scales = [float(part) for part in text.split(",")]
+    except ValueError:
+        scales = []
+    if len(set(scales)) < 2 or not all(0 < s < float("inf") for s in scales):
+        raise BadInput(
+            f'--scale: found "{text[:60]}", expected at least two different numbers '
+            "> 0, such as 1,0.5,0.25"
+        )
+    return scales
+
+
+def crosscheck(
+    robot: RobotArgument,
+    pose: PoseOption = None,
+    joint: JointOption = None,
+    rest: RestOption = None,
+    mismatch: MismatchOption = None,
+    errors: ErrorsOption = None,
+    seed: SeedOption = 1,
+    load: LoadOption = None,
+    drive_force: DriveForceOption = None,
+    gravity: GravityOption = None,
+    under: UnderOption = None,
+    scale: Annotated[
+        str,
+        typer.Option(
+            help="Scales: factors on errors and load. Smaller ones are added if a "
+            "check is "
+            "undecided."
+        ),
+    ] = "1,0.5,0.25,0.125",
+    links: Annotated[
+        str, typer.Option(help="How the simulation models links: beam | spring | fem.")
+    ] = "beam",
+    with_clearance: Annotated[
+        bool,
+        typer.Option(
+            "--with-clearance", help="Keep the joints' clearances in both models."
+        ),
+    ] = False,
+    state: Annotated[
+        str | None,
+        typer.Option(
+            help="Compare the platform's stiffness instead of the pose, in the state "
+            "exact (around the equilibrium with errors and loads).",
+        ),
+    ] = None,
+    grid: Annotated[
+        str | None,
+        typer.Option(help="Grid of poses, such as tx=-0.2:0.2:0.1,tz=-0.5."),
+    ] = None,
+    json: JsonOption = None,
+    figure: FigureOption = None,
+    report: ReportOption = None,
+    time_limit: Annotated[
+        float, typer.Option(min=0.0, help="Time limit of each simulation [s].")
+    ] = 600.0,
+) -> None:
+    """Compare with a multibody simulation at several scales.
+
+    Errors and loads are multiplied by each scale.  Joint clearances are left out in
+    both models, unless --with-clearance is given.  Then energies and springs are
+    compared instead of poses.  The exit status is 1 if a check fails.  It is also 1 if
+    the robot has neither errors nor a load, because then nothing can be compared.
+    """
+    from forcefit.assembly.effects.robot_effects import apply_robot_effects
+    from forcefit.assembly.exchange.robot_files import load_robot
+    from forcefit.assembly.kinematics.closing import closing_of
+    from forcefit.validation.crosscheck.crosscheck import Crosscheck, attempt
+    from forcefit.validation.crosscheck.crosscheck import crosscheck as compare_models
+    from forcefit.validation.crosscheck.stiffness_check import (
+        StiffnessCheck,
+        check_stiffness,
+    )
+
+    scales, wrench = parse_scales(scale), parse_load(load)
+    g, covariates = parse_gravity(gravity), parse_covariates(under)
+    if with_clearance and figure is not None:
+        raise BadInput(
+            "--figure: found together with --with-clearance; no slope is computed "
+            "with clearances: remove one of the two"
+        )
+    if state is not None:
+        parse_state(state, ("exact",))
+    if state is not None and (figure is not None or grid is not None):
+        raise BadInput(
+            "--state: found together with --figure or --grid; remove these options, "
+            "because the stiffness is compared at one pose"
+        )
+    if figure is not None:
+        check_writable(figure, PICTURE)
+    if grid is not None and (pose or joint or figure or drive_force):
+        raise BadInput(
+            "--grid: found together with --pose, --joint, --drive-force or --figure; "
+            "expected only one of them"
+        )
+
+    own = errors is None or rest is mismatch is None
+    source = provenance(robot, errors)
+
+    def compare(posture: "Posture") -> Crosscheck | StiffnessCheck:
+        fixed = None if own else posture.robot.declared_errors
+        drawn = with_errors(posture, errors, seed, fixed)
+        applied = apply_robot_effects(drawn, wrench, g, covariates)
+        if state is not None:
+            return check_stiffness(
+                applied.posture,
+                applied.load,
+                links,
+                applied.gravity,
+                time_limit,
+                with_clearance,
+            )
+        return compare_models(
+            applied.posture,
+            scales,
+            applied.load,
+            links,
+            applied.gravity,
+            time_limit,
+            with_clearance,
+        )
+
+    if grid is not None:
+        machine = load_robot(robot, closing_of(rest, mismatch, own_errors=own))
+        _crosscheck_grid(machine, grid, compare, json, report, source)
+        return
+    posture = declared_posture(
+        robot, pose, joint, rest, mismatch, own, drive_force=drive_force
+    )
+    results, failure = attempt(posture.robot.name, lambda: compare(posture))
+    if report is not None:
+        write_text(_crosscheck_page(results, failure, source), report)
+    write_json(failure if results is None else results.table(), json)
+    if json != "-":
+        print(failure["reason"] if results is None else results.text())
+    if figure is not None and isinstance(results, Crosscheck):
+        from forcefit.validation.crosscheck.plot import slope_figure
+
+        save_figure(slope_figure(results), figure)
+    if results is None or not results.passed:
+        raise typer.Exit(1)
+
+
+def _crosscheck_page(
+    results: "Crosscheck | StiffnessCheck | None", failure: "dict[str, Any]",
+    source: "Provenance",
+) -> str:  # fmt: skip
+    """Return the report page of a comparison at one pose."""
+    from forcefit.validation.crosscheck.crosscheck import Crosscheck
+    from forcefit.validation.crosscheck.report import crosscheck_page, failure_page
+    from forcefit.validation.crosscheck.stiffness_page import stiffness_check_page
+
+    if results is None:
+        return failure_page(failure, source)
+    if isinstance(results, Crosscheck):
+        return crosscheck_page(results, source)
+    return stiffness_check_page(results, source)
+
+
+def _crosscheck_grid(
+    machine: "Robot", grid: str, compare: "Callable[[Posture], Any]", json: str | None,
+    report: Path | None, source: "Provenance",
+) -> None:  # fmt: skip
+    """Compare at every pose of a grid; show a progress bar."""
+    from forcefit.assembly.sweeps.targets import parse_grid
+    from forcefit.validation.crosscheck.poses import (
+        check_poses,
+        poses_table,
+        poses_text,
+    )
+
+    axes = parse_grid(grid)
+    with progress_bars() as update:
+        rows = check_poses(machine, axes, compare, lambda d, n: update("poses", d, n))
+    if report is not None:
+        from forcefit.validation.crosscheck.report import poses_page
+
+        write_text(poses_page(machine.name, rows, source), report)
+    write_json(poses_table(rows), json)
+    if json != "-":
+        print(poses_text(rows))
+    if not poses_table(rows)["passed"]:
+        raise typer.Exit(1)

@@ -1,0 +1,37 @@
+"""The options --errors and --seed, which replace the errors of a robot by one draw."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from forcefit.assembly.kinematics.posture import Posture
+
+ErrorsOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="Distributions of errors (TOML); one draw from them replaces the robot's "
+        "declared errors."
+    ),
+]
+SeedOption = Annotated[
+    int, typer.Option(help="Seed of the draw from --errors.", min=0, max=2**63 - 1)
+]
+
+
+def with_errors(
+    posture: "Posture", errors: Path | None, seed: int, fixed: "NDArray | None"
+) -> "Posture":
+    """Return the posture with one draw of errors, or with the declared errors."""
+    if errors is None:
+        return posture
+    from forcefit.assembly.model.error_distributions import read_sources
+    from forcefit.assembly.steps.bolted import bolt_joints
+
+    sources = read_sources(errors, posture.robot, fixed)
+    errors_drawn = sources.errors(sources.draw(0, 1, seed)[0])
+    return replace(posture, robot=bolt_joints(posture.robot.with_errors(errors_drawn)))

@@ -1,0 +1,130 @@
+"""The command ``forcefit validation validity``: errors due to assumptions."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from forcefit.commands.errors_options import ErrorsOption, SeedOption, with_errors
+from forcefit.commands.options import (
+    FigureOption,
+    GravityOption,
+    JointOption,
+    JsonOption,
+    LoadOption,
+    MismatchOption,
+    PoseOption,
+    RestOption,
+    RobotArgument,
+    parse_gravity,
+    parse_load,
+    posture_of,
+)
+from forcefit.commands.progress import progress_bars
+from forcefit.commands.report import ReportOption, provenance
+from forcefit.inputs.errors import BadInput
+from forcefit.inputs.writing import (
+    PICTURE,
+    check_writable,
+    save_figure,
+    write_json,
+    write_text,
+)
+
+
+def validity(
+    robot: RobotArgument,
+    pose: PoseOption = None,
+    joint: JointOption = None,
+    rest: RestOption = None,
+    mismatch: MismatchOption = None,
+    errors: ErrorsOption = None,
+    seed: SeedOption = 1,
+    load: LoadOption = None,
+    gravity: GravityOption = None,
+    solids: Annotated[
+        bool,
+        typer.Option(
+            "--solids",
+            help="Also mesh links as solids, which takes seconds for each shape.",
+        ),
+    ] = False,
+    grid: Annotated[
+        str | None,
+        typer.Option(help="Grid of poses, such as tx=-0.2:0.2:0.1,tz=-0.5."),
+    ] = None,
+    poses: Annotated[
+        Path | None,
+        typer.Option(help="CSV table of poses: pose.tx .. or q.*."),
+    ] = None,
+    json: JsonOption = None,
+    figure: FigureOption = None,
+    report: ReportOption = None,
+) -> None:
+    """Estimate the errors due to the assumptions of the model.
+
+    The errors of position, rotation and energy are estimated at one pose or at many.
+    Four assumptions are tested: linear closures, beams instead of solids, weights at
+    the ends of links, and a disc and a cone as clearance zone of a pin in two bushes.
+    Errors above 20 um or 1 % are marked.  With --solids, errors of the stiffness of the
+    platform are also estimated.  The exit status is 1 if the robot has neither errors
+    nor a load, because then nothing can be compared.
+    """
+    from forcefit.assembly.sweeps.targets import grid_targets, parse_grid, read_targets
+    from forcefit.validation.assumptions.over_poses import costs_at, costs_over_poses
+    from forcefit.validation.assumptions.platform_cost import PlatformCosts
+    from forcefit.validation.assumptions.plot import platform_cost_figure
+    from forcefit.validation.assumptions.report import (
+        costs_table,
+        costs_text,
+        over_poses_table,
+        over_poses_text,
+    )
+
+    given = [bool(pose or joint), grid is not None, poses is not None]
+    if sum(given) > 1:
+        raise BadInput(
+            "found more than one option for poses; expected one of --pose or "
+            "--joint, --grid, --poses"
+        )
+    if figure is not None:
+        if not solids:
+            raise BadInput(
+                "--figure: found without --solids; add --solids, because the figure "
+                "shows the error that solids reveal"
+            )
+        check_writable(figure, PICTURE)
+    wrench, g = parse_load(load), parse_gravity(gravity)
+    own = errors is None or rest is mismatch is None
+    posture = posture_of(robot, pose, joint, rest, mismatch, own)
+    fixed = None if own else posture.robot.declared_errors
+    posture = with_errors(posture, errors, seed, fixed)
+    if grid is None and poses is None:
+        costs = costs_at(posture, wrench, g, solids)
+        table, text = costs_table(costs), costs_text(costs)
+    else:
+        machine = posture.robot
+        targets = (
+            grid_targets(parse_grid(grid, machine))
+            if grid is not None
+            else read_targets(poses or "", machine)
+        )
+        with progress_bars() as update:
+            costs = costs_over_poses(
+                machine, targets, wrench, g, solids,
+                lambda done, total: update("poses", done, total),
+            )  # fmt: skip
+        table, text = over_poses_table(costs), over_poses_text(costs)
+    if report is not None:
+        from forcefit.validation.assumptions.costs_page import costs_page
+
+        source = provenance(robot, errors, poses)
+        write_text(costs_page(costs, table, source), report)
+    write_json(table, json)
+    if json != "-":
+        print(text)
+    if figure is not None and isinstance(costs.platform, PlatformCosts):
+        name = posture.robot.name
+        save_figure(platform_cost_figure(costs.platform, costs.reached, name), figure)
+    if not costs.known:
+        raise typer.Exit(1)
