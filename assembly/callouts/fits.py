@@ -138,9 +138,10 @@ class Fit:
 
 @dataclass(frozen=True)
 class FittedEnd:
-    """One of two fitted places, at a distance about which the parts rotate.
+    """One of two fitted places of a hole and a shaft, such as an end of a bore.
 
-    The places are the ends of a bore or a guide, or two bearings.
+    The two places are the ends of a bore or a guide, or two bearings. Their clearances
+    let the parts rotate relative to each other.
 
     Attributes:
         length: [m] distance between the two places, > 0. The rotation is at most the

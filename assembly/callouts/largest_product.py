@@ -33,17 +33,17 @@ def largest_product(
 def product_by_bounds(
     w: NDArray, bounds: Sequence[NDArray], cones: Sequence[NDArray] = ()
 ) -> tuple[NDArray, float, NDArray]:
-    """Return :func:`largest_product`, and the parts of its bound.
+    """Return the result of :func:`largest_product`, and the parts of its bound.
 
     Args:
-        w: (m,).
-        bounds: as there.
-        cones: as there.
+        w: (m,) coefficients.
+        bounds: as for :func:`largest_product`.
+        cones: as for :func:`largest_product`.
 
     Returns:
-        x and the upper bound, and its part by each of ``bounds`` and ``cones``, the
-        size of the multiplier: the derivative of the bound with respect to the
-        logarithm of their size.
+        x, the upper bound, and the part of the upper bound due to each of ``bounds``
+        and ``cones``.  This part is the norm of the multiplier, which is the derivative
+        of the upper bound with respect to the logarithm of their size.
     """
     length = float(np.linalg.norm(w))
     if length == 0.0:
@@ -128,7 +128,7 @@ def _centre(
 
 
 def _halves(cones: Sequence[NDArray], x: NDArray) -> Iterator[tuple[NDArray, float]]:
-    """Yield rows and slack of each half |S x| <= 1 - s.x of the double cones."""
+    """Yield rows and slack of both halves |S x| <= 1 -+ s.x of each double cone."""
     for cone in cones:
         for sign in (1.0, -1.0):
             signed = np.vstack([sign * cone[:1], cone[1:]])

@@ -4,8 +4,9 @@ A zone is a set of screws d [RX RY RZ TX TY TZ] of a feature, in the feature's a
 contains all d with ``|bound @ d| <= 1`` for each bound. Components to which no bound
 refers are zero.  A bound with one row is an interval, with two rows a disc, with three
 rows a ball.  Linearly independent bounds can reach their limits simultaneously, so
-their set is d = columns u, |u_k| <= 1.  Further bounds cut this set. Double cones
-``|s @ d| + |S @ d| <= 1``, the zones of round faces, also cut it.
+their set is d = columns u, |u_k| <= 1.  Linearly dependent bounds exclude a part of
+this set. Double cones ``|s @ d| + |S @ d| <= 1``, the zones of round faces, also
+exclude a part.
 
 Sources:
     Mujezinovic, Davidson, Shah (2004), A new mathematical model for geometric
@@ -25,9 +26,9 @@ from forcefit.assembly.callouts.largest_product import largest_product
 from forcefit.assembly.callouts.unit_balls import VOLUMES, ball_variance, in_balls
 
 DISTRIBUTIONS = ("uniform", "normal", "truncated")
-_SAMPLE = 1 << 17  # number of draws for the covariance of a zone that is cut
+_SAMPLE = 1 << 17  # number of draws for the covariance of a zone without closed form
 _RANK = 1e-9  # smallest over largest singular value of independent bounds
-_MOST_ATTEMPTS = 10_000  # largest number of draws until a part is within the zone
+_MOST_ATTEMPTS = 10_000  # largest number of draws for one part inside the zone
 Numbers = Callable[[int], NDArray]  # attempt -> (k, words) uniform numbers
 
 
@@ -76,7 +77,7 @@ class Zone:
 
     @cached_property
     def cuts(self) -> tuple[NDArray, ...]:
-        """Matrices (k, m): the bounds that cut, as rows on u."""
+        """Matrices (k, m): the linearly dependent bounds as rows on u."""
         return tuple(self.bounds[i] @ self.columns for i in self._split[1])
 
     @cached_property
@@ -86,7 +87,7 @@ class Zone:
 
     @property
     def is_cut(self) -> bool:
-        """Whether the zone is smaller than the product of its balls."""
+        """Whether dependent bounds or cones make the zone smaller than its balls."""
         return bool(self.cuts or self.cones)
 
     @property
@@ -189,7 +190,7 @@ class Zone:
             again, fits = self._attempt(numbers(attempt), distribution, s, grown)
             taken = ~accepted & fits
             u[taken], accepted = again[taken], accepted | fits
-        raise RuntimeError("a zone was not met by random draws")
+        raise RuntimeError("tolerance zone: found no random draw inside it")
 
     def _attempt(
         self, uniform: NDArray, distribution: str, s: float, grown: NDArray
@@ -302,5 +303,5 @@ def _scale(rows: NDArray) -> NDArray:
 
 
 def _sample(words: int, attempt: int = 0) -> NDArray:
-    """Return fixed uniform numbers, which are equal at each call."""
+    """Return uniform random numbers of a fixed seed, equal at each call."""
     return np.random.default_rng([words, attempt]).random((_SAMPLE, words))

@@ -15,7 +15,7 @@ from forcefit.assembly.model.placed_frames import PlacedFrame, own_motion
 from forcefit.inputs.table import BadInput, quoted
 
 _ROUNDING = 1e-12
-# shape of the datum for each type of joint; all other types are axes
+# datum shape by joint type; the datum of any other joint type is an axis
 _DATUM_SHAPES = {
     "planar": "plane",
     "spherical": "point",

@@ -68,9 +68,9 @@ def bearings(
     """Return the contacts of a shaft along z in two bearings or in a bore's two ends.
 
     Args:
-        first: [m] height z and radial gap of the lower place; the radial gap is half
-            the diametral clearance.
-        second: [m] height z and radial gap of the upper place.
+        first: [m] height z and radial gap of the lower bearing or bore end. The radial
+            gap is half the diametral clearance.
+        second: [m] height z and radial gap of the upper bearing or bore end.
         name: beginning of the contacts' names.
 
     Returns:

@@ -31,7 +31,7 @@ from forcefit.stiffness.screws import transform
 
 @dataclass(frozen=True, eq=False)
 class _Plan:
-    """Names and places of the frames of a robot.
+    """Names of the frames of a robot, and the nodes that they belong to.
 
     Attributes:
         drawing: bodies and joints.
@@ -89,7 +89,7 @@ def robot_of_drawing(drawing: Drawing) -> Robot:
 
 
 def _cuts(steps: list[Step]) -> tuple[str, ...]:
-    """Return a remark on the joints after which loops close; empty without loops."""
+    """Return a remark that names the joints after which loops close, if any."""
     closing = [step for step in steps if step.closes]
     names = [f"{quoted(s.edge.item.name)} (at {quoted(s.end[0])})" for s in closing]
     return (f"loops close after {', '.join(names)}",) if names else ()

@@ -1,4 +1,4 @@
-"""The frames of a joint: one freedom each, all at the same point."""
+"""The frames of a joint: one frame per freedom, all at the joint's point."""
 
 from dataclasses import dataclass, replace
 
@@ -204,7 +204,7 @@ def _from_axes(screw: NDArray) -> NDArray:
 
 
 def _size(numbers: JointNumbers) -> NDArray | None:
-    """Return the tolerance (6,) in these axes, without signs."""
+    """Return the tolerance (6,), without signs, in the first frame's axes."""
     return None if numbers.tolerance is None else numbers.tolerance[_TO_SLIDE]
 
 

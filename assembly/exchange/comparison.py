@@ -53,7 +53,7 @@ class Comparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether the programs agree."""
+        """Whether both programs read the same robot from the file."""
         return self.difference <= AGREED
 
     def table(self) -> dict[str, Any]:

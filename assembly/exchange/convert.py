@@ -225,7 +225,7 @@ def _built_in(conversion: Conversion) -> tuple[Conversion, RobotAndMechanism]:
     if threads:
         raise BadInput(
             f"{conversion.robot.name}: found helical joints ({', '.join(threads)}), "
-            "which only robot files (.toml) hold; nothing is written"
+            "which only robot files (.toml) can represent; nothing is written"
         )
     posture = home_posture(conversion.robot)
     robot = with_calibration(posture)

@@ -295,7 +295,7 @@ def _pose(node: Node, angles: Angles) -> NDArray:
 def _at_key(
     root: Node, reading: _Reading, joints: tuple[Joint, ...]
 ) -> tuple[Joint, ...]:
-    """Return the joints at the positions of the keyframe named home."""
+    """Return the joints with the coordinates of the keyframe ``home``."""
     keys = [k for group in root.children("keyframe") for k in group.children("key")]
     counts = {name: _COUNTS.get(kind, 1) for name, kind in reading.coordinates.items()}
     for key in keys:

@@ -118,7 +118,7 @@ def at_key(key: Node, joint: Joint, values: NDArray) -> Joint:
     turn = placed(
         values[:-4] if len(values) == 7 else _ZERO, from_quaternion(quaternion)
     )
-    # a free body's values are its pose in the world, a ball's its rotation from rest
+    # a free body's values are its world pose, a ball's values its rotation from rest
     return replace(
         joint, placement=turn if len(values) == 7 else joint.placement @ turn
     )

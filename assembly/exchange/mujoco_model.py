@@ -56,7 +56,7 @@ def mjcf_of_model(model: Any) -> str:
         except ValueError as error:
             raise BadInput(f"MjSpec: MuJoCo does not compile it: {error}") from None
     if model.nflex:
-        raise BadInput("MjModel: found a flex, expected rigid bodies")
+        raise BadInput("MjModel: found a flex (flexible body), expected rigid bodies")
     root = Element("mujoco", model=_model_name(model))
     SubElement(root, "compiler", angle="radian")
     for i, (start, size) in enumerate(

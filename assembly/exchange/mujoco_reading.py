@@ -108,7 +108,9 @@ def _bare_urdf(path: Path) -> str:
         if element.tag.endswith(":joint") or element.get("quat_xyzw"):
             raise ValueError(f"its URDF has no {element.tag} of this kind")
         if element.tag == "inertia" and not _comparable(_attributes(element.attrib)):
-            element.attrib.update(_UNIT_INERTIA)  # MuJoCo rejects thin rods
+            element.attrib.update(
+                _UNIT_INERTIA
+            )  # MuJoCo rejects the inertia of thin rods
         for inner in list(element):
             if inner.tag in _DRAWN or ":" in inner.tag:
                 element.remove(inner)
@@ -221,7 +223,7 @@ def _moments(mujoco: Any, model: Any, i: int) -> NDArray:
 
 
 def _comparable(J: NDArray) -> bool:
-    """Return whether MuJoCo keeps the moments, which excludes thin rods and plates."""
+    """Return whether MuJoCo keeps the moments of inertia (not of thin rods, plates)."""
     least, middle, most = np.linalg.eigvalsh(J)
     return bool(least > _LEAST_MOMENT and most < (1 - 1e-9) * (least + middle))
 

@@ -119,7 +119,7 @@ def _tree(
 
 
 def _of_axis(joint: Node, tag: str, part: Node) -> str:
-    """Return the description of what is omitted from an axis; empty if nothing is."""
+    """Return a description of an axis's omitted properties; empty if there are none."""
     spring = part.child("spring_stiffness")
     # forcefit does not read further axes of joints of several freedoms
     crossed = joint.optional("type") in {"universal", "revolute2"}

@@ -178,7 +178,9 @@ def _is_static(model: Node) -> bool:
 def _gather(frames: Frames, model: Node, scope: str, outer: str, old: bool) -> None:
     """Collect the elements of a model and of its nested models."""
     if scope.count("::") > _NESTED:
-        raise model.bad("", f"found models more than {_NESTED} deep")
+        raise model.bad(
+            "", f"found models nested more than {_NESTED} deep, expected fewer levels"
+        )
     frames.named[scope + MODEL] = Named(model, outer, old)
     nodes = sorted(model.children(), key=lambda node: node.tag != "link")
     for node in nodes:

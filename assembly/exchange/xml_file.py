@@ -1,4 +1,4 @@
-"""Reader of XML files without entities and external files; one message per mistake."""
+"""Reader of XML files; entities and external files are rejected."""
 
 import re
 from collections.abc import Container, Iterator

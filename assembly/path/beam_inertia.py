@@ -1,4 +1,4 @@
-r"""Inertia and weight of a moving beam: equivalent wrenches at its ends and sections.
+r"""Inertia and weight of a moving beam, as wrenches at its ends and sections.
 
 A beam moves almost as a rigid body.  Its load per length is then linear along it,
 q(x) = rho A (g - a(x)), and its moment per length is constant, m = -rho (J alpha +
@@ -197,8 +197,8 @@ def beam_stress(frame: Frame, load: BeamLoad, tip: NDArray) -> NDArray:
         tip: (k, 6) [N m, N] wrench transmitted at the tip, in the frame's axes.
 
     Returns:
-        (k,) [Pa] stress. A tenth of the fibres is evaluated at 33 sections, then all
-        fibres at the worst section.
+        (k,) [Pa] stress. A tenth of the section's fibres is evaluated at 33 sections.
+        All fibres are then evaluated at the section of largest stress.
     """
     assert isinstance(frame.link, BeamLink)
     R = load.data.axes

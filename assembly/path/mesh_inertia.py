@@ -47,7 +47,7 @@ def mesh_end_wrenches(
         for point in (tip, tip - R @ span)
     )
     e = span / np.linalg.norm(span)
-    # slopes of the ends in the field of acceleration due to the rotation
+    # angular accelerations of both ends in the link's rigid acceleration field
     slope = alpha + np.cross(e, omega) * (omega @ e)[:, None]
     wrenches = -np.hstack([slope, at_base, slope, at_tip]) @ M.T
     base, tip = wrenches[:, :6], wrenches[:, 6:]

@@ -150,7 +150,7 @@ def follow_path(
 def _with_all_drives(
     robot: Robot, names: tuple[str, ...], path: tuple[NDArray, NDArray, NDArray]
 ) -> tuple[tuple[str, ...], tuple[NDArray, NDArray, NDArray]]:
-    """Return a joint path that also contains the drives not named, at rest."""
+    """Return a joint path that also contains the unnamed drives, which do not move."""
     drives = [f"q.{f.name}" for f in robot.frames if f.actuated]
     still = [name for name in drives if name not in names]
     zero = np.zeros((len(path[0]), len(still)))
@@ -237,7 +237,7 @@ def _second_of_pose(
     postures: Posture, names: tuple[str, ...], values: NDArray, twists: NDArray,
     drift: NDArray,
 ) -> NDArray:  # fmt: skip
-    """Return second derivatives (k, c) of the prescribed components for q'' = 0."""
+    """Return second derivatives (k, c) of prescribed components for q'' = 0."""
     if names[0] not in POSE:
         return np.zeros_like(values)
     row = postures.robot.index(postures.robot.platform)
@@ -270,7 +270,7 @@ def _turning_of_jacobian(turn: NDArray, rate: NDArray) -> NDArray:
 
 
 def _inverse(values: NDArray, mismatch: Any) -> NDArray:
-    """Return inverse singular values (k, m); 0 for those that count as zero."""
+    """Return inverse singular values (k, m); 0 where a singular value counts as 0."""
     least = np.maximum(_SINGULAR, _NOISE * np.broadcast_to(mismatch, len(values)))
     kept = values > least[:, None] * values[:, :1]
     return np.where(kept, 1 / np.where(kept, values, 1.0), 0.0)
@@ -297,7 +297,7 @@ def idle_rates(motion: Motion) -> NDArray:
 
 
 def _check_followed(E: NDArray, q: NDArray, right: NDArray) -> None:
-    """Reject derivatives that the robot cannot have."""
+    """Reject velocities and accelerations that the robot cannot have."""
     left = np.abs((E @ q[..., None])[..., 0] - right).max(axis=1, initial=0.0)
     size = np.abs(right).max(axis=1, initial=0.0)
     size = np.maximum(size, 1e-6 * size.max(initial=0.0))

@@ -43,14 +43,16 @@ if TYPE_CHECKING:
     import xarray
 
 _BLOCK = 2000  # number of points that are solved and stored together
-_BLOCK_OF_TANGENTS = 100  # the same, if each point has its own tangent
+_BLOCK_OF_TANGENTS = (
+    100  # number of points per block if each point has its own tangent stiffness
+)
 # results that also exist at points without a solution
 _GEOMETRIC = {
     "coordinates", "rates", "second_rates", "platform", "platform_velocity",
     "platform_acceleration", "compliance",
 }  # fmt: skip
 Progress = Callable[[int, int], None]
-# function from the number of a block's first point to its arrays, computed or stored
+# function: number of a block's first point -> arrays of the block
 Recall = Callable[..., tuple[NDArray, ...]]
 
 
@@ -287,7 +289,7 @@ def _moved(asked: _Asked, rows: slice) -> tuple[Motion, list[tuple[str, str]]]:
 def _followed(
     asked: _Asked, rows: slice, postures: Posture, idle: NDArray | float = 0.0
 ) -> Motion:
-    """Return the motion of a block of points, with added rates of idle motions."""
+    """Return the motion of a block of points, including idle motions."""
     path = asked.trajectory
     at = path.values[rows], path.first[rows], path.second[rows]
     try:
@@ -326,7 +328,7 @@ def _at_origin(twists: NDArray, T: NDArray) -> NDArray:
 
 
 def _drive_forces(robot: Robot, joint_wrenches: NDArray) -> NDArray:
-    """Return the force (k, drives) [N m or N] of each drive on the part it carries."""
+    """Return each drive's force (k, drives) [N m or N] on the part that it carries."""
     driven = [i for i, f in enumerate(robot.frames) if f.actuated]
     screws = np.array([own_screw(robot.frames[i]) for i in driven]).reshape(-1, 6)
     forces: NDArray = -np.einsum("kdi,di->kd", joint_wrenches[:, driven], screws)

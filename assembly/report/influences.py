@@ -1,4 +1,4 @@
-"""Whether the order of joining matters, as text and as plain values."""
+"""Effect of the order of joining on the assembled robot, as text and values."""
 
 from itertools import takewhile
 from typing import Any

@@ -30,10 +30,10 @@ from forcefit.results.text import lines_of, table_lines, value_text
 from forcefit.stiffness.screws import SCREW, WRENCH
 
 DIRECTIONS = tuple(name.lower() for name in SCREW)
-# texts for the two sides of a change of contact
+# texts for the tangent stiffness on both sides of a contact change
 _SIDES = {"holding": "loading", "letting go": "unloading"}
 _KINDS = {"link": "links", "joint": "joints", "clearance": "clearances"}
-_SHOWN = 12  # number of parts in the table and the chart; all others form one row
+_SHOWN = 12  # number of parts in table and chart; the sum of other parts is one row
 
 
 def stiffness_of(
@@ -126,7 +126,7 @@ def virtual_clearances(posture: Posture) -> bool:
 def _in_contact(
     posture: Posture, load: Any, gravity: Any, point: NDArray, length: float | None
 ) -> list[dict[str, Any]]:
-    """Return the tangent of (22), or two if a clearance just touches its bound."""
+    """Return the tangent of problem (22); two if a clearance just touches a bound."""
     assembly = solve_assembly(posture, load, gravity=gravity)
     pressed, touching = contacts(assembly)
     sides: list[Side] = ["holding"]

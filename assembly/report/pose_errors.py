@@ -84,7 +84,7 @@ def pose_error_of(
         for name in assumptions:
             try:
                 bound = bound_pose_error(assembly, name, offset=offset, **options)
-            except FreeMotion as error:  # freed compliant joints may have no springs
+            except FreeMotion as error:  # "free" may remove all springs
                 no_bounds = dict.fromkeys(("rotation", "translation"))
                 table[name] = no_bounds | {"reason": str(error)}
                 continue
@@ -99,7 +99,7 @@ def pose_error_of(
         if loaded:
             raise BadInput(
                 f'{posture.robot.name}: found a load and a joint with left = "worst", '
-                "expected no load; the worst position is that without loads"
+                "expected no load; the worst position is defined without loads"
             )
         results["bolted_worst"] = _worst_left(posture, offset)
     certificate = {"relative_gap": assembly.relative_gap()}

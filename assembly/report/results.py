@@ -37,7 +37,7 @@ from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.results.display import listing
 from forcefit.results.text import lines_of, value_text
 
-# numbers of a certificate: relative, except the duality gap in J
+# numbers of a certificate; they are relative, except the duality gap [J]
 _PROOF = (
     "closure_residual clearance_excess duality_gap relative_gap stationarity iterations"
 )

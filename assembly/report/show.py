@@ -39,9 +39,9 @@ def show(
     Args:
         thing: object to draw. A robot is drawn in its home pose. A posture is drawn
             without errors. An assembly is drawn nominal and forced, with exaggerated
-            displacements. An assembly with finite motions is drawn likewise, but large
-            displacements are to scale. For a platform stiffness, the shares of its
-            parts are drawn.
+            displacements. An assembly with finite motions is also drawn nominal and
+            forced, but large displacements are to scale. For a platform stiffness, the
+            shares of its parts are drawn.
         errors: ``"translation"`` or ``"rotation"`` to add the possible platform errors
             within the clearances to an assembly.
         assumption: assumption of problem (27) for these errors: ``"frozen"``,

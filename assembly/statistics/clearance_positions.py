@@ -96,7 +96,7 @@ def _moved_clearances(
     prepared: LinearResponse, draws: Assembly, left: NDArray, wrenches: NDArray | None,
     generators: Sequence[np.random.Generator],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the clearances of draws ``left`` after moving, and whether walks mixed."""
+    """Return moved clearances of the draws ``left``, and whether random walks mixed."""
     clearances, mixed = draws.clearances.copy(), np.ones(len(left), dtype=bool)
     loaded = loaded_clearances(prepared, draws)
     patterns, pattern_of_draw = np.unique(loaded, axis=0, return_inverse=True)
@@ -120,7 +120,7 @@ def contact_length_of(robot: Robot) -> float:
 
 
 def clearance_means(clearance: str, contact_length: float | None = None) -> str:
-    """Return the meaning of a clearance model, with the length of the contact model."""
+    """Return the meaning of a clearance model; for "contact" also its length."""
     words = CLEARANCE_MODELS[clearance]
     if clearance != "contact" or contact_length is None:
         return words
@@ -130,7 +130,7 @@ def clearance_means(clearance: str, contact_length: float | None = None) -> str:
 def _random_wrenches(
     generators: Sequence[np.random.Generator], length: float
 ) -> NDArray:
-    """Return random platform wrenches (k, 6) with moments scaled by the length."""
+    """Return random platform wrenches (k, 6), moments scaled by the contact length."""
     scale = np.repeat([1.0, 1.0 / length], 3)
     wrenches = np.array([rng.normal(size=6) for rng in generators])
     return wrenches.reshape(-1, 6) * scale
@@ -184,7 +184,7 @@ def _at_contact_alone(
     clearances: NDArray,
     direction: NDArray,
 ) -> NDArray:
-    """Return the farthest position (nu,) from the interior-point solver Clarabel."""
+    """Return the farthest clearance position (nu,), computed by the solver Clarabel."""
     group = np.unique(prepared.joints.group[free], return_inverse=True)[1]
     none, size = np.zeros((0, int(free.sum()))), np.linalg.norm(direction[free])
     solution = minimise_energy(

@@ -1,4 +1,4 @@
-"""Farthest positions of clearances in given directions."""
+"""Clearance positions that lie farthest in given directions of clearance space."""
 
 import numpy as np
 from numpy.typing import NDArray

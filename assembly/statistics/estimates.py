@@ -36,7 +36,7 @@ def proportion(successes: int, count: int, level: float = 0.95) -> dict[str, flo
 def bracketed(
     holds: int, fails: int, count: int, level: float = 0.95
 ) -> dict[str, float]:
-    """Return the probability of success if some trials are undecided.
+    """Return the probability of success if the outcome of some trials is unknown.
 
     Args:
         holds: number of certain successes in ``count`` independent trials.
@@ -70,7 +70,8 @@ def quantile(values: ArrayLike, share: float, level: float = 0.95) -> dict[str, 
     # infinite values are not interpolated
     way: Literal["linear", "higher"] = "linear" if np.isfinite(x).all() else "higher"
     low, high = stats.binom.ppf([(1 - level) / 2, (1 + level) / 2], count, share)
-    # P(fewer than low values below the quantile) < (1 - level)/2; likewise above
+    # P(fewer than ``low`` values lie below the quantile) < (1 - level)/2, and the same
+    # for the values above it
     below, above = int(low) - 1, int(high)
     return {
         "value": float(np.quantile(x, share, method=way)),

@@ -115,7 +115,7 @@ class Experiment:
 
     @cached_property
     def zones(self) -> dict[str, PostureMargins]:
-        """The posture prepared for problem (21), the margin, by quantity."""
+        """The posture prepared for margins, problem (21), by name of the margin."""
         if not self.margins:
             return {}
         return {k: prepare_margins(self.posture, r) for k, r in MARGINS.items()}
@@ -202,7 +202,7 @@ class Experiment:
     def _bolted(
         self, values: NDArray, draws: NDArray
     ) -> list[tuple[NDArray, NDArray, NDArray]]:
-        """Return results as :meth:`_without_stress`; NaN for a draw without a bolt."""
+        """Return :meth:`_without_stress`; NaN for draws that cannot be bolted."""
         try:
             return [self._without_stress(values, draws)]
         except CannotBolt:
@@ -265,7 +265,7 @@ class Experiment:
 def precision_for(
     limits: Mapping[str, float], share: float = _PRECISION
 ) -> tuple[float, float]:
-    """Return the precision of pose errors that is sufficient to check limits on them.
+    """Return the precision of pose errors that suffices to check their limits.
 
     Args:
         limits: limits by quantity.

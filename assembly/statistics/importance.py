@@ -7,8 +7,7 @@ result is linear in the errors, both indices equal ``a_i^2 var_i / sum_j a_j^2 v
 
 A draw without a solution is counted and discarded, together with the draws that are
 compared with it.  The errors of the remaining draws are then no longer independent.
-If more than a small share is discarded, the result is therefore a reason instead of
-indices.
+If too many draws are discarded, no indices are reported, but the reason why.
 
 Sources:
     Saltelli et al. (2010), Variance based sensitivity analysis of model output, table 2

@@ -1,4 +1,4 @@
-"""Fits of joints: the frames whose clearance a fit determines."""
+"""Fits of joints: which frame's clearance each fit determines."""
 
 from dataclasses import dataclass, replace
 

@@ -1,13 +1,13 @@
-"""Tolerances of locally least cost for nonconvex limits, by sequential programming.
+"""Tolerances of locally least cost for limits on nonconvex quantities.
 
 Wrenches, stress and pose errors are not convex in the errors, and a yield is not convex
-in the tolerances.  However, the derivatives of the worst samples with respect to every
-error are known, and so are their derivatives with respect to every tolerance.  A convex
-programme with these linearised limits, within a trust region around the present
-tolerances, computes a trial point.  The trial point is scaled uniformly until the
-samples just meet the limits again.  The trial point is accepted if its cost is smaller;
-otherwise the trust region is reduced.  The cost therefore never increases.  The result
-is a local minimum; a global minimum is not proved.
+in the tolerances.  However, the derivatives of the limited quantities with respect to
+every error and every tolerance are known for the worst samples.  They linearise the
+limits.  A convex programme with the linearised limits computes a trial point within a
+trust region around the present tolerances.  The trial point is scaled uniformly until
+the samples just meet the limits again.  The trial point is accepted if its cost is
+smaller; otherwise the trust region is reduced.  The cost therefore never increases.
+The result is a local minimum; a global minimum is not proved.
 
 For a yield below 1, the linearised limit is the mean over the samples closest to the
 limit, which is the derivative of the quantile.  For a yield of 1, each of the worst

@@ -104,7 +104,7 @@ class LinearResponse:
             self.posture, self.load, gravity=self.gravity, errors=errors
         )
         if found.joints.cones.shape[1] < self.starts[-1]:
-            return found.in_columns(self.joints)  # here motion limits are cones
+            return found.in_columns(self.joints)  # these columns include motion limits
         return found
 
 

@@ -1,4 +1,4 @@
-"""Quantities of perfect parts: the effect of clearances and loads without errors.
+"""Margins, energy and pose errors at zero errors: effect of clearances and loads.
 
 If a robot without errors exceeds a limit, no tolerance can meet this limit.  In the
 worst clearance model, the clearance of each joint contributes a part to the largest
@@ -106,14 +106,14 @@ def _clearance_kinds(prepared: LinearResponse) -> list[str]:
 
 
 def stored_perfect_parts(experiment: Experiment) -> str:
-    """Return the quantities of perfect parts as text, for a data set's attribute."""
+    """Return the results at zero errors as JSON text, for a data set attribute."""
     return json.dumps(perfect_parts(experiment))
 
 
 def limits_broken(
     parts: Mapping[str, Any], limits: Mapping[str, float]
 ) -> dict[str, Any]:
-    """Return the limits that perfect parts exceed.
+    """Return the limits that a robot of perfect parts (zero errors) exceeds.
 
     Args:
         parts: result of :func:`perfect_parts`.
@@ -155,7 +155,7 @@ def _size_text(one: Mapping[str, Any]) -> str:
 
 
 def _of_text(one: Mapping[str, Any]) -> str:
-    """Return the two largest contributions of clearances as text in brackets."""
+    """Return the two clearances that contribute most as text in brackets."""
     parts = list(one.get("clearances", {}).items())[:2]
     if not parts:
         return ""

@@ -1,4 +1,4 @@
-"""Summary tiles: the error or clearance that dominates a result."""
+"""Report tiles that name the error or clearance with the largest effect."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -1,4 +1,4 @@
-"""Tolerance files: classes of errors, their costs, and the limits to be met.
+"""Reading tolerance files: classes of errors, their costs, and limits on results.
 
 The format is described in ``docs/tolerances.md``.
 """

@@ -67,7 +67,7 @@ def worst_corner(
     """
     signs = corners.copy()
     if isinstance(prepared, LinearResponse):
-        # where clearances close an error completely, the energy has zero derivative
+        # if clearances compensate an error completely, the energy has zero derivative
         signs = np.vstack([
             signs,
             _worst_without_clearance(prepared, sources, tolerances, signs),

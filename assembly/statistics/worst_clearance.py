@@ -59,7 +59,7 @@ def bound_worst_errors(
     else:
         for i in solved.tolist():
             bounds[i], screws[i] = _under_load(draws, i, precision)
-    # solutions of (22) may differ by the square root of their duality gap
+    # two solutions of problem (22) differ by up to the square root of their duality gap
     least = np.stack([
         np.linalg.norm(draws.platform_screw[:, part], axis=1)
         for part in (slice(0, 3), slice(3, 6))

@@ -86,7 +86,7 @@ def _linear_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
         unit[:, i] = 1.0
         moved = settle(machine, with_adjustment(machine, state, step, unit))
         slopes[:, i] = (_to_vanish(machine, moved, step) - value)[0]
-    # of equally good changes take the least, with lengths in reference lengths
+    # among equally good changes take the smallest, lengths in reference lengths
     unit = 1 / machine.scale[rows_of(step.components)]
     return -value @ np.linalg.pinv(slopes * unit).T * unit
 
@@ -102,7 +102,7 @@ def _best_local_adjustment(machine: Machine, state: State, step: Adjust) -> NDAr
 
 
 def _with_pressed_clearances(machine: Machine, state: State) -> tuple[Machine, State]:
-    """Return the machine with each clearance as an error of its present value."""
+    """Return the machine with its present clearances as fixed geometric errors."""
     moved, joints = state.found.clearances @ machine.cones.T, machine.joints
     fixed = replace(joints, cones=joints.cones[:, :0], group=joints.group[:0])
     found = replace(state.found, clearances=state.found.clearances[:, :0])
@@ -167,7 +167,7 @@ def _check_not_bolted(machine: Machine, state: State, step: Adjust) -> None:
 
 
 def _closing_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
-    """Return the change for which closing a closure needs the least energy.
+    """Return the adjustment with which closing a loop needs the least energy.
 
     The changes are treated as free motions of the closed machine, whose energy is
     convex in the changes and the clearances together.  If several changes are equally
@@ -202,7 +202,7 @@ def _least_change(machine: Machine, state: State, count: int) -> NDArray:
 
 
 def _to_vanish(machine: Machine, state: State, step: Adjust) -> NDArray:
-    """Return what an adjustment minimises: a reading, or the strains of a closure."""
+    """Return the minimised quantities: a reading, or the strains of a closure."""
     part = step.reading.part
     if isinstance(part, str):
         return reading_of(machine, state, step.reading)

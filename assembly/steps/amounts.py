@@ -1,7 +1,7 @@
 """Simultaneous optimisation of all adjustments of a plan for one objective.
 
-Each adjustment by itself minimises its own reading.  From these changes, the
-Gauss-Newton method continues with finite differences of the whole plan. All trial
+The search starts from the changes with which each adjustment minimises its own reading.
+The Gauss-Newton method then uses finite differences of the whole plan. All trial
 changes are carried out together, as machines that differ in their adjustments.  A
 change is accepted only if the objective decreases, so the result is at least as good as
 the changes that minimise the readings. The result is a local minimum.
@@ -20,9 +20,7 @@ from forcefit.assembly.steps.run import StepResult, carry_out
 from forcefit.assembly.steps.state import State
 
 _STEP = 1e-7  # [rad, reference lengths] step of the finite differences
-_FLAT = (
-    1e-6  # slopes below this share of the steepest one are errors of the differences
-)
+_FLAT = 1e-6  # slopes below this share of the steepest one are finite-difference errors
 _MOST_STEPS, _SHARES = (
     20,
     0.5 ** np.arange(8),

@@ -225,7 +225,7 @@ def _loose(frame: Frame) -> Frame:
 
 
 def refuse_bolted(robot: Robot, what: str) -> None:
-    """Reject a robot with bolted joints where errors must act linearly.
+    """Reject a robot with bolted joints in computations that are linear in the errors.
 
     Args:
         robot: any robot.
@@ -244,7 +244,7 @@ def refuse_bolted(robot: Robot, what: str) -> None:
 
 
 def loose_over_poses(robot: Robot) -> list[str]:
-    """Return a remark on fixed joints that have loose clearance at every pose.
+    """Return a remark on fixed joints whose clearance is not bolted at any pose.
 
     Args:
         robot: robot that is solved at several poses.

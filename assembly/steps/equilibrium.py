@@ -34,8 +34,8 @@ from forcefit.assembly.solvers.many_programmes import (
 
 _OPEN = 1e-12  # [rad, reference lengths] closure error that counts as rounding
 _ROUNDING = 1e-14  # rounding error relative to the largest right side
-_SOLVED = 1e-11  # strains below this share of their terms are the solver's error
-_DRIVEN = 1e-8  # share of a load along a free motion that counts as rounding
+_SOLVED = 1e-11  # strains below this share of their summands are errors of the solver
+_DRIVEN = 1e-8  # a smaller share of a load along a free motion counts as rounding
 
 
 class Held(NamedTuple):
@@ -102,7 +102,7 @@ class Equilibrium:
 
 
 class _Split(NamedTuple):
-    """Rows split into those with springs and those without."""
+    """Closure rows, split into rows with springs and rows without springs."""
 
     basis: NDArray
     values: NDArray
@@ -152,7 +152,7 @@ def equilibrium(
 
 
 def without_idle_weight(movable: Movable, weight: NDArray, rows: NDArray) -> Movable:
-    """Return the loads without the weight along motions that nothing resists.
+    """Return the loads less the weight along motions that nothing resists.
 
     Args:
         movable: columns that may move, and the loads on them.

@@ -1,6 +1,6 @@
 """Whether the order of the joins changes the assembled machine.
 
-A join that is bolted "as it lies" locks in the opening G_k x that it finds.  The set S
+A join that is bolted "as it lies" locks in the present opening G_k x.  The set S
 of earlier joins has changed this opening by A_kS lambda_S + B_k q, where
 
 ======  ======================  =====================================================
@@ -67,7 +67,7 @@ def why_order_matters(plan: Plan) -> str:
 
 
 def depends_on_state(step: Step) -> bool:
-    """Return whether a step locks in a position that it finds.
+    """Return whether a step locks in the position in which it finds a part.
 
     Args:
         step: any step.
@@ -124,7 +124,7 @@ def _moving_alone(moved: list[NDArray], j: int) -> NDArray:
 
 
 def _carried(motions: NDArray) -> NDArray:
-    """Return the projector on wrenches that do no work on a part's own motions."""
+    """Return the projector on wrenches that do no work on one part's free motions."""
     return np.eye(len(motions)) - motions @ np.linalg.pinv(motions, rcond=_ZERO)
 
 

@@ -1,4 +1,4 @@
-"""A robot at a posture as arrays: columns that move, rows of closures and frames."""
+"""A robot at a posture as arrays: columns of motions, rows of closures and frames."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

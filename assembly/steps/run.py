@@ -217,7 +217,7 @@ def _share(linear: bool, limit: float, needed: NDArray, force: Callable) -> NDAr
     """Return the shares (k,) of the openings that a limited force can close."""
     share = np.minimum(1.0, limit / np.maximum(needed, 1e-300))
     if linear:
-        return share  # the force is proportional to the share
+        return share  # the closing force is proportional to the closed share
     low, high = np.zeros_like(needed), np.ones_like(needed)
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
@@ -254,7 +254,7 @@ def _wrenches(machine: Machine, state: State) -> dict[str, NDArray]:
 def _told(
     machine: Machine, before: State, after: State, result: StepResult
 ) -> tuple[State, StepResult]:
-    """Return the state after a step, and its result completed by energies."""
+    """Return the state after a step, and the step's result with its energies."""
     step = result.step
     kept = [after.loads[name] for name in after.loads if name in before.loads]
     load_work = machine.work(kept, after) - machine.work(kept, before)

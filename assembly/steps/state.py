@@ -141,7 +141,7 @@ def settle(machine: Machine, state: State) -> State:
 
 
 def _blocks(blocks: list[NDArray], count: int) -> NDArray:
-    """Return the springs of all fixtures as a block matrix on the rows of all holds."""
+    """Return the block matrix of all fixture springs by the rows of all holds."""
     columns = np.zeros((count, sum(block.shape[1] for block in blocks)))
     row = column = 0
     for block in blocks:

@@ -54,8 +54,8 @@ def cluster_solver(
         workers: number of processes of a local cluster to start; None if
             ``scheduler`` is given.
         scheduler: address of a running cluster, such as ``tcp://10.0.0.1:8786``.
-        report: function called at the end with a line on the number and median duration
-            of the tasks.
+        report: function called at the end with a line of text: the number of tasks
+            and their median duration.
 
     Returns:
         The solver, which connects to the cluster or starts it when it is first used.
@@ -239,7 +239,7 @@ def solve_task(
 
 @lru_cache(maxsize=4)
 def _question(content: bytes, digest: str) -> Question:
-    """Return the unpickled quantities, cached because robots are cached by identity."""
+    """Return the unpickled quantities; a cache keeps one robot object per worker."""
     asked: Question = pickle.loads(content)
     question = replace(asked, robot=solve_links(asked.robot))
     if question_hash(question) != digest:

@@ -43,7 +43,7 @@ _OLD_NAMES = {
     "play_mixed": "clearance_mixed",
 }
 _OLD_ATTRIBUTES = {"play": "clearance", "reading": "assumption"}
-# number of blocks per write; a write takes as long as solving a hundred points
+# number of blocks per write; one write lasts as long as solving a hundred points
 _TOGETHER = 256
 
 
@@ -251,7 +251,7 @@ def check_dataset(path: Path | str, what: str) -> None:
 
 
 def _is(path: Path, what: str) -> bool:
-    """Return whether the attributes of a file mark it as the given kind."""
+    """Return whether a file's attributes mark it as a file of the given kind."""
     import h5py
 
     try:

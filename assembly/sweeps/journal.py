@@ -4,9 +4,8 @@ The file begins with one line of JSON that identifies the sweep, and its check s
 Records follow. Each record is appended by one write and contains the number of a block,
 the length and a check sum, then the block's rows and texts.  Each check sum continues
 the check sum of the first line, so every record identifies its sweep.  A record with a
-wrong check sum is ignored, for example a damaged one or a last record that an
-interruption cut.  Records may be in any order and may occur twice.  Only one program at
-a time can lock the file.
+wrong check sum is ignored: it is damaged, or an interruption cut it short.  Records may
+be in any order and may occur twice.  Only one program at a time can lock the file.
 """
 
 import json
@@ -147,8 +146,8 @@ def open_journal(
             held.enter_context(locked_file(path, wait=False))
         except BlockingIOError:
             raise BadInput(
-                f"{path}: another run holds this journal; expected to be the only one "
-                "that writes this file (wait for it, or write to another file)"
+                f"{path}: another run holds this journal; expected no other run "
+                "that writes the same file (wait for its end, or write to another file)"
             ) from None
         except OSError as error:
             raise BadInput(unwritable(path, error)) from None
@@ -157,7 +156,7 @@ def open_journal(
 
 
 def _recover(path: Path, header: bytes, owner: int) -> dict[int, tuple[int, int]]:
-    """Return the places of finished blocks; repair the first line and a cut end."""
+    """Return the places of finished blocks; repair the file's first line and end."""
     try:
         with path.open("r+b") as file:
             size = os.fstat(file.fileno()).st_size
@@ -225,7 +224,7 @@ def _difference(first_line: bytes, header: bytes) -> str:
         )
     other = json.loads(line)
     keys = [k for k in expected if other.get(k) != expected[k]]
-    # omit the hash of the complete input if another line names the part that differs
+    # omit the hash of the whole input if another line names the differing part
     keys = [k for k in keys if k != "question_sha256"] or keys
     theirs = ", ".join(f"{k} {str(other.get(k))[:60]!r}" for k in keys)
     wanted = ", ".join(f"{k} {str(expected[k])[:60]!r}" for k in keys)

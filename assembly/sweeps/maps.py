@@ -37,8 +37,8 @@ def figure_of(
             figure 5.
 
     Returns:
-        A figure with one panel per quantity, by default six.  Only a notebook shows it,
-        if it is the result of a cell.
+        A figure with one panel per quantity, by default six.  It is not shown, except
+        by a notebook where it is the result of a cell.
 
     Raises:
         BadInput: an axis or a quantity is unknown, or more than two axes remain.
@@ -129,7 +129,7 @@ def _number(name: str, value: float | str) -> float:
 
 
 def _median(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Return the median over the draws, and the first status that is not ok."""
+    """Return each point's median over the draws, and its first status except ok."""
     numbers = [k for k, v in data.data_vars.items() if v.dtype.kind == "f"]
     middle = data[numbers].median("draw", skipna=True)
     first = data.isel(draw=0, drop=True)
@@ -146,7 +146,7 @@ def _median(data: "xarray.Dataset") -> "xarray.Dataset":
 
 
 def _squeezed(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Return the data set without those axes of the points that have one value."""
+    """Return the data set without axes that have only one value."""
     single = [d for d in data["status"].dims if data.sizes[d] == 1]
     return data.squeeze(single, drop=True)
 

@@ -43,7 +43,7 @@ class Sweep:
     def __post_init__(self) -> None:
         if self.size > LARGEST_GRID:
             raise BadInput(
-                f"sweep: {self.size} points; expected at most {LARGEST_GRID}"
+                f"sweep: found {self.size} points, expected at most {LARGEST_GRID}"
             )
 
     @property

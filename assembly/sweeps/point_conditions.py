@@ -40,7 +40,6 @@ def point_conditions(
 
     Returns:
         Conditions with k rows.
-        k rows of conditions.
     """
     many = Posture(
         robot.without_effects(),

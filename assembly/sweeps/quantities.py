@@ -23,7 +23,7 @@ BY_CLEARANCE = ("rotation_error_clearance", "translation_error_clearance")
 FINITE = ("linearisation_rotation", "linearisation_translation", "linearisation_energy")
 STRESS = ("stress", "stress_error", "safety")
 
-_READING = ("registration", "drift")  # effects that change readings but not screws
+_READING = ("registration", "drift")  # effects on measured readings only
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,7 @@ class Question:
 
     @property
     def reads_otherwise(self) -> bool:
-        """Whether a measuring device reads something other than the screw."""
+        """Whether an effect makes the measured pose differ from the platform screw."""
         robot = self.robot
         effects = [robot.effects, *robot.session_effects.values()]
         return any(name in every for every in effects for name in _READING) or any(

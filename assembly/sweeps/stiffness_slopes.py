@@ -21,7 +21,7 @@ _AS_ERROR = {"translation": "t", "rotation": "r"}
 
 
 class CannotChange(BadInput):
-    """A number cannot change by itself, because no robot exists for other values."""
+    """A design number cannot be varied, because no robot exists for other values."""
 
 
 def stiffness_slopes(
