@@ -233,7 +233,7 @@ def _face_within(callout: Callout, width: float) -> Zone:
 
 
 def _away(shape: str, offset: NDArray, datum_axis: NDArray | None) -> NDArray:
-    """Return the offset (3,) to which a length refers: across axes, along normals."""
+    """Return the offset (3,) that a length limits: normal to an axis or a plane."""
     if shape == "plane":
         return np.array([0.0, 0.0, offset[2]])
     if datum_axis is not None and np.linalg.norm(datum_axis[:2]) < _ALONG:

@@ -12,7 +12,7 @@ import numpy as np
 
 from forcefit.inputs.table import BadInput, quoted
 
-# [mm] largest length of each column; the first column begins above 0.5
+# [mm] largest length of each table column; the first column begins above 0.5
 LENGTHS = (3, 6, 30, 120, 400, 1000, 2000, 4000)
 # [mm] tolerance to each side; nan where the class has no value
 LINEAR = {

@@ -48,7 +48,7 @@ def product_by_bounds(
     length = float(np.linalg.norm(w))
     if length == 0.0:
         return np.zeros_like(w), 0.0, np.zeros(len(bounds) + len(cones))
-    # the value attained along w itself is the unit of all other values
+    # all other values are divided by the value that is attained along w itself
     reached = 1.0 / max(_largest_gauge(w, bounds, cones), 1e-300)
     unit = length * length * reached
     w = w / unit
@@ -59,7 +59,7 @@ def product_by_bounds(
     of_bounds = [float(part.sum()) for part in np.split(start, ends)]
     while best > (1 + _GAP) * max(float(w @ x), 0.0) and mu > _LEAST_MU:
         centre = _centre(w, bounds, cones, x, mu)
-        if centre is None:  # rounding errors: keep the value certified so far
+        if centre is None:  # rounding errors: keep the bound that is certified so far
             break
         x, multipliers = centre
         # the smallest change of the multipliers that balances w exactly

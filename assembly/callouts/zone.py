@@ -27,7 +27,7 @@ from forcefit.assembly.callouts.unit_balls import VOLUMES, ball_variance, in_bal
 
 DISTRIBUTIONS = ("uniform", "normal", "truncated")
 _SAMPLE = 1 << 17  # number of draws for the covariance of a zone without closed form
-_RANK = 1e-9  # smallest over largest singular value of independent bounds
+_RANK = 1e-9  # least accepted singular value of independent bounds, over the largest
 _MOST_ATTEMPTS = 10_000  # largest number of draws for one part inside the zone
 Numbers = Callable[[int], NDArray]  # attempt -> (k, words) uniform numbers
 
@@ -97,7 +97,7 @@ class Zone:
 
     @property
     def words(self) -> int:
-        """Number of uniform numbers per draw: one per coordinate, then one for size."""
+        """Uniform random numbers per draw: one per coordinate, one for hole size."""
         return sum(self.dimensions) + self.grows
 
     def growth(self, size: NDArray) -> NDArray:
@@ -105,7 +105,7 @@ class Zone:
         return size if self.from_zero else 1.0 + self.bonus * size
 
     def inside(self, u: NDArray, grown: NDArray | float = 1.0) -> NDArray:
-        """Return (k,) bool: whether coordinates (k, m) are in the scaled zone."""
+        """Return (k,) bool, True for coordinates (k, m) inside the scaled zone."""
         limits = [(part, grown) for part in self._balls(u)]
         limits += [(u @ cut.T, 1.0) for cut in self.cuts]
         marks = [np.linalg.norm(x, axis=-1) <= g * (1 + 1e-12) for x, g in limits]
@@ -205,7 +205,7 @@ class Zone:
         return u, self.inside(u, grown)
 
     def _in_balls(self, uniform: NDArray, distribution: str, s: float) -> NDArray:
-        """Return coordinates (k, m) in the unit balls, before the cuts."""
+        """Return coordinates (k, m) in the unit balls, before parts are rejected."""
         return in_balls(uniform, self.dimensions, distribution, s)
 
     @cached_property

@@ -124,7 +124,7 @@ def guide(
         Two chains, which roll about two opposite edges of the block.
     """
     edge = np.array([width / 2, height / 2, 0.0])
-    # the bounds limit the roll to half of the bound of the first chain
+    # the gaps limit the roll of the block to half of the bound that the chains have
     c_x, c_y = largest or gaps
     most = 2 * min(2 * c_y / width, 2 * c_x / height)
     rolls = Clearance(spin=most), Clearance(spin=np.inf, axial=np.inf)

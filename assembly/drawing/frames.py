@@ -37,7 +37,7 @@ class _Plan:
         drawing: bodies and joints.
         joints: joints of the drawing by name.
         bodies: bodies of the drawing by name.
-        own: name of the frame of each body that has one, by node.
+        own: by node, the name of the frame of each body that has its own frame.
         carriers: name of the frame that carries the objects on a node.
         links: name of the frame of a body's link, if it differs from the body's frame.
         ends: name of the last frame of an edge that closes a loop.

@@ -176,7 +176,7 @@ def _several(posture: Posture, rows: list[int]) -> tuple[DrawnJoint, list[int]] 
     kind, R, numbers = found
     name = _common_name(posture.robot, rows)
     if R is not axes[0] and kind == "spherical":
-        rows = rows[::-1]  # the contact remains on the body that has it
+        rows = rows[::-1]  # the contact remains on its body
     second = R[:, 0] if kind != "universal" else z[1]
     joint = DrawnJoint(
         name, kind, "", "", posture.transforms[rows[0]][:3, 3], R[:, 2],

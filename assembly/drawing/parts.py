@@ -187,7 +187,8 @@ def _shares(joint: DrawnJoint) -> list[JointNumbers]:
     if joint.kind == "spherical":
         return [own, JointNumbers(), JointNumbers()]
     if joint.kind == "planar":
-        # the error places the plane before the sliding; the contact is at the rotation
+        # the error moves the plane and precedes the sliding; the rotation has the
+        # contact
         placed = JointNumbers(error=_from_axes(own.error), tolerance=_size(own))
         contact = replace(own, error=np.zeros(6), tolerance=None)
         return [placed, JointNumbers(), contact]

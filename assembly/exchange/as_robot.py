@@ -274,7 +274,7 @@ def mechanism_of_robot(robot: Robot, home: NDArray) -> RobotAndMechanism:
 
 
 def _unlike(name: str, taken: set[str]) -> str:
-    """Return the name, lengthened until it is unique."""
+    """Return the name with a suffix that makes it unique."""
     while name in taken:
         name += "_"
     return name

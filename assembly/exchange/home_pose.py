@@ -17,11 +17,11 @@ from forcefit.inputs.errors import BadInput, quoted
 from forcefit.stiffness.screws import rotation_vector, skew, transform
 
 CLOSED = 1e-10  # [rad, m] largest mismatch of a loop that counts as closed
-_SCREWED_TIGHT = 1e-14  # scaled residual below which only rounding errors remain
+_SCREWED_TIGHT = 1e-14  # scaled loop mismatch below which only rounding errors remain
 _STARTS = 20  # number of random starts, at increasing distance from the file's home
 _STARTS_ALONE = 12  # number of starts for a single loop, to find one that cannot close
-_STEPS = 200  # largest number of steps from a start
-_LONGEST_STEP = 0.3  # [rad or lengths] largest step
+_STEPS = 200  # largest number of search steps from one start
+_LONGEST_STEP = 0.3  # [rad or lengths] largest search step
 # ratio of the sums of squares over ten steps above which a search counts as stalled
 _STALLED = 0.999
 

@@ -71,7 +71,8 @@ class _Reading:
     parts: dict[str, list[str]] = field(default_factory=dict)
     sites: dict[str, tuple[str, NDArray]] = field(default_factory=dict)
     extra: dict[str, list[str]] = field(default_factory=dict)
-    coordinates: dict[str, str] = field(default_factory=dict)  # kinds, in order of qpos
+    # kind of each joint, in the order of MuJoCo's coordinates qpos
+    coordinates: dict[str, str] = field(default_factory=dict)
     number: int = 0  # number of bodies so far
     unweighed: list[str] = field(default_factory=list)
 
@@ -123,7 +124,7 @@ def read_mjcf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
     free = [name for name, kind in reading.coordinates.items() if kind == "free"]
     floating = counted("free joints that no loop ties to the ground", free)
     unweighed = tuple(reading.unweighed)
-    if unweighed and reading.rules.total > 0:  # scaling would need all masses
+    if unweighed and reading.rules.total > 0:  # scaling requires all masses
         unweighed = tuple(name for name in reading.bodies if name != WORLD)
     mechanism = replace(
         mechanism, joints=joints, loops=closed, left_out=left_out, couplings=couplings,
@@ -170,7 +171,7 @@ def _filled(node: Node, childclass: str, reading: _Reading) -> Node:
     name = node.text("class", childclass)
     if name not in reading.defaults:
         hint = nearest(name, reading.defaults)
-        raise node.bad("class", f"found {quoted(name)}, no default class{hint}")
+        raise node.bad("class", f"found {quoted(name)}, expected a default class{hint}")
     given = {**reading.defaults[name].get(node.tag, {}), **node.element.attrib}
     element = type(node.element)(node.element.tag, given)
     element.extend(list(node.element))

@@ -26,7 +26,8 @@ from forcefit.assembly.model.inertia import (
 )
 
 _SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
-# [kg, kg m^2] smaller lower bounds only let massless bodies move in MuJoCo
+# [kg, kg m^2] smaller lower bounds are ignored: files set them only so that MuJoCo
+# accepts massless bodies
 _REGULAR, _REGULAR_INERTIA = 1e-6, 1e-9
 _KINDS = (*_SIZES, "plane", "hfield", "mesh", "sdf")
 

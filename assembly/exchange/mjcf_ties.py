@@ -81,7 +81,10 @@ class Ties:
             if node.tag in {"tendon", "joint"}:
                 continue
             if node.tag not in {"connect", "weld"}:
-                raise node.bad("", "found it, expected connect, weld, joint or tendon")
+                raise node.bad(
+                    "",
+                    "found another constraint, expected connect, weld, joint or tendon",
+                )
             name = node.optional("name") or f"loop{count}"
             if name in names:
                 raise node.bad("name", "found this name twice; expected unique names")
@@ -168,7 +171,7 @@ class Ties:
                 if name not in self.parts:
                     hint = nearest(name, self.parts)
                     raise self.root.bad(
-                        "actuator", f"found {quoted(name)}, no joint{hint}"
+                        "actuator", f"found {quoted(name)}, expected a joint{hint}"
                     )
                 names.add(name)
         return names

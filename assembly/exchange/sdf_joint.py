@@ -218,7 +218,9 @@ def _part(mimic: Node, parts: list[str], tag: str) -> str:
     for part in parts:
         if part.endswith(ends):
             return part
-    raise mimic.bad("axis", f"found {quoted(tag)}, no axis of {quoted(parts[0])}")
+    raise mimic.bad(
+        "axis", f"found {quoted(tag)}, expected an axis of {quoted(parts[0])}"
+    )
 
 
 def _number(node: Node, key: str, default: float) -> float:

@@ -78,7 +78,7 @@ class BeamLoad:
     m: NDArray
 
     def rows(self, which: NDArray) -> "BeamLoad":
-        """Return the load at selected points."""
+        """Return the load at selected points of the path."""
         return replace(self, q0=self.q0[which], q1=self.q1[which], m=self.m[which])
 
     def at_tip(self) -> NDArray:
@@ -193,7 +193,7 @@ def beam_stress(frame: Frame, load: BeamLoad, tip: NDArray) -> NDArray:
 
     Args:
         frame: frame of the beam, which has a declared cross-section.
-        load: distributed load at k points.
+        load: distributed load at k points of the path.
         tip: (k, 6) [N m, N] wrench transmitted at the tip, in the frame's axes.
 
     Returns:

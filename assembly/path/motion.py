@@ -38,7 +38,8 @@ from forcefit.assembly.model.robot import Robot
 # relative size below which a singular value of closures and path counts as zero, as in
 # forcefit.assembly.kinematics.closure_rates
 _SINGULAR = 1e-6
-_NOISE = 30.0  # the same limit, as a multiple of the closures' nominal error
+# the limit of a zero singular value, as a multiple of the closures' nominal error
+_NOISE = 30.0
 _PRESCRIBED = 1e-4  # largest relative error of a prescribed velocity
 
 

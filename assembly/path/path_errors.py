@@ -43,16 +43,14 @@ if TYPE_CHECKING:
     import xarray
 
 _BLOCK = 2000  # number of points that are solved and stored together
-_BLOCK_OF_TANGENTS = (
-    100  # number of points per block if each point has its own tangent stiffness
-)
+_BLOCK_OF_TANGENTS = 100  # number of points per block with tangents at each point
 # results that also exist at points without a solution
 _GEOMETRIC = {
     "coordinates", "rates", "second_rates", "platform", "platform_velocity",
     "platform_acceleration", "compliance",
 }  # fmt: skip
 Progress = Callable[[int, int], None]
-# function: number of a block's first point -> arrays of the block
+# function that returns the arrays of the block that begins at a given point
 Recall = Callable[..., tuple[NDArray, ...]]
 
 

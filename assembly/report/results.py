@@ -53,7 +53,7 @@ _UNSTABLE = (
 
 
 def zone_of(posture: Posture) -> dict[str, Any]:
-    """Return the margins of (21), with compliant joints rigid and free, as values."""
+    """Return the margins, problem (21), for rigid and for free compliant joints."""
     rigid, free = zone_margin(posture, "rigid"), zone_margin(posture, "free")
     unproved_parts = "; ".join(filter(None, (rigid.unproved, free.unproved)))
     return {
@@ -142,7 +142,7 @@ def solution_of(
 
 
 def proof_status(reason: str) -> dict[str, str]:
-    """Return status and reason of a solution with an incomplete proof, or nothing."""
+    """Return status and reason if a certificate is incomplete; otherwise empty."""
     return {"status": NOT_PROVED, "reason": reason} if reason else {}
 
 
@@ -328,7 +328,7 @@ def status_line(results: dict[str, Any]) -> str:
 
 
 def worst(assembly: Assembly) -> dict[str, Any] | None:
-    """Return certified bounds of the largest pose error, assumption ``frozen`` of (27).
+    """Return certified bounds of the largest pose error for the assumption ``frozen``.
 
     Args:
         assembly: the least-energy solution.

@@ -64,7 +64,9 @@ def show(
         interactive = in_notebook()
     if errors is not None and not isinstance(thing, Assembly):
         kind = type(thing).__name__
-        raise BadInput(f"show: found errors of a {kind}, expected of an Assembly")
+        raise BadInput(
+            f"show: found errors of a {kind}, expected errors of an Assembly"
+        )
     if isinstance(thing, PlatformStiffness):
         return _shares(thing, interactive)
     spec, name, caption = _scene(thing, errors, assumption)
@@ -89,7 +91,7 @@ def _scene(
     many = isinstance(thing, Assembly) and thing.of_many
     if many or posture.transforms.ndim > 3:
         kind = type(thing).__name__
-        raise BadInput(f"show: found {kind} of many points, expected one of them")
+        raise BadInput(f"show: found {kind} of many points, expected a single point")
     if isinstance(thing, Posture):
         return nominal_scene(thing), thing.robot.name, _NOMINAL
     body, caption = None, _FORCED

@@ -236,7 +236,7 @@ def _length(end: FittedEnd | None) -> list[float]:
 
 
 def _nth(uniforms: Callable[[int], list[NDArray]], i: int) -> Callable[[int], NDArray]:
-    """Return a function: attempt number -> uniform random numbers of callout i."""
+    """Return a function that maps an attempt to callout i's random numbers."""
     return lambda attempt: uniforms(attempt)[i]
 
 

@@ -98,7 +98,8 @@ def cpk_interval_one_sided(
     """Return the exact interval of Cpk for one limit (noncentral t distribution)."""
     from scipy.optimize import brentq
 
-    # 3 sqrt(n) Cpk of the sample is a noncentral t with 3 sqrt(n) times the true one
+    # 3 sqrt(n) Cpk of a sample has a noncentral t distribution, whose noncentrality is
+    # 3 sqrt(n) times the true Cpk
     t, root = 3 * np.sqrt(n) * cpk, 3 * np.sqrt(n)
     low, high = cpk_interval(cpk, n, 1 - (1 - level) / 100)
 

@@ -9,7 +9,7 @@ worst    any position; the largest pose errors are computed, see
          :mod:`forcefit.assembly.statistics.worst_clearance`
 uniform  uniformly distributed over the set (billiard walk)
 contact  displaced by a wrench of random direction on the platform until in contact
-least    the position in the solution of (22), one of many possible ones
+least    the position in the least-energy solution, one of many possible ones
 ======== =====================================================================
 
 The contact model requires a length that relates moments to forces: random moments
@@ -145,7 +145,7 @@ def _at_random(
 
     free = ~loaded
     rows = clearance_constraints(prepared, loaded)[:, free]
-    # null space of the rows, which are orthonormal
+    # null space of the closure equations, whose rows are orthonormal
     Z = np.ascontiguousarray(np.linalg.svd(rows)[2][len(rows) :].T)
     to_screw = np.ascontiguousarray(prepared.screws[:, : len(free)][:, free])
     starts, mixed = free_starts(prepared, free), np.ones(len(clearances), dtype=bool)
@@ -207,7 +207,8 @@ def loaded_clearances(prepared: LinearResponse, draws: Assembly) -> NDArray:
         forces += prepared.loads.joint @ prepared.joints.cones
     force_sizes = _sizes(forces, prepared.starts)
     slack = np.maximum(0.0, 1.0 - _sizes(draws.clearances, prepared.starts))
-    # force times slack is about the solver's gap, so one of the two is nearly zero
+    # the product of contact force and slack is about the solver's duality gap, so force
+    # or slack is nearly zero
     scale = np.maximum(draws.energy, 1e-18)[:, None]
     loaded = (force_sizes > scale * slack) & (force_sizes > 1e-9 * scale)
     return np.repeat(loaded, np.diff(prepared.starts), axis=1)

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from forcefit.assembly.solvers.one_problem import farthest_points
 
-_PRECISION = 1e-9  # relative precision of the component in the given direction
+_PRECISION = 1e-9  # relative precision of the largest component in a direction
 
 
 def move_to_contact(

@@ -206,7 +206,7 @@ def zones_of_errors(sources: Sources) -> list[tuple[str, Zone, NDArray]]:
 
 
 def _intervals(sources: ErrorSources) -> list[tuple[str, Zone, NDArray]]:
-    """Return the intervals of independent errors, in units of their half widths."""
+    """Return interval zones of independent errors, in units of their half widths."""
     pairs = zip(sources.labels, _half_widths(sources), strict=True)
     return [(name, Zone((np.eye(6)[:1],)), np.array([width])) for name, width in pairs]
 

@@ -181,7 +181,7 @@ class Experiment:
             (k,) records of :attr:`record_type`; NaN and status 1 if there is no
             solution.  In the worst clearance model, rotation and translation are upper
             bounds of the largest errors. The platform screw is then the screw of the
-            solution of (22).
+            least-energy solution (22).
         """
         if not isinstance(self.sources, CalloutSources) or not self.sources.fits:
             parts = self._bolted(values, np.asarray(draws))

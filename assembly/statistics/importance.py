@@ -54,7 +54,7 @@ class Importance:
 
 @dataclass(frozen=True, eq=False)
 class SaltelliDesign:
-    """Saltelli's design: A, B, and A with the columns of each group taken from B.
+    """Saltelli's design: A, B, and for each group A with that group's columns of B.
 
     Attributes:
         A: (k, m) independent draws of the errors.

@@ -82,7 +82,7 @@ def importance_rows(
     """Return the records of a range of rows of a design.
 
     Random clearance positions would add variance that is not due to the errors, so the
-    positions in the solution of (22) are used instead.
+    positions in the least-energy solution (22) are used.
 
     Args:
         experiment: distributions and quantities.

@@ -35,16 +35,17 @@ _EXCEEDED = 1e-9  # relative excess from which a limit counts as exceeded
 
 
 def perfect_parts(experiment: Experiment) -> dict[str, Any]:
-    """Return the quantities of a robot without errors.
+    """Return the results of a robot without geometric errors.
 
     Args:
         experiment: posture, loads and clearance model.
 
     Returns:
-        By quantity: ``reached``; for random clearance models this is the median of 200
-        positions.  For pose errors of the worst model without loads also
-        ``clearances``: the part [rad or m] of each kind of clearance, largest first.
-        The dictionary is empty if the robot without errors has no solution.
+        By quantity: ``reached``, the value without errors; for random clearance models
+        this is the median of 200 positions.  For pose errors of the worst model without
+        loads also ``clearances``: the part [rad or m] of each kind of clearance,
+        largest first. The dictionary is empty if the robot without errors has no
+        solution.
     """
     random = experiment.clearance in {"uniform", "contact"}
     count = _DRAWS if random else 1
@@ -130,7 +131,7 @@ def limits_broken(
 
 
 def perfect_text(summary: Mapping[str, Any]) -> list[str]:
-    """Return lines of text on the values for perfect parts and on exceeded limits."""
+    """Return lines of text on the results without errors and on exceeded limits."""
     parts, lines = summary.get("perfect_parts", {}), []
     alone = {k: parts[k] for k in POSE_ERRORS if parts.get(k, {}).get("reached")}
     why = "clearances and loads alone" if summary.get("load") else "clearances alone"
@@ -148,7 +149,7 @@ def perfect_text(summary: Mapping[str, Any]) -> list[str]:
 
 
 def _size_text(one: Mapping[str, Any]) -> str:
-    """Return the value for perfect parts as text, with its unit."""
+    """Return a result without errors as text, with its unit."""
     if np.isinf(one["reached"]):
         return "without bound"
     return f"of {one['reached']:.4g} {one['unit']}"

@@ -288,7 +288,7 @@ class Requirement:
         return reached
 
     def _refuse_broken(self, reached: Mapping[str, tuple[float, str]]) -> None:
-        """Reject the limit that perfect parts exceed most, if any."""
+        """Reject the limit that a robot without errors exceeds most, if any."""
         limits = self.plan.limits
         for key in sorted(reached, key=lambda k: -reached[k][0] / limits[k]):
             value, where = reached[key]

@@ -50,7 +50,7 @@ def respond(
             :data:`forcefit.assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
             In the worst model, the value and its derivatives belong to the largest
             error found. For uniform and contact positions the derivatives belong to the
-            solution of (22).
+            least-energy solution (22).
         contact_length: [m] length of the contact model, see
             :class:`forcefit.assembly.statistics.experiment.Experiment`.
 
@@ -73,7 +73,7 @@ def respond(
         return draws.energy, -by_number(draws.wrenches)
     size = np.full(len(values), np.nan)
     slopes = np.full(errors.shape, np.nan)
-    # the active bounds of a draw are unknown if its clearances are unknown
+    # a draw without known clearances has no known active clearance bounds
     known = np.isfinite(draws.energy) & np.isfinite(draws.clearances).all(axis=1)
     solved = np.flatnonzero(known)
     if len(solved):

@@ -10,7 +10,7 @@ from forcefit.assembly.statistics.requirement import Requirement
 from forcefit.assembly.statistics.worst_case import CORNERS, random_corners
 from forcefit.inputs.table import BadInput
 
-_FINE = 1e-4  # precision of the largest utilisation, relative to the limits
+_FINE = 1e-4  # precision of the largest utilisation (value divided by limit)
 _MOST_TRIALS = 80
 
 

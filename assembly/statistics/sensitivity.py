@@ -27,7 +27,8 @@ from forcefit.assembly.statistics.linear_response import LinearResponse
 
 # forces below this share of the largest force on any clearance count as zero
 _ACTIVE = 1e-7
-# relative rank tolerance; no motion is assumed along undetermined directions
+# relative size below which a singular value counts as zero; clearances are assumed not
+# to move along such directions
 _RANK = 1e-10
 
 

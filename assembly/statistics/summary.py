@@ -174,7 +174,7 @@ def _yields(
 
 
 def _worst(data: "xarray.Dataset", key: str) -> NDArray:
-    """Return the values (k,) of a quantity, the largest of all links."""
+    """Return a quantity's (k,) values; for links, the largest over all links."""
     values = np.asarray(data[key].values, dtype=float)
     return values.max(axis=1) if values.ndim == 2 else values
 

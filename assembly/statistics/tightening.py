@@ -12,7 +12,7 @@ _NAMED = 3  # largest number of contributors named in a tile
 
 
 def tightening_tiles(summary: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles: values for perfect parts, main contributor, advice to tighten.
+    """Return tiles: results without errors, main contributor, advice to tighten.
 
     Args:
         summary: result of :func:`forcefit.assembly.statistics.summary.summarise`.
@@ -48,7 +48,7 @@ def tightening_tiles(summary: Mapping[str, Any]) -> list[Tile]:
 
 
 def _deciding(summary: Mapping[str, Any]) -> str:
-    """Return the quantity that is exceeded most often, or translation or energy."""
+    """Return the quantity whose limit is exceeded most often (default translation)."""
     exceeds = sorted(
         summary["exceeds"], key=lambda k: -summary["exceeds"][k]["probability"]
     )

@@ -124,8 +124,8 @@ def _with_callouts(
 class _Groups(NamedTuple):
     """Groups of errors with a common tolerance, from the tables ``[[tolerance]]``."""
 
-    of: dict[tuple[int, int], int]  # by frame and component
-    callouts: dict[int, int]  # by callout
+    of: dict[tuple[int, int], int]  # number of the class, by frame and component
+    callouts: dict[int, int]  # number of the class, by callout
     names: list[str]
     costs: list[float]
     least: list[float]

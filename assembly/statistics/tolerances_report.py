@@ -116,7 +116,7 @@ def _present_tiles(present: Mapping[str, Any]) -> list[Tile]:
 
 
 def _present_section(present: Mapping[str, Any]) -> str:
-    """Return the section on the shares of the present errors in the largest margin."""
+    """Return the section on each present error's share of the largest margin."""
     rows: list[list[Cell]] = [
         [one["error"], Value(one["value"], _error_unit(one["error"])),
          one["share_of_margin"]]

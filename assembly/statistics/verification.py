@@ -18,7 +18,7 @@ from forcefit.assembly.statistics.worst_case import (
 )
 
 _BATCH = 256  # number of draws between two progress reports
-_ROUNDING = 1e-9  # relative excess above a limit that counts as rounding
+_ROUNDING = 1e-9  # relative excess over a limit that counts as rounding error
 # largest number of verifications, and their joint confidence
 LOOKS, CONFIDENCE = 4, 0.95
 

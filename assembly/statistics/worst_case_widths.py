@@ -56,7 +56,7 @@ class _Case:
         return replace(self.sets, screws=self.sets.screws * factors)
 
     def worst(self, shares: NDArray) -> tuple[float, float, NDArray]:
-        """Return the value attained, its certified bound, and its direction (3,)."""
+        """Return the worst pose error found, its bound, and its direction (3,)."""
         half = 3 * POSE_ERRORS.index(self.key)
         (low, high), screw = farthest_screw(self.scaled(shares), half)
         direction = screw[half : half + 3]
@@ -170,7 +170,7 @@ def _plane(case: _Case, plan: Plan, shares: NDArray) -> list[NDArray]:
 
 def _factor(case: _Case, plan: Plan, shares: NDArray) -> float:
     """Return the factor on tolerances for which the certified bound meets the limit."""
-    # the worst case is convex in the factor, so the chord from zero lies above it
+    # the worst pose error is convex in the factor, so a chord from zero lies above it
     limit, high = plan.limits[case.key], case.worst(shares)[1]
     if high <= limit:
         return 1.0

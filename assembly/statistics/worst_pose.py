@@ -44,7 +44,8 @@ from forcefit.inputs.table import BadInput
 from forcefit.results.display import Figures, html_table, short_repr
 from forcefit.results.text import in_unit
 
-_TOLERANCE = 3e-4  # relative to the sum of the support functions along x, y and z
+# accepted difference of the bounds, relative to the support along x, y and z
+_TOLERANCE = 3e-4
 _STARTS = 24  # number of random corners from which the search starts
 _CLIMBS = 12  # largest number of steps from corner to corner
 
@@ -272,7 +273,7 @@ def _climb(
     scale = np.concatenate([unit for _, _, unit in own])
 
     def corners(slopes: NDArray) -> NDArray:
-        """Return the farthest errors for slopes (k, m), as numbers of the sources."""
+        """Return the errors (k, m) that maximise their product with slopes (k, m)."""
         u = np.zeros_like(slopes)
         for row, w in zip(u, slopes * scale, strict=True):
             for (_, zone, _), columns in zip(own, parts, strict=True):

@@ -30,11 +30,10 @@ from forcefit.assembly.steps.state import (
 )
 from forcefit.inputs.table import BadInput, quoted
 
-_MOST_STEPS, _HALVINGS = 30, 12  # Gauss-Newton steps, and halvings of each step
+_MOST_STEPS, _HALVINGS = 30, 12  # most Gauss-Newton steps, and most halvings of a step
 _STEP = 1e-7  # [rad, reference lengths] step of the finite differences
-_FLAT = (
-    1e-6  # slopes below this share of the steepest one are errors of the differences
-)
+# derivatives below this share of the largest one are finite-difference errors
+_FLAT = 1e-6
 _SETTLED = 1e-7  # relative reduction of the reading below which the search ends
 
 
@@ -189,7 +188,7 @@ def _closing_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray
 
 
 def _least_change(machine: Machine, state: State, count: int) -> NDArray:
-    """Return the last a motions (k, a), less what other free motions can replace."""
+    """Return the smallest values (k, a) of the last a motions with equal openings."""
     motions = machine.movable((), tuple(state.bolted.values()), 1)[2][:-count]
     rows = np.vstack([hold.rows for hold in state.holds.values()])
     changing, free = rows @ machine.free[:, -count:], rows @ machine.free[:, :-count]

@@ -20,12 +20,11 @@ from forcefit.assembly.steps.run import StepResult, carry_out
 from forcefit.assembly.steps.state import State
 
 _STEP = 1e-7  # [rad, reference lengths] step of the finite differences
-_FLAT = 1e-6  # slopes below this share of the steepest one are finite-difference errors
-_MOST_STEPS, _SHARES = (
-    20,
-    0.5 ** np.arange(8),
-)  # Gauss-Newton steps, and halvings of each step
-_SETTLED = 1e-7  # relative reduction below which the iteration ends
+# derivatives below this share of the largest one are finite-difference errors
+_FLAT = 1e-6
+# largest number of Gauss-Newton steps, and tried shares of each step
+_MOST_STEPS, _SHARES = 20, 0.5 ** np.arange(8)
+_SETTLED = 1e-7  # relative reduction of the objective below which the iteration ends
 
 # function from a number of machines to their state before the first step
 Start = Callable[[int], State]

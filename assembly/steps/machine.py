@@ -143,7 +143,7 @@ class Machine:
     def opening(
         self, errors: NDArray, found: Equilibrium, holds: Mapping[str, Any], hold: Any
     ) -> NDArray:
-        """Return the opening of rows that free motions cannot close.
+        """Return the part of an opening that free motions cannot close.
 
         Args:
             errors: (k, 6n) geometric errors.

@@ -46,7 +46,7 @@ from forcefit.assembly.steps.state import (
     without,
 )
 
-_ROUNDED = 1e-13  # energy differences below this share of the energies are rounding
+_ROUNDED = 1e-13  # smaller relative energy differences are rounding errors
 _HALVINGS = 50  # bisections of the share of an opening that a limited force closes
 
 
@@ -240,7 +240,7 @@ def _blank(machine: Machine, state: State, step: Step) -> StepResult:
 
 
 def _wrenches(machine: Machine, state: State) -> dict[str, NDArray]:
-    """Return the wrenches (k, 6) [N m, N] of all holds, each in its own axes."""
+    """Return the wrenches (k, 6) [N m, N] of all closures and fixtures that hold."""
     found = state.multipliers()
     wrenches = np.zeros((len(state.errors), len(found), 6))
     for i, (name, multipliers) in enumerate(found.items()):

@@ -39,7 +39,7 @@ _EQUAL = 1e-9  # smallest relative improvement that replaces the given order
 MOST_STATES = 200_000  # largest number of states computed, which takes some minutes
 
 
-# a partial order: state, peak force, steps done and steps left
+# a partial order of steps: state, peak force, completed steps and remaining steps
 _Partial = tuple[State, float, tuple[Step, ...], tuple[Step, ...]]
 
 

@@ -36,7 +36,7 @@ KINDS = {
 }  # fmt: skip
 _TEXT = {name: QUANTITIES[name].meaning for name in ("status", *TEXTS)}
 _TEXT["status"] += ": " + ", ".join(OF_POINTS[1:])
-# names in files of older releases, with their present names
+# variable names in files of older releases, and the present names
 _OLD_NAMES = {
     "rotation_error_play": "rotation_error_clearance",
     "translation_error_play": "translation_error_clearance",

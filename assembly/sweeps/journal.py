@@ -39,7 +39,7 @@ class Journal:
         path: path of the file.
         record_type: type of the rows.
         owner: check sum of the first line, from which the records' check sums continue.
-        places: offset and length of the content of each finished block.
+        places: file offset and length [bytes] of each finished block's content.
     """
 
     path: Path
@@ -156,7 +156,7 @@ def open_journal(
 
 
 def _recover(path: Path, header: bytes, owner: int) -> dict[int, tuple[int, int]]:
-    """Return the places of finished blocks; repair the file's first line and end."""
+    """Return file positions of finished blocks; repair the first line and the end."""
     try:
         with path.open("r+b") as file:
             size = os.fstat(file.fileno()).st_size
@@ -182,7 +182,7 @@ def _recover(path: Path, header: bytes, owner: int) -> dict[int, tuple[int, int]
 def _scan(
     content: mmap.mmap, start: int, owner: int
 ) -> tuple[dict[int, tuple[int, int]], int]:
-    """Return the places of all valid records, and the end of the last one."""
+    """Return the file positions of all valid records, and the end of the last one."""
     places: dict[int, tuple[int, int]] = {}
     end = start
     place = content.find(_MAGIC, start)

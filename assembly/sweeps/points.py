@@ -352,7 +352,7 @@ def _record_frequencies(
 
 
 def _record_bounds(bounds: PoseError, solved: SolvedPoints, rows: NDArray) -> None:
-    """Record pose error bounds (27) where problem (22) is solved, and failures."""
+    """Record pose error bounds where a solution exists, and record failures."""
     out = solved.records
     for i in np.flatnonzero(out["status"][rows] == 0).tolist():
         row = int(rows[i])
@@ -366,7 +366,7 @@ def _record_bounds(bounds: PoseError, solved: SolvedPoints, rows: NDArray) -> No
 def _bound_clearance_only(
     perfect: Posture, solved: SolvedPoints, rows: NDArray
 ) -> None:
-    """Record pose error bounds (27) at zero errors, once for each posture."""
+    """Record pose error bounds, problem (27), at zero errors for each posture."""
     T = perfect.transforms
     runs = list(_runs(T.reshape(len(T), -1)))
     starts = [run.start for run in runs]

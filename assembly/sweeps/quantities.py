@@ -23,7 +23,8 @@ BY_CLEARANCE = ("rotation_error_clearance", "translation_error_clearance")
 FINITE = ("linearisation_rotation", "linearisation_translation", "linearisation_energy")
 STRESS = ("stress", "stress_error", "safety")
 
-_READING = ("registration", "drift")  # effects on measured readings only
+# effects that change measured readings, but not the platform screw
+_READING = ("registration", "drift")
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +40,7 @@ class Question:
         sources: sources of drawn errors; None to use the errors of the robot file.
         seed: seed of the draws.
         assumption: assumption of problem (27); None if its bounds are not computed.
-        clearance_only: whether (27) is also bounded for the robot without errors.
+        clearance_only: whether the pose error is also bounded without errors.
         wrenches: frames whose wrenches are recorded.
         linearisation: whether each point is also solved with finite motions.
         near: distance below which a singularity is reported.

@@ -198,7 +198,7 @@ def _short(value: float | str) -> str:
 
 
 def _check_assumption(question: Question) -> None:
-    """Reject pose error bounds for a loaded robot, because (27) contains no load."""
+    """Reject pose error bounds under load, because problem (27) has no load."""
     home = point_conditions(
         question, question.robot, [home_posture(question.robot)], None
     )

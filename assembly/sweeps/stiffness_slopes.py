@@ -14,7 +14,8 @@ from forcefit.assembly.platform_stiffness.tangent_slopes import (
 from forcefit.assembly.sweeps.parameters import Design
 from forcefit.inputs.table import BadInput
 
-# step relative to the number, or 1 if it is zero; the derivative's error is 1e-8
+# difference step relative to the number, or to 1 if it is zero; the relative error of
+# the derivative is 1e-8
 _STEP = 1e-4
 _SMALL_STEP = 1e-8  # [rad, m] step for errors, because contacts change within some um
 _AS_ERROR = {"translation": "t", "rotation": "r"}

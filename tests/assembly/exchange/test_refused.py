@@ -67,7 +67,7 @@ REFUSED = {
     ("urdf", "nan"): (urdf(more='<origin xyz="0 0 nan"/>'),
         "origin.xyz: found '0 0 nan', expected 3 finite numbers [m]"),
     ("urdf", "an axis of zero"): (urdf(more='<axis xyz="0 0 0"/>'),
-        "axis.xyz: found [0.0, 0.0, 0.0], not a direction"),
+        "axis.xyz: found [0.0, 0.0, 0.0], expected a direction"),
     ("urdf", "an unknown leader"): (urdf(more='<mimic joint="k"/>'),
         'mimic.joint: found "k", expected a joint with one degree'),
     ("urdf", "a joint that follows itself"): (
@@ -200,7 +200,7 @@ REFUSED = {
         "found 2 models, expected exactly one"),
     ("sdf", "an axis of zero"): (
         four_bar().replace("<xyz>0 0 1</xyz>", "<xyz>0 0 0</xyz>"),
-        "xyz: found [0.0, 0.0, 0.0], not a direction"),
+        "xyz: found [0.0, 0.0, 0.0], expected a direction"),
     ("sdf", "a joint to its own parent"): (
         sdf('<frame name="f" attached_to="base"/>' + sdf_joint("j", "f", "base")),
         'joint "j".child: found "base", which is also its parent; expected another '
