@@ -120,8 +120,8 @@ def profiled(
         raise BadInput(f'--profile: found "{profile[:60]}"{nearest(profile, PROFILES)}')
     if (duration is None) == (speed is None and acceleration is None):
         raise BadInput(
-            "--profile: expected either --duration, or --speed, or --acceleration, or "
-            "the last two together"
+            "--profile: expected --duration, or --speed, --acceleration or both of the "
+            "latter"
         )
     curve = CubicSpline(_chords(table, size), table.values, bc_type="natural")
 

@@ -63,7 +63,7 @@ def capability(
         )
     mean, sigma = float(x.mean()), float(x.std(ddof=1))
     if sigma == 0:
-        raise ValueError("capability: found equal values, expected values that vary")
+        raise ValueError("capability: found values that do not vary")
     sides = (upper - mean) / (3 * sigma), (mean - lower) / (3 * sigma)
     cp, cpk = (upper - lower) / (6 * sigma), min(sides)
     one = not np.isfinite([lower, upper]).all()
