@@ -80,7 +80,7 @@ def product_by_bounds(
 def _largest_gauge(
     x: NDArray, bounds: Sequence[NDArray], cones: Sequence[NDArray]
 ) -> float:
-    """Return the factor by which the set must be enlarged to reach x."""
+    """Return the factor by which the convex set must be enlarged to contain x."""
     sizes = [float(np.linalg.norm(b @ x)) for b in bounds]
     sizes += [abs(c[0] @ x) + float(np.linalg.norm(c[1:] @ x)) for c in cones]
     return max(sizes)

@@ -53,7 +53,7 @@ class Zone:
 
     @cached_property
     def _split(self) -> tuple[list[int], list[int]]:
-        """Indices of the independent bounds, and of the bounds that cut their set."""
+        """Indices of the linearly independent bounds, and of the other bounds."""
         kept: list[int] = []
         cutting: list[int] = []
         for i, bound in enumerate(self.bounds):
@@ -120,7 +120,7 @@ class Zone:
         ]
 
     def _balls(self, u: NDArray) -> list[NDArray]:
-        """Return the coordinates of each ball."""
+        """Return the coordinates u, split into one array per ball."""
         ends = np.cumsum(self.dimensions)
         return np.split(u, ends[:-1], axis=-1)
 

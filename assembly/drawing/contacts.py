@@ -139,7 +139,7 @@ def guide(
 def _tilts(
     name: str, gaps: tuple[float, float], length: float, chain: int
 ) -> Iterator[Contact]:
-    """Yield rotations about y and x at both ends; each moves only the other end."""
+    """Yield rotations at both ends of a guide; each moves only the other end."""
     # columns: axes of a frame whose z is the joint's y, then the joint's x
     axes = np.eye(3)[:, [2, 0, 1]], np.eye(3)[:, [1, 2, 0]]
     for turn, gap, R in zip(("yaw", "pitch"), gaps, axes, strict=True):

@@ -176,7 +176,7 @@ def _yaml(path: Path | str) -> dict[str, Any]:
 
 
 def _list(table: Table, key: str) -> list[Any]:
-    """Return a list from a table; the list may be empty."""
+    """Return the list under a key of a table; the list may be empty."""
     value = table.get(key)
     if value is None:
         return []
@@ -186,7 +186,7 @@ def _list(table: Table, key: str) -> list[Any]:
 
 
 def _names(table: Table, key: str) -> tuple[str, ...]:
-    """Return a list of names from a table."""
+    """Return the list of names under a key of a table."""
     values = _list(table, key)
     for value in values:
         if not isinstance(value, str):
@@ -208,7 +208,7 @@ def _turns(table: Table) -> dict[str, str]:
 
 
 def _pair(table: Table, index: int, pair: object) -> tuple[str, str]:
-    """Return a pair of different names."""
+    """Return the two names of a loop, which must differ."""
     names = pair if isinstance(pair, list) else []
     names = [name for name in names if isinstance(name, str)]
     if len(names) != 2 or pair != names or names[0] == names[1]:

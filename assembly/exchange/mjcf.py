@@ -179,7 +179,7 @@ def _filled(node: Node, childclass: str, reading: _Reading) -> Node:
 
 
 def _inside(frame: Node, place: _Place) -> _Place:
-    """Return the place of the elements inside a frame."""
+    """Return the place of the elements inside an MJCF ``frame``."""
     T = place.offset @ _pose(frame, place.angles)
     angles = place.angles
     if frame.has(UNIT):  # the frame comes from an attached model
@@ -289,7 +289,7 @@ def _freedoms(node: Node, place: _Place, reading: _Reading) -> Iterator[Joint]:
 
 
 def _pose(node: Node, angles: Angles) -> NDArray:
-    """Return the (4, 4) pose of an element from ``pos`` and its orientation."""
+    """Return the (4, 4) pose of an element from its ``pos`` and its orientation."""
     return placed(node.numbers("pos", 3, "m", _ZERO), orientation(node, angles))
 
 

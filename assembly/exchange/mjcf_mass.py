@@ -92,7 +92,7 @@ class MassRules:
         }
 
     def _bounded(self, body: Body) -> Body:
-        """Return a body with at least the least mass and principal moments."""
+        """Return a body whose mass and principal moments meet the lower bounds."""
         if self.least > _REGULAR:
             body = replace(body, mass=max(body.mass, self.least))
         if not self.balanced and self.least_inertia <= _REGULAR_INERTIA:
@@ -187,7 +187,7 @@ def _sizes(geom: Node, kind: str) -> list[float]:
 
 
 def _first(geom: Node, count: int) -> float:
-    """Return the first size [m]."""
+    """Return the first size [m] of a shape."""
     return float(geom.numbers("size", max(1, count), "m")[0])
 
 

@@ -187,7 +187,7 @@ class Ties:
 
 
 def _polynomial(node: Node) -> list[float]:
-    """Return five coefficients; missing ones have the default of the format."""
+    """Return the five polynomial coefficients of a joint constraint."""
     count = len(node.optional("polycoef").split())
     default = [0.0, 1.0, 0.0, 0.0, 0.0]
     if not count:
@@ -203,7 +203,7 @@ def _name(node: Node, keys: "list[str] | tuple[str, ...]" = ()) -> str:
 
 
 def _known(node: Node, key: str, valid: Mapping[str, Any]) -> Any:
-    """Return the object with the name in an attribute; reject unknown names."""
+    """Return the object that an attribute names; reject unknown names."""
     name = node.text(key)
     if name not in valid:
         raise node.bad(key, f"found {quoted(name)}{nearest(name, valid)}")

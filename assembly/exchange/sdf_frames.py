@@ -170,7 +170,7 @@ def frames_of(root: Node) -> Frames:
 
 
 def _is_static(model: Node) -> bool:
-    """Return whether a model is static."""
+    """Return whether an SDF model is declared static (fixed to the world)."""
     static = model.child("static")
     return static is not None and static.content.lower() in {"true", "1"}
 
@@ -198,7 +198,7 @@ def _gather(frames: Frames, model: Node, scope: str, outer: str, old: bool) -> N
 
 
 def _take(frames: Frames, node: Node, scope: str, name: str, old: bool) -> None:
-    """Add a link, joint or frame; of equal names, the link keeps its name."""
+    """Add a link, joint or frame; if names are equal, only the link keeps its name."""
     full = scope + name
     if full in frames.named and frames.named[full].node.tag != node.tag:
         full += f"_{node.tag}"  # libsdformat uses the same new name

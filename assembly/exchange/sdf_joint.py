@@ -224,6 +224,6 @@ def _part(mimic: Node, parts: list[str], tag: str) -> str:
 
 
 def _number(node: Node, key: str, default: float) -> float:
-    """Return the number in an inner element, or the default."""
+    """Return the number in an inner element, or the default if it is absent."""
     inner = node.child(key)
     return default if inner is None else inner.number("", "-")

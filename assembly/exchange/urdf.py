@@ -116,7 +116,7 @@ def _body(node: Node) -> Body:
 
 
 def _joints(node: Node) -> tuple[list[Joint], list[Body]]:
-    """Return a joint as joints of one freedom, and the bodies between them."""
+    """Return the one-freedom joints of a URDF joint, and the bodies between them."""
     ends = []
     for tag in ("parent", "child"):
         end = node.child(tag)

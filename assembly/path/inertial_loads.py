@@ -100,6 +100,6 @@ def _of_rigid_body(motion: Motion, i: int, gravity: NDArray) -> NDArray:
 
 
 def _turned(R: NDArray, wrenches: NDArray) -> NDArray:
-    """Return wrenches (k, 6) in rotated axes; one rotation for all, or k rotations."""
+    """Return wrenches (k, 6) in axes that are rotated by one or by k rotations."""
     halves = wrenches.reshape(len(wrenches), 2, 3)
     return (halves @ np.swapaxes(R, -1, -2)).reshape(len(wrenches), 6)

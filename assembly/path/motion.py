@@ -177,7 +177,7 @@ def _closures(robot: Robot) -> NDArray:
 
 
 def _of_closures(robot: Robot, bodies: NDArray) -> NDArray:
-    """Return the differences (k, 6 closures) of the screws (k, n, 6) at closures."""
+    """Return the screw differences (k, 6 closures) between each closure's frames."""
     pairs = _closures(robot)
     first, second = bodies[:, pairs[:, 0]], bodies[:, pairs[:, 1]]
     return (first - second).reshape(len(bodies), 6 * len(pairs))

@@ -270,7 +270,7 @@ def _solve(asked: _Asked, rows: slice) -> dict[str, NDArray]:
 
 
 def _moved(asked: _Asked, rows: slice) -> tuple[Motion, list[tuple[str, str]]]:
-    """Return the motion of a block of points, and the verdict on each posture."""
+    """Return the motion of a block of points; also whether each posture is usable."""
     robot, path = asked.robot, asked.trajectory
     values = path.values[rows]
     postures, reasons = placed(robot, path.names, values)
@@ -301,7 +301,7 @@ def _followed(
 
 
 def _assembled(asked: _Asked, motion: Motion, loads: InertialLoads) -> Assembly:
-    """Return the solutions of least energy under loads on bodies and platform."""
+    """Return the least-energy solutions under loads on the bodies and the platform."""
     return solve_assembly(
         motion.postures, asked.load, loads.bodies, carried=loads.carried
     )

@@ -189,7 +189,7 @@ def path_text(summary: dict[str, Any]) -> str:
 
 
 def _table(summary: dict[str, Any]) -> list[str]:
-    """Return the lines of the largest values and drive forces."""
+    """Return text lines with the largest values and drive forces."""
     rows: dict[str, tuple[Any, ...]] = {}
     for key, peak in summary["largest"].items():
         words, _, unit = LARGEST[key]

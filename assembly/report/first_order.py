@@ -117,7 +117,7 @@ def _singular(posture: Posture) -> bool:
 
 
 def _words(exact: ExactAssembly) -> str:
-    """Return energy and pose error of the solution with finite motions as text."""
+    """Return as text the energy and pose error of the finite-motion solution."""
     return (
         f"{rounded(exact.energy):.6g} J, platform error "
         f"{screw_text(exact.platform_screw)}"

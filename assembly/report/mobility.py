@@ -162,7 +162,7 @@ def _direction(d: Any) -> str:
 
 
 def _plain(value: float) -> str:
-    """Return a number with 4 digits as text, with rounding errors as 0."""
+    """Return a number with 4 digits as text; rounding errors become 0."""
     return f"{0.0 if abs(value) < 1e-9 else value:.4g}"
 
 

@@ -109,7 +109,7 @@ def _tangents(
 
 
 def _along(answer: PlatformStiffness, direction: ArrayLike) -> dict[str, Any]:
-    """Return stiffness and shares along a given screw."""
+    """Return the platform's stiffness, and the parts' shares, along a given screw."""
     way = np.asarray(direction, dtype=float)
     free, blocked = answer.along(way)
     return {

@@ -110,7 +110,7 @@ def pose_error_of(
 
 
 def _bounds(bound: PoseError) -> dict[str, Any]:
-    """Return the bounds under one assumption."""
+    """Return the pose error bounds under one assumption of problem (27)."""
     return {
         "rotation": _bracket(bound.rotation_error, bound.rotation_screw),
         "translation": _bracket(bound.translation_error, bound.translation_screw),
@@ -120,7 +120,7 @@ def _bounds(bound: PoseError) -> dict[str, Any]:
 
 
 def _worst_left(posture: Posture, offset: NDArray) -> dict[str, Any]:
-    """Return the bounds over all positions in which joints may be bolted."""
+    """Return the pose error bounds over all positions of joints when bolted."""
     worst = worst_left(posture, offset)
     bounds = {
         part: dict(zip(("lower", "upper"), getattr(worst, part), strict=True))

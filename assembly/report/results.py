@@ -68,7 +68,7 @@ def zone_of(posture: Posture) -> dict[str, Any]:
 
 
 def _finite(value: float) -> float | None:
-    """Return a margin; None if no factor on the clearances assembles the robot."""
+    """Return a margin; None if no clearance size allows the robot to assemble."""
     return None if np.isinf(value) else value
 
 
@@ -305,7 +305,7 @@ def _linearisation_lines(results: dict[str, Any]) -> dict[str, str]:
 
 
 def _bound_lines(results: dict[str, Any]) -> dict[str, str]:
-    """Return lines on the certified screw error and its undetermined motion."""
+    """Return lines on the bound of the screw's error, and on undetermined motions."""
     bound, largest = results["certificate"], results["worst_error"]
     lines = lines_of(bound, "screw_rotation_error screw_translation_error")
     if (

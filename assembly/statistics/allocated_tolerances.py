@@ -150,7 +150,7 @@ def price_shares(allocation: Allocation) -> NDArray:
 def _taken(
     allocation: Allocation, key: str, reached: float, at: str
 ) -> dict[str, float | str]:
-    """Return the pose error due to clearances, and the cost at zero clearance."""
+    """Return the pose error due to clearances, and the cost if clearances were zero."""
     plan, limit = allocation.plan, allocation.plan.limits[key]
     # the pose errors due to geometric errors and due to clearances nearly add up; the
     # former are proportional to the tolerances

@@ -176,7 +176,7 @@ class CalloutSources:
         return self._with_radial([one.fit.radial[1] for one in self.fits])
 
     def _with_radial(self, radial: list[float]) -> Robot:
-        """Return the robot with given radial clearances [m] of the fits."""
+        """Return the robot whose joint fits have the given radial clearances [m]."""
         frames = list(self.robot.frames)
         for one, bound in zip(self.fits, radial, strict=True):
             gap = max(0.0, bound)

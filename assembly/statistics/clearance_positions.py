@@ -140,7 +140,7 @@ def _at_random(
     prepared: LinearResponse, loaded: NDArray, clearances: NDArray,
     generators: Sequence[np.random.Generator],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return uniformly distributed clearances, and whether the random walks mixed."""
+    """Return uniformly drawn clearances, and whether each random walk mixed."""
     from forcefit.assembly.solvers.uniform_clearance import sample_uniform_position
 
     free = ~loaded
@@ -227,5 +227,5 @@ def _cone_columns(prepared: LinearResponse) -> NDArray:
 
 
 def _sizes(values: NDArray, starts: NDArray) -> NDArray:
-    """Return the norms (k, cones) of the components of each cone."""
+    """Return the norms (k, cones) of the clearance components of each cone."""
     return np.sqrt(np.add.reduceat(values**2, starts[:-1], axis=1))

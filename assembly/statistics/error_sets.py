@@ -182,7 +182,7 @@ def _real_rows(rows: NDArray, columns: NDArray) -> NDArray:
 
 
 def _maps(sources: Sources) -> NDArray:
-    """Return the errors (n, 6, m) of all frames per unit of each number."""
+    """Return the errors (n, 6, m) of all frames per unit of each random number."""
     if isinstance(sources, CalloutSources):
         return sources.maps
     return np.moveaxis(sources.errors(np.eye(len(sources))), 0, -1)

@@ -202,7 +202,7 @@ class Experiment:
     def _bolted(
         self, values: NDArray, draws: NDArray
     ) -> list[tuple[NDArray, NDArray, NDArray]]:
-        """Return :meth:`_without_stress`; NaN for draws that cannot be bolted."""
+        """Return the records of all draws; NaN for draws that cannot be bolted."""
         try:
             return [self._without_stress(values, draws)]
         except CannotBolt:
@@ -221,7 +221,7 @@ class Experiment:
     def _without_stress(
         self, values: NDArray, draws: Sequence[int] | NDArray
     ) -> tuple[NDArray, NDArray, NDArray]:
-        """Return records, wrenches and weights for the clearances of the posture."""
+        """Return records without stress, wrenches, and distributed loads at the tips."""
         robot = self.posture.robot
         bolts = bolt_generators(robot, self.seed, draws)
         errors = bolted_errors(robot, self.sources.errors(values), bolts)

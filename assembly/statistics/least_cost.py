@@ -97,7 +97,7 @@ def _saving(plan: Plan, before: NDArray, after: NDArray) -> float:
 
 
 def _planes(requirement: Requirement, samples: Samples, t: NDArray) -> list[NDArray]:
-    """Return linearised limits a (G,), a.t' <= 1, for the critical samples."""
+    """Return linearised limits a.t' <= 1, a (G,), at the samples nearest to limits."""
     values = samples.values * requirement.plan.spread(t)
     utilisations = requirement.utilisations(values)[1]
     if requirement.plan.asked_yield == 1.0:

@@ -73,7 +73,7 @@ def perfect_parts(experiment: Experiment) -> dict[str, Any]:
 
 
 def _clearance_parts(prepared: LinearResponse) -> dict[str, dict[str, float]]:
-    """Return the part of each kind of clearance in the largest pose errors."""
+    """Return the part of each clearance kind in the largest pose errors [rad or m]."""
     draws = prepared.solve(np.zeros((1, len(prepared.posture.robot.frames), 6)))
     if not (np.isfinite(draws.energy).all() and np.isfinite(draws.clearances).all()):
         return {}
@@ -94,7 +94,7 @@ def _clearance_parts(prepared: LinearResponse) -> dict[str, dict[str, float]]:
 
 
 def _clearance_kinds(prepared: LinearResponse) -> list[str]:
-    """Return the kind of each cone, such as ``hinge.tilt``, without the leg's name."""
+    """Return each clearance's name without the leg's name, such as ``hinge.tilt``."""
     robot, kinds = prepared.posture.robot, []
     for first, end in zip(prepared.starts[:-1], prepared.starts[1:], strict=True):
         columns: NDArray = prepared.joints.cones[:, first:end]

@@ -100,7 +100,7 @@ def _good(share: Mapping[str, float]) -> bool | None:
 
 
 def _share_text(interval: Mapping[str, float]) -> str:
-    """Return a probability in per cent, with its interval."""
+    """Return a probability in per cent as text, with its confidence interval."""
     low, high = 100 * interval["lower"], 100 * interval["upper"]
     return f"{100 * interval['probability']:.2f} % ({low:.2f} to {high:.2f})"
 

@@ -182,7 +182,7 @@ def _worst(data: "xarray.Dataset", key: str) -> NDArray:
 def _described(
     data: "xarray.Dataset", key: str, solved: NDArray, level: float
 ) -> dict[str, Any]:
-    """Return mean, quantiles and mode, which is 0 if most values are zero."""
+    """Return mean, quantiles and mode; the mode is 0 if most values are zero."""
     every = _worst(data, key)
     values = every[solved]
     finite = values[np.isfinite(values)]

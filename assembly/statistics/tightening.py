@@ -58,7 +58,7 @@ def _deciding(summary: Mapping[str, Any]) -> str:
 
 
 def _clearance_tiles(summary: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles on the pose error of perfect parts."""
+    """Return tiles on the pose error that clearances cause without errors."""
     parts = summary["perfect_parts"]
     answer: list[str | Value] = []
     for key in ("rotation", "translation"):
@@ -89,6 +89,6 @@ def _broken_tile(broken: Mapping[str, Any]) -> Tile:
 
 
 def _listed(names: list[str]) -> str:
-    """Return the first names, and how many more there are, as text."""
+    """Return a text with the first names and the number of the remaining names."""
     more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
     return ", ".join(names[:_NAMED]) + more

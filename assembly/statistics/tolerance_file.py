@@ -198,7 +198,7 @@ def _choice(table: Table, key: str, valid: tuple[str, ...]) -> str:
 
 
 def _limits(table: Table) -> dict[str, float]:
-    """Return the limits by quantity."""
+    """Return the limits of a tolerance file by quantity."""
     valid = limit_names()
     limits = {}
     for key in list(table.content):
@@ -209,7 +209,7 @@ def _limits(table: Table) -> dict[str, float]:
 
 
 def _places(table: Table, robot: Robot) -> tuple[list[tuple[int, int]], int]:
-    """Return frames and components of a table, and 0 for angles or 1 for lengths."""
+    """Return a table's frames and components; also 0 for angles, 1 for lengths."""
     names = table.require("frames", "a list of frame names")
     parts = table.require("components", 'a list such as ["TX"]')
     for key, value in (("frames", names), ("components", parts)):

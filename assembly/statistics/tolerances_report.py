@@ -153,7 +153,7 @@ def _allocation_sentence(allocation: Mapping[str, Any]) -> str:
 
 
 def _allocation_tiles(allocation: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles: yield, part used by clearances, tolerances of largest cost."""
+    """Return tiles: yield, pose error due to clearances, most expensive tolerances."""
     tiles = []
     check = allocation["verification"]
     if check:

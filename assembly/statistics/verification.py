@@ -65,7 +65,7 @@ def prove_worst(
 
 
 def _proof(bound: Callable, *given: Any) -> tuple[float]:
-    """Return an upper bound of the worst case at one posture."""
+    """Return a proven upper bound of a limited quantity at one posture."""
     return (bound(*given),)
 
 
@@ -148,7 +148,7 @@ def verify_yield(
 
 
 def _verdict(interval: Mapping[str, float], asked: float) -> str:
-    """Return whether the interval contradicts the required yield."""
+    """Return whether the confidence interval contradicts the required yield."""
     if asked == 1.0:
         return "no draw failed" if interval["probability"] == 1.0 else "contradicted"
     if interval["lower"] >= asked:

@@ -158,14 +158,14 @@ def bound_energy(
 
 
 def _reach(V: NDArray, starts: NDArray) -> NDArray:
-    """Return the largest norms (cones,) of affine clearances in each cone."""
+    """Return each cone's largest clearance norm (cones,) for affine clearances."""
     return np.sqrt(np.add.reduceat(V**2, starts[:-1], axis=0)).sum(axis=1)
 
 
 def _affine_clearances(
     B: NDArray, asked: NDArray, starts: NDArray, G: NDArray | None, h: NDArray | None
 ) -> NDArray:
-    """Return V (nu, m) with B V = asked, smallest in the cones or of least energy."""
+    """Return the map V (nu, m) with B V = asked: smallest norms or least energy."""
     import cvxpy as cp
 
     nu, m = starts[-1], asked.shape[1]

@@ -142,7 +142,7 @@ def worst_error_slopes(
 def _pressing(
     prepared: LinearResponse, free: NDArray, along: NDArray, clearances: NDArray
 ) -> NDArray:
-    """Return directions (k, ..) of free clearances, projected onto the equations."""
+    """Return directions (k, ..) of free clearances that satisfy closure equations."""
     rows = clearance_constraints(prepared, ~free)[:, free]
     size = np.linalg.norm(along, axis=1, keepdims=True)
     moving = size[:, 0] > 0.0

@@ -185,7 +185,7 @@ def _at_largest_clearances(
 
 
 def _reading(sets: ErrorSets) -> str:
-    """Return the definition that applies to the worst case, a key of MEANINGS."""
+    """Return the key in MEANINGS of the worst-case definition that applies."""
     # parallel contacts of one joint constrain each other, but no other joint
     held = len(sets.rigid_rows) > len(sets.contact_rows)
     sprung = len(sets.spring_rows) > 0

@@ -76,7 +76,7 @@ def adjustment_of(machine: Machine, state: State, step: Adjust) -> NDArray:
 
 
 def _linear_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
-    """Return the best change if no clearance is loose."""
+    """Return the adjustment that minimises a reading if no clearance is loose."""
     count = len(step.components)
     value = _to_vanish(machine, state, step)
     slopes = np.empty((value.shape[1], count))
@@ -91,7 +91,7 @@ def _linear_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
 
 
 def _best_local_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
-    """Return the better change of two local minima of the reading."""
+    """Return the better of two adjustments at local minima of the reading."""
     none = np.zeros((len(state.errors), len(step.components)))
     amount, size = _local_adjustment(machine, state, step, none)
     pressed = _linear_adjustment(*_with_pressed_clearances(machine, state), step)
@@ -112,7 +112,7 @@ def _with_pressed_clearances(machine: Machine, state: State) -> tuple[Machine, S
 def _local_adjustment(
     machine: Machine, state: State, step: Adjust, start: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return the change at a local minimum of the reading, and the (k,) minimum."""
+    """Return the adjustment at a local minimum of the reading, and the (k,) minimum."""
     unit = 1 / machine.scale[rows_of(step.components)]
     amount = start
     value, slopes = _value_and_slopes(machine, state, step, amount)
@@ -138,7 +138,7 @@ def _local_adjustment(
 def _value_and_slopes(
     machine: Machine, state: State, step: Adjust, amount: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return the minimised quantities (k, p) after a change, and slopes (k, p, a)."""
+    """Return minimised quantities (k, p) after an adjustment, and their derivatives."""
     value = _value_at(machine, state, step, amount)
     slopes = np.empty((*value.shape, len(step.components)))
     for i, scale in enumerate(machine.scale[rows_of(step.components)]):
@@ -150,7 +150,7 @@ def _value_and_slopes(
 
 
 def _value_at(machine: Machine, state: State, step: Adjust, amount: NDArray) -> NDArray:
-    """Return the quantities that an adjustment minimises, after a change."""
+    """Return the quantities that an adjustment minimises, after a trial change."""
     moved = settle(machine, with_adjustment(machine, state, step, amount))
     return _to_vanish(machine, moved, step)
 

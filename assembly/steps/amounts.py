@@ -81,7 +81,7 @@ def with_best_amounts(
 
 
 def _rounded(steps: list[Adjust], amounts: NDArray) -> NDArray:
-    """Return changes rounded to multiples of the increments of their steps."""
+    """Return adjustments rounded to multiples of the increments of their steps."""
     sizes = np.concatenate([np.full(len(s.components), s.increment) for s in steps])
     whole = np.where(sizes > 0, sizes, 1.0)
     return np.where(sizes > 0, whole * np.round(amounts / whole), amounts)
@@ -100,7 +100,7 @@ def _with_amounts(plan: Plan, amounts: NDArray) -> Plan:
 
 
 def _carried_out(plan: Plan, machine: Machine, state: State) -> list[StepResult]:
-    """Return the results of all steps."""
+    """Return the results of all steps of a plan."""
     results = []
     for step in plan.steps:
         state, result = carry_out(machine, state, step)
@@ -111,7 +111,7 @@ def _carried_out(plan: Plan, machine: Machine, state: State) -> list[StepResult]
 def _outcome(
     plan: Plan, machine: Machine, state: State, objective: str
 ) -> tuple[NDArray, NDArray]:
-    """Return residuals (k, p) for least squares, and the objective (k,)."""
+    """Return least-squares residuals (k, p) of a plan, and its objective (k,)."""
     forces = [np.zeros((len(state.errors), 3))]
     screw = machine.platform_screw(state.errors, state.found)
     for step in plan.steps:

@@ -139,7 +139,7 @@ def _size(A: NDArray) -> float:
 
 
 def _unit(machine: Machine, join: Join) -> NDArray:
-    """Return the units of a join's rows, which convert reference lengths to m."""
+    """Return factors that convert a join's rows from reference lengths to m."""
     if isinstance(join.part, str):
         frames = np.abs(machine.free).reshape(-1, 6, machine.free.shape[1]).any(axis=1)
         return machine.free_size[frames[machine.posture.robot.index(join.part)]]

@@ -91,7 +91,7 @@ def _directions(of_cones: NDArray, of_motions: NDArray) -> NDArray:
 
 
 def _loaded(machine: Machine, state: State, of_cones: NDArray) -> NDArray:
-    """Return (k, nu) bool: whether a clearance transmits force at its bound."""
+    """Return (k, nu) bool, True if a clearance is at its bound and transmits force."""
     group, energy = machine.joints.group, state.found.energy
     cones = (group[:, None] == np.unique(group)).astype(float)
     forces = np.sqrt((state.found.multipliers @ of_cones) ** 2 @ cones)

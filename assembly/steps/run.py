@@ -214,7 +214,7 @@ def _join(
 
 
 def _share(linear: bool, limit: float, needed: NDArray, force: Callable) -> NDArray:
-    """Return the shares (k,) of the openings that a limited force can close."""
+    """Return the share (k,) of each opening that the limited force can close."""
     share = np.minimum(1.0, limit / np.maximum(needed, 1e-300))
     if linear:
         return share  # the closing force is proportional to the closed share
@@ -227,7 +227,7 @@ def _share(linear: bool, limit: float, needed: NDArray, force: Callable) -> NDAr
 
 
 def _blank(machine: Machine, state: State, step: Step) -> StepResult:
-    """Return the result of a step that changes nothing."""
+    """Return the result of a step that does no work and moves no part."""
     k = len(state.errors)
     zero, six, empty = np.zeros(k), np.zeros((k, 6)), np.zeros((k, 0))
     return StepResult(

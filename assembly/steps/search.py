@@ -257,7 +257,7 @@ def _bottleneck(
 
 
 def _joined_after(chosen: int, later: dict[int, int]) -> list[int]:
-    """Return the parts joined after a set, in the order of joining."""
+    """Return the parts that are joined after a set, in the order of joining."""
     order = []
     while (k := later[chosen]) >= 0:
         order.append(k)

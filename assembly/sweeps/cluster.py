@@ -176,7 +176,7 @@ def _distribute(
 
 
 def _threads(client: "distributed.Client") -> int:
-    """Return the current number of threads of all workers; clusters may change."""
+    """Return the present number of threads of all workers, which may change."""
     from distributed.comm import CommClosedError
 
     try:

@@ -94,7 +94,7 @@ def write_sweep(
 def _write(
     sweep: "Sweep", read: Callable[[int], tuple[NDArray, Texts]], file: Any
 ) -> None:
-    """Write the file, first the coordinates, then block after block."""
+    """Write the NetCDF file, first the coordinates, then block after block."""
     import h5py
 
     text = h5py.string_dtype()
@@ -170,7 +170,7 @@ def slabs(shape: tuple[int, ...], first: int, last: int) -> Iterator[tuple[slice
 
 
 def _joined(blocks: list[tuple[NDArray, Texts]]) -> tuple[NDArray, Texts]:
-    """Concatenate blocks and return them as one block."""
+    """Concatenate the results of several blocks."""
     texts: Texts = {name: {} for name in TEXTS}
     start = 0
     for records, texts_of_block in blocks:
@@ -183,7 +183,7 @@ def _joined(blocks: list[tuple[NDArray, Texts]]) -> tuple[NDArray, Texts]:
 
 
 def _text_column(name: str, records: NDArray, texts: Texts) -> NDArray:
-    """Return the texts (k,) of a variable as an object array."""
+    """Return a text variable's values (k,) as an object array."""
     if name == "status":
         return np.array(OF_POINTS, dtype=object)[records["status"]]
     column = np.full(len(records), "", dtype=object)

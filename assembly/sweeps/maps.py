@@ -244,7 +244,7 @@ def path_figure(
 
 
 def _along_numbers(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Return the data set with increasing axis values; labels become 1, 2, .."""
+    """Return the data set with increasing axis values; text labels become 1, 2, .."""
     for name in map(str, data["status"].dims):
         if data[name].dtype.kind not in "fiu":
             data = data.assign_coords({name: np.arange(data.sizes[name]) + 1})

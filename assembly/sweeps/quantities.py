@@ -176,7 +176,7 @@ def _moving(robot: Robot) -> tuple[str, ...]:
 
 
 def _stiffness_variables(robot: Robot, state: str) -> dict[str, Variable]:
-    """Return the variables of K_C and of its parts."""
+    """Return the variables of the stiffness K_C and of its parts' shares."""
     eigen, parts = tuple("123456"), stiffness_parts(robot, state)
     return {
         "compliance": _variable("compliance", f", at its origin, {STATES[state]}"),

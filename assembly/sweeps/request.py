@@ -193,7 +193,7 @@ def _sources(
 
 
 def _short(value: float | str) -> str:
-    """Return a covariate as it is written on the command line."""
+    """Return a covariate's value as text for the command line."""
     return value if isinstance(value, str) else f"{value:g}"
 
 

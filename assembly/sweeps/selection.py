@@ -65,7 +65,7 @@ def _with_optional(question: Question) -> Question:
 
 
 def _for(question: Question, kept: dict[str, Variable]) -> Question:
-    """Return a request for exactly the given variables."""
+    """Return a sweep request for exactly the given variables."""
     every = _with_optional(question)
     return replace(
         question,

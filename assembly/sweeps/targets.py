@@ -254,7 +254,7 @@ def _cell(whose: str, text: str) -> float:
 
 
 def _check_labels(path: Path, labels: Sequence[str]) -> None:
-    """Reject a table with two rows of equal id."""
+    """Reject a table of postures in which two rows have the same id."""
     if len(set(labels)) < len(labels):
         twice = next(label for label in labels if labels.count(label) > 1)
         raise BadInput(f"{path}: id: found {quoted(twice)} twice; expected unique ids")
