@@ -1,8 +1,8 @@
 """Conversion of a drawing to a robot of frames and closures.
 
 A joint becomes one frame with its name, or one frame for each of its freedoms
-(``joint.first``).  A body becomes a fixed frame with its name if it has a mass or a
-link, if it is the platform, or if a loop closes at the body.
+(``joint.first``).  A body becomes a fixed frame with its name in three cases: it has a
+mass or a link, it is the platform, or a loop closes at it.
 """
 
 from collections.abc import Mapping

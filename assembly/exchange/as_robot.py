@@ -1,9 +1,9 @@
 """Conversion of a mechanism to a robot of frames, and back.
 
 A moving joint becomes a frame with the joint's name; a body on a fixed joint becomes a
-frame with the body's name.  A body on a moving joint gets its own frame if the body has
-a mass, ends a chain, or is an end of a loop, because its axes may differ from the
-joint's axes.
+frame with the body's name.  A body on a moving joint gets its own frame if it has a
+mass, ends a chain, or is an end of a loop, because such a body may have other axes than
+the joint.
 """
 
 from collections.abc import Mapping

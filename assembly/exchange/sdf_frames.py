@@ -2,9 +2,9 @@
 
 Sources:
     sdformat.org, specification 1.12 and "Pose frame semantics": the pose of a link is
-    in its model's frame, of a joint in its child's frame, of a frame in the frame
-    ``attached_to``, unless ``relative_to`` names another frame; names of nested models
-    are joined by ``::``.
+    relative to its model's frame, the pose of a joint to its child's frame, and the
+    pose of a frame to the frame ``attached_to``. The attribute ``relative_to`` names
+    another frame.  Names of nested models are joined by ``::``.
 """
 
 import math

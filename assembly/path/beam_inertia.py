@@ -1,8 +1,8 @@
 r"""Inertia and weight of a moving beam, as wrenches at its ends and sections.
 
-A beam moves almost as a rigid body.  Its load per length is then linear along it,
-q(x) = rho A (g - a(x)), and its moment per length is constant, m = -rho (J alpha +
-omega x J omega).  At the tip of a cantilever, this load causes the same deflection as
+A beam moves almost as a rigid body.  Its load per length is then linear along the beam,
+q(x) = rho A (g - a(x)). Its moment per length is constant, m = -rho (J alpha + omega x
+J omega).  At the tip of a cantilever, this load causes the same deflection as
 
     F_x = Q_0 / 2 + Q_1 / 3                M_x = m_x L / 2
     F_y = Q_0 / 2 + Q_1 (7/20 + phi/3) / (1 + phi) + m_z / (1 + phi)

@@ -14,10 +14,10 @@ A_j     ``accelerations``       (k, n, 6)     derivative of V_j with time
 With V = sum S_j q'_j over the joints that carry a body, its derivative is
 A = sum S_j q''_j + [V_j, S_j] q'_j.  At a closure, V and A of its two frames are equal.
 These equations, and the equations for the prescribed components of the pose, are linear
-in q' and then in q'', with the same matrix.  If neither closures nor path prescribe a
-rate, such as the spin of a rod between two balls, the least-norm solution is used;
-:mod:`forcefit.assembly.path.idle_motions` adds the rates that the inertia of the bodies
-determines.  No finite differences of poses are used.
+in q' and then in q'', with the same matrix.  Closures and path may leave a rate
+undetermined, such as the spin of a rod between two balls. The least-norm solution is
+then used. :mod:`forcefit.assembly.path.idle_motions` adds the rates that the inertia of
+the bodies determines.  No finite differences of poses are used.
 
 Sources:
     Featherstone (2008), Rigid Body Dynamics Algorithms, chapters 2 and 8 (spatial

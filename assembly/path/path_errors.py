@@ -1,6 +1,6 @@
 """Errors of a robot along a path: deflection, forces and stress due to acceleration.
 
-At each instant, the bodies' inertia and weight act as loads on the posture, and problem
+At each instant, the bodies' inertia and weight act as loads on the posture. Problem
 (22) is solved as for a robot at rest (quasi-static).  Vibration, damping and the
 inertia of the deflection itself are neglected. This is valid if the motion takes many
 periods of the first natural frequency and its acceleration does not jump.

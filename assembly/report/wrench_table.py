@@ -25,8 +25,8 @@ def wrench_lines(
     """Return the wrenches through all frames and closures as lines of text.
 
     A joint that consists of several frames has one row, at the joint's point in its
-    axes, because the wrench through its other frames is the same.  The contacts of a
-    clearance have no row: together they carry the wrench through their joint.
+    axes. The wrench through its other frames is the same.  The contacts of a clearance
+    have no row: together they carry the wrench through their joint.
 
     Args:
         frames: wrenches by frame, from

@@ -4,13 +4,13 @@ Two requirements are convex in the tolerances t:
 
 - *yield 1*: margin or energy at every corner of the tolerance box.  For every choice s
   of signs, ``m(t s)`` is convex in t; the margin is also proportional to t.
-- *yield below 1*: the mean over the worst (1 - yield) of many fixed draws s (the
-  conditional value at risk), which is a stricter condition than the yield itself.
+- *yield below 1*: the mean over the worst share (1 - yield) of many fixed draws s. This
+  mean is the conditional value at risk. Limiting it is stricter than the yield itself.
 
-Each iteration minimises the cost within the planes found so far, finds the largest
-violation of the requirement, and adds the plane that linearises it.  Every plane holds
-for all tolerances that meet the requirement. The minimum within the planes is therefore
-a lower bound of the cost.
+Each iteration minimises the cost within the planes found so far.  It then finds the
+largest violation of the requirement, and adds the plane that linearises the violated
+quantity.  Every plane holds for all tolerances that meet the requirement. The minimum
+within the planes is therefore a lower bound of the cost.
 
 Sources:
     Kelley (1960), The cutting-plane method for solving convex programs; Rockafellar,

@@ -11,7 +11,7 @@ The result is a local minimum; a global minimum is not proved.
 
 For a yield below 1, the linearised limit is the mean over the samples closest to the
 limit, which is the derivative of the quantile.  For a yield of 1, each of the worst
-samples has a separate linearised limit, and the worst corners of the tolerance box are
+samples has a separate linearised limit. The worst corners of the tolerance box are
 searched again at every step.
 
 Sources:

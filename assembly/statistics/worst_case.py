@@ -1,8 +1,8 @@
 """Lower and upper bounds of the worst case of errors within tolerances.
 
-Margin and energy are convex in the errors, so their worst case is a corner of the
-tolerance box, where every error is at one end of its tolerance.  The derivatives at a
-corner point to another corner whose value is at least as large.  Repeating this step
+Margin and energy are convex in the errors. Their worst case is therefore a corner of
+the tolerance box, where every error is at one end of its tolerance.  The derivatives at
+a corner point to another corner whose value is at least as large.  Repeating this step
 from many corners finds a lower bound.  The worst case of a wrench, a stress or a pose
 error need not be a corner; the same search still finds a lower bound.  The upper bound
 restricts the clearances to affine functions of the errors: ``u = sum_i V_i s_i`` for

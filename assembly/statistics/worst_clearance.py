@@ -1,16 +1,16 @@
 """Largest pose errors over all clearance positions: problem (27) for many draws.
 
-The assumption ``frozen`` is used: springs keep their deformations from the solution of
-(22), and unloaded clearances may be anywhere within their bounds.  By strict convexity,
-every solution of (22) has the same springs; by complementary slackness, it has the same
-loaded clearances.  The set is therefore the set of *all* solutions of (22), inside and
-outside an assembly zone.  The set contains the positions of the uniform and the contact
-model, and the solution that the solver returns. The other assumptions change the robot:
-``free`` lets compliant joints rotate without energy; ``budget`` allows more energy than
-the least.
+The assumption ``frozen`` is used: springs keep their deformations from the least-energy
+solution (22), and unloaded clearances may be anywhere within their bounds.  By strict
+convexity, all least-energy solutions have the same spring deformations. By
+complementary slackness, they have the same loaded clearances.  The set of positions is
+therefore the set of *all* least-energy solutions, inside and outside an assembly zone.
+The set contains the positions of the uniform and the contact model, and the solution
+that the solver returns. The other assumptions change the robot: ``free`` lets compliant
+joints rotate without energy; ``budget`` allows more energy than the least.
 
-Under a load, the same applies to energy minus work: only clearances that transmit no
-force are free.
+Under a load, the energy minus the work of the load replaces the energy. Only clearances
+that transmit no force are then free.
 """
 
 import numpy as np

@@ -1,8 +1,8 @@
 """Least energy of a partly assembled robot, for many sets of errors at once.
 
-The small screws of all frames are s = e + E y + U u + F q, with errors e, springs y,
-clearances u and free motions q (:mod:`forcefit.assembly.linear.closure`).  At each step
-of assembly the rows
+The small screws of all frames are s = e + E y + U u + F q. Here e are the errors, y the
+springs, u the clearances and q the free motions
+(:mod:`forcefit.assembly.linear.closure`).  At each step of assembly the rows
 
     R s + L y_f = b
 
@@ -11,9 +11,9 @@ fixtures.  The equilibrium minimises y.y / 2 minus the work of the loads.  Its
 multipliers are the wrenches of the rows.  The unknowns are eliminated as in
 :mod:`forcefit.assembly.linear.reference.reduction`.
 
-If the energy does not determine all clearances and free motions, they remain as close
-as possible to their values after the preceding step (least sum of squares, clearances
-in units of their bounds, lengths in reference lengths).
+Clearances and free motions that the energy does not determine remain as close as
+possible to their values after the preceding step. The distance is the sum of squares,
+with clearances in units of their bounds and lengths in reference lengths.
 """
 
 from dataclasses import dataclass

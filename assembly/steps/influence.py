@@ -11,11 +11,12 @@ B_k     ``free``                opening at k by motions that nothing resists
 lambda                          wrenches of the earlier joins
 ======  ======================  =====================================================
 
-K is the stiffness of the machine before the first of these joins.  If A_kj = 0 for all
-other joins j, and no free motion changes the openings at k and j together, then k finds
-the same opening after every set of other joins. The place of k in the order then does
-not matter.  Free motions that change only the opening at j, such as the rotation of its
-own pin, are omitted, together with the wrenches that they do not transmit.
+K is the stiffness of the machine before the first of these joins.  Assume that A_kj = 0
+for all other joins j, and that no free motion changes the openings at k and j together.
+Then k finds the same opening after every set of other joins. The place of k in the
+order then does not matter.  Free motions that change only the opening at j, such as the
+rotation of its own pin, are omitted. The wrenches that they do not transmit are omitted
+too.
 """
 
 from collections.abc import Sequence

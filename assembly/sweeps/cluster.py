@@ -1,7 +1,7 @@
 """Parallel solution of a sweep with Dask, on this machine or on a cluster.
 
 The client submits a few tasks per worker at a time and writes their results to the
-journal, so the client and every worker hold only a few blocks in memory.  A task
+journal. The client and every worker therefore hold only a few blocks in memory.  A task
 contains as many blocks as can be solved in about half a second. The last tasks are
 smaller, so that workers finish at nearly the same time.  Dask reassigns the tasks of a
 lost worker.  The distribution of blocks does not change any result, because each

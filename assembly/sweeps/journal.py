@@ -1,11 +1,12 @@
 """Journal of a sweep: a file of finished blocks that survives an interruption.
 
 The file begins with one line of JSON that identifies the sweep, and its check sum.
-Records follow. Each record is appended by one write and contains the number of a block,
-the length and a check sum, then the block's rows and texts.  Each check sum continues
-the check sum of the first line, so every record identifies its sweep.  A record with a
-wrong check sum is ignored: it is damaged, or an interruption cut it short.  Records may
-be in any order and may occur twice.  Only one program at a time can lock the file.
+Records follow. Each record is appended by one write. It contains the number of a block,
+the length of the content and a check sum, then the block's rows and texts.  Each check
+sum continues the check sum of the first line, so every record identifies its sweep.  A
+record with a wrong check sum is ignored: it is damaged, or an interruption cut it
+short.  Records may be in any order and may occur twice.  Only one program at a time can
+lock the file.
 """
 
 import json
