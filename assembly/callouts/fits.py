@@ -15,7 +15,7 @@ from forcefit.inputs.table import BadInput, quoted
 
 STEPS = (3, 6, 10, 18, 30, 50, 80, 120, 180, 250, 315, 400, 500)  # [mm] upper ends
 GRADES = (5, 6, 7, 8, 9, 10, 11)
-# [um] tolerance of each grade, one row per step
+# [um] tolerance by grade, one row per step of nominal size
 _WIDTHS = (
     (4, 6, 10, 14, 25, 40, 60),
     (5, 8, 12, 18, 30, 48, 75),

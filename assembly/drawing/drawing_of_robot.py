@@ -145,7 +145,7 @@ def _frames(sheet: _Sheet) -> dict[str, str]:
 
 
 def _left_out(sheet: _Sheet) -> list[str]:
-    """Return descriptions of what a drawing cannot represent."""
+    """Return descriptions of properties that a drawing cannot represent."""
     posture, robot = sheet.posture, sheet.posture.robot
     lost = []
     turned = rotation_vector(posture.platform[:3, :3])

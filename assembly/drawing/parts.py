@@ -178,7 +178,7 @@ def _across(vector: NDArray, axis: NDArray) -> NDArray:
 
 
 def _shares(joint: DrawnJoint) -> list[JointNumbers]:
-    """Return the numbers of each frame; one frame carries those of the joint."""
+    """Return error, clearance and stiffness of each of the joint's frames."""
     own = joint.numbers[0]
     if joint.kind == "universal":
         return [joint.numbers[0], joint.numbers[-1]]

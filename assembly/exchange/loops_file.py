@@ -110,7 +110,7 @@ def read_loops(path: Path | str) -> LoopsFile:
 
 
 def with_points(loops: LoopsFile, names: Sequence[str]) -> LoopsFile:
-    """Return loops of which some are declared as points, whatever their type.
+    """Return the loops file with the named loops declared as points (type 3d).
 
     Args:
         loops: loops of a file.

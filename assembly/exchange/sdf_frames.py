@@ -76,7 +76,7 @@ class Frames:
         raise node.bad(key, f"found {quoted(name)}, expected a link or frame{hint}")
 
     def pose(self, name: str, asked: tuple[str, ...] = ()) -> NDArray:
-        """Return the (4, 4) pose in the world of a full name."""
+        """Return the (4, 4) pose in the world of the frame with a full name."""
         if name == WORLD:
             return np.eye(4)
         if name not in self.poses:

@@ -140,7 +140,7 @@ def _limits(node: Node) -> tuple[float, float] | None:
     if limit is None or node.text("type") in {"fixed", "continuous"}:
         return None
     ends = (limit.element.get("lower"), limit.element.get("upper"))
-    # an absent end means 0 in the format; files without limits omit both ends
+    # in URDF an absent limit means 0; files without limits omit both limits
     lower, upper = ("0" if end is None else end for end in ends)
     return None if ends == (None, None) else limit.limits(lower, upper)
 

@@ -103,7 +103,8 @@ def profiled(
         duration: [s] duration of the motion; None if limits are given.
         speed: [m/s, or rad/s of drives] largest speed of the platform's origin, or of
             any named joint.
-        acceleration: [m/s^2, or rad/s^2 of drives] largest acceleration of these.
+        acceleration: [m/s^2, or rad/s^2 of drives] largest acceleration of the
+            platform's origin, or of any named joint.
 
     Returns:
         The trajectory, the shortest one within the limits.

@@ -17,7 +17,7 @@ from forcefit.assembly.steps.state import State
 def influences_among_joins(
     machine: Machine, state: State, plan: Plan, number: int
 ) -> list[Influence]:
-    """Return the influences among consecutive joins, of which a step is the first.
+    """Return the influences among consecutive joins that begin with a given step.
 
     Args:
         machine: columns and rows of the robot.

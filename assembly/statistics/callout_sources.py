@@ -43,7 +43,7 @@ class CalloutSources:
     Attributes:
         robot: robot with the callouts.
         placed: callouts of the robot with their zones.
-        independent: errors that are added to those of the callouts, or None.
+        independent: errors that are added to the errors of the callouts, or None.
         fixed: (n, 6) [rad, m] errors that are added to every draw; zero if None.
         fits: fits of the robot's joints.
     """
@@ -191,7 +191,7 @@ class CalloutSources:
         return full if self.fixed is None else full + self.fixed
 
     def of_numbers(self, slopes: NDArray) -> NDArray:
-        """Return derivatives by numbers (..., m) from those by delta l (..., n, 6)."""
+        """Convert derivatives by delta l (..., n, 6) to ones by numbers (..., m)."""
         return np.einsum("...ni,nim->...m", slopes, self.maps)
 
     @cached_property

@@ -41,7 +41,7 @@ class Experiment:
     """Error distributions at a posture, and the quantities to compute for each draw.
 
     Attributes:
-        posture: posture of the robot; drawn errors replace those of the robot file.
+        posture: posture of the robot; drawn errors replace the robot file's errors.
         sources: distributions of the errors.
         seed: seed of all draws.
         clearance: one of

@@ -95,7 +95,7 @@ def respond(
 def _by_number(
     robot: Robot, sources: Sources, values: NDArray, slopes: NDArray
 ) -> NDArray:
-    """Return derivatives by the m sources (k, m) from those by all frame errors.
+    """Return derivatives by m sources (k, m), from derivatives by all frame errors.
 
     The clearance that a bolted joint locks in depends on the errors; its derivatives
     are central differences.

@@ -62,7 +62,7 @@ def with_worst_corners(
         t: (G,) [rad or m] tolerances.
 
     Returns:
-        The samples and those worst corners that were not yet among the samples.
+        The samples, extended by the worst corners that are not yet among them.
     """
     corners = np.vstack([
         samples.values[: CORNERS // 2],
@@ -105,7 +105,7 @@ def scale_uniformly(
         utilisations = requirement.utilisations(samples.values * plan.spread(trial))[
             1
         ].max(axis=0)
-        # largest utilisation among all samples except those that may fail
+        # largest utilisation among all samples except the samples that may fail
         utilisation = float(
             np.partition(utilisations, -1 - samples.allowed)[-1 - samples.allowed]
         )

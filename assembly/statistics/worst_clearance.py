@@ -126,7 +126,7 @@ def worst_error_slopes(
     by_screw, by_clearance = np.zeros_like(screws), np.zeros_like(draws.clearances)
     by_screw[:, part : part + 3] = screws[:, part : part + 3] / np.maximum(size, 1e-300)
     loaded = loaded_clearances(prepared, draws)
-    # derivative of the pose error by the clearances; those at their bounds do not move
+    # derivative of the pose error by clearances; a clearance at its bound does not move
     along = by_screw @ prepared.screws[:, : draws.clearances.shape[1]]
     patterns, pattern_of = np.unique(loaded, axis=0, return_inverse=True)
     for k, pattern in enumerate(patterns):

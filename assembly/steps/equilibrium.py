@@ -96,7 +96,7 @@ class Equilibrium:
 
     @property
     def energy(self) -> NDArray:
-        """(k,) [J] energy of all springs, including those of the fixtures."""
+        """(k,) [J] energy of all springs, including the springs of fixtures."""
         links = np.vecdot(self.springs, self.springs)
         return (links + np.vecdot(self.fixtures, self.fixtures)) / 2
 

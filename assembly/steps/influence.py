@@ -83,7 +83,7 @@ def depends_on_state(step: Step) -> bool:
 
 
 def influences(machine: Machine, state: State, run: Sequence[Join]) -> list[Influence]:
-    """Return the influence of joins on those joins that lock in an opening.
+    """Return the influence of all joins on the joins that lock in an opening.
 
     Args:
         machine: columns and rows of the robot.

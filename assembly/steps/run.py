@@ -182,7 +182,7 @@ def _row(machine: Machine, step: Join) -> int:
 def _join(
     machine: Machine, state: State, step: Join, blank: StepResult
 ) -> tuple[State, StepResult]:
-    """Close a closure, except for its locked components, which stay as they lie."""
+    """Close a closure, except for the components that are bolted as they lie."""
     assert not isinstance(step.part, str)
     hold = closed_rows(machine, state, step.part)
     opening = machine.opening(state.errors, state.found, state.holds, hold)

@@ -51,8 +51,8 @@ class BestOrder:
         plan: the plan in the best order, with the changes of its adjustments.
         value: value of the objective [N, J or m].
         bound: lower bound over all orders. It equals ``value`` if all orders were
-            searched. It is 0 if changes of the adjustments other than those that
-            minimise the readings were found to be better.
+            searched. It is 0 if adjustments were found that are better than
+            the adjustments that minimise the readings.
         given: value for the order of the given plan; inf if it cannot be assembled.
         searched: number of sets, or of partial orders, that were computed.
         method: ``"sets"`` or ``"orders"``.

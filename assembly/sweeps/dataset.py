@@ -53,7 +53,7 @@ def sweep_dataset(sweep: "Sweep", records: NDArray, texts: Texts) -> "xarray.Dat
     Args:
         sweep: sweep to which the results belong.
         records: (points,) records of all points.
-        texts: for each name, the texts of those points that have one.
+        texts: for each text variable, the texts of the points that have one.
 
     Returns:
         The data set; units are in the attribute ``units``.

@@ -56,7 +56,7 @@ class Journal:
         Args:
             block: number of the block.
             records: records of its points.
-            texts: for each name, the texts of those rows that have one.
+            texts: for each text variable, the texts of the rows that have one.
 
         Raises:
             BadInput: the file cannot be written, for example because the disk is full.

@@ -33,8 +33,8 @@ def figure_of(
         at: values on further axes by name; the nearest points are shown.  If no draw is
             selected, the median over the draws is shown.
         quantities: quantities to show, by the names in
-            :mod:`forcefit.assembly.sweeps.panels`; by default those of the paper's
-            figure 5.
+            :mod:`forcefit.assembly.sweeps.panels`; by default the quantities in
+            figure 5 of the paper.
 
     Returns:
         A figure with one panel per quantity, by default six.  It is not shown, except

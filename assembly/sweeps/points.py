@@ -83,7 +83,7 @@ class SolvedPoints:
 
     Attributes:
         records: (k,) records of :func:`record_type`; NaN for points without a solution.
-        texts: for each name in :data:`TEXTS`, the texts of those points that have one.
+        texts: for each name in :data:`TEXTS`, the texts of the points that have one.
     """
 
     records: NDArray

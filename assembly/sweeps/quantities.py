@@ -92,7 +92,7 @@ class Variable:
     """A variable of a sweep's data set.
 
     Attributes:
-        dims: axes other than those of the points, with their labels.
+        dims: axes in addition to the axes of the points, with their labels.
         quantity: entry in the table of quantities.
         condition: condition of the computation, appended to the meaning.
     """
@@ -130,7 +130,7 @@ def variables(question: Question) -> dict[str, Variable]:
 
 
 def computed(question: Question) -> dict[str, Variable]:
-    """Return the numeric variables that are computed, including those not stored.
+    """Return all numeric variables that are computed, stored or not.
 
     Args:
         question: quantities of a sweep.
