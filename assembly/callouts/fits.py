@@ -290,7 +290,7 @@ def _hole(step: int, letter: str, grade: int) -> tuple[float, float]:
         name = f"{letter.upper()}{grade}"
         raise BadInput(
             f"found {quoted(name)}, expected {letter.upper()} of a grade from "
-            f"{finest} to {coarsest}: the table has no others"
+            f"{finest} to {coarsest}: the table has no other grades"
         )
     delta = width - _width(step, grade - 1) if step else 0.0
     upper = -deviation + delta

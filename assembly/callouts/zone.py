@@ -77,17 +77,17 @@ class Zone:
 
     @cached_property
     def cuts(self) -> tuple[NDArray, ...]:
-        """Matrices (k, m): the linearly dependent bounds as rows on u."""
+        """Matrices (k, m): the linearly dependent bounds, as conditions on u."""
         return tuple(self.bounds[i] @ self.columns for i in self._split[1])
 
     @cached_property
     def cones_on_u(self) -> tuple[NDArray, ...]:
-        """Matrices (3, m): the double cones as rows on u."""
+        """Matrices (3, m): the double cones as conditions on the coordinates u."""
         return tuple(cone @ self.columns for cone in self.cones)
 
     @property
     def is_cut(self) -> bool:
-        """Whether dependent bounds or cones make the zone smaller than its balls."""
+        """Whether further bounds or cones restrict the product of unit balls."""
         return bool(self.cuts or self.cones)
 
     @property

@@ -96,7 +96,7 @@ def _cuts(steps: list[Step]) -> tuple[str, ...]:
 
 
 def _plan(drawing: Drawing, steps: list[Step]) -> _Plan:
-    """Return the names of the frames, changed only if a joint has the same name."""
+    """Return the frame names; a suffix is added if a joint has the same name."""
     joints = {joint.name: joint for joint in drawing.joints}
     bodies = {body.name: body for body in drawing.bodies}
     taken = _part_names(drawing)

@@ -186,7 +186,7 @@ def guess_platform(mechanism: Mechanism) -> str:
     for joint in mechanism.joints:
         depth[joint.child] = depth[joint.parent] + (joint.kind != "fixed")
     if len(depth) == 1:
-        raise BadInput(f"{mechanism.name}: found no joint, expected at least one")
+        raise BadInput(f"{mechanism.name}: found no joint, expected at least one joint")
     met = {name for loop in mechanism.loops for name in (loop.first, loop.second)}
     # a body that only closes a loop does not belong to the main chain
     closing = [j for j in mechanism.joints if _closes(j, mechanism)]

@@ -96,7 +96,7 @@ def with_loops(
 def _followed(
     joints: tuple[Joint, ...], couplings: Sequence[Coupling], loops: LoopsFile
 ) -> tuple[Joint, ...]:
-    """Return the joints, in which followers have the coordinates of their couplings."""
+    """Return the joints; each coupled joint has the coordinate of its coupling."""
     at = {joint.name: joint.position for joint in joints}
     for coupling in couplings:
         name = coupling.follower

@@ -100,7 +100,7 @@ def read_mjcf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
             )
     reading = _Reading(MassRules.of(root), _defaults(root))
     if root.child("worldbody") is None:
-        raise root.bad("worldbody", "missing")
+        raise root.bad("worldbody", "missing; expected bodies")
     for world in root.children("worldbody"):
         _walk(world, _Place(WORLD, np.eye(4), "main", Angles.of(root)), reading)
     for node in root.children():

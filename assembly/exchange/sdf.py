@@ -62,7 +62,7 @@ def read_sdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
     model = frames.model
     made = {name: link_body(frames, name, named) for name, named in frames.of("link")}
     if not made:
-        raise BadInput(f"{path}: link: missing; expected at least one")
+        raise BadInput(f"{path}: link: missing; expected at least one link")
     bodies = {name: body for name, (body, _) in made.items()}
     ends = {name: joint_ends(frames, named) for name, named in frames.of("joint")}
     first = frames.link(MODEL)

@@ -134,7 +134,7 @@ class Frames:
         for name, _ in self.of("link"):
             if name.startswith(scope):
                 return name
-        raise model.bad("link", "missing; expected at least one")
+        raise model.bad("link", "missing; expected at least one link")
 
 
 def frames_of(root: Node) -> Frames:

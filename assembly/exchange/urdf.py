@@ -64,7 +64,7 @@ def read_urdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
             raise node.bad("name", "found this name twice; expected unique names")
         bodies[body.name] = body
     if not bodies:
-        raise BadInput(f"{path}: link: missing; expected at least one")
+        raise BadInput(f"{path}: link: missing; expected at least one link")
     links = dict(bodies)
     nodes = [node for node in root.children() if node.tag.split(":")[-1] == "joint"]
     joints: dict[str, Joint] = {}

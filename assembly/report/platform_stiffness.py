@@ -189,7 +189,7 @@ def stiffness_values(
 
 
 def _share_values(stiffness: PlatformStiffness, axis: NDArray) -> dict[str, Any]:
-    """Return the shares along an axis by kind of part and frame."""
+    """Return the compliance shares along an axis, by kind of part and frame."""
     table: dict[str, Any] = {"links": {}, "joints": {}}
     for part, share in stiffness.shares(axis).items():
         if part.kind in _KINDS:

@@ -148,7 +148,7 @@ def _bracket(bounds: Sequence[float] | NDArray, screw: NDArray) -> dict[str, Any
 
 
 def pose_error_text(results: dict[str, Any]) -> str:
-    """Return the bounds as text, with one line for each assumption."""
+    """Return the pose error bounds as text, with one line for each assumption."""
     lines = lines_of(results, "pose status reason")
     for assumption, bounds in (results["error"] or {}).items():
         if "reason" in bounds:

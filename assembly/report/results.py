@@ -322,7 +322,7 @@ def _bound_lines(results: dict[str, Any]) -> dict[str, str]:
 
 
 def status_line(results: dict[str, Any]) -> str:
-    """Return a line with status and reason of a result whose status is not ok."""
+    """Return a line with a result's status and reason, unless the status is ok."""
     status, reason = results["status"], results["reason"]
     return reason if reason.startswith(status) else f"{status}: {reason}"
 

@@ -184,7 +184,7 @@ def _callouts(table: Table, robot: Robot, callouts: dict[int, int], number: int)
             if callouts.setdefault(k, number) != number:
                 raise table.bad("callouts", f"found {quoted(names[k])} twice")
     if not value:
-        raise table.bad("callouts", "expected at least one")
+        raise table.bad("callouts", "expected at least one callout")
     words = robot.callouts[next(k for k, n in callouts.items() if n == number)].words
     return f"{words} of {value[0]}"
 
@@ -229,7 +229,7 @@ def _places(table: Table, robot: Robot) -> tuple[list[tuple[int, int]], int]:
     except BadInput as error:
         raise table.bad("frames", str(error)) from None
     if not frames:
-        raise table.bad("frames", "expected at least one")
+        raise table.bad("frames", "expected at least one frame")
     places = [
         (row, order[SCREW.index(part)])
         for name in frames for row, order in error_rows(robot, name) for part in parts

@@ -81,7 +81,7 @@ REFUSED = {
     ("urdf", "a link without a name"): ("<robot><link/></robot>",
         "link.name: missing; expected a text"),
     ("urdf", "no link"): ("<robot/>",
-        "link: missing; expected at least one"),
+        "link: missing; expected at least one link"),
     ("urdf", "another element"): ("<robott/>",
         'found the root element "robott", expected robot'),
     ("urdf", "half a file"): ("<robot>",
