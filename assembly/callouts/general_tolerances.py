@@ -14,7 +14,7 @@ from forcefit.inputs.table import BadInput, quoted
 
 # [mm] largest length of each table column; the first column begins above 0.5
 LENGTHS = (3, 6, 30, 120, 400, 1000, 2000, 4000)
-# [mm] tolerance to each side; nan where the class has no value
+# [mm] tolerance to each side (+-); NaN where the standard has no value
 LINEAR = {
     "f": (0.05, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5, np.nan),
     "m": (0.1, 0.1, 0.2, 0.3, 0.5, 0.8, 1.2, 2.0),

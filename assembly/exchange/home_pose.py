@@ -22,7 +22,8 @@ _STARTS = 20  # number of random starts, at increasing distance from the file's 
 _STARTS_ALONE = 12  # number of starts for a single loop, to find one that cannot close
 _STEPS = 200  # largest number of search steps from one start
 _LONGEST_STEP = 0.3  # [rad or lengths] largest search step
-# ratio of the sums of squares over ten steps above which a search counts as stalled
+# a search counts as stalled if ten steps reduce the sum of squares by less than this
+# factor
 _STALLED = 0.999
 
 

@@ -20,7 +20,7 @@ from forcefit.assembly.linear.reference.reduction import FreeMotion
 from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.assembly.statistics.linear_response import LinearResponse
 
-# assumption of problem (27): springs keep their deformation of problem (22)
+# assumption of the pose error bounds: springs keep their least-energy deformation
 ASSUMPTION = "frozen"
 
 

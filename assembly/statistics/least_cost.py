@@ -32,10 +32,10 @@ from forcefit.assembly.statistics.scaling import (
     with_worst_corners,
 )
 
-_COARSE = 1e-3  # precision of intermediate costs, relative to the limits
-# smallest cost reduction per step for which iteration continues, relative to the cost
+_COARSE = 1e-3  # precision of the scaling at intermediate steps, relative to the limits
+# smallest relative reduction of the cost per step for which the iteration continues
 _GAIN = 1e-4
-# factors on the tolerances that bound the trust region
+# largest and smallest factor on the tolerances in one step (trust region)
 _LARGEST_RADIUS, _SMALLEST_RADIUS = 2.0, 1.01
 _MOST_STEPS = 60
 _PLANES = 200  # number of worst samples that are linearised for a yield of 1

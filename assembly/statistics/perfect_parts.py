@@ -25,7 +25,7 @@ from forcefit.assembly.statistics.worst_clearance import (
     worst_error_slopes,
 )
 
-# number of positions of a random clearance model from which the median is taken
+# number of random clearance positions from which the median is computed
 _DRAWS = 200
 _PRECISION = (1e-9, 1e-9)  # [rad, m] required precision of the largest pose errors
 _SHARE = 1e-3  # parts below this share of the largest pose error are not listed

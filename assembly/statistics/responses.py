@@ -26,8 +26,8 @@ from forcefit.assembly.steps.bolted import bolted_errors
 
 _STEP = 1e-6  # step for differences of the stress formula, relative to the wrench
 _PRECISION = 1e-9  # [rad or m] required precision of the largest pose errors
-# step for differences of bolted joints, relative to the largest value of a number, and
-# the smallest such value
+# finite-difference step for errors of bolted joints, relative to the largest absolute
+# value of the error; and the least value to which the step is relative
 _BOLT_STEP, _LEAST_VALUE = 1e-4, 1e-6
 _PARTS = {"moment": slice(0, 3), "force": slice(3, 6)}
 

@@ -19,7 +19,7 @@ from forcefit.assembly.statistics.worst_case import (
 
 _BATCH = 256  # number of draws between two progress reports
 _ROUNDING = 1e-9  # relative excess over a limit that counts as rounding error
-# largest number of verifications, and their joint confidence
+# largest number of verification tests, and the confidence level of all tests together
 LOOKS, CONFIDENCE = 4, 0.95
 
 

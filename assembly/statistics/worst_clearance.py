@@ -31,7 +31,7 @@ from forcefit.assembly.statistics.quantities import POSE_ERRORS
 
 ASSUMPTION = "frozen"
 PRECISION = (1e-6, 1e-6)  # [rad, m] required difference of upper and lower bounds
-# [rad or m] precision of a support function whose multipliers are derivatives
+# [rad or m] precision of the support function, whose multipliers are the derivatives
 _SUPPORT_PRECISION = 1e-12
 
 

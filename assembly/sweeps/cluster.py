@@ -36,7 +36,7 @@ _TASK = 0.5  # [s] target duration of a task; Dask recommends at least 0.1
 _IN_FLIGHT = 3  # number of submitted tasks per thread of the cluster
 _LARGEST = 256  # largest number of blocks per task
 _LAST = 2  # number of tasks per thread into which the last blocks are divided
-# Dask's profiler samples every 10 ms, which makes workers a thirtieth slower
+# Dask's profiler samples every 10 ms, which makes workers about 3 % slower
 _QUIET = {"distributed.worker.profile.enabled": False}
 _PATIENCE = 60.0  # [s] longest wait for the first worker
 

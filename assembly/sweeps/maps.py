@@ -119,7 +119,7 @@ def part_of_sweep(
 
 
 def _number(name: str, value: float | str) -> float:
-    """Return the number that was given for an axis."""
+    """Return the number at which an axis is fixed."""
     try:
         return float(value)
     except ValueError:
