@@ -115,7 +115,7 @@ def _side(step: Step, body: str) -> tuple[str, bool, DrawnJoint]:
 
 
 def _axis(joint: DrawnJoint, body: str) -> NDArray:
-    """Return the axis (3,) of a joint on a body, base axes at home."""
+    """Return the axis (3,) of a joint, as fixed to a body, in base axes at home."""
     second = joint.kind == "universal" and body == joint.second
     return joint.axis2 if second else joint.axis
 

@@ -174,7 +174,7 @@ def _places(kind: str, data: Any) -> list[tuple[Any, Any]]:
 
 
 def _drives(mujoco: Any, model: Any, root: Element) -> None:
-    """Add the actuators, according to what they move."""
+    """Add the actuators as MJCF elements that refer to the actuated objects."""
     group = SubElement(root, "actuator")
     for i in range(model.nu):
         kind = _DRIVEN.get(mujoco.mjtTrn(int(model.actuator_trntype[i])).name, "site")

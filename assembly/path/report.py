@@ -100,7 +100,7 @@ def path_page(
 
 
 def _good(summary: Mapping[str, Any]) -> bool | None:
-    """Return True if all instants are solved; None if vibration may be significant."""
+    """Return True if all instants are solved, None if vibration may be significant."""
     if summary["status"] != OK:
         return False
     periods = summary["periods"] or 0.0

@@ -224,7 +224,7 @@ class Requirement:
         return bounds[0], bounds[1]
 
     def utilisation_slopes(self, case: int, values: NDArray) -> NDArray:
-        """Return derivatives (k, m) of a row of :meth:`utilisations` by each error."""
+        """Return derivatives (k, m) by each error of a row of :meth:`utilisations`."""
         key, i = self.cases[case]
         return self.respond(key, i, values)[1] / self.plan.limits[key]
 

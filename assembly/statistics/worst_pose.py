@@ -46,8 +46,8 @@ from forcefit.results.text import in_unit
 
 # accepted difference of the bounds, relative to the support along x, y and z
 _TOLERANCE = 3e-4
-_STARTS = 24  # number of random corners from which the search starts
-_CLIMBS = 12  # largest number of steps from corner to corner
+_STARTS = 24  # number of random corners of the tolerances at which searches start
+_CLIMBS = 12  # largest number of steps from one corner of the tolerances to another
 
 MEANINGS = {
     "linear": "nothing is over-constrained: every reading is the same",

@@ -148,7 +148,7 @@ def _unit(machine: Machine, join: Join) -> NDArray:
 
 
 def _rows(machine: Machine, join: Join) -> NDArray:
-    """Return the rows of a join with respect to springs and free motions."""
+    """Return the derivatives of a join's opening by springs and by free motions."""
     ny = machine.springs.shape[1]
     if isinstance(join.part, str):
         row = machine.posture.robot.index(join.part)
