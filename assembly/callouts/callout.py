@@ -138,7 +138,7 @@ class Callout:
 
 
 def axes_along(axis: tuple[float, float, float]) -> NDArray:
-    """Return (3, 3) axes as columns with z along a unit vector; for z the identity."""
+    """Return (3, 3) axes as columns, z along a unit vector (identity if it is z)."""
     z = np.array(axis)
     if np.array_equal(z, [0.0, 0.0, 1.0]):
         return np.eye(3)
@@ -233,7 +233,7 @@ def _face_within(callout: Callout, width: float) -> Zone:
 
 
 def _away(shape: str, offset: NDArray, datum_axis: NDArray | None) -> NDArray:
-    """Return the offset (3,) to which a length refers: across axes, along normals."""
+    """Return the offset (3,) that a length limits: normal to an axis or a plane."""
     if shape == "plane":
         return np.array([0.0, 0.0, offset[2]])
     if datum_axis is not None and np.linalg.norm(datum_axis[:2]) < _ALONG:
@@ -242,7 +242,7 @@ def _away(shape: str, offset: NDArray, datum_axis: NDArray | None) -> NDArray:
 
 
 def _general(callout: Callout, away: NDArray, datum_axis: NDArray | None) -> list[Zone]:
-    """Return the zones of a general tolerance: of the length and perpendicularity."""
+    """Return the length and perpendicularity zones of a general tolerance."""
     linear, geometry = parse_general(callout.general)
     distance = float(np.linalg.norm(away))
     zones = [shift_along(linear_tolerance(distance, linear), away / distance)]
@@ -274,7 +274,9 @@ def check_orientation(
     """
     for kind in set(callout.widths) & set(ORIENTATIONS):
         if datum_axis is None:
-            raise BadInput(f"found {kind} to a point, expected an axis or a plane as A")
+            raise BadInput(
+                f"found {kind} to a point, expected an axis or a plane as datum A"
+            )
         cosine = abs(float(axis @ datum_axis))
         parallel = cosine > np.sqrt(1 - _ALONG**2)
         square = cosine < _ALONG

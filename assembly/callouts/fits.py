@@ -15,7 +15,7 @@ from forcefit.inputs.table import BadInput, quoted
 
 STEPS = (3, 6, 10, 18, 30, 50, 80, 120, 180, 250, 315, 400, 500)  # [mm] upper ends
 GRADES = (5, 6, 7, 8, 9, 10, 11)
-# [um] tolerance of each grade, one row per step
+# [um] tolerance by grade, one row per step of nominal size
 _WIDTHS = (
     (4, 6, 10, 14, 25, 40, 60),
     (5, 8, 12, 18, 30, 48, 75),
@@ -138,9 +138,10 @@ class Fit:
 
 @dataclass(frozen=True)
 class FittedEnd:
-    """One of two fitted places, at a distance about which the parts rotate.
+    """One of two fitted places of a hole and a shaft, such as an end of a bore.
 
-    The places are the ends of a bore or a guide, or two bearings.
+    The two places are the ends of a bore or a guide, or two bearings. Their clearances
+    let the parts rotate relative to each other.
 
     Attributes:
         length: [m] distance between the two places, > 0. The rotation is at most the
@@ -289,7 +290,7 @@ def _hole(step: int, letter: str, grade: int) -> tuple[float, float]:
         name = f"{letter.upper()}{grade}"
         raise BadInput(
             f"found {quoted(name)}, expected {letter.upper()} of a grade from "
-            f"{finest} to {coarsest}: the table has no others"
+            f"{finest} to {coarsest}: the table has no other grades"
         )
     delta = width - _width(step, grade - 1) if step else 0.0
     upper = -deviation + delta

@@ -1,7 +1,7 @@
 """General tolerances of ISO 2768: lengths and perpendicularity by class.
 
-Part 1 limits linear dimensions.  Of part 2, which is withdrawn and whose successor ISO
-22081 contains no tables, only perpendicularity is available.  Neither part limits a
+Part 1 limits linear dimensions.  Of part 2, only perpendicularity is available. Part 2
+is withdrawn, and its successor ISO 22081 contains no tables.  Neither part limits a
 position or a coaxiality.
 """
 
@@ -12,9 +12,9 @@ import numpy as np
 
 from forcefit.inputs.table import BadInput, quoted
 
-# [mm] largest length of each column; the first column begins above 0.5
+# [mm] largest length of each table column; the first column begins above 0.5
 LENGTHS = (3, 6, 30, 120, 400, 1000, 2000, 4000)
-# [mm] tolerance to each side; nan where the class has no value
+# [mm] tolerance to each side (+-); NaN where the standard has no value
 LINEAR = {
     "f": (0.05, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5, np.nan),
     "m": (0.1, 0.1, 0.2, 0.3, 0.5, 0.8, 1.2, 2.0),
@@ -33,7 +33,7 @@ _TEXT = re.compile(r"\s*ISO\s*2768\s*-\s*([fmcv])([HKL])?\s*")
 
 
 class GeneralTolerance(NamedTuple):
-    """Classes of ISO 2768 for lengths and for geometry; empty if not specified."""
+    """ISO 2768 tolerance classes for lengths and for geometry; empty if not given."""
 
     linear: str
     geometry: str
@@ -83,7 +83,7 @@ def perpendicularity_tolerance(side: float, kind: str) -> float:
 def _entry(
     row: tuple[float, ...], steps: tuple[int, ...], mm: float, name: str
 ) -> float:
-    """Return the value [m] of the first step that is at least as large as a size."""
+    """Return the tolerance [m] of the smallest size step that contains a size."""
     # a rounding error of a length in metres must not select the next step
     value = row[int(np.searchsorted(steps, mm * (1 - 1e-12)))]
     if np.isnan(value):

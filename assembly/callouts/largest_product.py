@@ -33,22 +33,22 @@ def largest_product(
 def product_by_bounds(
     w: NDArray, bounds: Sequence[NDArray], cones: Sequence[NDArray] = ()
 ) -> tuple[NDArray, float, NDArray]:
-    """Return :func:`largest_product`, and the parts of its bound.
+    """Return the result of :func:`largest_product`, and the parts of its bound.
 
     Args:
-        w: (m,).
-        bounds: as there.
-        cones: as there.
+        w: (m,) coefficients.
+        bounds: as for :func:`largest_product`.
+        cones: as for :func:`largest_product`.
 
     Returns:
-        x and the upper bound, and its part by each of ``bounds`` and ``cones``, the
-        size of the multiplier: the derivative of the bound with respect to the
-        logarithm of their size.
+        x, the upper bound, and the part of the upper bound due to each of ``bounds``
+        and ``cones``.  This part is the norm of the multiplier, which is the derivative
+        of the upper bound with respect to the logarithm of their size.
     """
     length = float(np.linalg.norm(w))
     if length == 0.0:
         return np.zeros_like(w), 0.0, np.zeros(len(bounds) + len(cones))
-    # the value attained along w itself is the unit of all other values
+    # all other values are divided by the value that is attained along w itself
     reached = 1.0 / max(_largest_gauge(w, bounds, cones), 1e-300)
     unit = length * length * reached
     w = w / unit
@@ -59,7 +59,7 @@ def product_by_bounds(
     of_bounds = [float(part.sum()) for part in np.split(start, ends)]
     while best > (1 + _GAP) * max(float(w @ x), 0.0) and mu > _LEAST_MU:
         centre = _centre(w, bounds, cones, x, mu)
-        if centre is None:  # rounding errors: keep the value certified so far
+        if centre is None:  # rounding errors: keep the bound that is certified so far
             break
         x, multipliers = centre
         # the smallest change of the multipliers that balances w exactly
@@ -80,7 +80,7 @@ def product_by_bounds(
 def _largest_gauge(
     x: NDArray, bounds: Sequence[NDArray], cones: Sequence[NDArray]
 ) -> float:
-    """Return the factor by which the set must be enlarged to reach x."""
+    """Return the factor by which the convex set must be enlarged to contain x."""
     sizes = [float(np.linalg.norm(b @ x)) for b in bounds]
     sizes += [abs(c[0] @ x) + float(np.linalg.norm(c[1:] @ x)) for c in cones]
     return max(sizes)
@@ -128,7 +128,7 @@ def _centre(
 
 
 def _halves(cones: Sequence[NDArray], x: NDArray) -> Iterator[tuple[NDArray, float]]:
-    """Yield rows and slack of each half |S x| <= 1 - s.x of the double cones."""
+    """Yield rows and slack of both halves |S x| <= 1 -+ s.x of each double cone."""
     for cone in cones:
         for sign in (1.0, -1.0):
             signed = np.vstack([sign * cone[:1], cone[1:]])

@@ -1,4 +1,4 @@
-"""Random points in products of unit balls, from uniform numbers."""
+"""Random points in products of unit balls, computed from uniform random numbers."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""Texts of tolerances: zone widths, lengths with tolerances, maximum material."""
+"""Parsing of tolerance texts: zone widths, lengths with tolerances, modifiers."""
 
 import re
 

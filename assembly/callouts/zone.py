@@ -4,8 +4,9 @@ A zone is a set of screws d [RX RY RZ TX TY TZ] of a feature, in the feature's a
 contains all d with ``|bound @ d| <= 1`` for each bound. Components to which no bound
 refers are zero.  A bound with one row is an interval, with two rows a disc, with three
 rows a ball.  Linearly independent bounds can reach their limits simultaneously, so
-their set is d = columns u, |u_k| <= 1.  Further bounds cut this set. Double cones
-``|s @ d| + |S @ d| <= 1``, the zones of round faces, also cut it.
+their set is d = columns u, |u_k| <= 1.  Linearly dependent bounds exclude a part of
+this set. Double cones ``|s @ d| + |S @ d| <= 1``, the zones of round faces, also
+exclude a part.
 
 Sources:
     Mujezinovic, Davidson, Shah (2004), A new mathematical model for geometric
@@ -25,9 +26,9 @@ from forcefit.assembly.callouts.largest_product import largest_product
 from forcefit.assembly.callouts.unit_balls import VOLUMES, ball_variance, in_balls
 
 DISTRIBUTIONS = ("uniform", "normal", "truncated")
-_SAMPLE = 1 << 17  # number of draws for the covariance of a zone that is cut
-_RANK = 1e-9  # smallest over largest singular value of independent bounds
-_MOST_ATTEMPTS = 10_000  # largest number of draws until a part is within the zone
+_SAMPLE = 1 << 17  # number of draws for the covariance of a zone without closed form
+_RANK = 1e-9  # least accepted singular value of independent bounds, over the largest
+_MOST_ATTEMPTS = 10_000  # largest number of draws for one part inside the zone
 Numbers = Callable[[int], NDArray]  # attempt -> (k, words) uniform numbers
 
 
@@ -52,7 +53,7 @@ class Zone:
 
     @cached_property
     def _split(self) -> tuple[list[int], list[int]]:
-        """Indices of the independent bounds, and of the bounds that cut their set."""
+        """Indices of the linearly independent bounds, and of the other bounds."""
         kept: list[int] = []
         cutting: list[int] = []
         for i, bound in enumerate(self.bounds):
@@ -76,17 +77,17 @@ class Zone:
 
     @cached_property
     def cuts(self) -> tuple[NDArray, ...]:
-        """Matrices (k, m): the bounds that cut, as rows on u."""
+        """Matrices (k, m): the linearly dependent bounds, as conditions on u."""
         return tuple(self.bounds[i] @ self.columns for i in self._split[1])
 
     @cached_property
     def cones_on_u(self) -> tuple[NDArray, ...]:
-        """Matrices (3, m): the double cones as rows on u."""
+        """Matrices (3, m): the double cones as conditions on the coordinates u."""
         return tuple(cone @ self.columns for cone in self.cones)
 
     @property
     def is_cut(self) -> bool:
-        """Whether the zone is smaller than the product of its balls."""
+        """Whether further bounds or cones restrict the product of unit balls."""
         return bool(self.cuts or self.cones)
 
     @property
@@ -96,7 +97,7 @@ class Zone:
 
     @property
     def words(self) -> int:
-        """Number of uniform numbers per draw: one per coordinate, then one for size."""
+        """Uniform random numbers per draw: one per coordinate, one for hole size."""
         return sum(self.dimensions) + self.grows
 
     def growth(self, size: NDArray) -> NDArray:
@@ -104,7 +105,7 @@ class Zone:
         return size if self.from_zero else 1.0 + self.bonus * size
 
     def inside(self, u: NDArray, grown: NDArray | float = 1.0) -> NDArray:
-        """Return (k,) bool: whether coordinates (k, m) are in the scaled zone."""
+        """Return (k,) bool, True for coordinates (k, m) inside the scaled zone."""
         limits = [(part, grown) for part in self._balls(u)]
         limits += [(u @ cut.T, 1.0) for cut in self.cuts]
         marks = [np.linalg.norm(x, axis=-1) <= g * (1 + 1e-12) for x, g in limits]
@@ -119,7 +120,7 @@ class Zone:
         ]
 
     def _balls(self, u: NDArray) -> list[NDArray]:
-        """Return the coordinates of each ball."""
+        """Return the coordinates u, split into one array per ball."""
         ends = np.cumsum(self.dimensions)
         return np.split(u, ends[:-1], axis=-1)
 
@@ -189,7 +190,7 @@ class Zone:
             again, fits = self._attempt(numbers(attempt), distribution, s, grown)
             taken = ~accepted & fits
             u[taken], accepted = again[taken], accepted | fits
-        raise RuntimeError("a zone was not met by random draws")
+        raise RuntimeError("tolerance zone: found no random draw inside it")
 
     def _attempt(
         self, uniform: NDArray, distribution: str, s: float, grown: NDArray
@@ -204,7 +205,7 @@ class Zone:
         return u, self.inside(u, grown)
 
     def _in_balls(self, uniform: NDArray, distribution: str, s: float) -> NDArray:
-        """Return coordinates (k, m) in the unit balls, before the cuts."""
+        """Return coordinates (k, m) in the unit balls, before parts are rejected."""
         return in_balls(uniform, self.dimensions, distribution, s)
 
     @cached_property
@@ -302,5 +303,5 @@ def _scale(rows: NDArray) -> NDArray:
 
 
 def _sample(words: int, attempt: int = 0) -> NDArray:
-    """Return fixed uniform numbers, which are equal at each call."""
+    """Return uniform random numbers of a fixed seed, equal at each call."""
     return np.random.default_rng([words, attempt]).random((_SAMPLE, words))

@@ -15,7 +15,7 @@ from forcefit.assembly.model.placed_frames import PlacedFrame, own_motion
 from forcefit.inputs.table import BadInput, quoted
 
 _ROUNDING = 1e-12
-# shape of the datum for each type of joint; all other types are axes
+# datum shape by joint type; the datum of any other joint type is an axis
 _DATUM_SHAPES = {
     "planar": "plane",
     "spherical": "point",
@@ -61,7 +61,7 @@ def _of_frames(
     drawn: DrawnCallout, passed: Mapping[str, Step],
     poses: Mapping[str, tuple[NDArray, NDArray]],
 ) -> Callout:  # fmt: skip
-    """Return one callout at the frame that is on the callout's body."""
+    """Return a drawn callout, transferred to the frame on the callout's body."""
     callout = drawn.callout
     step = passed[callout.feature]
     frame, after, joint = _side(step, drawn.body)
@@ -89,7 +89,7 @@ def _of_frames(
 
 
 def _hole_of(step: Step, drawn: DrawnCallout) -> str:
-    """Return the name of the fit of a joint's hole on a body, or of the joint."""
+    """Return the name of the fit of a joint's hole; without a fit, of the joint."""
     joint = step.edge.item
     assert isinstance(joint, DrawnJoint)
     fitted = [p for p in parts_of(joint, step.reverse) if p.numbers.fit]
@@ -107,7 +107,7 @@ def _hole_of(step: Step, drawn: DrawnCallout) -> str:
 
 
 def _side(step: Step, body: str) -> tuple[str, bool, DrawnJoint]:
-    """Return the frame of a joint at a body, whether it is moved, and the joint."""
+    """Return a joint's frame at a body, whether the joint moves it, and the joint."""
     joint = step.edge.item
     assert isinstance(joint, DrawnJoint)
     after = step.start[0] != body
@@ -115,7 +115,7 @@ def _side(step: Step, body: str) -> tuple[str, bool, DrawnJoint]:
 
 
 def _axis(joint: DrawnJoint, body: str) -> NDArray:
-    """Return the axis (3,) of a joint on a body, base axes at home."""
+    """Return the axis (3,) of a joint, as fixed to a body, in base axes at home."""
     second = joint.kind == "universal" and body == joint.second
     return joint.axis2 if second else joint.axis
 

@@ -68,9 +68,9 @@ def bearings(
     """Return the contacts of a shaft along z in two bearings or in a bore's two ends.
 
     Args:
-        first: [m] height z and radial gap of the lower place; the radial gap is half
-            the diametral clearance.
-        second: [m] height z and radial gap of the upper place.
+        first: [m] height z and radial gap of the lower bearing or bore end. The radial
+            gap is half the diametral clearance.
+        second: [m] height z and radial gap of the upper bearing or bore end.
         name: beginning of the contacts' names.
 
     Returns:
@@ -124,7 +124,7 @@ def guide(
         Two chains, which roll about two opposite edges of the block.
     """
     edge = np.array([width / 2, height / 2, 0.0])
-    # the bounds limit the roll to half of the bound of the first chain
+    # the gaps limit the roll of the block to half of the bound that the chains have
     c_x, c_y = largest or gaps
     most = 2 * min(2 * c_y / width, 2 * c_x / height)
     rolls = Clearance(spin=most), Clearance(spin=np.inf, axial=np.inf)
@@ -139,7 +139,7 @@ def guide(
 def _tilts(
     name: str, gaps: tuple[float, float], length: float, chain: int
 ) -> Iterator[Contact]:
-    """Yield rotations about y and x at both ends; each moves only the other end."""
+    """Yield rotations at both ends of a guide; each moves only the other end."""
     # columns: axes of a frame whose z is the joint's y, then the joint's x
     axes = np.eye(3)[:, [2, 0, 1]], np.eye(3)[:, [1, 2, 0]]
     for turn, gap, R in zip(("yaw", "pitch"), gaps, axes, strict=True):

@@ -27,7 +27,7 @@ FREE_ROWS: dict[str, tuple[int, ...]] = {
     "planar": (2, 3, 4),
 }
 Direction = tuple[float, float, float] | None
-NEAR_X = 0.985  # cosine of 10 deg: for an axis nearer to the base's x, y is used
+NEAR_X = 0.985  # cosine of 10 deg; nearer to the base's x, the base's y is used
 
 
 @dataclass(frozen=True, eq=False)

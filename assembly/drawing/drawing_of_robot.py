@@ -44,14 +44,14 @@ _HELD = {
 
 @dataclass(frozen=True, eq=False)
 class DrawnRobot:
-    """A robot as a drawing, with what the drawing cannot represent.
+    """A robot as a drawing, with a list of properties that a drawing cannot represent.
 
     Attributes:
         drawing: bodies and joints of the robot.
         frames: for each joint, the name that its frame gets in the robot of the
             drawing. Ball, cylindrical and planar joints are not listed, because their
             axes change.
-        left_out: descriptions of what a drawing cannot represent.
+        left_out: descriptions of properties of the robot that the drawing omits.
     """
 
     drawing: Drawing
@@ -75,8 +75,10 @@ def drawing_of_robot(robot: Robot) -> DrawnRobot:
     rigid = rigid_bodies(robot)
     end = rigid.after[robot.index(robot.platform)]
     if end == 0:
-        raise BadInput(f"{robot.name}: found a platform fixed to the base")
-    # effects refer to frames by name
+        raise BadInput(
+            f"{robot.name}: found a platform fixed to the base, expected one that moves"
+        )
+    # a robot with effects keeps one joint per frame: effects refer to frames by name
     sheet = _Sheet(posture, rigid, found_joints(posture, rigid, not robot.has_effects))
     _add_bodies(sheet)
     for i, frame in enumerate(robot.frames):
@@ -143,7 +145,7 @@ def _frames(sheet: _Sheet) -> dict[str, str]:
 
 
 def _left_out(sheet: _Sheet) -> list[str]:
-    """Return descriptions of what a drawing cannot represent."""
+    """Return descriptions of properties that a drawing cannot represent."""
     posture, robot = sheet.posture, sheet.posture.robot
     lost = []
     turned = rotation_vector(posture.platform[:3, :3])

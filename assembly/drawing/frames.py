@@ -1,8 +1,8 @@
 """Conversion of a drawing to a robot of frames and closures.
 
 A joint becomes one frame with its name, or one frame for each of its freedoms
-(``joint.first``).  A body becomes a fixed frame with its name if it has a mass or a
-link, if it is the platform, or if a loop closes at the body.
+(``joint.first``).  A body becomes a fixed frame with its name in three cases: it has a
+mass or a link, it is the platform, or a loop closes at it.
 """
 
 from collections.abc import Mapping
@@ -31,13 +31,13 @@ from forcefit.stiffness.screws import transform
 
 @dataclass(frozen=True, eq=False)
 class _Plan:
-    """Names and places of the frames of a robot.
+    """Names of the frames of a robot, and the nodes that they belong to.
 
     Attributes:
         drawing: bodies and joints.
         joints: joints of the drawing by name.
         bodies: bodies of the drawing by name.
-        own: name of the frame of each body that has one, by node.
+        own: by node, the name of the frame of each body that has its own frame.
         carriers: name of the frame that carries the objects on a node.
         links: name of the frame of a body's link, if it differs from the body's frame.
         ends: name of the last frame of an edge that closes a loop.
@@ -89,14 +89,14 @@ def robot_of_drawing(drawing: Drawing) -> Robot:
 
 
 def _cuts(steps: list[Step]) -> tuple[str, ...]:
-    """Return a remark on the joints after which loops close; empty without loops."""
+    """Return a remark that names the joints after which loops close, if any."""
     closing = [step for step in steps if step.closes]
     names = [f"{quoted(s.edge.item.name)} (at {quoted(s.end[0])})" for s in closing]
     return (f"loops close after {', '.join(names)}",) if names else ()
 
 
 def _plan(drawing: Drawing, steps: list[Step]) -> _Plan:
-    """Return the names of the frames, changed only if a joint has the same name."""
+    """Return the frame names; a suffix is added if a joint has the same name."""
     joints = {joint.name: joint for joint in drawing.joints}
     bodies = {body.name: body for body in drawing.bodies}
     taken = _part_names(drawing)

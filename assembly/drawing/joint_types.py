@@ -92,7 +92,7 @@ def _ends(bodies: RigidBodies, rows: list[int]) -> tuple[int, int]:
 
 
 def _following(posture: Posture, bodies: RigidBodies) -> dict[int, int]:
-    """Return the next frame at the same point, if the body between carries nothing."""
+    """Return the next frame at this point, if no mass or link is between them."""
     robot, size = posture.robot, size_of(posture.robot)
     held = Counter(bodies.before[robot.index(robot.platform)] for _ in range(2))
     for i, frame in enumerate(robot.frames):
@@ -132,12 +132,12 @@ def _single(posture: Posture, i: int) -> DrawnJoint:
 def _numbers(frame: Frame) -> JointNumbers:
     """Return error, clearance and stiffness of a frame, in its axes."""
     bolt, error = frame.locked_at, frame.geometric_error
-    if bolt is not None:  # the drawing is of the robot before it is bolted
+    if bolt is not None:  # the drawing shows the robot before its joints are bolted
         if {"rx", "ry", "rz"} & set(bolt.pose):
             raise BadInput(
                 f"frame {quoted(frame.name)}.locked_at: found a rotation of the "
-                "platform, whose axes a drawing turns; expected its translation, or "
-                "joints"
+                "platform, but the platform has other axes in a drawing; expected only "
+                "a translation, or joint coordinates"
             )
         bolt, error = replace(bolt, screw=np.zeros(6)), error - bolt.screw
     return JointNumbers(
@@ -176,7 +176,7 @@ def _several(posture: Posture, rows: list[int]) -> tuple[DrawnJoint, list[int]] 
     kind, R, numbers = found
     name = _common_name(posture.robot, rows)
     if R is not axes[0] and kind == "spherical":
-        rows = rows[::-1]  # the contact remains on the body that has it
+        rows = rows[::-1]  # the contact remains on its body
     second = R[:, 0] if kind != "universal" else z[1]
     joint = DrawnJoint(
         name, kind, "", "", posture.transforms[rows[0]][:3, 3], R[:, 2],
@@ -247,7 +247,7 @@ def _with_one_contact(
 
 
 def _isotropic(own: JointNumbers) -> bool:
-    """Return whether there is only a contact that is symmetric about z."""
+    """Return whether a frame has only a clearance that is symmetric about z."""
     K = own.stiffness
     even = K is None or (
         not (np.where(np.isinf(K), 0.0, K) - np.diag(np.where(
@@ -258,7 +258,7 @@ def _isotropic(own: JointNumbers) -> bool:
 
 
 def _empty(own: JointNumbers) -> bool:
-    """Return whether there is no error, clearance, spring or tolerance."""
+    """Return whether a joint has no error, clearance, spring or tolerance."""
     return (
         own.clearance is None and own.stiffness is None and own.tolerance is None
         and not own.error.any()

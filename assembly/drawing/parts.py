@@ -1,4 +1,4 @@
-"""The frames of a joint: one freedom each, all at the same point."""
+"""The frames of a joint: one frame per freedom, all at the joint's point."""
 
 from dataclasses import dataclass, replace
 
@@ -178,7 +178,7 @@ def _across(vector: NDArray, axis: NDArray) -> NDArray:
 
 
 def _shares(joint: DrawnJoint) -> list[JointNumbers]:
-    """Return the numbers of each frame; one frame carries those of the joint."""
+    """Return error, clearance and stiffness of each of the joint's frames."""
     own = joint.numbers[0]
     if joint.kind == "universal":
         return [joint.numbers[0], joint.numbers[-1]]
@@ -187,7 +187,8 @@ def _shares(joint: DrawnJoint) -> list[JointNumbers]:
     if joint.kind == "spherical":
         return [own, JointNumbers(), JointNumbers()]
     if joint.kind == "planar":
-        # the error places the plane before the sliding; the contact is at the rotation
+        # the error moves the plane and precedes the sliding; the rotation has the
+        # contact
         placed = JointNumbers(error=_from_axes(own.error), tolerance=_size(own))
         contact = replace(own, error=np.zeros(6), tolerance=None)
         return [placed, JointNumbers(), contact]
@@ -204,7 +205,7 @@ def _from_axes(screw: NDArray) -> NDArray:
 
 
 def _size(numbers: JointNumbers) -> NDArray | None:
-    """Return the tolerance (6,) in these axes, without signs."""
+    """Return the tolerance (6,), without signs, in the first frame's axes."""
     return None if numbers.tolerance is None else numbers.tolerance[_TO_SLIDE]
 
 

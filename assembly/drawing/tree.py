@@ -128,7 +128,7 @@ def _edges(drawing: Drawing) -> list[Edge]:
 
 
 def _entered(around: Mapping[Node, list[Edge]]) -> dict[Node, Edge]:
-    """Return the edge by which the tree reaches each node, reversing few edges."""
+    """Return the edge by which the tree reaches each node; few edges are reversed."""
     entered: dict[Node, Edge] = {}
     reached: set[Node] = set()
     count = 0  # number of added edges, which keeps the file's order among equal paths

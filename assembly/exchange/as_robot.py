@@ -1,9 +1,9 @@
 """Conversion of a mechanism to a robot of frames, and back.
 
 A moving joint becomes a frame with the joint's name; a body on a fixed joint becomes a
-frame with the body's name.  A body on a moving joint gets its own frame if the body has
-a mass, ends a chain, or is an end of a loop, because its axes may differ from the
-joint's axes.
+frame with the body's name.  A body on a moving joint gets its own frame if it has a
+mass, ends a chain, or is an end of a loop, because such a body may have other axes than
+the joint.
 """
 
 from collections.abc import Mapping
@@ -186,7 +186,7 @@ def guess_platform(mechanism: Mechanism) -> str:
     for joint in mechanism.joints:
         depth[joint.child] = depth[joint.parent] + (joint.kind != "fixed")
     if len(depth) == 1:
-        raise BadInput(f"{mechanism.name}: found no joint, expected at least one")
+        raise BadInput(f"{mechanism.name}: found no joint, expected at least one joint")
     met = {name for loop in mechanism.loops for name in (loop.first, loop.second)}
     # a body that only closes a loop does not belong to the main chain
     closing = [j for j in mechanism.joints if _closes(j, mechanism)]
@@ -274,7 +274,7 @@ def mechanism_of_robot(robot: Robot, home: NDArray) -> RobotAndMechanism:
 
 
 def _unlike(name: str, taken: set[str]) -> str:
-    """Return the name, lengthened until it is unique."""
+    """Return the name with a suffix that makes it unique."""
     while name in taken:
         name += "_"
     return name

@@ -1,4 +1,4 @@
-"""Ball joints as three rotations that are zero at home, where they are not singular."""
+"""Conversion of ball joints to three rotations that are zero at the home pose."""
 
 from dataclasses import replace
 

@@ -18,9 +18,10 @@ from typing import Any
 from forcefit.assembly.exchange.mechanism import Mechanism
 from forcefit.assembly.model.inertia import MassProperties
 
-AGREED = 1e-9  # [rad, m, relative mass] largest difference that counts as agreement
+# [rad, m, -] largest difference of poses and masses that counts as agreement
+AGREED = 1e-9
 POSTURES = 20
-_LONGEST = 60.0  # [s] time limit of the other program
+_LONGEST = 60.0  # [s] longest run time of the other program
 _WORKER = "from forcefit.assembly.exchange.mujoco_reading import main; main()"
 
 
@@ -53,7 +54,7 @@ class Comparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether the programs agree."""
+        """Whether both programs read the same robot from the file."""
         return self.difference <= AGREED
 
     def table(self) -> dict[str, Any]:

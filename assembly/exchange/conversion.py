@@ -39,7 +39,7 @@ class Conversion:
 
     @property
     def agrees(self) -> bool:
-        """Whether no other program disagrees with forcefit's reading."""
+        """Whether all other programs read the same robot as forcefit."""
         return all(comparison.agrees for comparison in self.comparisons)
 
     def table(self) -> dict[str, Any]:

@@ -78,7 +78,7 @@ def convert(
         target: a ``.toml``, ``.urdf`` or ``.xml`` file.
         loops: YAML file with ``closed_loop``; None for the file next to the source.
         overlay: TOML file with elasticity, clearances and errors of frames by name.
-        points: names of loops that close only in a point, in addition to those of type
+        points: names of loops that close only in a point, in addition to loops of type
             3d; an empty list to use the types unchanged.  None to use the types unless
             every loop is declared 6d and the loops cannot close: then all loops become
             points, and the result reports this.
@@ -225,7 +225,7 @@ def _built_in(conversion: Conversion) -> tuple[Conversion, RobotAndMechanism]:
     if threads:
         raise BadInput(
             f"{conversion.robot.name}: found helical joints ({', '.join(threads)}), "
-            "which only robot files (.toml) hold; nothing is written"
+            "which only robot files (.toml) can represent; nothing is written"
         )
     posture = home_posture(conversion.robot)
     robot = with_calibration(posture)

@@ -1,4 +1,4 @@
-"""Joints that follow other joints."""
+"""Couplings: joints whose coordinate is a polynomial of another joint's."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -44,7 +44,7 @@ def with_loops(
     mechanism, parts = _retyped(mechanism, loops.turns, parts)
     ends = {name: name for name in mechanism.bodies}
     children = {joint.name: joint.child for joint in mechanism.joints}
-    # a joint of several freedoms ends at its last part
+    # a joint of several freedoms ends at the last of its one-freedom joints
     ends |= {name: children[several[-1]] for name, several in parts.items()}
     # a link on a fixed joint may have the joint's name: both denote the same place
     count, closed = len(mechanism.loops), list(mechanism.loops)
@@ -96,7 +96,7 @@ def with_loops(
 def _followed(
     joints: tuple[Joint, ...], couplings: Sequence[Coupling], loops: LoopsFile
 ) -> tuple[Joint, ...]:
-    """Return the joints, in which followers have the coordinates of their couplings."""
+    """Return the joints; each coupled joint has the coordinate of its coupling."""
     at = {joint.name: joint.position for joint in joints}
     for coupling in couplings:
         name = coupling.follower

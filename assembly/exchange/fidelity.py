@@ -1,4 +1,4 @@
-"""Accuracy of a written robot: comparison in random postures."""
+"""Comparison of a written robot with the original robot in random postures."""
 
 from collections.abc import Mapping, Sequence
 
@@ -38,7 +38,10 @@ def largest_difference(placed: RobotAndMechanism) -> float:
     rows = {f.name: i for i, f in enumerate(robot.frames) if f.joint != "fixed"}
     lost = sorted(set(rows) ^ set(moving))
     if lost:
-        raise BadInput(f"{robot.name}: joint {lost[0]} was lost in conversion")
+        raise BadInput(
+            f"{robot.name}: found joint {lost[0]} only before or only after the "
+            "conversion, expected it in both"
+        )
     random, worst = np.random.default_rng(0), 0.0
     kinds = np.array([KINDS[f.joint] for f in robot.frames])
     leads = np.array([f.lead for f in robot.frames])

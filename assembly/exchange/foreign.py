@@ -159,7 +159,7 @@ def _laid_over(
     placed: RobotAndMechanism, source: Path, overlay: Path | str | None,
     named: str | None,
 ) -> Robot:  # fmt: skip
-    """Return the robot with an overlay, in which the platform may be a body's name."""
+    """Return the robot with its overlay, which may name a body as the platform."""
     content = robot_table(placed.robot)
     if overlay is None:
         return robot_of(Table(content, str(source), ""), source.stem)
@@ -186,7 +186,7 @@ def _left_out(placed: RobotAndMechanism, named: str | None) -> tuple[str, ...]:
 
 
 def _weighed(mechanism: Mechanism, comparison: Comparison) -> Mechanism:
-    """Return bodies with mesh masses from the other program, or report their lack."""
+    """Return bodies with the mesh masses of another program, or report them missing."""
     known = comparison.weights
     bodies = dict(mechanism.bodies)
     for name, (mass, centre, J) in known.items():

@@ -17,12 +17,13 @@ from forcefit.inputs.errors import BadInput, quoted
 from forcefit.stiffness.screws import rotation_vector, skew, transform
 
 CLOSED = 1e-10  # [rad, m] largest mismatch of a loop that counts as closed
-_SCREWED_TIGHT = 1e-14  # scaled residual below which only rounding errors remain
+_SCREWED_TIGHT = 1e-14  # scaled loop mismatch below which only rounding errors remain
 _STARTS = 20  # number of random starts, at increasing distance from the file's home
 _STARTS_ALONE = 12  # number of starts for a single loop, to find one that cannot close
-_STEPS = 200  # largest number of steps from a start
-_LONGEST_STEP = 0.3  # [rad or lengths] largest step
-# ratio of the sums of squares over ten steps above which a search counts as stalled
+_STEPS = 200  # largest number of search steps from one start
+_LONGEST_STEP = 0.3  # [rad or lengths] largest search step
+# a search counts as stalled if ten steps reduce the sum of squares by less than this
+# factor
 _STALLED = 0.999
 
 
@@ -33,7 +34,7 @@ def loop_residual(mechanism: Mechanism, coordinates: NDArray) -> float:
 
 
 def close_loops(mechanism: Mechanism, file: str) -> tuple[NDArray, bool]:
-    """Return coordinates for which all loops close, near those of the file.
+    """Return joint coordinates for which all loops close, near those of the file.
 
     The first search holds the drives.  If the loops do not close, the next search also
     moves the drives.  Then searches follow from random starts, each farther away; the
@@ -79,7 +80,7 @@ def _check_alone(mechanism: Mechanism, file: str) -> None:
 
 
 def nearest_closed(mechanism: Mechanism, starts: int) -> tuple[NDArray, float, bool]:
-    """Return coordinates near those of the file with the least mismatch of the loops.
+    """Return joint coordinates with the least loop mismatch, near those of the file.
 
     Args:
         mechanism: mechanism of n joints.
@@ -157,7 +158,7 @@ def _size(mechanism: Mechanism) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Loops:
-    """The closure equations of loops and of joints that follow others.
+    """The closure equations of loops, and the equations of coupled joints.
 
     In these equations, every joint rotates about or translates along its own z axis.
     """
@@ -222,7 +223,7 @@ class _Loops:
 
     @cached_property
     def concerned(self) -> NDArray:
-        """(n,) bool, whether a joint is on one side of a loop but not on the other."""
+        """(n,) bool, whether a joint's motion changes the mismatch of a loop."""
         marks = np.zeros(len(self.kinds), dtype=bool)
         for (i, _), (j, _), _ in self.ends:
             marks |= self.carried[i] != self.carried[j]

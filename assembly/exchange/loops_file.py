@@ -3,9 +3,10 @@
 The format is that of the project example-parallel-robots. ``closed_loop`` lists pairs
 of joints or links that coincide; ``type`` is ``6d``, or ``3d`` if only the points
 coincide; ``name_mot`` lists the drives.  ``joint_name`` and ``joint_type`` declare a
-joint as SPHERICAL, as FIXED or as a UJOINT about two axes (_XY, _YX, ..), because CAD
-programs export such joints as one rotation.  The keys ``home`` (coordinates by joint)
-and ``platform`` are additions of forcefit, which other readers ignore.
+joint as SPHERICAL, as FIXED or as a UJOINT about two axes (_XY, _YX, ..). They are
+needed because CAD programs export such joints as one rotation.  The keys ``home``
+(coordinates by joint) and ``platform`` are additions of forcefit, which other readers
+ignore.
 
 The generator of that project writes ``6d`` for every loop, and users correct the types
 by hand.  A file that contains only ``6d`` may therefore be uncorrected: its loops
@@ -109,7 +110,7 @@ def read_loops(path: Path | str) -> LoopsFile:
 
 
 def with_points(loops: LoopsFile, names: Sequence[str]) -> LoopsFile:
-    """Return loops of which some are declared as points, whatever their type.
+    """Return the loops file with the named loops declared as points (type 3d).
 
     Args:
         loops: loops of a file.
@@ -176,7 +177,7 @@ def _yaml(path: Path | str) -> dict[str, Any]:
 
 
 def _list(table: Table, key: str) -> list[Any]:
-    """Return a list from a table; the list may be empty."""
+    """Return the list under a key of a table; the list may be empty."""
     value = table.get(key)
     if value is None:
         return []
@@ -186,7 +187,7 @@ def _list(table: Table, key: str) -> list[Any]:
 
 
 def _names(table: Table, key: str) -> tuple[str, ...]:
-    """Return a list of names from a table."""
+    """Return the list of names under a key of a table."""
     values = _list(table, key)
     for value in values:
         if not isinstance(value, str):
@@ -208,7 +209,7 @@ def _turns(table: Table) -> dict[str, str]:
 
 
 def _pair(table: Table, index: int, pair: object) -> tuple[str, str]:
-    """Return a pair of different names."""
+    """Return the two names of a loop, which must differ."""
     names = pair if isinstance(pair, list) else []
     names = [name for name in names if isinstance(name, str)]
     if len(names) != 2 or pair != names or names[0] == names[1]:

@@ -71,7 +71,8 @@ class _Reading:
     parts: dict[str, list[str]] = field(default_factory=dict)
     sites: dict[str, tuple[str, NDArray]] = field(default_factory=dict)
     extra: dict[str, list[str]] = field(default_factory=dict)
-    coordinates: dict[str, str] = field(default_factory=dict)  # kinds, in order of qpos
+    # kind of each joint, in the order of MuJoCo's coordinates qpos
+    coordinates: dict[str, str] = field(default_factory=dict)
     number: int = 0  # number of bodies so far
     unweighed: list[str] = field(default_factory=list)
 
@@ -99,7 +100,7 @@ def read_mjcf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
             )
     reading = _Reading(MassRules.of(root), _defaults(root))
     if root.child("worldbody") is None:
-        raise root.bad("worldbody", "missing")
+        raise root.bad("worldbody", "missing; expected bodies")
     for world in root.children("worldbody"):
         _walk(world, _Place(WORLD, np.eye(4), "main", Angles.of(root)), reading)
     for node in root.children():
@@ -123,7 +124,7 @@ def read_mjcf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
     free = [name for name, kind in reading.coordinates.items() if kind == "free"]
     floating = counted("free joints that no loop ties to the ground", free)
     unweighed = tuple(reading.unweighed)
-    if unweighed and reading.rules.total > 0:  # scaling would need all masses
+    if unweighed and reading.rules.total > 0:  # scaling requires all masses
         unweighed = tuple(name for name in reading.bodies if name != WORLD)
     mechanism = replace(
         mechanism, joints=joints, loops=closed, left_out=left_out, couplings=couplings,
@@ -170,7 +171,7 @@ def _filled(node: Node, childclass: str, reading: _Reading) -> Node:
     name = node.text("class", childclass)
     if name not in reading.defaults:
         hint = nearest(name, reading.defaults)
-        raise node.bad("class", f"found {quoted(name)}, no default class{hint}")
+        raise node.bad("class", f"found {quoted(name)}, expected a default class{hint}")
     given = {**reading.defaults[name].get(node.tag, {}), **node.element.attrib}
     element = type(node.element)(node.element.tag, given)
     element.extend(list(node.element))
@@ -178,7 +179,7 @@ def _filled(node: Node, childclass: str, reading: _Reading) -> Node:
 
 
 def _inside(frame: Node, place: _Place) -> _Place:
-    """Return the place of the elements inside a frame."""
+    """Return the place of the elements inside an MJCF ``frame``."""
     T = place.offset @ _pose(frame, place.angles)
     angles = place.angles
     if frame.has(UNIT):  # the frame comes from an attached model
@@ -288,14 +289,14 @@ def _freedoms(node: Node, place: _Place, reading: _Reading) -> Iterator[Joint]:
 
 
 def _pose(node: Node, angles: Angles) -> NDArray:
-    """Return the (4, 4) pose of an element from ``pos`` and its orientation."""
+    """Return the (4, 4) pose of an element from its ``pos`` and its orientation."""
     return placed(node.numbers("pos", 3, "m", _ZERO), orientation(node, angles))
 
 
 def _at_key(
     root: Node, reading: _Reading, joints: tuple[Joint, ...]
 ) -> tuple[Joint, ...]:
-    """Return the joints at the positions of the keyframe named home."""
+    """Return the joints with the coordinates of the keyframe ``home``."""
     keys = [k for group in root.children("keyframe") for k in group.children("key")]
     counts = {name: _COUNTS.get(kind, 1) for name, kind in reading.coordinates.items()}
     for key in keys:

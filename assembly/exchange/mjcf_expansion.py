@@ -130,7 +130,7 @@ def _copies(
 
 
 def _end(element: Any, keys: tuple[str, ...], ending: str) -> None:
-    """Append an ending to the names of an element and of all elements in it."""
+    """Append a suffix to the names of an element and of all elements in it."""
     for one in element.iter():
         for key in keys:
             if key in one.attrib:

@@ -74,7 +74,7 @@ def one_freedom(
         stiffness = given.number("stiffness", "N m/rad or N/m")
         rest = given.number("springref", "angle or m", 0.0)
         rest *= unit if kind == "revolute" else 1.0
-    # the spring's rest coordinate includes ref, by which the joint's zero is shifted
+    # the attribute ref shifts the joint's zero and the spring's rest coordinate
     return replace(
         joint, placement=anchor @ motion(joint, -ref), position=ref,
         stiffness=stiffness, rest=rest, limits=_limits(given, kind, angles),
@@ -118,7 +118,7 @@ def at_key(key: Node, joint: Joint, values: NDArray) -> Joint:
     turn = placed(
         values[:-4] if len(values) == 7 else _ZERO, from_quaternion(quaternion)
     )
-    # a free body's values are its pose in the world, a ball's its rotation from rest
+    # a free body's values are its world pose, a ball's values its rotation from rest
     return replace(
         joint, placement=turn if len(values) == 7 else joint.placement @ turn
     )

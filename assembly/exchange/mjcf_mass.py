@@ -26,7 +26,8 @@ from forcefit.assembly.model.inertia import (
 )
 
 _SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
-# [kg, kg m^2] smaller lower bounds only let massless bodies move in MuJoCo
+# [kg, kg m^2] smaller lower bounds are ignored: files set them only so that MuJoCo
+# accepts massless bodies
 _REGULAR, _REGULAR_INERTIA = 1e-6, 1e-9
 _KINDS = (*_SIZES, "plane", "hfield", "mesh", "sdf")
 
@@ -91,7 +92,7 @@ class MassRules:
         }
 
     def _bounded(self, body: Body) -> Body:
-        """Return a body with at least the least mass and principal moments."""
+        """Return a body whose mass and principal moments meet the lower bounds."""
         if self.least > _REGULAR:
             body = replace(body, mass=max(body.mass, self.least))
         if not self.balanced and self.least_inertia <= _REGULAR_INERTIA:
@@ -186,7 +187,7 @@ def _sizes(geom: Node, kind: str) -> list[float]:
 
 
 def _first(geom: Node, count: int) -> float:
-    """Return the first size [m]."""
+    """Return the first size [m] of a shape."""
     return float(geom.numbers("size", max(1, count), "m")[0])
 
 

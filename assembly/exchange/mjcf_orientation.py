@@ -34,9 +34,11 @@ class Angles:
             sequence = compiler.text("eulerseq", sequence)
             automatic = compiler.text("autolimits", automatic)
             if len(sequence) != 3 or not set(sequence.lower()) <= set("xyz"):
-                raise compiler.bad("eulerseq", "expected three of x, y, z")
+                raise compiler.bad(
+                    "eulerseq", "expected three axis letters out of x, y, z, X, Y, Z"
+                )
             if compiler.text("coordinate", "local") != "local":
-                raise compiler.bad("coordinate", "expected local")
+                raise compiler.bad("coordinate", 'expected "local"')
         return Angles(
             1.0 if unit == "radian" else math.pi / 180, sequence, automatic == "true"
         )

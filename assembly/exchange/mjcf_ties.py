@@ -81,7 +81,10 @@ class Ties:
             if node.tag in {"tendon", "joint"}:
                 continue
             if node.tag not in {"connect", "weld"}:
-                raise node.bad("", "found it, expected connect, weld, joint or tendon")
+                raise node.bad(
+                    "",
+                    "found another constraint, expected connect, weld, joint or tendon",
+                )
             name = node.optional("name") or f"loop{count}"
             if name in names:
                 raise node.bad("name", "found this name twice; expected unique names")
@@ -168,7 +171,7 @@ class Ties:
                 if name not in self.parts:
                     hint = nearest(name, self.parts)
                     raise self.root.bad(
-                        "actuator", f"found {quoted(name)}, no joint{hint}"
+                        "actuator", f"found {quoted(name)}, expected a joint{hint}"
                     )
                 names.add(name)
         return names
@@ -184,7 +187,7 @@ class Ties:
 
 
 def _polynomial(node: Node) -> list[float]:
-    """Return five coefficients; missing ones have the default of the format."""
+    """Return the five polynomial coefficients of a joint constraint."""
     count = len(node.optional("polycoef").split())
     default = [0.0, 1.0, 0.0, 0.0, 0.0]
     if not count:
@@ -200,7 +203,7 @@ def _name(node: Node, keys: "list[str] | tuple[str, ...]" = ()) -> str:
 
 
 def _known(node: Node, key: str, valid: Mapping[str, Any]) -> Any:
-    """Return the object with the name in an attribute; reject unknown names."""
+    """Return the object that an attribute names; reject unknown names."""
     name = node.text(key)
     if name not in valid:
         raise node.bad(key, f"found {quoted(name)}{nearest(name, valid)}")

@@ -8,7 +8,7 @@ from forcefit.assembly.exchange.mechanism import Joint, Mechanism
 from forcefit.assembly.exchange.orientation import to_quaternion
 from forcefit.assembly.exchange.urdf_writing import XML_MARK, numbers
 
-_SMALLEST_INERTIA = 1e-9  # [kg m^2] smallest moment that is written
+_SMALLEST_INERTIA = 1e-9  # [kg m^2] smallest moment of inertia that is written
 _KINDS = {"revolute": "hinge", "prismatic": "slide"}
 
 

@@ -56,7 +56,7 @@ def mjcf_of_model(model: Any) -> str:
         except ValueError as error:
             raise BadInput(f"MjSpec: MuJoCo does not compile it: {error}") from None
     if model.nflex:
-        raise BadInput("MjModel: found a flex, expected rigid bodies")
+        raise BadInput("MjModel: found a flex (flexible body), expected rigid bodies")
     root = Element("mujoco", model=_model_name(model))
     SubElement(root, "compiler", angle="radian")
     for i, (start, size) in enumerate(
@@ -174,7 +174,7 @@ def _places(kind: str, data: Any) -> list[tuple[Any, Any]]:
 
 
 def _drives(mujoco: Any, model: Any, root: Element) -> None:
-    """Add the actuators, according to what they move."""
+    """Add the actuators as MJCF elements that refer to the actuated objects."""
     group = SubElement(root, "actuator")
     for i in range(model.nu):
         kind = _DRIVEN.get(mujoco.mjtTrn(int(model.actuator_trntype[i])).name, "site")

@@ -108,7 +108,9 @@ def _bare_urdf(path: Path) -> str:
         if element.tag.endswith(":joint") or element.get("quat_xyzw"):
             raise ValueError(f"its URDF has no {element.tag} of this kind")
         if element.tag == "inertia" and not _comparable(_attributes(element.attrib)):
-            element.attrib.update(_UNIT_INERTIA)  # MuJoCo rejects thin rods
+            element.attrib.update(
+                _UNIT_INERTIA
+            )  # MuJoCo rejects the inertia of thin rods
         for inner in list(element):
             if inner.tag in _DRAWN or ":" in inner.tag:
                 element.remove(inner)
@@ -124,7 +126,7 @@ def _bare_urdf(path: Path) -> str:
 def _compared(
     mujoco: Any, model: Any, mechanism: Mechanism, start: Comparison, whole: bool
 ) -> Comparison:
-    """Return the comparison in random postures."""
+    """Return the comparison of both readings in random postures."""
     bodies = _body_names(model)
     strange = [name for name in bodies[1:] if name not in mechanism.bodies]
     unread = {} if not strange else {f"body {strange[0]}, which was not read,": np.inf}
@@ -221,13 +223,13 @@ def _moments(mujoco: Any, model: Any, i: int) -> NDArray:
 
 
 def _comparable(J: NDArray) -> bool:
-    """Return whether MuJoCo keeps the moments, which excludes thin rods and plates."""
+    """Return whether MuJoCo keeps the moments of inertia (not of thin rods, plates)."""
     least, middle, most = np.linalg.eigvalsh(J)
     return bool(least > _LEAST_MOMENT and most < (1 - 1e-9) * (least + middle))
 
 
 def _attributes(six: Mapping[str, str]) -> NDArray:
-    """Return the inertia (3, 3) [kg m^2] of a URDF element."""
+    """Return the inertia (3, 3) [kg m^2] from a URDF element's attributes."""
     return inertia_matrix([float(six.get(key, "0")) for key in _KEYS])
 
 
@@ -242,7 +244,7 @@ def _rules(mujoco: Any, model: Any) -> dict[str, tuple[int, float]]:
 
 
 def _rows(mujoco: Any, data: Any, constraint: int) -> NDArray:
-    """Return the rows of an equality constraint."""
+    """Return the constraint rows of an equality."""
     equal = data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
     return np.asarray(equal & (data.efc_id == constraint))
 

@@ -1,4 +1,4 @@
-"""Orientations in the forms of other programs: roll-pitch-yaw, quaternions, Euler.
+"""Conversion of roll-pitch-yaw angles, quaternions, Euler angles to rotations.
 
 Sources:
     Shoemake (1994), Euler angle conversion, Graphics Gems IV: the third angle is

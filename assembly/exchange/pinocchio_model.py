@@ -69,7 +69,7 @@ def _is_body(frame: Any) -> bool:
 
 
 def _pose(placement: Any) -> dict[str, str]:
-    """Return a placement as attributes of an element."""
+    """Return a placement as the attributes of an MJCF element."""
     quaternion = to_quaternion(np.array(placement.rotation))
     return {"pos": words(placement.translation), "quat": words(quaternion)}
 

@@ -70,7 +70,7 @@ def load_robot(
 
 
 def _load_declared(name: str | Path, close: Closing | None) -> Robot:
-    """Return the robot of a name or a file, with links not yet solved."""
+    """Return the robot of a name or a file; its link stiffnesses are not solved."""
     path = Path(name)
     if path.suffix.lower() not in OTHERS:
         if _is_of_other(path):

@@ -62,7 +62,7 @@ def read_sdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
     model = frames.model
     made = {name: link_body(frames, name, named) for name, named in frames.of("link")}
     if not made:
-        raise BadInput(f"{path}: link: missing; expected at least one")
+        raise BadInput(f"{path}: link: missing; expected at least one link")
     bodies = {name: body for name, (body, _) in made.items()}
     ends = {name: joint_ends(frames, named) for name, named in frames.of("joint")}
     first = frames.link(MODEL)
@@ -119,7 +119,7 @@ def _tree(
 
 
 def _of_axis(joint: Node, tag: str, part: Node) -> str:
-    """Return the description of what is omitted from an axis; empty if nothing is."""
+    """Return a description of an axis's omitted properties; empty if there are none."""
     spring = part.child("spring_stiffness")
     # forcefit does not read further axes of joints of several freedoms
     crossed = joint.optional("type") in {"universal", "revolute2"}

@@ -2,9 +2,9 @@
 
 Sources:
     sdformat.org, specification 1.12 and "Pose frame semantics": the pose of a link is
-    in its model's frame, of a joint in its child's frame, of a frame in the frame
-    ``attached_to``, unless ``relative_to`` names another frame; names of nested models
-    are joined by ``::``.
+    relative to its model's frame, the pose of a joint to its child's frame, and the
+    pose of a frame to the frame ``attached_to``. The attribute ``relative_to`` names
+    another frame.  Names of nested models are joined by ``::``.
 """
 
 import math
@@ -76,7 +76,7 @@ class Frames:
         raise node.bad(key, f"found {quoted(name)}, expected a link or frame{hint}")
 
     def pose(self, name: str, asked: tuple[str, ...] = ()) -> NDArray:
-        """Return the (4, 4) pose in the world of a full name."""
+        """Return the (4, 4) pose in the world of the frame with a full name."""
         if name == WORLD:
             return np.eye(4)
         if name not in self.poses:
@@ -134,7 +134,7 @@ class Frames:
         for name, _ in self.of("link"):
             if name.startswith(scope):
                 return name
-        raise model.bad("link", "missing; expected at least one")
+        raise model.bad("link", "missing; expected at least one link")
 
 
 def frames_of(root: Node) -> Frames:
@@ -170,7 +170,7 @@ def frames_of(root: Node) -> Frames:
 
 
 def _is_static(model: Node) -> bool:
-    """Return whether a model is static."""
+    """Return whether an SDF model is declared static (fixed to the world)."""
     static = model.child("static")
     return static is not None and static.content.lower() in {"true", "1"}
 
@@ -178,7 +178,9 @@ def _is_static(model: Node) -> bool:
 def _gather(frames: Frames, model: Node, scope: str, outer: str, old: bool) -> None:
     """Collect the elements of a model and of its nested models."""
     if scope.count("::") > _NESTED:
-        raise model.bad("", f"found models more than {_NESTED} deep")
+        raise model.bad(
+            "", f"found models nested more than {_NESTED} deep, expected fewer levels"
+        )
     frames.named[scope + MODEL] = Named(model, outer, old)
     nodes = sorted(model.children(), key=lambda node: node.tag != "link")
     for node in nodes:
@@ -196,7 +198,7 @@ def _gather(frames: Frames, model: Node, scope: str, outer: str, old: bool) -> N
 
 
 def _take(frames: Frames, node: Node, scope: str, name: str, old: bool) -> None:
-    """Add a link, joint or frame; of equal names, the link keeps its name."""
+    """Add a link, joint or frame; if names are equal, only the link keeps its name."""
     full = scope + name
     if full in frames.named and frames.named[full].node.tag != node.tag:
         full += f"_{node.tag}"  # libsdformat uses the same new name

@@ -218,10 +218,12 @@ def _part(mimic: Node, parts: list[str], tag: str) -> str:
     for part in parts:
         if part.endswith(ends):
             return part
-    raise mimic.bad("axis", f"found {quoted(tag)}, no axis of {quoted(parts[0])}")
+    raise mimic.bad(
+        "axis", f"found {quoted(tag)}, expected an axis of {quoted(parts[0])}"
+    )
 
 
 def _number(node: Node, key: str, default: float) -> float:
-    """Return the number in an inner element, or the default."""
+    """Return the number in an inner element, or the default if it is absent."""
     inner = node.child(key)
     return default if inner is None else inner.number("", "-")

@@ -70,7 +70,7 @@ def link_body(frames: Frames, name: str, named: Named) -> tuple[Body, str]:
 
 
 def _moments(inertial: Node) -> NDArray | None:
-    """Return ``inertia`` (3, 3) [kg m^2] in its pose's axes; None if not written."""
+    """Return the written inertia (3, 3) [kg m^2] in its pose's axes; None if absent."""
     inertia = inertial.child("inertia")
     if inertia is None:
         return None

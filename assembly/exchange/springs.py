@@ -1,4 +1,4 @@
-"""Springs of joints: those unloaded at home are converted, others are reported."""
+"""Joint springs: springs unloaded at home are converted, others are reported."""
 
 import numpy as np
 from numpy.typing import NDArray

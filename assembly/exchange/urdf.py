@@ -64,7 +64,7 @@ def read_urdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
             raise node.bad("name", "found this name twice; expected unique names")
         bodies[body.name] = body
     if not bodies:
-        raise BadInput(f"{path}: link: missing; expected at least one")
+        raise BadInput(f"{path}: link: missing; expected at least one link")
     links = dict(bodies)
     nodes = [node for node in root.children() if node.tag.split(":")[-1] == "joint"]
     joints: dict[str, Joint] = {}
@@ -116,7 +116,7 @@ def _body(node: Node) -> Body:
 
 
 def _joints(node: Node) -> tuple[list[Joint], list[Body]]:
-    """Return a joint as joints of one freedom, and the bodies between them."""
+    """Return the one-freedom joints of a URDF joint, and the bodies between them."""
     ends = []
     for tag in ("parent", "child"):
         end = node.child(tag)
@@ -140,7 +140,7 @@ def _limits(node: Node) -> tuple[float, float] | None:
     if limit is None or node.text("type") in {"fixed", "continuous"}:
         return None
     ends = (limit.element.get("lower"), limit.element.get("upper"))
-    # an absent end means 0 in the format; files without limits omit both ends
+    # in URDF an absent limit means 0; files without limits omit both limits
     lower, upper = ("0" if end is None else end for end in ends)
     return None if ends == (None, None) else limit.limits(lower, upper)
 

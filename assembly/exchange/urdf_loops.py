@@ -63,7 +63,7 @@ def with_closing_joints(
 
 
 def _closing(mechanism: Mechanism, root: Node) -> Iterator[tuple[Node, Closing]]:
-    """Yield the closing joints of both kinds."""
+    """Yield the closing joints: ``<loop_joint>`` and joints in ``<gazebo>``."""
     for node in root.children():
         if node.tag.split(":")[-1] == "loop_joint":
             yield node, _loop_joint(mechanism, node)

@@ -1,4 +1,4 @@
-"""Export of URDF and of its loops file; numbers have all digits."""
+"""Export of a URDF and its loops file; numbers are written with all digits."""
 
 from xml.sax.saxutils import quoteattr
 

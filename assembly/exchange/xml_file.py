@@ -1,4 +1,4 @@
-"""Reader of XML files without entities and external files; one message per mistake."""
+"""Reader of XML files; entities and external files are rejected."""
 
 import re
 from collections.abc import Container, Iterator
@@ -186,7 +186,9 @@ class Node:
         vector = self.numbers(key, 3, "-", default)
         length = float(np.linalg.norm(vector))
         if length < 1e-9:
-            raise self.bad(key, f"found {describe(vector.tolist())}, not a direction")
+            raise self.bad(
+                key, f"found {describe(vector.tolist())}, expected a direction"
+            )
         # a vector whose length is 1 except for rounding is not changed
         return vector if abs(length - 1.0) < 1e-15 else vector / length
 
@@ -267,7 +269,7 @@ def placed(translation: NDArray, rotation: NDArray) -> NDArray:
 
 
 def counted(what: str, names: list[str]) -> tuple[str, ...]:
-    """Return a line with the number of omitted items and their first names, if any."""
+    """Return a text line with the number and first names of omitted items, if any."""
     if not names:
         return ()
     named = [name for name in names if name]

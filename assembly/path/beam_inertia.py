@@ -1,8 +1,8 @@
-r"""Inertia and weight of a moving beam: equivalent wrenches at its ends and sections.
+r"""Inertia and weight of a moving beam, as wrenches at its ends and sections.
 
-A beam moves almost as a rigid body.  Its load per length is then linear along it,
-q(x) = rho A (g - a(x)), and its moment per length is constant, m = -rho (J alpha +
-omega x J omega).  At the tip of a cantilever, this load causes the same deflection as
+A beam moves almost as a rigid body.  Its load per length is then linear along the beam,
+q(x) = rho A (g - a(x)). Its moment per length is constant, m = -rho (J alpha + omega x
+J omega).  At the tip of a cantilever, this load causes the same deflection as
 
     F_x = Q_0 / 2 + Q_1 / 3                M_x = m_x L / 2
     F_y = Q_0 / 2 + Q_1 (7/20 + phi/3) / (1 + phi) + m_z / (1 + phi)
@@ -78,7 +78,7 @@ class BeamLoad:
     m: NDArray
 
     def rows(self, which: NDArray) -> "BeamLoad":
-        """Return the load at selected points."""
+        """Return the load at selected points of the path."""
         return replace(self, q0=self.q0[which], q1=self.q1[which], m=self.m[which])
 
     def at_tip(self) -> NDArray:
@@ -193,12 +193,12 @@ def beam_stress(frame: Frame, load: BeamLoad, tip: NDArray) -> NDArray:
 
     Args:
         frame: frame of the beam, which has a declared cross-section.
-        load: distributed load at k points.
+        load: distributed load at k points of the path.
         tip: (k, 6) [N m, N] wrench transmitted at the tip, in the frame's axes.
 
     Returns:
-        (k,) [Pa] stress. A tenth of the fibres is evaluated at 33 sections, then all
-        fibres at the worst section.
+        (k,) [Pa] stress. A tenth of the section's fibres is evaluated at 33 sections.
+        All fibres are then evaluated at the section of largest stress.
     """
     assert isinstance(frame.link, BeamLink)
     R = load.data.axes

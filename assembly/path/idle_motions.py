@@ -4,9 +4,9 @@ Neither drives nor platform nor closures prevent an idle motion, such as the spi
 rod between two balls.  No force acts along an idle motion, so its momentum remains zero
 on a path that starts from rest: a round rod has no angular momentum about its axis, and
 its kinetic energy is the least.  The acceleration of an idle motion is such that the
-loads do no work on it.  Together, these two rules are exact if the inertia does not
-depend on the idle motion, for example if the mass of the body is rotationally symmetric
-about its axis of spin.
+loads do no work on it.  These two rules are exact if the inertia does not depend on the
+idle motion. An example is a body whose mass is rotationally symmetric about its axis of
+spin.
 """
 
 from dataclasses import dataclass, replace
@@ -19,7 +19,7 @@ from forcefit.assembly.path.inertial_loads import InertialLoads, inertial_loads
 from forcefit.assembly.path.motion import Motion, carries_matrix, idle_rates
 
 _MASSLESS = 1e-12  # inertias below this share of the largest inertia count as zero
-_ROUNDING = 1e-20  # share of (total mass x longest arm^2): arm errors of 1e-10, squared
+_ROUNDING = 1e-20  # share of mass x (longest arm)^2: squared arm error 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +118,7 @@ def _inverse(inertia: NDArray, least: NDArray) -> NDArray:
         inertia: (k, d, d) inertia of the idle motions.
         least: (k,) eigenvalues up to this value count as 0.  Without this limit, a spin
             without mass, or with masses on its axis, would have a rounding error as
-            inertia and would accelerate without bound.
+            inertia. Its acceleration would then be arbitrarily large.
 
     Returns:
         The pseudoinverses.
@@ -130,7 +130,7 @@ def _inverse(inertia: NDArray, least: NDArray) -> NDArray:
 
 
 def _largest_inertia(motion: Motion, bodies: list[NDArray]) -> NDArray:
-    """Return the inertia (k,) if the total mass moved like the fastest body."""
+    """Return the inertia (k,) that results if all mass moves like the fastest body."""
     along = np.zeros_like(motion.twists)
     along[..., 3] = 1.0
     still = replace(motion, twists=np.zeros_like(along), accelerations=along)

@@ -7,9 +7,9 @@ origin O, are
 
 The inertia of a beam with a density is distributed along the beam
 (:mod:`forcefit.assembly.path.beam_inertia`). The inertia of a mesh link follows from
-its consistent mass matrix (:mod:`forcefit.assembly.path.mesh_inertia`).  The share at
-the link's start acts on the part that carries the link.  If the total load acted at the
-tip instead, the deflection of a beam would be up to 1.5 times too large.
+its consistent mass matrix (:mod:`forcefit.assembly.path.mesh_inertia`).  The share of
+the load at the link's start acts on the part that carries the link.  If the total load
+acted at the tip instead, the deflection of a beam would be up to 1.5 times too large.
 """
 
 from dataclasses import dataclass
@@ -100,6 +100,6 @@ def _of_rigid_body(motion: Motion, i: int, gravity: NDArray) -> NDArray:
 
 
 def _turned(R: NDArray, wrenches: NDArray) -> NDArray:
-    """Return wrenches (k, 6) expressed in axes rotated by one or by k rotations."""
+    """Return wrenches (k, 6) in axes that are rotated by one or by k rotations."""
     halves = wrenches.reshape(len(wrenches), 2, 3)
     return (halves @ np.swapaxes(R, -1, -2)).reshape(len(wrenches), 6)

@@ -1,9 +1,9 @@
 """Inertia and weight of a moving mesh link, as wrenches at its two ends.
 
-The consistent mass matrix of the link's finite elements, condensed to the motions of
-its two interfaces, is multiplied by the accelerations of both ends.  Mass away from the
-line between the ends can cause a difference to the resultant force and moment of the
-rigid link. This difference is divided between both ends.
+The consistent mass matrix of the link's finite elements is condensed to the motions of
+its two interfaces. It is multiplied by the accelerations of both ends.  Mass away from
+the line between the ends can cause a difference to the resultant force and moment of
+the rigid link. This difference is divided between both ends.
 """
 
 import numpy as np
@@ -47,7 +47,7 @@ def mesh_end_wrenches(
         for point in (tip, tip - R @ span)
     )
     e = span / np.linalg.norm(span)
-    # slopes of the ends in the field of acceleration due to the rotation
+    # angular accelerations of both ends in the link's rigid acceleration field
     slope = alpha + np.cross(e, omega) * (omega @ e)[:, None]
     wrenches = -np.hstack([slope, at_base, slope, at_tip]) @ M.T
     base, tip = wrenches[:, :6], wrenches[:, 6:]

@@ -14,10 +14,10 @@ A_j     ``accelerations``       (k, n, 6)     derivative of V_j with time
 With V = sum S_j q'_j over the joints that carry a body, its derivative is
 A = sum S_j q''_j + [V_j, S_j] q'_j.  At a closure, V and A of its two frames are equal.
 These equations, and the equations for the prescribed components of the pose, are linear
-in q' and then in q'', with the same matrix.  If neither closures nor path prescribe a
-rate, such as the spin of a rod between two balls, the least-norm solution is used;
-:mod:`forcefit.assembly.path.idle_motions` adds the rates that the inertia of the bodies
-determines.  No finite differences of poses are used.
+in q' and then in q'', with the same matrix.  Closures and path may leave a rate
+undetermined, such as the spin of a rod between two balls. The least-norm solution is
+then used. :mod:`forcefit.assembly.path.idle_motions` adds the rates that the inertia of
+the bodies determines.  No finite differences of poses are used.
 
 Sources:
     Featherstone (2008), Rigid Body Dynamics Algorithms, chapters 2 and 8 (spatial
@@ -38,7 +38,8 @@ from forcefit.assembly.model.robot import Robot
 # relative size below which a singular value of closures and path counts as zero, as in
 # forcefit.assembly.kinematics.closure_rates
 _SINGULAR = 1e-6
-_NOISE = 30.0  # the same limit, as a multiple of the closures' nominal error
+# the limit of a zero singular value, as a multiple of the closures' nominal error
+_NOISE = 30.0
 _PRESCRIBED = 1e-4  # largest relative error of a prescribed velocity
 
 
@@ -150,7 +151,7 @@ def follow_path(
 def _with_all_drives(
     robot: Robot, names: tuple[str, ...], path: tuple[NDArray, NDArray, NDArray]
 ) -> tuple[tuple[str, ...], tuple[NDArray, NDArray, NDArray]]:
-    """Return a joint path that also contains the drives not named, at rest."""
+    """Return a joint path that also contains the unnamed drives, which do not move."""
     drives = [f"q.{f.name}" for f in robot.frames if f.actuated]
     still = [name for name in drives if name not in names]
     zero = np.zeros((len(path[0]), len(still)))
@@ -176,7 +177,7 @@ def _closures(robot: Robot) -> NDArray:
 
 
 def _of_closures(robot: Robot, bodies: NDArray) -> NDArray:
-    """Return the differences (k, 6 closures) of the screws (k, n, 6) at closures."""
+    """Return the screw differences (k, 6 closures) between each closure's frames."""
     pairs = _closures(robot)
     first, second = bodies[:, pairs[:, 0]], bodies[:, pairs[:, 1]]
     return (first - second).reshape(len(bodies), 6 * len(pairs))
@@ -237,7 +238,7 @@ def _second_of_pose(
     postures: Posture, names: tuple[str, ...], values: NDArray, twists: NDArray,
     drift: NDArray,
 ) -> NDArray:  # fmt: skip
-    """Return second derivatives (k, c) of the prescribed components for q'' = 0."""
+    """Return second derivatives (k, c) of prescribed components for q'' = 0."""
     if names[0] not in POSE:
         return np.zeros_like(values)
     row = postures.robot.index(postures.robot.platform)
@@ -270,7 +271,7 @@ def _turning_of_jacobian(turn: NDArray, rate: NDArray) -> NDArray:
 
 
 def _inverse(values: NDArray, mismatch: Any) -> NDArray:
-    """Return inverse singular values (k, m); 0 for those that count as zero."""
+    """Return inverse singular values (k, m); 0 where a singular value counts as 0."""
     least = np.maximum(_SINGULAR, _NOISE * np.broadcast_to(mismatch, len(values)))
     kept = values > least[:, None] * values[:, :1]
     return np.where(kept, 1 / np.where(kept, values, 1.0), 0.0)
@@ -297,7 +298,7 @@ def idle_rates(motion: Motion) -> NDArray:
 
 
 def _check_followed(E: NDArray, q: NDArray, right: NDArray) -> None:
-    """Reject derivatives that the robot cannot have."""
+    """Reject velocities and accelerations that the robot cannot have."""
     left = np.abs((E @ q[..., None])[..., 0] - right).max(axis=1, initial=0.0)
     size = np.abs(right).max(axis=1, initial=0.0)
     size = np.maximum(size, 1e-6 * size.max(initial=0.0))

@@ -1,6 +1,6 @@
 """Errors of a robot along a path: deflection, forces and stress due to acceleration.
 
-At each instant, the bodies' inertia and weight act as loads on the posture, and problem
+At each instant, the bodies' inertia and weight act as loads on the posture. Problem
 (22) is solved as for a robot at rest (quasi-static).  Vibration, damping and the
 inertia of the deflection itself are neglected. This is valid if the motion takes many
 periods of the first natural frequency and its acceleration does not jump.
@@ -43,14 +43,14 @@ if TYPE_CHECKING:
     import xarray
 
 _BLOCK = 2000  # number of points that are solved and stored together
-_BLOCK_OF_TANGENTS = 100  # the same, if each point has its own tangent
+_BLOCK_OF_TANGENTS = 100  # number of points per block with tangents at each point
 # results that also exist at points without a solution
 _GEOMETRIC = {
     "coordinates", "rates", "second_rates", "platform", "platform_velocity",
     "platform_acceleration", "compliance",
 }  # fmt: skip
 Progress = Callable[[int, int], None]
-# function from the number of a block's first point to its arrays, computed or stored
+# function that returns the arrays of the block that begins at a given point
 Recall = Callable[..., tuple[NDArray, ...]]
 
 
@@ -270,7 +270,7 @@ def _solve(asked: _Asked, rows: slice) -> dict[str, NDArray]:
 
 
 def _moved(asked: _Asked, rows: slice) -> tuple[Motion, list[tuple[str, str]]]:
-    """Return the motion of a block of points, and the verdict on each posture."""
+    """Return the motion of a block of points; also whether each posture is usable."""
     robot, path = asked.robot, asked.trajectory
     values = path.values[rows]
     postures, reasons = placed(robot, path.names, values)
@@ -287,7 +287,7 @@ def _moved(asked: _Asked, rows: slice) -> tuple[Motion, list[tuple[str, str]]]:
 def _followed(
     asked: _Asked, rows: slice, postures: Posture, idle: NDArray | float = 0.0
 ) -> Motion:
-    """Return the motion of a block of points, with added rates of idle motions."""
+    """Return the motion of a block of points, including idle motions."""
     path = asked.trajectory
     at = path.values[rows], path.first[rows], path.second[rows]
     try:
@@ -301,7 +301,7 @@ def _followed(
 
 
 def _assembled(asked: _Asked, motion: Motion, loads: InertialLoads) -> Assembly:
-    """Return the solutions of least energy under loads on bodies and platform."""
+    """Return the least-energy solutions under loads on the bodies and the platform."""
     return solve_assembly(
         motion.postures, asked.load, loads.bodies, carried=loads.carried
     )
@@ -326,7 +326,7 @@ def _at_origin(twists: NDArray, T: NDArray) -> NDArray:
 
 
 def _drive_forces(robot: Robot, joint_wrenches: NDArray) -> NDArray:
-    """Return the force (k, drives) [N m or N] of each drive on the part it carries."""
+    """Return each drive's force (k, drives) [N m or N] on the part that it carries."""
     driven = [i for i, f in enumerate(robot.frames) if f.actuated]
     screws = np.array([own_screw(robot.frames[i]) for i in driven]).reshape(-1, 6)
     forces: NDArray = -np.einsum("kdi,di->kd", joint_wrenches[:, driven], screws)

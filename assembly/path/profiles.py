@@ -1,4 +1,4 @@
-"""Motion profiles from rest to rest: s increases from 0 to 1 in the time 0 to 1.
+"""Motion profiles from rest to rest: path share s over relative time t, 0 to 1.
 
 ==========  ========================  ==========  ============  ====================
 name        s                         peak speed  acceleration  jumps

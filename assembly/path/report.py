@@ -100,7 +100,7 @@ def path_page(
 
 
 def _good(summary: Mapping[str, Any]) -> bool | None:
-    """Return whether every instant is solved; None if vibration may be significant."""
+    """Return True if all instants are solved, None if vibration may be significant."""
     if summary["status"] != OK:
         return False
     periods = summary["periods"] or 0.0
@@ -108,7 +108,7 @@ def _good(summary: Mapping[str, Any]) -> bool | None:
 
 
 def _verdict(summary: Mapping[str, Any]) -> str:
-    """Return the conclusion as one sentence."""
+    """Return the conclusion on a path's errors as one sentence."""
     if "largest" not in summary:
         return f"No point has a result: {summary.get('reason', summary['status'])}."
     peak = summary["largest"].get("inertial_translation")

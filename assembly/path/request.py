@@ -95,8 +95,7 @@ def errors_along_path(
 
     Raises:
         BadInput: the path, its times or the robot violate a rule; a row is out of
-            reach;
-            the journal belongs to another path, or a file cannot be written.
+            reach; the journal belongs to another path; or a file cannot be written.
     """
     machine = robot if isinstance(robot, Robot) else load_robot(robot)
     if drive_force:
@@ -192,10 +191,13 @@ def _with_times(table: PathTable, times: PathTimes, where: str) -> PathTable:
     if times.profile is None:
         for option in ("--duration", "--speed", "--acceleration"):
             if limits[option][0] is not None:
-                raise BadInput(f"{option}: found without --profile, which it limits")
+                raise BadInput(
+                    f"{option}: found without --profile, expected together with it"
+                )
     elif times.ends == "moving":
         raise BadInput(
-            "--ends moving: found together with --profile, from rest to rest"
+            "--ends moving: found together with --profile, whose motion starts and "
+            "ends at rest; expected only one of them"
         )
     if times.interval is None:
         return table

@@ -16,8 +16,8 @@ from forcefit.results.display import largest_row, listing
 from forcefit.results.text import in_unit, lines_of, table_lines
 from forcefit.results.units import FACTORS
 
-LEAST_PERIODS = 10.0  # below, vibration adds at least 15 % (quintic, undamped)
-_STARTS = 1e-6  # share of the largest acceleration; more at an end is a jump from rest
+LEAST_PERIODS = 10.0  # for fewer periods, vibration adds >= 15 % (quintic, undamped)
+_STARTS = 1e-6  # share of the largest acceleration; a larger end value is a jump
 LAWS = {"times": "spline through given times"}
 # largest values by key: description, SI unit, displayed unit
 LARGEST = {
@@ -105,7 +105,7 @@ def path_summary(errors: PathErrors) -> dict[str, Any]:
 def _peak(
     values: NDArray, times: NDArray, owners: list[str] | None = None
 ) -> dict[str, Any]:
-    """Return the largest value of (k,) or (k, owners) values, its time and owner."""
+    """Return the largest value, when it occurs, and the body or link that has it."""
     known = np.where(np.isfinite(values), values, -1.0)  # magnitudes are not negative
     over_time = known if known.ndim == 1 else known.max(axis=1)
     row = largest_row(over_time)
@@ -116,7 +116,7 @@ def _peak(
 
 
 def remarks(errors: PathErrors) -> list[str]:
-    """Return remarks on what the quasi-static results neglect.
+    """Return remarks on the effects that the quasi-static results neglect.
 
     Args:
         errors: errors along a path.
@@ -189,7 +189,7 @@ def path_text(summary: dict[str, Any]) -> str:
 
 
 def _table(summary: dict[str, Any]) -> list[str]:
-    """Return the lines of the largest values and drive forces."""
+    """Return text lines with the largest values and drive forces."""
     rows: dict[str, tuple[Any, ...]] = {}
     for key, peak in summary["largest"].items():
         words, _, unit = LARGEST[key]

@@ -82,7 +82,7 @@ def _compliance(
     posture: Posture, state: str, load: ArrayLike | None, bodies: NDArray,
     carried: NDArray,
 ) -> NDArray:  # fmt: skip
-    """Return the compliance (6, 6) under loads on bodies and platform."""
+    """Return the platform's compliance (6, 6) under loads on bodies and platform."""
     if state == "contact":
         assembly = solve_assembly(posture, load, bodies, carried=carried)
         return in_contact(assembly, "letting go").compliance

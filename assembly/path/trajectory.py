@@ -3,10 +3,10 @@
 Rows with times are interpolated by a quintic spline, which is continuous up to the
 fourth derivative.  If the ends are at rest, speed and acceleration are zero there; two
 rows then result in the quintic profile.  Rows without times are interpolated by a
-natural cubic spline over the length of the chords, which is a straight line for two
-rows.  The path is then traversed with a profile of
-:mod:`forcefit.assembly.path.profiles`.  Both splines interpolate positions, rotation
-vectors or joint coordinates, component by component.
+natural cubic spline. Its parameter is the sum of the distances between successive rows
+(chord length), so two rows result in a straight line.  The path is then traversed with
+a profile of :mod:`forcefit.assembly.path.profiles`.  Both splines interpolate
+positions, rotation vectors or joint coordinates, component by component.
 """
 
 from dataclasses import dataclass
@@ -103,7 +103,8 @@ def profiled(
         duration: [s] duration of the motion; None if limits are given.
         speed: [m/s, or rad/s of drives] largest speed of the platform's origin, or of
             any named joint.
-        acceleration: [m/s^2, or rad/s^2 of drives] largest acceleration of these.
+        acceleration: [m/s^2, or rad/s^2 of drives] largest acceleration of the
+            platform's origin, or of any named joint.
 
     Returns:
         The trajectory, the shortest one within the limits.
@@ -120,8 +121,8 @@ def profiled(
         raise BadInput(f'--profile: found "{profile[:60]}"{nearest(profile, PROFILES)}')
     if (duration is None) == (speed is None and acceleration is None):
         raise BadInput(
-            "--profile: expected --duration, or --speed and --acceleration or one of "
-            "them"
+            "--profile: expected --duration, or --speed, --acceleration or both of the "
+            "latter"
         )
     curve = CubicSpline(_chords(table, size), table.values, bc_type="natural")
 
@@ -156,8 +157,8 @@ def _chords(table: PathTable, size: float) -> NDArray:
     if not lengths.all():
         row = int(np.argmin(lengths))
         raise BadInput(
-            f"path: {table.row_name(row + 1)}: found the pose of "
-            f"{table.row_name(row)}; expected another, or times"
+            f"path: {table.row_name(row + 1)}: found the same pose as "
+            f"in {table.row_name(row)}; expected a different pose, or a path with times"
         )
     before = np.concatenate([[0.0], np.cumsum(lengths)])
     return before / before[-1]
@@ -167,7 +168,7 @@ def _within(
     names: tuple[str, ...], first: NDArray, second: NDArray, speed: float | None,
     acceleration: float | None,
 ) -> float:  # fmt: skip
-    """Return the shortest duration [s] of a motion given for a duration of 1."""
+    """Return the least duration [s] within limits for a motion of unit duration."""
     # speeds are inversely proportional to the duration, accelerations to its square
     moved = [k for k, name in enumerate(names) if name[0] == "t"]
     if names[0].startswith("q."):

@@ -1,11 +1,11 @@
-"""Remarks on exact equilibria that the linear model does not predict."""
+"""Remarks on exact equilibria that differ much from the linear model's solution."""
 
 import numpy as np
 
 from forcefit.assembly.exact.exact import ExactAssembly
 
-# relative difference from the linear model of the platform's motion, and of the energy
-# or potential; it is smaller even for links that rotate by 0.1 rad
+# largest accepted relative difference between exact and linear model: of the platform's
+# motion, and of the energy or potential. Links that rotate by 0.1 rad stay below it
 _FAR = 0.3
 
 

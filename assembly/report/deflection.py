@@ -76,7 +76,7 @@ def deflection_of(
 
 
 def _curve_values(curve: DeflectionCurve) -> dict[str, Any]:
-    """Return a curve as plain values."""
+    """Return a load-deflection curve as plain values."""
     return {
         "loads": curve.loads,
         "deflection": curve.deflection,

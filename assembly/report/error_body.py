@@ -72,7 +72,7 @@ def possible_errors(assembly: Assembly, part: str, assumption: str) -> ErrorBody
         raise BadInput(
             f"{assembly.posture.robot.name}: found a free motion of the "
             f"platform, so its {part} error has no bound; expected a "
-            "robot without one, or no plot of the error"
+            "robot without a free platform motion, or no plot of the error"
         )
     return error_body(reach, part)
 

@@ -15,7 +15,7 @@ from forcefit.assembly.model.statuses import BEYOND_LIMITS, SINGULAR
 from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.results.display import rounded, screw_text
 
-# relative energy change by finite motions above which first order counts as invalid
+# relative energy difference to finite motions above which first order is invalid
 MOST_ENERGY = 0.5
 # [rad or lengths] joint motion above which first order counts as invalid; the error of
 # the linear closures is then a tenth
@@ -25,7 +25,7 @@ _LARGE = 0.3
 def linearisation_of(
     assembly: Assembly, gravity: ArrayLike | None
 ) -> tuple[dict[str, Any], str]:
-    """Return linear minus exact solution as values, and the exact solution as text."""
+    """Return linear minus exact results as values, and the exact solution as text."""
     try:
         exact = solve_exact(assembly.posture, assembly.load, assembly, gravity=gravity)
     except SolverFailed as error:
@@ -104,7 +104,7 @@ def singular_status(
 
 
 def off_by(change: float) -> str:
-    """Return the reason if the first-order energy has a given relative error."""
+    """Return the reason why first order is invalid: its relative energy error."""
     return (
         "the first-order analysis is not valid here: its energy is wrong by "
         f"{100 * abs(change):.3g} %"
@@ -117,7 +117,7 @@ def _singular(posture: Posture) -> bool:
 
 
 def _words(exact: ExactAssembly) -> str:
-    """Return energy and pose error of the solution with finite motions as text."""
+    """Return as text the energy and pose error of the finite-motion solution."""
     return (
         f"{rounded(exact.energy):.6g} J, platform error "
         f"{screw_text(exact.platform_screw)}"

@@ -1,4 +1,4 @@
-"""Whether the order of joining matters, as text and as plain values."""
+"""Effect of the order of joining on the assembled robot, as text and values."""
 
 from itertools import takewhile
 from typing import Any
@@ -17,7 +17,7 @@ from forcefit.assembly.steps.state import State
 def influences_among_joins(
     machine: Machine, state: State, plan: Plan, number: int
 ) -> list[Influence]:
-    """Return the influences among consecutive joins, of which a step is the first.
+    """Return the influences among consecutive joins that begin with a given step.
 
     Args:
         machine: columns and rows of the robot.

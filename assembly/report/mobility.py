@@ -77,7 +77,7 @@ def mobility_of(posture: Posture) -> dict[str, Any]:
     singular = near.freedoms < here.freedoms
     singular |= there.freedoms_drives_locked < here.freedoms_drives_locked
     if singular and near.there is not None:
-        # motions are omitted: several modes with different motions may meet here
+        # motions are omitted: several modes of motion may intersect at this posture
         counts["near"] = vars(near.there)
     counts |= {"singular": singular, "finite_freedoms": near.freedoms}
     return counts | {"words": mobility_words(counts)}
@@ -95,7 +95,7 @@ def _motions(posture: Posture) -> list[dict[str, Any]]:
 
 
 def mobility_words(counts: Mapping[str, Any]) -> str:
-    """Return freedoms, the platform's motions and over-constraints as text.
+    """Return as text the freedoms, platform motions and over-constraints.
 
     Args:
         counts: result of :func:`mobility_of`.
@@ -162,7 +162,7 @@ def _direction(d: Any) -> str:
 
 
 def _plain(value: float) -> str:
-    """Return a number with 4 digits as text, with rounding errors as 0."""
+    """Return a number with 4 digits as text; rounding errors become 0."""
     return f"{0.0 if abs(value) < 1e-9 else value:.4g}"
 
 

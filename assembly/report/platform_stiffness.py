@@ -30,10 +30,10 @@ from forcefit.results.text import lines_of, table_lines, value_text
 from forcefit.stiffness.screws import SCREW, WRENCH
 
 DIRECTIONS = tuple(name.lower() for name in SCREW)
-# texts for the two sides of a change of contact
+# texts for the tangent stiffness on both sides of a contact change
 _SIDES = {"holding": "loading", "letting go": "unloading"}
 _KINDS = {"link": "links", "joint": "joints", "clearance": "clearances"}
-_SHOWN = 12  # number of parts in the table and the chart; all others form one row
+_SHOWN = 12  # number of parts in table and chart; the sum of other parts is one row
 
 
 def stiffness_of(
@@ -109,7 +109,7 @@ def _tangents(
 
 
 def _along(answer: PlatformStiffness, direction: ArrayLike) -> dict[str, Any]:
-    """Return stiffness and shares along a given screw."""
+    """Return the platform's stiffness, and the parts' shares, along a given screw."""
     way = np.asarray(direction, dtype=float)
     free, blocked = answer.along(way)
     return {
@@ -126,7 +126,7 @@ def virtual_clearances(posture: Posture) -> bool:
 def _in_contact(
     posture: Posture, load: Any, gravity: Any, point: NDArray, length: float | None
 ) -> list[dict[str, Any]]:
-    """Return the tangent of (22), or two if a clearance just touches its bound."""
+    """Return the tangent of problem (22); two if a clearance just touches a bound."""
     assembly = solve_assembly(posture, load, gravity=gravity)
     pressed, touching = contacts(assembly)
     sides: list[Side] = ["holding"]
@@ -189,7 +189,7 @@ def stiffness_values(
 
 
 def _share_values(stiffness: PlatformStiffness, axis: NDArray) -> dict[str, Any]:
-    """Return the shares along an axis by kind of part and frame."""
+    """Return the compliance shares along an axis, by kind of part and frame."""
     table: dict[str, Any] = {"links": {}, "joints": {}}
     for part, share in stiffness.shares(axis).items():
         if part.kind in _KINDS:

@@ -139,7 +139,7 @@ def add_bodies(
 
 
 def _drawn_rows(robot: Robot, bodies: DisplacedBodies) -> list[int]:
-    """Return the indices of bodies to draw: not short, and no contacts of joints."""
+    """Return indices of bodies to draw, without short bodies and joint contacts."""
     lengths = np.linalg.norm(bodies.ends - bodies.starts, axis=1)
     contacts = contact_frames(robot)
     return [

@@ -1,4 +1,4 @@
-"""Pictures of a robot during closing, from bodies with errors to the assembly.
+"""Animation of a robot whose loops close, from open loops to the assembly.
 
 In the first picture, the bodies have only their geometric errors, so closures are open.
 The deformations and joint motions of the least-energy solution, problem (22), then

@@ -84,7 +84,7 @@ def pose_error_of(
         for name in assumptions:
             try:
                 bound = bound_pose_error(assembly, name, offset=offset, **options)
-            except FreeMotion as error:  # freed compliant joints may have no springs
+            except FreeMotion as error:  # "free" may remove all springs
                 no_bounds = dict.fromkeys(("rotation", "translation"))
                 table[name] = no_bounds | {"reason": str(error)}
                 continue
@@ -99,7 +99,7 @@ def pose_error_of(
         if loaded:
             raise BadInput(
                 f'{posture.robot.name}: found a load and a joint with left = "worst", '
-                "expected no load; the worst position is that without loads"
+                "expected no load; the worst position is defined without loads"
             )
         results["bolted_worst"] = _worst_left(posture, offset)
     certificate = {"relative_gap": assembly.relative_gap()}
@@ -110,7 +110,7 @@ def pose_error_of(
 
 
 def _bounds(bound: PoseError) -> dict[str, Any]:
-    """Return the bounds under one assumption."""
+    """Return the pose error bounds under one assumption of problem (27)."""
     return {
         "rotation": _bracket(bound.rotation_error, bound.rotation_screw),
         "translation": _bracket(bound.translation_error, bound.translation_screw),
@@ -120,7 +120,7 @@ def _bounds(bound: PoseError) -> dict[str, Any]:
 
 
 def _worst_left(posture: Posture, offset: NDArray) -> dict[str, Any]:
-    """Return the bounds over all positions in which joints may be bolted."""
+    """Return the pose error bounds over all positions of joints when bolted."""
     worst = worst_left(posture, offset)
     bounds = {
         part: dict(zip(("lower", "upper"), getattr(worst, part), strict=True))
@@ -148,7 +148,7 @@ def _bracket(bounds: Sequence[float] | NDArray, screw: NDArray) -> dict[str, Any
 
 
 def pose_error_text(results: dict[str, Any]) -> str:
-    """Return the bounds as text, with one line for each assumption."""
+    """Return the pose error bounds as text, with one line for each assumption."""
     lines = lines_of(results, "pose status reason")
     for assumption, bounds in (results["error"] or {}).items():
         if "reason" in bounds:

@@ -37,7 +37,7 @@ from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.results.display import listing
 from forcefit.results.text import lines_of, value_text
 
-# numbers of a certificate: relative, except the duality gap in J
+# numbers of a certificate; they are relative, except the duality gap [J]
 _PROOF = (
     "closure_residual clearance_excess duality_gap relative_gap stationarity iterations"
 )
@@ -53,7 +53,7 @@ _UNSTABLE = (
 
 
 def zone_of(posture: Posture) -> dict[str, Any]:
-    """Return the margins of (21), with compliant joints rigid and free, as values."""
+    """Return the margins, problem (21), for rigid and for free compliant joints."""
     rigid, free = zone_margin(posture, "rigid"), zone_margin(posture, "free")
     unproved_parts = "; ".join(filter(None, (rigid.unproved, free.unproved)))
     return {
@@ -68,7 +68,7 @@ def zone_of(posture: Posture) -> dict[str, Any]:
 
 
 def _finite(value: float) -> float | None:
-    """Return a margin; None if no factor on the clearances assembles the robot."""
+    """Return a margin; None if no clearance size allows the robot to assemble."""
     return None if np.isinf(value) else value
 
 
@@ -142,7 +142,7 @@ def solution_of(
 
 
 def proof_status(reason: str) -> dict[str, str]:
-    """Return status and reason of a solution with an incomplete proof, or nothing."""
+    """Return status and reason if a certificate is incomplete; otherwise empty."""
     return {"status": NOT_PROVED, "reason": reason} if reason else {}
 
 
@@ -305,7 +305,7 @@ def _linearisation_lines(results: dict[str, Any]) -> dict[str, str]:
 
 
 def _bound_lines(results: dict[str, Any]) -> dict[str, str]:
-    """Return lines on the certified screw error and its undetermined motion."""
+    """Return lines on the bound of the screw's error, and on undetermined motions."""
     bound, largest = results["certificate"], results["worst_error"]
     lines = lines_of(bound, "screw_rotation_error screw_translation_error")
     if (
@@ -322,13 +322,13 @@ def _bound_lines(results: dict[str, Any]) -> dict[str, str]:
 
 
 def status_line(results: dict[str, Any]) -> str:
-    """Return a line with status and reason of a result whose status is not ok."""
+    """Return a line with a result's status and reason, unless the status is ok."""
     status, reason = results["status"], results["reason"]
     return reason if reason.startswith(status) else f"{status}: {reason}"
 
 
 def worst(assembly: Assembly) -> dict[str, Any] | None:
-    """Return certified bounds of the largest pose error, assumption ``frozen`` of (27).
+    """Return certified bounds of the largest pose error for the assumption ``frozen``.
 
     Args:
         assembly: the least-energy solution.

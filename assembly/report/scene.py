@@ -1,4 +1,4 @@
-"""The robot as an interactive scene of a page, which can be rotated and exaggerated."""
+"""Interactive 3D scene of a robot for an HTML page."""
 
 from dataclasses import asdict
 from typing import Any

@@ -39,9 +39,9 @@ def show(
     Args:
         thing: object to draw. A robot is drawn in its home pose. A posture is drawn
             without errors. An assembly is drawn nominal and forced, with exaggerated
-            displacements. An assembly with finite motions is drawn likewise, but large
-            displacements are to scale. For a platform stiffness, the shares of its
-            parts are drawn.
+            displacements. An assembly with finite motions is also drawn nominal and
+            forced, but large displacements are to scale. For a platform stiffness, the
+            shares of its parts are drawn.
         errors: ``"translation"`` or ``"rotation"`` to add the possible platform errors
             within the clearances to an assembly.
         assumption: assumption of problem (27) for these errors: ``"frozen"``,
@@ -64,7 +64,9 @@ def show(
         interactive = in_notebook()
     if errors is not None and not isinstance(thing, Assembly):
         kind = type(thing).__name__
-        raise BadInput(f"show: found errors of a {kind}, expected of an Assembly")
+        raise BadInput(
+            f"show: found errors of a {kind}, expected errors of an Assembly"
+        )
     if isinstance(thing, PlatformStiffness):
         return _shares(thing, interactive)
     spec, name, caption = _scene(thing, errors, assumption)
@@ -89,7 +91,7 @@ def _scene(
     many = isinstance(thing, Assembly) and thing.of_many
     if many or posture.transforms.ndim > 3:
         kind = type(thing).__name__
-        raise BadInput(f"show: found {kind} of many points, expected one of them")
+        raise BadInput(f"show: found {kind} of many points, expected a single point")
     if isinstance(thing, Posture):
         return nominal_scene(thing), thing.robot.name, _NOMINAL
     body, caption = None, _FORCED

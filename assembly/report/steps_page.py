@@ -74,7 +74,7 @@ def _verdict(results: Mapping[str, Any]) -> str:
 
 
 def _good(results: Mapping[str, Any]) -> bool | None:
-    """Return whether all steps are carried out; None if one exceeds its force."""
+    """Return True if all steps succeed; None if one exceeds its force limit."""
     if results["status"] != "ok":
         return False
     return None if any(step.get("exceeded") for step in results["steps"]) else True

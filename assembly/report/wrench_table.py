@@ -66,7 +66,7 @@ def wrench_lines(
 
 
 def _shown(name: str, joints: Mapping[str, str]) -> str:
-    """Return the name in the table; empty for the other frames of a joint."""
+    """Return a frame's name in the table; empty for further frames of a joint."""
     for joint, main in joints.items():
         if name == main:
             return joint

@@ -33,7 +33,7 @@ _SHARE_OF = {
 
 @dataclass(frozen=True, eq=False)
 class Allocation:
-    """Tolerances and their cost, with proven bounds of the cost and of the limits.
+    """Tolerances and their cost, with bounds of the cost and of the limited values.
 
     Attributes:
         plan: costs and limits.
@@ -150,10 +150,10 @@ def price_shares(allocation: Allocation) -> NDArray:
 def _taken(
     allocation: Allocation, key: str, reached: float, at: str
 ) -> dict[str, float | str]:
-    """Return the part of a limit that clearances use, and the cost without them."""
+    """Return the pose error due to clearances, and the cost if clearances were zero."""
     plan, limit = allocation.plan, allocation.plan.limits[key]
-    # pose errors due to errors and to clearances nearly add up, and scale with
-    # tolerances
+    # the pose errors due to geometric errors and due to clearances nearly add up; the
+    # former are proportional to the tolerances
     looser = limit / (limit - reached) if reached < limit else np.inf
     without = allocation.price / looser
     if plan.cost == "logarithm":
@@ -238,7 +238,7 @@ def allocation_text(results: dict[str, Any]) -> str:
 
 
 def _taken_text(key: str, one: dict[str, Any]) -> str:
-    """Return a sentence on the part of a limit that clearances use without errors."""
+    """Return a sentence on the pose error that clearances cause at zero errors."""
     reached, limit = (
         in_unit(one[k], _SHOWN[one["unit"]]) for k in ("reached", "limit")
     )
@@ -251,7 +251,7 @@ def _taken_text(key: str, one: dict[str, Any]) -> str:
 
 
 def _looks_text(check: dict[str, Any]) -> str:
-    """Return the number of verifications and their confidence levels as text."""
+    """Return the number of verification tests and their confidence levels as text."""
     left = check["yield"]["undecided"]
     undecided = f", {left} draws undecided" if left else ""
     return (

@@ -1,13 +1,15 @@
 """Tolerance allocation: tolerances of least cost within limits.
 
 Each class g of errors has a tolerance t_g, whose cost is ``c_g / t_g`` (or ``-c_g log
-t_g``).  Limits on the margin and on the energy are convex. For these limits and a yield
-of 1, :mod:`forcefit.assembly.statistics.cutting_planes` finds the least cost and proves
-that no tolerances cost less.  A yield below 1, and limits on wrenches, stress and pose
-errors, are not convex. For these, :mod:`forcefit.assembly.statistics.least_cost`
-continues to a local minimum.  Finally, all tolerances are multiplied by one factor such
-that independent draws, or the worst corners, just meet every limit. New draws then
-verify the tolerances.
+t_g``).  The margin and the energy are convex in the tolerances. If only they are
+limited and the yield is 1, :mod:`forcefit.assembly.statistics.cutting_planes` finds the
+least cost and proves that no tolerances cost less.  Wrenches, stress, pose errors and a
+yield below 1 are not convex in the tolerances. For limits on them,
+:mod:`forcefit.assembly.statistics.least_cost` continues to a local minimum of the cost.
+
+Finally, all tolerances are multiplied by one factor. With this factor, independent
+random draws, or the worst corners of the tolerance box, just meet every limit. New
+random draws then verify the tolerances.
 """
 
 from collections.abc import Callable, Sequence
@@ -71,7 +73,7 @@ def allocate(
     perfect_parts = requirement.perfect_parts()
     convex_requirement = requirement
     if not requirement.convex:
-        # without convex limits, start from the tolerances for a limit on the energy
+        # without a convex quantity, start from the tolerances for a limited energy
         typical = _typical_energy(requirement)
         convex_requirement = Requirement(
             postures, replace(plan, limits={"energy": typical}), replay
@@ -106,7 +108,7 @@ def _scaled_tolerances(
     proportions: NDArray,
     progress: Callable[[str, int, int], None],
 ) -> tuple[NDArray, NDArray]:
-    """Return the tolerances of least cost, and given proportions scaled uniformly."""
+    """Return the tolerances of least cost, and uniformly scaled start tolerances."""
     samples = draw_samples(requirement, TRAINING)
     if requirement.is_convex:
         uniformly_scaled = scale_uniformly(

@@ -20,7 +20,7 @@ from forcefit.assembly.linear.reference.reduction import FreeMotion
 from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.assembly.statistics.linear_response import LinearResponse
 
-# assumption of (27): every spring keeps its deformation from the solution of (22)
+# assumption of the pose error bounds: springs keep their least-energy deformation
 ASSUMPTION = "frozen"
 
 
@@ -53,7 +53,7 @@ def draws_at_bounds(prepared: LinearResponse, draws: Assembly) -> NDArray:
 
 
 def _moves_platform(prepared: LinearResponse) -> NDArray:
-    """Return (nq,) bool: free motions that move the platform and open no closure."""
+    """Return (nq,) bool, True if a free motion moves the platform in closed loops."""
     mismatch = prepared.posture.mismatch
     A_q = prepared.closures @ prepared.joints.free
     P_q = prepared.platform @ prepared.joints.free

@@ -1,8 +1,8 @@
-"""Random errors from the callouts and fits of a robot, and independent errors.
+"""Random geometric errors from drawing callouts, joint fits and an errors file.
 
-Each callout is drawn as a whole, because shift and tilt of a bore in a position zone
-depend on each other.  A draw depends only on its number and on the seed, as in
-:mod:`forcefit.assembly.model.error_distributions`.
+The shift and the tilt of a bore in its position zone depend on each other.  All errors
+of one callout are therefore drawn together.  A draw depends only on its number and on
+the seed, as in :mod:`forcefit.assembly.model.error_distributions`.
 """
 
 from collections.abc import Callable
@@ -34,7 +34,7 @@ _WORDS = 4  # number of random numbers that one step of the Philox generator ret
 
 @dataclass(frozen=True, eq=False)
 class CalloutSources:
-    """Random errors of callouts, independent errors and fits: m numbers per draw.
+    """Sources of random errors (callouts, errors file, fits): m numbers per draw.
 
     The m numbers are, in this order: the independent errors [rad or m]; the coordinates
     of the callouts' zones relative to the radius of each ball [-]; and the radial
@@ -43,7 +43,7 @@ class CalloutSources:
     Attributes:
         robot: robot with the callouts.
         placed: callouts of the robot with their zones.
-        independent: errors that are added to those of the callouts, or None.
+        independent: errors that are added to the errors of the callouts, or None.
         fixed: (n, 6) [rad, m] errors that are added to every draw; zero if None.
         fits: fits of the robot's joints.
     """
@@ -157,7 +157,7 @@ class CalloutSources:
         return np.hstack(parts)
 
     def _share_sizes(self, parts: list[NDArray]) -> None:
-        """Use the same uniform random number wherever the size of a hole occurs."""
+        """Use one uniform random number for all occurrences of a hole's size."""
         sizes: dict[str, NDArray] = {}
         for part, placed in zip(parts[1:], self.placed, strict=False):
             if placed.hole:
@@ -176,7 +176,7 @@ class CalloutSources:
         return self._with_radial([one.fit.radial[1] for one in self.fits])
 
     def _with_radial(self, radial: list[float]) -> Robot:
-        """Return the robot with given radial clearances [m] of the fits."""
+        """Return the robot whose joint fits have the given radial clearances [m]."""
         frames = list(self.robot.frames)
         for one, bound in zip(self.fits, radial, strict=True):
             gap = max(0.0, bound)
@@ -191,7 +191,7 @@ class CalloutSources:
         return full if self.fixed is None else full + self.fixed
 
     def of_numbers(self, slopes: NDArray) -> NDArray:
-        """Return slopes by the numbers (..., m) from slopes by delta l (..., n, 6)."""
+        """Convert derivatives by delta l (..., n, 6) to ones by numbers (..., m)."""
         return np.einsum("...ni,nim->...m", slopes, self.maps)
 
     @cached_property
@@ -213,7 +213,7 @@ class CalloutSources:
 
     @property
     def identity(self) -> list[NDArray]:
-        """Arrays that are equal for two objects exactly if their draws are equal."""
+        """Arrays that are equal for two objects exactly if their errors are equal."""
         own = [] if self.independent is None else self.independent.identity
         for p in self.placed:
             law = [DISTRIBUTIONS.index(p.callout.distribution), p.callout.cp]
@@ -236,14 +236,14 @@ def _length(end: FittedEnd | None) -> list[float]:
 
 
 def _nth(uniforms: Callable[[int], list[NDArray]], i: int) -> Callable[[int], NDArray]:
-    """Return a function from the attempt to the uniform numbers of callout i."""
+    """Return a function that maps an attempt to callout i's random numbers."""
     return lambda attempt: uniforms(attempt)[i]
 
 
 def _uniforms(
     first: int, count: int, seed: int, stream: int, words: int, attempt: int
 ) -> NDArray:
-    """Return (count, words) uniform numbers, different ones for each attempt."""
+    """Return (count, words) uniform random numbers; each attempt uses new ones."""
     steps = -(-max(1, words) // _WORDS)
     philox = np.random.Philox(
         key=np.array([seed, stream], dtype=np.uint64),

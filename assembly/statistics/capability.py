@@ -57,10 +57,13 @@ def capability(
     """
     x = np.asarray(values, dtype=float)
     if len(x) < 2 or not lower < upper or not np.isfinite([lower, upper]).any():
-        raise ValueError("capability needs two values and a limit, lower < upper")
+        raise ValueError(
+            "capability: expected at least two values, and a lower or an upper limit "
+            "with lower < upper"
+        )
     mean, sigma = float(x.mean()), float(x.std(ddof=1))
     if sigma == 0:
-        raise ValueError("capability of values that do not vary")
+        raise ValueError("capability: found values that do not vary")
     sides = (upper - mean) / (3 * sigma), (mean - lower) / (3 * sigma)
     cp, cpk = (upper - lower) / (6 * sigma), min(sides)
     one = not np.isfinite([lower, upper]).all()
@@ -95,7 +98,8 @@ def cpk_interval_one_sided(
     """Return the exact interval of Cpk for one limit (noncentral t distribution)."""
     from scipy.optimize import brentq
 
-    # 3 sqrt(n) Cpk of the sample is a noncentral t with 3 sqrt(n) times the true one
+    # 3 sqrt(n) Cpk of a sample has a noncentral t distribution, whose noncentrality is
+    # 3 sqrt(n) times the true Cpk
     t, root = 3 * np.sqrt(n) * cpk, 3 * np.sqrt(n)
     low, high = cpk_interval(cpk, n, 1 - (1 - level) / 100)
 
@@ -172,7 +176,7 @@ def draws_capability(
     """Return Cp, Cpk and the parts per million of draws above a limit.
 
     Args:
-        values: (k,) draws; NaN, for a draw without a solution, counts as above.
+        values: (k,) draws; a NaN (draw without a solution) counts as above the limit.
         exceeds: ``limit``, its ``unit``, and the ``probability`` of a value above the
             limit with the bounds ``lower`` and ``upper``.
         level: confidence level of the intervals.
@@ -197,7 +201,7 @@ def capability_text(results: Mapping[str, Any]) -> str:
     """Return the capability of draws as text, with one line per quantity."""
 
     def index(one: Mapping[str, float]) -> str:
-        # a quotient by an unknown, infinite width may be -0.0
+        # division by an unknown, infinite width of the distribution may result in -0.0
         value, low, high = (one[key] + 0.0 for key in ("value", "lower", "upper"))
         return f"{value:.3g} ({low:.3g} to {high:.3g})"
 

@@ -9,7 +9,7 @@ worst    any position; the largest pose errors are computed, see
          :mod:`forcefit.assembly.statistics.worst_clearance`
 uniform  uniformly distributed over the set (billiard walk)
 contact  displaced by a wrench of random direction on the platform until in contact
-least    the position in the solution of (22), one of many possible ones
+least    the position in the least-energy solution, one of many possible ones
 ======== =====================================================================
 
 The contact model requires a length that relates moments to forces: random moments
@@ -96,7 +96,7 @@ def _moved_clearances(
     prepared: LinearResponse, draws: Assembly, left: NDArray, wrenches: NDArray | None,
     generators: Sequence[np.random.Generator],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the clearances of draws ``left`` after moving, and whether walks mixed."""
+    """Return moved clearances of the draws ``left``, and whether random walks mixed."""
     clearances, mixed = draws.clearances.copy(), np.ones(len(left), dtype=bool)
     loaded = loaded_clearances(prepared, draws)
     patterns, pattern_of_draw = np.unique(loaded, axis=0, return_inverse=True)
@@ -120,7 +120,7 @@ def contact_length_of(robot: Robot) -> float:
 
 
 def clearance_means(clearance: str, contact_length: float | None = None) -> str:
-    """Return the meaning of a clearance model, with the length of the contact model."""
+    """Return the meaning of a clearance model; for "contact" also its length."""
     words = CLEARANCE_MODELS[clearance]
     if clearance != "contact" or contact_length is None:
         return words
@@ -130,7 +130,7 @@ def clearance_means(clearance: str, contact_length: float | None = None) -> str:
 def _random_wrenches(
     generators: Sequence[np.random.Generator], length: float
 ) -> NDArray:
-    """Return random platform wrenches (k, 6) with moments scaled by the length."""
+    """Return random platform wrenches (k, 6), moments scaled by the contact length."""
     scale = np.repeat([1.0, 1.0 / length], 3)
     wrenches = np.array([rng.normal(size=6) for rng in generators])
     return wrenches.reshape(-1, 6) * scale
@@ -140,12 +140,12 @@ def _at_random(
     prepared: LinearResponse, loaded: NDArray, clearances: NDArray,
     generators: Sequence[np.random.Generator],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return uniformly distributed clearances, and whether the random walks mixed."""
+    """Return uniformly drawn clearances, and whether each random walk mixed."""
     from forcefit.assembly.solvers.uniform_clearance import sample_uniform_position
 
     free = ~loaded
     rows = clearance_constraints(prepared, loaded)[:, free]
-    # null space of the rows, which are orthonormal
+    # null space of the closure equations, whose rows are orthonormal
     Z = np.ascontiguousarray(np.linalg.svd(rows)[2][len(rows) :].T)
     to_screw = np.ascontiguousarray(prepared.screws[:, : len(free)][:, free])
     starts, mixed = free_starts(prepared, free), np.ones(len(clearances), dtype=bool)
@@ -184,7 +184,7 @@ def _at_contact_alone(
     clearances: NDArray,
     direction: NDArray,
 ) -> NDArray:
-    """Return the farthest position (nu,) from the interior-point solver Clarabel."""
+    """Return the farthest clearance position (nu,), computed by the solver Clarabel."""
     group = np.unique(prepared.joints.group[free], return_inverse=True)[1]
     none, size = np.zeros((0, int(free.sum()))), np.linalg.norm(direction[free])
     solution = minimise_energy(
@@ -207,7 +207,8 @@ def loaded_clearances(prepared: LinearResponse, draws: Assembly) -> NDArray:
         forces += prepared.loads.joint @ prepared.joints.cones
     force_sizes = _sizes(forces, prepared.starts)
     slack = np.maximum(0.0, 1.0 - _sizes(draws.clearances, prepared.starts))
-    # force times slack is about the solver's gap, so one of the two is nearly zero
+    # the product of contact force and slack is about the solver's duality gap, so force
+    # or slack is nearly zero
     scale = np.maximum(draws.energy, 1e-18)[:, None]
     loaded = (force_sizes > scale * slack) & (force_sizes > 1e-9 * scale)
     return np.repeat(loaded, np.diff(prepared.starts), axis=1)
@@ -226,5 +227,5 @@ def _cone_columns(prepared: LinearResponse) -> NDArray:
 
 
 def _sizes(values: NDArray, starts: NDArray) -> NDArray:
-    """Return the norms (k, cones) of the components of each cone."""
+    """Return the norms (k, cones) of the clearance components of each cone."""
     return np.sqrt(np.add.reduceat(values**2, starts[:-1], axis=1))

@@ -1,11 +1,11 @@
-"""Farthest positions of clearances in given directions."""
+"""Clearance positions that lie farthest in given directions of clearance space."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.assembly.solvers.one_problem import farthest_points
 
-_PRECISION = 1e-9  # relative precision of the component in the given direction
+_PRECISION = 1e-9  # relative precision of the largest component in a direction
 
 
 def move_to_contact(

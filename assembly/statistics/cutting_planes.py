@@ -1,16 +1,16 @@
-"""Tolerances of least cost for convex limits, by the method of cutting planes.
+"""Tolerances of least cost for convex requirements, by cutting planes.
 
 Two requirements are convex in the tolerances t:
 
 - *yield 1*: margin or energy at every corner of the tolerance box.  For every choice s
   of signs, ``m(t s)`` is convex in t; the margin is also proportional to t.
-- *yield below 1*: the mean over the worst (1 - yield) of many fixed draws s (the
-  conditional value at risk), which is a stricter condition than the yield itself.
+- *yield below 1*: the mean over the worst share (1 - yield) of many fixed draws s. This
+  mean is the conditional value at risk. Limiting it is stricter than the yield itself.
 
-Each iteration minimises the cost within the planes found so far, finds the largest
-violation of the requirement, and adds the plane that linearises it.  Every plane holds
-for all tolerances that meet the requirement. The minimum within the planes is therefore
-a lower bound of the cost.
+Each iteration minimises the cost within the planes found so far.  It then finds the
+largest violation of the requirement, and adds the plane that linearises the violated
+quantity.  Every plane holds for all tolerances that meet the requirement. The minimum
+within the planes is therefore a lower bound of the cost.
 
 Sources:
     Kelley (1960), The cutting-plane method for solving convex programs; Rockafellar,
@@ -33,7 +33,7 @@ _MOST_CUTS = 200
 def cut_planes(
     requirement: Requirement, progress: Callable[[str, int, int], None]
 ) -> tuple[NDArray, float, int]:
-    """Return the tolerances of least cost that meet the convex limits.
+    """Return the tolerances of least cost that meet the convex requirements.
 
     Args:
         requirement: requirement at all postures.
@@ -82,7 +82,7 @@ def cheapest_within(
     import cvxpy as cp
 
     A = np.array(planes).reshape(-1, len(plan.names))
-    # scaled such that each single tolerance reaches its steepest plane at 1
+    # scaled such that each tolerance alone reaches its most restrictive plane at 1
     steepest = np.maximum(A, 0.0).max(axis=0, initial=0.0)
     scale = np.minimum(most, 1.0 / np.maximum(steepest, 1e-300))
     x = cp.Variable(len(plan.names))
@@ -97,7 +97,10 @@ def cheapest_within(
     problem = cp.Problem(goal, constraints)
     problem.solve(solver="CLARABEL")
     if x.value is None:
-        raise BadInput("tolerances: even the tightest ones allowed violate a limit")
+        raise BadInput(
+            "tolerances: even the smallest allowed tolerances violate a limit; loosen "
+            "the limit or allow smaller tolerances"
+        )
     return np.clip(x.value * scale, least, most)
 
 
@@ -132,8 +135,11 @@ def _violated(requirement: Requirement, t: NDArray) -> Iterator[NDArray]:
 
 
 def _plane(slopes: NDArray, value: float, t: NDArray, limit: float) -> NDArray:
-    """Return the plane ``a.t' <= 1`` of a quantity linearised at t."""
+    """Return the plane ``a.t' <= 1`` of a limited quantity linearised at t."""
     right = limit - value + float(slopes @ t)
     if right <= 0:
-        raise BadInput(f"even perfect parts exceed a limit of {limit:g}")
+        raise BadInput(
+            f"even a robot without geometric errors exceeds a limit of {limit:g}; "
+            "loosen the limit or tighten the clearances"
+        )
     return slopes / right

@@ -1,4 +1,4 @@
-"""Zones of all errors and clearances at a posture, and their platform screws."""
+"""Zones of all errors and clearances at a posture, and the pose errors they cause."""
 
 from dataclasses import dataclass
 
@@ -23,7 +23,7 @@ _ROUNDING = 1e-9  # rows smaller than this share of the largest row are rounding
 
 @dataclass(frozen=True, eq=False)
 class ErrorSets:
-    """Zones of all errors and clearances in one vector z, with linear conditions on z.
+    """Zones of errors and clearances as one vector z with linear conditions on z.
 
     Attributes:
         names: names of the zones.
@@ -46,7 +46,7 @@ class ErrorSets:
     contact_rows: NDArray
 
     def weights_on_zones(self, along: NDArray) -> NDArray:
-        """Return the weights of the coordinates that parallel contacts cannot reduce.
+        """Return the weights of the coordinates z after parallel contacts reduce them.
 
         Args:
             along: (total,) weights of the coordinates.
@@ -109,14 +109,14 @@ def error_sets(prepared: LinearResponse, sources: Sources) -> ErrorSets:
 
 
 def parts_of(sets: ErrorSets, along: NDArray) -> list[float]:
-    """Return the parts of the zones in the largest product, loops free to open.
+    """Return each zone's part of the largest product if loops may open.
 
     Args:
         sets: zones of errors and clearances.
         along: (total,) weights of the coordinates.
 
     Returns:
-        One for each zone; their sum is the largest product.
+        One part for each zone; their sum is the largest product of ``along`` with z.
     """
     weights = sets.weights_on_zones(along)
     pairs = zip(sets.zones, sets.columns, strict=True)
@@ -124,15 +124,15 @@ def parts_of(sets: ErrorSets, along: NDArray) -> list[float]:
 
 
 def rigid_parts(sets: ErrorSets, along: NDArray) -> list[float]:
-    """Return the parts of the zones in the largest product where rigid loops close.
+    """Return each zone's part of the largest product if rigid loops must close.
 
     Args:
         sets: zones of errors and clearances.
         along: (total,) weights of the coordinates.
 
     Returns:
-        One for each zone: the derivative of the largest product with respect to the
-        logarithm of the zone's size.  Their sum is the largest product (Euler).
+        One part for each zone: the derivative of the largest product with respect to
+        the logarithm of the zone's size.  Their sum is the largest product (Euler).
     """
     N, bounds, cones = bounds_where_closed(sets, sets.rigid_rows)
     _, _, sizes = product_by_bounds(along @ N, bounds, cones)
@@ -151,7 +151,7 @@ def bounds_where_closed(
 
     Args:
         sets: zones of errors and clearances.
-        rows: (k, total) that must be zero.
+        rows: (k, total) rows whose product with z must be zero.
 
     Returns:
         (total, m) orthonormal basis, and the rows of balls and of double cones (., m).
@@ -174,7 +174,7 @@ def _contact_rows(prepared: LinearResponse, columns: NDArray) -> NDArray:
 
 
 def _real_rows(rows: NDArray, columns: NDArray) -> NDArray:
-    """Return orthonormal rows of rows @ columns; none if all entries are rounding."""
+    """Return an orthonormal row basis of rows @ columns; empty if all is rounding."""
     product = rows @ columns
     scale = np.abs(rows).max(initial=0.0) * np.linalg.norm(columns)
     _, sizes, vt = np.linalg.svd(product, full_matrices=False)
@@ -182,7 +182,7 @@ def _real_rows(rows: NDArray, columns: NDArray) -> NDArray:
 
 
 def _maps(sources: Sources) -> NDArray:
-    """Return the errors (n, 6, m) of all frames per unit of each number."""
+    """Return the errors (n, 6, m) of all frames per unit of each random number."""
     if isinstance(sources, CalloutSources):
         return sources.maps
     return np.moveaxis(sources.errors(np.eye(len(sources))), 0, -1)
@@ -197,13 +197,16 @@ def zones_of_errors(sources: Sources) -> list[tuple[str, Zone, NDArray]]:
     else:
         independent, fixed = sources, sources.fixed
     if fixed is not None and fixed.any():
-        raise BadInput("worst case: found closures that do not hold, expected none")
+        raise BadInput(
+            "worst case: found closures that do not close at home, whose mismatch is a "
+            "constant error; expected closures that close"
+        )
     found = [] if independent is None else _intervals(independent)
     return found + [(p.name, p.zone, np.ones(sum(p.zone.dimensions))) for p in placed]
 
 
 def _intervals(sources: ErrorSources) -> list[tuple[str, Zone, NDArray]]:
-    """Return the intervals of independent errors, in units of their half widths."""
+    """Return interval zones of independent errors, in units of their half widths."""
     pairs = zip(sources.labels, _half_widths(sources), strict=True)
     return [(name, Zone((np.eye(6)[:1],)), np.array([width])) for name, width in pairs]
 

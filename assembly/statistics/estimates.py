@@ -36,7 +36,7 @@ def proportion(successes: int, count: int, level: float = 0.95) -> dict[str, flo
 def bracketed(
     holds: int, fails: int, count: int, level: float = 0.95
 ) -> dict[str, float]:
-    """Return the probability of success if some trials are undecided.
+    """Return the probability of success if the outcome of some trials is unknown.
 
     Args:
         holds: number of certain successes in ``count`` independent trials.
@@ -67,10 +67,11 @@ def quantile(values: ArrayLike, share: float, level: float = 0.95) -> dict[str, 
     """
     x = np.sort(np.asarray(values, dtype=float))
     count = len(x)
-    # infinite values are not interpolated
+    # do not interpolate between infinite values
     way: Literal["linear", "higher"] = "linear" if np.isfinite(x).all() else "higher"
     low, high = stats.binom.ppf([(1 - level) / 2, (1 + level) / 2], count, share)
-    # P(fewer than low values below the quantile) < (1 - level)/2; likewise above
+    # P(fewer than ``low`` values lie below the quantile) < (1 - level)/2, and the same
+    # for the values above it
     below, above = int(low) - 1, int(high)
     return {
         "value": float(np.quantile(x, share, method=way)),
@@ -123,7 +124,7 @@ def most_probable(
     scale = min(float(x.std()), spread) or float(x.std())
     if scale <= 1e-12 * np.abs(x).max():  # all values are equal except for rounding
         return dict.fromkeys(("value", "lower", "upper"), float(x[0]))
-    # bins exclude a long tail, because the mode is elsewhere
+    # histogram bins exclude a long tail, in which the mode cannot be
     ends = np.quantile(x, [0.25, 0.75]) + np.array([-8.0, 8.0]) * scale
     low = 0.0 if positive else max(float(x.min()) - 4 * scale, float(ends[0]))
     high = min(float(x.max()) + 4 * scale, float(ends[1]))

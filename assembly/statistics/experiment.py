@@ -41,7 +41,7 @@ class Experiment:
     """Error distributions at a posture, and the quantities to compute for each draw.
 
     Attributes:
-        posture: posture of the robot; drawn errors replace those of the robot file.
+        posture: posture of the robot; drawn errors replace the robot file's errors.
         sources: distributions of the errors.
         seed: seed of all draws.
         clearance: one of
@@ -115,7 +115,7 @@ class Experiment:
 
     @cached_property
     def zones(self) -> dict[str, PostureMargins]:
-        """The posture prepared for problem (21), the margin, by quantity."""
+        """The posture prepared for margins, problem (21), by name of the margin."""
         if not self.margins:
             return {}
         return {k: prepare_margins(self.posture, r) for k, r in MARGINS.items()}
@@ -181,7 +181,7 @@ class Experiment:
             (k,) records of :attr:`record_type`; NaN and status 1 if there is no
             solution.  In the worst clearance model, rotation and translation are upper
             bounds of the largest errors. The platform screw is then the screw of the
-            solution of (22).
+            least-energy solution (22).
         """
         if not isinstance(self.sources, CalloutSources) or not self.sources.fits:
             parts = self._bolted(values, np.asarray(draws))
@@ -202,7 +202,7 @@ class Experiment:
     def _bolted(
         self, values: NDArray, draws: NDArray
     ) -> list[tuple[NDArray, NDArray, NDArray]]:
-        """Return results as :meth:`_without_stress`; NaN for a draw without a bolt."""
+        """Return the records of all draws; NaN for draws that cannot be bolted."""
         try:
             return [self._without_stress(values, draws)]
         except CannotBolt:
@@ -221,7 +221,7 @@ class Experiment:
     def _without_stress(
         self, values: NDArray, draws: Sequence[int] | NDArray
     ) -> tuple[NDArray, NDArray, NDArray]:
-        """Return records, wrenches and weights for the clearances of the posture."""
+        """Return records without stress, wrenches, and distributed loads at tips."""
         robot = self.posture.robot
         bolts = bolt_generators(robot, self.seed, draws)
         errors = bolted_errors(robot, self.sources.errors(values), bolts)
@@ -265,7 +265,7 @@ class Experiment:
 def precision_for(
     limits: Mapping[str, float], share: float = _PRECISION
 ) -> tuple[float, float]:
-    """Return the precision of pose errors that is sufficient to check limits on them.
+    """Return the precision of pose errors that suffices to check their limits.
 
     Args:
         limits: limits by quantity.

@@ -7,8 +7,7 @@ result is linear in the errors, both indices equal ``a_i^2 var_i / sum_j a_j^2 v
 
 A draw without a solution is counted and discarded, together with the draws that are
 compared with it.  The errors of the remaining draws are then no longer independent.
-If more than a small share is discarded, the result is therefore a reason instead of
-indices.
+If too many draws are discarded, no indices are reported, but the reason why.
 
 Sources:
     Saltelli et al. (2010), Variance based sensitivity analysis of model output, table 2
@@ -55,7 +54,7 @@ class Importance:
 
 @dataclass(frozen=True, eq=False)
 class SaltelliDesign:
-    """Saltelli's design: A, B, and A with the columns of each group taken from B.
+    """Saltelli's design: A, B, and for each group A with that group's columns of B.
 
     Attributes:
         A: (k, m) independent draws of the errors.

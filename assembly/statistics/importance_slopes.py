@@ -1,7 +1,7 @@
 """Exact derivatives of the platform's screw with respect to groups of errors.
 
 The ratio of two sampled standard deviations is not a derivative, because it contains
-sampling noise.  As long as the active clearances do not change, the solution of (22) is
+sampling noise.  As long as the active clearances do not change, the solution (22) is
 linear in the errors, and its derivatives are exact
 (:mod:`forcefit.assembly.statistics.sensitivity`). The gain of a group is the root mean
 square of these derivatives over the group's errors, weighted by variance, and over

@@ -82,7 +82,7 @@ def importance_rows(
     """Return the records of a range of rows of a design.
 
     Random clearance positions would add variance that is not due to the errors, so the
-    positions in the solution of (22) are used instead.
+    positions in the least-energy solution (22) are used.
 
     Args:
         experiment: distributions and quantities.
@@ -259,7 +259,7 @@ def importance_text(report: Mapping[str, Any]) -> str:
 
 
 def _moves_text(one: Mapping[str, Any]) -> str:
-    """Return part and gain of a group as columns of the table."""
+    """Return the part and the gain of a group of errors as table columns."""
     gain = {
         "m": (f"{one['translation_gain']:11.4g}", " " * 13),
         "rad": (" " * 11, f"{1e3 * one['translation_gain']:13.4g}"),

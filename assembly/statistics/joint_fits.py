@@ -1,4 +1,4 @@
-"""Fits of joints: the frames whose clearance a fit determines."""
+"""Fits of joints: which frame's clearance each fit determines."""
 
 from dataclasses import dataclass, replace
 
@@ -52,7 +52,7 @@ def kind_of_fit(robot: Robot, fit: JointFit) -> str:
 
 
 def with_clearance(frame: Frame, new: dict[str, float]) -> Frame:
-    """Return the frame with new clearances; for a bolted joint those before bolting."""
+    """Return the frame with a new clearance; of a bolted joint, before it is bolted."""
     bolt = frame.locked_at
     if bolt is not None:
         clearance = replace(bolt.clearance, **new)

@@ -1,17 +1,17 @@
-"""Tolerances of locally least cost for nonconvex limits, by sequential programming.
+"""Tolerances of locally least cost for limits on nonconvex quantities.
 
 Wrenches, stress and pose errors are not convex in the errors, and a yield is not convex
-in the tolerances.  However, the derivatives of the worst samples with respect to every
-error are known, and so are their derivatives with respect to every tolerance.  A convex
-programme with these linearised limits, within a trust region around the present
-tolerances, computes a trial point.  The trial point is scaled uniformly until the
-samples just meet the limits again.  The trial point is accepted if its cost is smaller;
-otherwise the trust region is reduced.  The cost therefore never increases.  The result
-is a local minimum; a global minimum is not proved.
+in the tolerances.  However, the derivatives of the limited quantities with respect to
+every error and every tolerance are known for the worst samples.  They linearise the
+limits.  A convex programme with the linearised limits computes a trial point within a
+trust region around the present tolerances.  The trial point is scaled uniformly until
+the samples just meet the limits again.  The trial point is accepted if its cost is
+smaller; otherwise the trust region is reduced.  The cost therefore never increases.
+The result is a local minimum; a global minimum is not proved.
 
 For a yield below 1, the linearised limit is the mean over the samples closest to the
 limit, which is the derivative of the quantile.  For a yield of 1, each of the worst
-samples has a separate linearised limit, and the worst corners of the tolerance box are
+samples has a separate linearised limit. The worst corners of the tolerance box are
 searched again at every step.
 
 Sources:
@@ -32,10 +32,10 @@ from forcefit.assembly.statistics.scaling import (
     with_worst_corners,
 )
 
-_COARSE = 1e-3  # precision of intermediate costs, relative to the limits
-# smallest cost reduction per step for which iteration continues, relative to the cost
+_COARSE = 1e-3  # precision of the scaling at intermediate steps, relative to the limits
+# smallest relative reduction of the cost per step for which the iteration continues
 _GAIN = 1e-4
-# factors on the tolerances that bound the trust region
+# largest and smallest factor on the tolerances in one step (trust region)
 _LARGEST_RADIUS, _SMALLEST_RADIUS = 2.0, 1.01
 _MOST_STEPS = 60
 _PLANES = 200  # number of worst samples that are linearised for a yield of 1
@@ -97,7 +97,7 @@ def _saving(plan: Plan, before: NDArray, after: NDArray) -> float:
 
 
 def _planes(requirement: Requirement, samples: Samples, t: NDArray) -> list[NDArray]:
-    """Return linearised limits a (G,), a.t' <= 1, for the critical samples."""
+    """Return linearised limits a.t' <= 1, a (G,), at the samples nearest to limits."""
     values = samples.values * requirement.plan.spread(t)
     utilisations = requirement.utilisations(values)[1]
     if requirement.plan.asked_yield == 1.0:

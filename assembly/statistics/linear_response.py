@@ -104,7 +104,7 @@ class LinearResponse:
             self.posture, self.load, gravity=self.gravity, errors=errors
         )
         if found.joints.cones.shape[1] < self.starts[-1]:
-            return found.in_columns(self.joints)  # here motion limits are cones
+            return found.in_columns(self.joints)  # these columns include motion limits
         return found
 
 
@@ -197,7 +197,7 @@ def linear_response(
 
 
 def _bent(reduced: Reduction, closing: NDArray) -> NDArray:
-    """Return the deformations (6n,) [rad, m] due to loads at zero clearance."""
+    """Return the elastic deformations (6n,) [rad, m] under load at zero clearance."""
     # wrenches that balance the free motions, with the least spring energy
     bent = reduced.spread.T @ reduced.load_springs
     springs = spring_deformations(

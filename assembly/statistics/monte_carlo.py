@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     import xarray
 
 BLOCK = 1024  # number of draws that are solved and written to the journal together
-# by axis: no limit is one number
 _QUEUED = 4  # number of queued blocks per thread
 
 

@@ -1,4 +1,4 @@
-"""Quantities of perfect parts: the effect of clearances and loads without errors.
+"""Margins, energy and pose errors at zero errors: effect of clearances and loads.
 
 If a robot without errors exceeds a limit, no tolerance can meet this limit.  In the
 worst clearance model, the clearance of each joint contributes a part to the largest
@@ -25,7 +25,7 @@ from forcefit.assembly.statistics.worst_clearance import (
     worst_error_slopes,
 )
 
-# number of positions of a random clearance model from which the median is taken
+# number of random clearance positions from which the median is computed
 _DRAWS = 200
 _PRECISION = (1e-9, 1e-9)  # [rad, m] required precision of the largest pose errors
 _SHARE = 1e-3  # parts below this share of the largest pose error are not listed
@@ -35,16 +35,17 @@ _EXCEEDED = 1e-9  # relative excess from which a limit counts as exceeded
 
 
 def perfect_parts(experiment: Experiment) -> dict[str, Any]:
-    """Return the quantities of a robot without errors.
+    """Return the results of a robot without geometric errors.
 
     Args:
         experiment: posture, loads and clearance model.
 
     Returns:
-        By quantity: ``reached``; for random clearance models this is the median of 200
-        positions.  For pose errors of the worst model without loads also
-        ``clearances``: the part [rad or m] of each kind of clearance, largest first.
-        The dictionary is empty if the robot without errors has no solution.
+        By quantity: ``reached``, the value without errors; for random clearance models
+        this is the median of 200 positions.  For pose errors of the worst model without
+        loads also ``clearances``: the part [rad or m] of each kind of clearance,
+        largest first. The dictionary is empty if the robot without errors has no
+        solution.
     """
     random = experiment.clearance in {"uniform", "contact"}
     count = _DRAWS if random else 1
@@ -72,7 +73,7 @@ def perfect_parts(experiment: Experiment) -> dict[str, Any]:
 
 
 def _clearance_parts(prepared: LinearResponse) -> dict[str, dict[str, float]]:
-    """Return the part of each kind of clearance in the largest pose errors."""
+    """Return the part of each clearance kind in the largest pose errors [rad or m]."""
     draws = prepared.solve(np.zeros((1, len(prepared.posture.robot.frames), 6)))
     if not (np.isfinite(draws.energy).all() and np.isfinite(draws.clearances).all()):
         return {}
@@ -93,7 +94,7 @@ def _clearance_parts(prepared: LinearResponse) -> dict[str, dict[str, float]]:
 
 
 def _clearance_kinds(prepared: LinearResponse) -> list[str]:
-    """Return the kind of each cone, such as ``hinge.tilt``, without the leg's name."""
+    """Return each clearance's name without the leg's name, such as ``hinge.tilt``."""
     robot, kinds = prepared.posture.robot, []
     for first, end in zip(prepared.starts[:-1], prepared.starts[1:], strict=True):
         columns: NDArray = prepared.joints.cones[:, first:end]
@@ -106,14 +107,14 @@ def _clearance_kinds(prepared: LinearResponse) -> list[str]:
 
 
 def stored_perfect_parts(experiment: Experiment) -> str:
-    """Return the quantities of perfect parts as text, for a data set's attribute."""
+    """Return the results at zero errors as JSON text, for a data set attribute."""
     return json.dumps(perfect_parts(experiment))
 
 
 def limits_broken(
     parts: Mapping[str, Any], limits: Mapping[str, float]
 ) -> dict[str, Any]:
-    """Return the limits that perfect parts exceed.
+    """Return the limits that a robot of perfect parts (zero errors) exceeds.
 
     Args:
         parts: result of :func:`perfect_parts`.
@@ -130,7 +131,7 @@ def limits_broken(
 
 
 def perfect_text(summary: Mapping[str, Any]) -> list[str]:
-    """Return lines of text on the values for perfect parts and on exceeded limits."""
+    """Return lines of text on the results without errors and on exceeded limits."""
     parts, lines = summary.get("perfect_parts", {}), []
     alone = {k: parts[k] for k in POSE_ERRORS if parts.get(k, {}).get("reached")}
     why = "clearances and loads alone" if summary.get("load") else "clearances alone"
@@ -148,14 +149,14 @@ def perfect_text(summary: Mapping[str, Any]) -> list[str]:
 
 
 def _size_text(one: Mapping[str, Any]) -> str:
-    """Return the value for perfect parts as text, with its unit."""
+    """Return a result without errors as text, with its unit."""
     if np.isinf(one["reached"]):
         return "without bound"
     return f"of {one['reached']:.4g} {one['unit']}"
 
 
 def _of_text(one: Mapping[str, Any]) -> str:
-    """Return the two largest contributions of clearances as text in brackets."""
+    """Return the two clearances that contribute most as text in brackets."""
     parts = list(one.get("clearances", {}).items())[:2]
     if not parts:
         return ""

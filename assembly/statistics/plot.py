@@ -69,7 +69,7 @@ def histogram_figure(
     Args:
         data: result of :func:`forcefit.assembly.statistics.monte_carlo.run_draws`.
         quantities: quantities to show, by the names in
-            :mod:`forcefit.assembly.sweeps.panels`; by default those with a limit.
+            :mod:`forcefit.assembly.sweeps.panels`; by default the limited quantities.
 
     Returns:
         A figure with one panel per quantity that varies; bands are 95 % confidence
@@ -112,7 +112,7 @@ def histogram_figure(
 
 
 def _histogram(panel: Any, text: str, values: Any) -> None:
-    """Draw one histogram; of a variable with components, the largest is drawn."""
+    """Draw one histogram; for several components, of the largest component."""
     x = values.max(axis=1) if values.ndim == 2 else values
     x = x[np.isfinite(x)]
     panel.set(xlabel=text, ylabel="draws")

@@ -19,7 +19,8 @@ from forcefit.assembly.linear.zone import Compliant, Zone, zone_margin
 from forcefit.assembly.solvers.cones import cone_starts
 from forcefit.assembly.statistics.linear_response import checked_errors
 
-# [rad, reference lengths] errors at least this large cannot be closed by any motion
+# [rad, reference lengths] a larger infeasible error component is no rounding error, so
+# no motion or clearance can close the loops
 _CLEARLY_INFEASIBLE = 1e-10
 
 

@@ -1,4 +1,4 @@
-"""Possible ranks of sampled shares, and summary names for equal errors of all legs."""
+"""Possible ranks of variance shares, and joint names for equal errors of all legs."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any

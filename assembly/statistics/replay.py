@@ -1,4 +1,4 @@
-"""Results of an expensive deterministic computation, stored in a journal in order.
+"""Journal of the results of a long deterministic computation, in order.
 
 An interrupted computation resumes when it is started again: results in the journal are
 read instead of computed.  Each result is stored with a digest of its arguments. A

@@ -86,7 +86,7 @@ def draws_sections(
 
 
 def _share(summary: Mapping[str, Any]) -> Mapping[str, float]:
-    """Return the probability that all limits are met, or without limits of assembly."""
+    """Return the yield: limits met or, if none are given, the robot assembles."""
     limits: Mapping[str, float] | None = summary.get("within_limits")
     forced: Mapping[str, float] = summary["assembles"]["forced"]
     return limits or forced
@@ -100,7 +100,7 @@ def _good(share: Mapping[str, float]) -> bool | None:
 
 
 def _share_text(interval: Mapping[str, float]) -> str:
-    """Return a probability in per cent, with its interval."""
+    """Return a probability in per cent as text, with its confidence interval."""
     low, high = 100 * interval["lower"], 100 * interval["upper"]
     return f"{100 * interval['probability']:.2f} % ({low:.2f} to {high:.2f})"
 
@@ -144,7 +144,7 @@ def _yields(summary: Mapping[str, Any]) -> str:
 
 
 def _perfect_parts(summary: Mapping[str, Any]) -> str:
-    """Return the values for perfect parts, by kind of clearance, as HTML."""
+    """Return the results without errors, by kind of clearance, as HTML."""
     parts = {k: v for k, v in summary["perfect_parts"].items() if v["reached"]}
     if not parts:
         return ""

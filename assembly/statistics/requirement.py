@@ -1,4 +1,4 @@
-"""Requirements on tolerances: limits at every posture, for all robots or a share."""
+"""Requirements on tolerances: limits at every posture, and the required yield."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -70,7 +70,7 @@ class Plan:
 
     @property
     def limits_pose(self) -> bool:
-        """Whether a pose error is limited; only then the clearance model is used."""
+        """Whether a pose error is limited; otherwise no clearance model is used."""
         return bool(set(POSE_ERRORS) & set(self.limits))
 
     __repr__, _repr_html_ = short_repr, html_table
@@ -141,10 +141,10 @@ class Requirement:
 
     @cached_property
     def convex(self) -> dict[str, list]:
-        """Prepared postures by limited quantity, for limits convex in the errors.
+        """Prepared postures by limited quantity, for quantities convex in the errors.
 
-        With bolted joints no limit is convex, because the locked-in clearance is not
-        linear in the errors.
+        If a joint is bolted, no quantity is convex in the errors, because the locked-in
+        clearance is not linear in the errors.
         """
         if any(frame.locked_at for frame in self.postures[0].robot.frames):
             return {}
@@ -152,7 +152,7 @@ class Requirement:
 
     @property
     def is_convex(self) -> bool:
-        """Whether all limits are convex in the tolerances; True only for yield 1."""
+        """Whether all limited quantities are convex; True only for a yield of 1."""
         return self.plan.asked_yield == 1.0 and len(self.convex) == len(self.prepared)
 
     @property
@@ -224,7 +224,7 @@ class Requirement:
         return bounds[0], bounds[1]
 
     def utilisation_slopes(self, case: int, values: NDArray) -> NDArray:
-        """Return derivatives (k, m) of a row of :meth:`utilisations` by each error."""
+        """Return derivatives (k, m) by each error of a row of :meth:`utilisations`."""
         key, i = self.cases[case]
         return self.respond(key, i, values)[1] / self.plan.limits[key]
 
@@ -246,7 +246,7 @@ class Requirement:
         return size, slopes
 
     def worst_corner(self, key: str, i: int, t: NDArray, corners: NDArray) -> Corner:
-        """Return the worst corner of tolerances (G,) that is found at posture i."""
+        """Return the worst corner of the tolerance box (G,) found at posture i."""
         spread, sources = self.plan.spread(t), self.plan.sources
         assert isinstance(sources, ErrorSources)  # callouts have no corners
 
@@ -261,7 +261,7 @@ class Requirement:
         return Corner(float(value), signs, slopes)
 
     def perfect_parts(self) -> dict[str, tuple[float, str]]:
-        """Return the part of each limit on a pose error that clearances use.
+        """Return the pose errors that clearances alone cause, for limited pose errors.
 
         Returns:
             By quantity: a lower bound of the largest pose error [rad or m] without
@@ -288,7 +288,7 @@ class Requirement:
         return reached
 
     def _refuse_broken(self, reached: Mapping[str, tuple[float, str]]) -> None:
-        """Reject the limit that perfect parts exceed most, if any."""
+        """Reject the limit that a robot without errors exceeds most, if any."""
         limits = self.plan.limits
         for key in sorted(reached, key=lambda k: -reached[k][0] / limits[k]):
             value, where = reached[key]
@@ -302,7 +302,7 @@ class Requirement:
                 )
 
     def check_taken_up(self) -> None:
-        """Reject errors that neither a clearance nor a spring can close at a posture.
+        """Reject errors that neither a clearance nor a spring can compensate.
 
         Raises:
             BadInput: such an error exists; the message names the error.

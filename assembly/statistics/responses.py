@@ -26,8 +26,8 @@ from forcefit.assembly.steps.bolted import bolted_errors
 
 _STEP = 1e-6  # step for differences of the stress formula, relative to the wrench
 _PRECISION = 1e-9  # [rad or m] required precision of the largest pose errors
-# step for differences of bolted joints, relative to the largest value of a number, and
-# the smallest such value
+# finite-difference step for errors of bolted joints, relative to the largest absolute
+# value of the error; and the least value to which the step is relative
 _BOLT_STEP, _LEAST_VALUE = 1e-4, 1e-6
 _PARTS = {"moment": slice(0, 3), "force": slice(3, 6)}
 
@@ -50,7 +50,7 @@ def respond(
             :data:`forcefit.assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
             In the worst model, the value and its derivatives belong to the largest
             error found. For uniform and contact positions the derivatives belong to the
-            solution of (22).
+            least-energy solution (22).
         contact_length: [m] length of the contact model, see
             :class:`forcefit.assembly.statistics.experiment.Experiment`.
 
@@ -73,7 +73,7 @@ def respond(
         return draws.energy, -by_number(draws.wrenches)
     size = np.full(len(values), np.nan)
     slopes = np.full(errors.shape, np.nan)
-    # the active bounds of a draw are unknown if its clearances are unknown
+    # a draw without known clearances has no known active clearance bounds
     known = np.isfinite(draws.energy) & np.isfinite(draws.clearances).all(axis=1)
     solved = np.flatnonzero(known)
     if len(solved):
@@ -95,7 +95,7 @@ def respond(
 def _by_number(
     robot: Robot, sources: Sources, values: NDArray, slopes: NDArray
 ) -> NDArray:
-    """Return derivatives (k, m) by the sources from derivatives by all frame errors.
+    """Return derivatives by m sources (k, m), from derivatives by all frame errors.
 
     The clearance that a bolted joint locks in depends on the errors; its derivatives
     are central differences.

@@ -10,7 +10,7 @@ from forcefit.assembly.statistics.requirement import Requirement
 from forcefit.assembly.statistics.worst_case import CORNERS, random_corners
 from forcefit.inputs.table import BadInput
 
-_FINE = 1e-4  # precision of the largest utilisation, relative to the limits
+_FINE = 1e-4  # precision of the largest utilisation (value divided by limit)
 _MOST_TRIALS = 80
 
 
@@ -19,7 +19,7 @@ class Samples:
     """Error samples that must meet every limit at every posture, with few exceptions.
 
     Attributes:
-        values: (k, m) errors relative to their tolerances.
+        values: (k, m) errors divided by their tolerances.
         allowed: number of samples that may fail.
     """
 
@@ -28,7 +28,7 @@ class Samples:
 
 
 def draw_samples(requirement: Requirement, stream: int, times: int = 1) -> Samples:
-    """Return fixed random draws or, for a yield of 1, corners of the tolerances.
+    """Return random error samples or, for a yield of 1, corners of the tolerance box.
 
     Args:
         requirement: requirement at all postures.
@@ -62,7 +62,7 @@ def with_worst_corners(
         t: (G,) [rad or m] tolerances.
 
     Returns:
-        The samples and those worst corners that were not yet among the samples.
+        The samples, extended by the worst corners that are not yet among them.
     """
     corners = np.vstack([
         samples.values[: CORNERS // 2],
@@ -82,7 +82,7 @@ def with_worst_corners(
 def scale_uniformly(
     requirement: Requirement, samples: Samples, t: NDArray, precision: float = _FINE
 ) -> NDArray:
-    """Scale tolerances by one factor, within bounds, until the samples just fit.
+    """Scale tolerances by one factor, within bounds, until samples just meet limits.
 
     Args:
         requirement: requirement at all postures.
@@ -91,7 +91,8 @@ def scale_uniformly(
         precision: relative precision of the largest utilisation, or of the factor.
 
     Returns:
-        (G,) [rad or m] tolerances; the upper bounds if the samples still fit there.
+        (G,) [rad or m] tolerances; their upper bounds if the samples still meet all
+        limits there.
 
     Raises:
         BadInput: no scale factor makes the samples meet the limits.
@@ -104,7 +105,7 @@ def scale_uniformly(
         utilisations = requirement.utilisations(samples.values * plan.spread(trial))[
             1
         ].max(axis=0)
-        # largest utilisation among all samples except those that may fail
+        # largest utilisation among all samples except the samples that may fail
         utilisation = float(
             np.partition(utilisations, -1 - samples.allowed)[-1 - samples.allowed]
         )
@@ -116,8 +117,8 @@ def scale_uniformly(
             break
         if low == 0 and high < 1e-9:
             raise BadInput(
-                "tolerances: even perfect parts violate a limit; loosen the "
-                "limit or tighten the clearances"
+                "tolerances: even a robot without geometric errors violates a limit; "
+                "loosen the limit or tighten the clearances"
             )
         if (
             0 < utilisation < np.inf
@@ -127,7 +128,7 @@ def scale_uniformly(
             steep = np.log(utilisation / previous[1]) / np.log(factor / previous[0])
             power = float(np.clip(steep, 0.3, 10.0))
         previous = factor, utilisation
-        # a power law of the utilisation predicts the factor, otherwise bisection
+        # predict the factor by a power law of the utilisation, or else bisect
         factor = _next_factor(low, high, factor, utilisation, power, precision)
     return np.clip(low * t, plan.least, plan.most)
 
@@ -136,7 +137,7 @@ def _next_factor(
     low: float, high: float, factor: float, utilisation: float, power: float,
     precision: float,
 ) -> float:  # fmt: skip
-    """Return the next trial factor."""
+    """Return the next trial value of the factor on all tolerances."""
     if 0 < utilisation < np.inf:
         guess = factor * ((1 - precision / 2) / utilisation) ** (1 / power)
         if low * (1 + precision / 4) < guess < high * (1 - precision / 4):
@@ -147,7 +148,7 @@ def _next_factor(
 
 
 def _allowed_failures(draws: int, asked: float) -> int:
-    """Return the largest number of failures that still demonstrates a yield at 95 %."""
+    """Return the most failures with which a yield is demonstrated at 95 %."""
     # proportion() decreases with the number of failures, so bisection applies
     low, high = -1, draws
     while high - low > 1:

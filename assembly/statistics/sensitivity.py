@@ -1,4 +1,4 @@
-"""Derivatives by every geometric error, from multipliers and active clearances.
+"""Derivatives of a solution with respect to every geometric error.
 
 The least energy (22) equals the maximum of its dual ``-w.dl - ..`` over all balanced
 wrenches w.  The derivative of the energy by delta l is therefore minus the wrench that
@@ -25,9 +25,10 @@ from forcefit.assembly.linear.energy import Assembly
 from forcefit.assembly.solvers.conic import GAP_WITHOUT_CLEARANCE
 from forcefit.assembly.statistics.linear_response import LinearResponse
 
-# forces below this share of the largest force on any cone count as zero
+# forces below this share of the largest force on any clearance count as zero
 _ACTIVE = 1e-7
-# relative rank tolerance; no motion is assumed along undetermined directions
+# relative size below which a singular value counts as zero; clearances are assumed not
+# to move along such directions
 _RANK = 1e-10
 
 

@@ -1,8 +1,9 @@
 """Distribution of the platform's stiffness over draws of errors and clearances.
 
 Errors do not change the nominal platform stiffness K_C.  They change which clearances
-are in contact, so the tangent stiffness of (22) differs between draws.  The tangent of
-the exact equilibrium also includes the effects of internal forces and of rotated parts.
+are in contact, so the tangent stiffness of problem (22) differs between draws.  The
+tangent of the exact equilibrium also includes the effects of internal forces and of
+rotated parts.
 """
 
 from collections.abc import Mapping

@@ -141,7 +141,7 @@ def summarise(
 def _yields(
     data: "xarray.Dataset", solved: NDArray, limits: Mapping[str, float], level: float
 ) -> dict[str, Any]:
-    """Return how often each limit, and at least one limit, is exceeded."""
+    """Return the probability that each limit, and any limit, is exceeded."""
     count = len(solved)
     met, failed, exceeds = solved.copy(), ~solved, {}
     for key, limit in limits.items():
@@ -174,7 +174,7 @@ def _yields(
 
 
 def _worst(data: "xarray.Dataset", key: str) -> NDArray:
-    """Return the values (k,) of a quantity, the largest of all links."""
+    """Return a quantity's (k,) values; for links, the largest over all links."""
     values = np.asarray(data[key].values, dtype=float)
     return values.max(axis=1) if values.ndim == 2 else values
 
@@ -182,7 +182,7 @@ def _worst(data: "xarray.Dataset", key: str) -> NDArray:
 def _described(
     data: "xarray.Dataset", key: str, solved: NDArray, level: float
 ) -> dict[str, Any]:
-    """Return mean, quantiles and mode, which is 0 if most values are zero."""
+    """Return mean, quantiles and mode; the mode is 0 if most values are zero."""
     every = _worst(data, key)
     values = every[solved]
     finite = values[np.isfinite(values)]
@@ -270,14 +270,14 @@ def summary_text(summary: Mapping[str, Any]) -> str:
 
 
 def _titled(name: str, results: Mapping[str, Any]) -> str:
-    """Return a name, followed by the clearance model if the value depends on one."""
+    """Return a quantity's name, with the clearance model if the value depends on it."""
     return (
         f"{name} [clearance {results['clearance']}]" if "clearance" in results else name
     )
 
 
 def _share(interval: Mapping[str, float]) -> str:
-    """Return a probability with its interval, and the number of undecided draws."""
+    """Return as text a probability, its interval and the count of undecided draws."""
     low, high = interval["lower"], interval["upper"]
     text = f"{interval['probability']:.5g} ({low:.5g} to {high:.5g})"
     undecided = interval.get("undecided", 0)

@@ -1,4 +1,4 @@
-"""Summary tiles: the error or clearance that dominates a result."""
+"""Report tiles that name the error or clearance with the largest effect."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,7 +12,7 @@ _NAMED = 3  # largest number of contributors named in a tile
 
 
 def tightening_tiles(summary: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles: values for perfect parts, main contributor, advice to tighten.
+    """Return tiles: results without errors, main contributor, advice to tighten.
 
     Args:
         summary: result of :func:`forcefit.assembly.statistics.summary.summarise`.
@@ -48,7 +48,7 @@ def tightening_tiles(summary: Mapping[str, Any]) -> list[Tile]:
 
 
 def _deciding(summary: Mapping[str, Any]) -> str:
-    """Return the quantity that is exceeded most often, or translation or energy."""
+    """Return the quantity whose limit is exceeded most often (default translation)."""
     exceeds = sorted(
         summary["exceeds"], key=lambda k: -summary["exceeds"][k]["probability"]
     )
@@ -58,7 +58,7 @@ def _deciding(summary: Mapping[str, Any]) -> str:
 
 
 def _clearance_tiles(summary: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles on the pose error of perfect parts."""
+    """Return tiles on the pose error that clearances cause without errors."""
     parts = summary["perfect_parts"]
     answer: list[str | Value] = []
     for key in ("rotation", "translation"):
@@ -89,6 +89,6 @@ def _broken_tile(broken: Mapping[str, Any]) -> Tile:
 
 
 def _listed(names: list[str]) -> str:
-    """Return the first names, and how many more there are, as text."""
+    """Return a text with the first names and the number of the remaining names."""
     more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
     return ", ".join(names[:_NAMED]) + more

@@ -1,4 +1,4 @@
-"""Tolerance files: classes of errors, their costs, and the limits to be met.
+"""Reading tolerance files: classes of errors, their costs, and limits on results.
 
 The format is described in ``docs/tolerances.md``.
 """
@@ -124,8 +124,8 @@ def _with_callouts(
 class _Groups(NamedTuple):
     """Groups of errors with a common tolerance, from the tables ``[[tolerance]]``."""
 
-    of: dict[tuple[int, int], int]  # by frame and component
-    callouts: dict[int, int]  # by callout
+    of: dict[tuple[int, int], int]  # number of the class, by frame and component
+    callouts: dict[int, int]  # number of the class, by callout
     names: list[str]
     costs: list[float]
     least: list[float]
@@ -184,7 +184,7 @@ def _callouts(table: Table, robot: Robot, callouts: dict[int, int], number: int)
             if callouts.setdefault(k, number) != number:
                 raise table.bad("callouts", f"found {quoted(names[k])} twice")
     if not value:
-        raise table.bad("callouts", "expected at least one")
+        raise table.bad("callouts", "expected at least one callout")
     words = robot.callouts[next(k for k, n in callouts.items() if n == number)].words
     return f"{words} of {value[0]}"
 
@@ -198,7 +198,7 @@ def _choice(table: Table, key: str, valid: tuple[str, ...]) -> str:
 
 
 def _limits(table: Table) -> dict[str, float]:
-    """Return the limits by quantity."""
+    """Return the limits of a tolerance file by quantity."""
     valid = limit_names()
     limits = {}
     for key in list(table.content):
@@ -209,7 +209,7 @@ def _limits(table: Table) -> dict[str, float]:
 
 
 def _places(table: Table, robot: Robot) -> tuple[list[tuple[int, int]], int]:
-    """Return frames and components of a table, and 0 for angles or 1 for lengths."""
+    """Return a table's frames and components; also 0 for angles, 1 for lengths."""
     names = table.require("frames", "a list of frame names")
     parts = table.require("components", 'a list such as ["TX"]')
     for key, value in (("frames", names), ("components", parts)):
@@ -229,7 +229,7 @@ def _places(table: Table, robot: Robot) -> tuple[list[tuple[int, int]], int]:
     except BadInput as error:
         raise table.bad("frames", str(error)) from None
     if not frames:
-        raise table.bad("frames", "expected at least one")
+        raise table.bad("frames", "expected at least one frame")
     places = [
         (row, order[SCREW.index(part)])
         for name in frames for row, order in error_rows(robot, name) for part in parts

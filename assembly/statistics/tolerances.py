@@ -151,7 +151,7 @@ def present_errors(
 
 
 def present_text(results: dict[str, Any]) -> str:
-    """Return the results of :func:`present_errors` as text, with five errors."""
+    """Return :func:`present_errors` as text, with the five largest derivatives."""
     where = ", ".join(
         f"{k} = {v:.4g}" for k, v in results["at"].items() if abs(v) > 1e-9
     )

@@ -1,4 +1,4 @@
-"""HTML page of tolerances: requirement, tolerances, and the part used by clearances."""
+"""HTML page of tolerances, their requirement, and the effect of clearances alone."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,7 +13,7 @@ from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
 
 _LISTED = 20  # largest number of errors in a table of shares
-# relative to the largest share: difference below which shares count as equal
+# difference below which two shares count as equal, relative to the largest share
 _ALIKE = 0.01
 _ASSUMED = (
     "Limits hold at the postures of the grid; nothing is known between them.",
@@ -116,7 +116,7 @@ def _present_tiles(present: Mapping[str, Any]) -> list[Tile]:
 
 
 def _present_section(present: Mapping[str, Any]) -> str:
-    """Return the section on the shares of the present errors in the largest margin."""
+    """Return the section on each present error's share of the largest margin."""
     rows: list[list[Cell]] = [
         [one["error"], Value(one["value"], _error_unit(one["error"])),
          one["share_of_margin"]]
@@ -153,7 +153,7 @@ def _allocation_sentence(allocation: Mapping[str, Any]) -> str:
 
 
 def _allocation_tiles(allocation: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles: yield, part used by clearances, tolerances of largest cost."""
+    """Return tiles: yield, pose error due to clearances, most expensive tolerances."""
     tiles = []
     check = allocation["verification"]
     if check:
@@ -171,7 +171,7 @@ def _allocation_tiles(allocation: Mapping[str, Any]) -> list[Tile]:
 
 
 def _tighten_tile(allocation: Mapping[str, Any]) -> Tile:
-    """Return a tile of the tolerances with the largest share of the cost, if any."""
+    """Return a tile that names the tolerances with the largest share of the cost."""
     tight = [one for one in allocation["tolerances"] if not one["at_loosest"]]
     if not tight:
         why = "every tolerance may be the loosest allowed."
@@ -271,7 +271,7 @@ def _price_paragraph(allocation: Mapping[str, Any]) -> str:
 
 
 def _clearance_sections(allocation: Mapping[str, Any]) -> list[str]:
-    """Return sections on the part of pose limits that clearances use by themselves."""
+    """Return sections on the pose errors that clearances alone cause."""
     taken = {k: v for k, v in allocation["perfect_parts"].items() if v["reached"] > 0.0}
     if not taken:
         return []

@@ -18,8 +18,8 @@ from forcefit.assembly.statistics.worst_case import (
 )
 
 _BATCH = 256  # number of draws between two progress reports
-_ROUNDING = 1e-9  # relative excess above a limit that counts as rounding
-# largest number of verifications, and their joint confidence
+_ROUNDING = 1e-9  # relative excess over a limit that counts as rounding error
+# largest number of verification tests, and the confidence level of all tests together
 LOOKS, CONFIDENCE = 4, 0.95
 
 
@@ -65,7 +65,7 @@ def prove_worst(
 
 
 def _proof(bound: Callable, *given: Any) -> tuple[float]:
-    """Return an upper bound of the worst case at one posture."""
+    """Return a proven upper bound of a limited quantity at one posture."""
     return (bound(*given),)
 
 
@@ -148,7 +148,7 @@ def verify_yield(
 
 
 def _verdict(interval: Mapping[str, float], asked: float) -> str:
-    """Return whether the interval contradicts the required yield."""
+    """Return whether the confidence interval contradicts the required yield."""
     if asked == 1.0:
         return "no draw failed" if interval["probability"] == 1.0 else "contradicted"
     if interval["lower"] >= asked:

@@ -1,8 +1,8 @@
 """Lower and upper bounds of the worst case of errors within tolerances.
 
-Margin and energy are convex in the errors, so their worst case is a corner of the
-tolerance box, where every error is at one end of its tolerance.  The derivatives at a
-corner point to another corner whose value is at least as large.  Repeating this step
+Margin and energy are convex in the errors. Their worst case is therefore a corner of
+the tolerance box, where every error is at one end of its tolerance.  The derivatives at
+a corner point to another corner whose value is at least as large.  Repeating this step
 from many corners finds a lower bound.  The worst case of a wrench, a stress or a pose
 error need not be a corner; the same search still finds a lower bound.  The upper bound
 restricts the clearances to affine functions of the errors: ``u = sum_i V_i s_i`` for
@@ -67,7 +67,7 @@ def worst_corner(
     """
     signs = corners.copy()
     if isinstance(prepared, LinearResponse):
-        # where clearances close an error completely, the energy has zero derivative
+        # if clearances compensate an error completely, the energy has zero derivative
         signs = np.vstack([
             signs,
             _worst_without_clearance(prepared, sources, tolerances, signs),
@@ -158,14 +158,14 @@ def bound_energy(
 
 
 def _reach(V: NDArray, starts: NDArray) -> NDArray:
-    """Return the largest norms (cones,) of affine clearances in each cone."""
+    """Return each cone's largest clearance norm (cones,) for affine clearances."""
     return np.sqrt(np.add.reduceat(V**2, starts[:-1], axis=0)).sum(axis=1)
 
 
 def _affine_clearances(
     B: NDArray, asked: NDArray, starts: NDArray, G: NDArray | None, h: NDArray | None
 ) -> NDArray:
-    """Return V (nu, m) with B V = asked, smallest in the cones or of least energy."""
+    """Return the map V (nu, m) with B V = asked: smallest norms or least energy."""
     import cvxpy as cp
 
     nu, m = starts[-1], asked.shape[1]

@@ -1,11 +1,11 @@
-"""Callout widths of least cost such that every machine within them meets the limits.
+"""Zone widths of callouts with least cost for which every machine meets the limits.
 
 The worst pose error is the maximum over directions n of a sum of support functions,
-``sum_g t_g s_g(n) + c(n)``. This requires a convex maximisation without constraints:
-either nothing is over-constrained, or parts are elastic and have no clearance.  The
-worst pose error is convex in the tolerances t.  For each direction, ``sum_g t_g s_g(n)
-<= limit - c(n)`` holds for all tolerances that meet the limit. A programme of such
-planes therefore proves the least cost, see
+``sum_g t_g s_g(n) + c(n)``. This formula holds only without closure constraints: either
+no loop is over-constrained, or parts are elastic and joints have no clearance.  The
+worst pose error is then convex in the tolerances t.  For each direction, ``sum_g t_g
+s_g(n) <= limit - c(n)`` holds for all tolerances that meet the limit. A programme of
+such planes therefore proves the least cost, see
 :mod:`forcefit.assembly.statistics.cutting_planes`.
 """
 
@@ -56,7 +56,7 @@ class _Case:
         return replace(self.sets, screws=self.sets.screws * factors)
 
     def worst(self, shares: NDArray) -> tuple[float, float, NDArray]:
-        """Return the value attained, its certified bound, and its direction (3,)."""
+        """Return the worst pose error found, its bound, and its direction (3,)."""
         half = 3 * POSE_ERRORS.index(self.key)
         (low, high), screw = farthest_screw(self.scaled(shares), half)
         direction = screw[half : half + 3]
@@ -64,7 +64,7 @@ class _Case:
         return low, high, direction / size if size else np.eye(3)[0]
 
     def supports(self, direction: NDArray, count: int) -> tuple[NDArray, float]:
-        """Return the support of classes (G,) at largest width, and of clearances."""
+        """Return the support functions of the classes (G,) and of the clearances."""
         half = 3 * POSE_ERRORS.index(self.key)
         weights = direction @ self.sets.screws[half : half + 3]
         found = np.zeros(count + 1)
@@ -170,7 +170,7 @@ def _plane(case: _Case, plan: Plan, shares: NDArray) -> list[NDArray]:
 
 def _factor(case: _Case, plan: Plan, shares: NDArray) -> float:
     """Return the factor on tolerances for which the certified bound meets the limit."""
-    # the worst case is convex in the factor, so the chord from zero lies above it
+    # the worst pose error is convex in the factor, so a chord from zero lies above it
     limit, high = plan.limits[case.key], case.worst(shares)[1]
     if high <= limit:
         return 1.0

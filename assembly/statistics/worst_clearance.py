@@ -1,16 +1,16 @@
 """Largest pose errors over all clearance positions: problem (27) for many draws.
 
-The assumption ``frozen`` is used: springs keep their deformations from the solution of
-(22), and unloaded clearances may be anywhere within their bounds.  By strict convexity,
-every solution of (22) has the same springs; by complementary slackness, it has the same
-loaded clearances.  The set is therefore the set of *all* solutions of (22), inside and
-outside an assembly zone.  The set contains the positions of the uniform and the contact
-model, and the solution that the solver returns. The other assumptions change the robot:
-``free`` lets compliant joints rotate without energy; ``budget`` allows more energy than
-the least.
+The assumption ``frozen`` is used: springs keep their deformations from the least-energy
+solution (22), and unloaded clearances may be anywhere within their bounds.  By strict
+convexity, all least-energy solutions have the same spring deformations. By
+complementary slackness, they have the same loaded clearances.  The set of positions is
+therefore the set of *all* least-energy solutions, inside and outside an assembly zone.
+The set contains the positions of the uniform and the contact model, and the solution
+that the solver returns. The other assumptions change the robot: ``free`` lets compliant
+joints rotate without energy; ``budget`` allows more energy than the least.
 
-Under a load, the same applies to energy minus work: only clearances that transmit no
-force are free.
+Under a load, the energy minus the work of the load replaces the energy. Only clearances
+that transmit no force are then free.
 """
 
 import numpy as np
@@ -31,7 +31,7 @@ from forcefit.assembly.statistics.quantities import POSE_ERRORS
 
 ASSUMPTION = "frozen"
 PRECISION = (1e-6, 1e-6)  # [rad, m] required difference of upper and lower bounds
-# [rad or m] precision of a support function whose multipliers are derivatives
+# [rad or m] precision of the support function, whose multipliers are the derivatives
 _SUPPORT_PRECISION = 1e-12
 
 
@@ -59,7 +59,7 @@ def bound_worst_errors(
     else:
         for i in solved.tolist():
             bounds[i], screws[i] = _under_load(draws, i, precision)
-    # solutions of (22) may differ by the square root of their duality gap
+    # two solutions of problem (22) differ by up to the square root of their duality gap
     least = np.stack([
         np.linalg.norm(draws.platform_screw[:, part], axis=1)
         for part in (slice(0, 3), slice(3, 6))
@@ -126,7 +126,7 @@ def worst_error_slopes(
     by_screw, by_clearance = np.zeros_like(screws), np.zeros_like(draws.clearances)
     by_screw[:, part : part + 3] = screws[:, part : part + 3] / np.maximum(size, 1e-300)
     loaded = loaded_clearances(prepared, draws)
-    # [rad or m] derivative by the clearances; clearances at their bounds do not move
+    # derivative of the pose error by clearances; a clearance at its bound does not move
     along = by_screw @ prepared.screws[:, : draws.clearances.shape[1]]
     patterns, pattern_of = np.unique(loaded, axis=0, return_inverse=True)
     for k, pattern in enumerate(patterns):
@@ -142,7 +142,7 @@ def worst_error_slopes(
 def _pressing(
     prepared: LinearResponse, free: NDArray, along: NDArray, clearances: NDArray
 ) -> NDArray:
-    """Return directions (k, ..) of free clearances, projected onto the equations."""
+    """Return directions (k, ..) of free clearances that satisfy closure equations."""
     rows = clearance_constraints(prepared, ~free)[:, free]
     size = np.linalg.norm(along, axis=1, keepdims=True)
     moving = size[:, 0] > 0.0

@@ -6,13 +6,14 @@ Four definitions of the worst pose error differ if a machine is over-constrained
 rigid       errors and clearances that close without any force: a convex set
 elastic     no clearance: the platform's screw is linear in the errors
 equilibrium least energy (22) at given errors, worst position in the clearances
-bound       clearances are added as if they were errors: not below equilibrium
+bound       clearances are added like errors: an upper bound of ``equilibrium``
 =========== ====================================================================
 
 The rigid and the elastic worst case are convex maximisations: the maximum over all
-directions of a sum of support functions. If nothing is over-constrained, this applies
-to all four.  The equilibrium with clearances is not a convex maximisation: it is
-bracketed by a search from corner to corner (lower bound) and by ``bound``.
+directions of a sum of support functions. If no loop is over-constrained, all four
+definitions are such maximisations.  Otherwise the equilibrium with clearances is not.
+A search from corner to corner then finds its lower bound, and ``bound`` is its upper
+bound.
 
 Sources:
     Hoffman (1981), see :mod:`forcefit.assembly.solvers.outer_cuts`.
@@ -43,9 +44,10 @@ from forcefit.inputs.table import BadInput
 from forcefit.results.display import Figures, html_table, short_repr
 from forcefit.results.text import in_unit
 
-_TOLERANCE = 3e-4  # relative to the sum of the support functions along x, y and z
-_STARTS = 24  # number of random corners from which the search starts
-_CLIMBS = 12  # largest number of steps from corner to corner
+# accepted difference of the bounds, relative to the support along x, y and z
+_TOLERANCE = 3e-4
+_STARTS = 24  # number of random corners of the tolerances at which searches start
+_CLIMBS = 12  # largest number of steps from one corner of the tolerances to another
 
 MEANINGS = {
     "linear": "nothing is over-constrained: every reading is the same",
@@ -83,7 +85,7 @@ class WorstPose:
     __repr__, _repr_html_ = short_repr, html_table
 
     def _figures(self) -> Figures:
-        """Return lines with both bounds and the three largest shares."""
+        """Return text lines with both bounds and the three largest shares."""
         unit = "mrad" if self.quantity == "rotation" else "um"
         return {
             "quantity": self.quantity,
@@ -132,7 +134,7 @@ def worst_pose(
     direction = direction / size if size else np.eye(3)[0]
     along = direction @ sets.screws[half : half + 3]
     parts = rigid_parts(sets, along) if reading == "rigid" else parts_of(sets, along)
-    shares: dict[str, float] = {}  # the contacts of one joint have one name
+    shares: dict[str, float] = {}  # all contacts of one joint are listed under one name
     for name, part in zip(sets.names, parts, strict=True):
         shares[name] = shares.get(name, 0.0) + part
     ordered = tuple(sorted(shares.items(), key=lambda share: -share[1]))
@@ -171,7 +173,10 @@ def _at_largest_clearances(
     """Return the posture with largest fit clearances, and the sources except fits."""
     refuse_bolted(prepared.posture.robot, "worst case")
     if prepared.loads is not None:
-        raise BadInput("worst case: found a load, expected none: it is not linear then")
+        raise BadInput(
+            "worst case: found a load, expected none, because the pose error of a "
+            "loaded robot is not linear in the errors"
+        )
     if isinstance(sources, CalloutSources) and sources.fits:
         robot = sources.with_largest_clearances()
         prepared = linear_response(replace(prepared.posture, robot=robot))
@@ -180,8 +185,8 @@ def _at_largest_clearances(
 
 
 def _reading(sets: ErrorSets) -> str:
-    """Return the definition that applies to the worst case, a key of MEANINGS."""
-    # parallel contacts within a joint constrain each other, but no other part
+    """Return the key in MEANINGS of the worst-case definition that applies."""
+    # parallel contacts of one joint constrain each other, but no other joint
     held = len(sets.rigid_rows) > len(sets.contact_rows)
     sprung = len(sets.spring_rows) > 0
     if sprung and sets.clearances:
@@ -190,7 +195,7 @@ def _reading(sets: ErrorSets) -> str:
 
 
 def farthest_screw(sets: ErrorSets, half: int) -> tuple[tuple[float, float], NDArray]:
-    """Bracket the largest rotation or translation over the zones, without closures.
+    """Bracket the largest platform rotation or translation if loops may open.
 
     Args:
         sets: zones of errors and clearances.
@@ -205,7 +210,7 @@ def farthest_screw(sets: ErrorSets, half: int) -> tuple[tuple[float, float], NDA
 def _farthest(
     sets: ErrorSets, rows: NDArray, half: int, tolerance: float = _TOLERANCE
 ) -> tuple[tuple[float, float], NDArray]:
-    """Bracket the largest rotation or translation over the zones with rows @ z = 0."""
+    """Bracket the largest rotation or translation over zones with rows @ z = 0."""
     support = _support(sets, rows, half)
     sizes = [support(direction)[0] for direction in np.eye(3)]
     if not max(sizes) > 0:
@@ -223,7 +228,7 @@ def _farthest(
 
 
 def _sum_of_sizes(sets: ErrorSets, half: int) -> float:
-    """Return an upper bound [rad or m]: the sum of the largest sizes of all balls."""
+    """Bound the pose error [rad or m] by the sum of the errors of all ball zones."""
     # cutting planes converge slowly if the screws form a ball; there this sum is exact
     total = 0.0
     for zone, columns in zip(sets.zones, sets.columns, strict=True):
@@ -260,7 +265,7 @@ def _support(
 def _climb(
     prepared: LinearResponse, sources: Sources, quantity: str, seed: int, start: NDArray
 ) -> tuple[float, NDArray]:
-    """Return the largest equilibrium found by the search, and its direction (3,)."""
+    """Return the largest equilibrium pose error found, and its direction (3,)."""
     half = 3 * POSE_ERRORS.index(quantity)
     own = zones_of_errors(sources)
     sizes = [sum(zone.dimensions) for _, zone, _ in own]
@@ -268,7 +273,7 @@ def _climb(
     scale = np.concatenate([unit for _, _, unit in own])
 
     def corners(slopes: NDArray) -> NDArray:
-        """Return the farthest errors for slopes (k, m), as numbers of the sources."""
+        """Return the errors (k, m) that maximise their product with slopes (k, m)."""
         u = np.zeros_like(slopes)
         for row, w in zip(u, slopes * scale, strict=True):
             for (_, zone, _), columns in zip(own, parts, strict=True):

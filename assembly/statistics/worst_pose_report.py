@@ -11,7 +11,7 @@ from forcefit.page.page import paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
 
 _LISTED = 8  # largest number of shares in the text
-_LEAST = 1e-6  # smallest part of the sum that is listed; less is rounding
+_LEAST = 1e-6  # smallest listed share of the sum; smaller shares are rounding errors
 
 
 def worst_results(

@@ -30,11 +30,10 @@ from forcefit.assembly.steps.state import (
 )
 from forcefit.inputs.table import BadInput, quoted
 
-_MOST_STEPS, _HALVINGS = 30, 12  # Gauss-Newton steps, and halvings of each step
+_MOST_STEPS, _HALVINGS = 30, 12  # most Gauss-Newton steps, and most halvings of a step
 _STEP = 1e-7  # [rad, reference lengths] step of the finite differences
-_FLAT = (
-    1e-6  # slopes below this share of the steepest one are errors of the differences
-)
+# derivatives below this share of the largest one are finite-difference errors
+_FLAT = 1e-6
 _SETTLED = 1e-7  # relative reduction of the reading below which the search ends
 
 
@@ -77,7 +76,7 @@ def adjustment_of(machine: Machine, state: State, step: Adjust) -> NDArray:
 
 
 def _linear_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
-    """Return the best change if no clearance is loose."""
+    """Return the adjustment that minimises a reading if no clearance is loose."""
     count = len(step.components)
     value = _to_vanish(machine, state, step)
     slopes = np.empty((value.shape[1], count))
@@ -86,13 +85,13 @@ def _linear_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
         unit[:, i] = 1.0
         moved = settle(machine, with_adjustment(machine, state, step, unit))
         slopes[:, i] = (_to_vanish(machine, moved, step) - value)[0]
-    # of equally good changes take the least, with lengths in reference lengths
+    # among equally good changes take the smallest, lengths in reference lengths
     unit = 1 / machine.scale[rows_of(step.components)]
     return -value @ np.linalg.pinv(slopes * unit).T * unit
 
 
 def _best_local_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
-    """Return the better change of two local minima of the reading."""
+    """Return the better of two adjustments at local minima of the reading."""
     none = np.zeros((len(state.errors), len(step.components)))
     amount, size = _local_adjustment(machine, state, step, none)
     pressed = _linear_adjustment(*_with_pressed_clearances(machine, state), step)
@@ -102,7 +101,7 @@ def _best_local_adjustment(machine: Machine, state: State, step: Adjust) -> NDAr
 
 
 def _with_pressed_clearances(machine: Machine, state: State) -> tuple[Machine, State]:
-    """Return the machine with each clearance as an error of its present value."""
+    """Return the machine with its present clearances as fixed geometric errors."""
     moved, joints = state.found.clearances @ machine.cones.T, machine.joints
     fixed = replace(joints, cones=joints.cones[:, :0], group=joints.group[:0])
     found = replace(state.found, clearances=state.found.clearances[:, :0])
@@ -113,7 +112,7 @@ def _with_pressed_clearances(machine: Machine, state: State) -> tuple[Machine, S
 def _local_adjustment(
     machine: Machine, state: State, step: Adjust, start: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return the change at a local minimum of the reading, and the (k,) minimum."""
+    """Return the adjustment at a local minimum of the reading, and the (k,) minimum."""
     unit = 1 / machine.scale[rows_of(step.components)]
     amount = start
     value, slopes = _value_and_slopes(machine, state, step, amount)
@@ -139,7 +138,7 @@ def _local_adjustment(
 def _value_and_slopes(
     machine: Machine, state: State, step: Adjust, amount: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return the minimised quantities (k, p) after a change, and slopes (k, p, a)."""
+    """Return minimised quantities (k, p) after an adjustment, and their derivatives."""
     value = _value_at(machine, state, step, amount)
     slopes = np.empty((*value.shape, len(step.components)))
     for i, scale in enumerate(machine.scale[rows_of(step.components)]):
@@ -151,7 +150,7 @@ def _value_and_slopes(
 
 
 def _value_at(machine: Machine, state: State, step: Adjust, amount: NDArray) -> NDArray:
-    """Return the quantities that an adjustment minimises, after a change."""
+    """Return the quantities that an adjustment minimises, after a trial change."""
     moved = settle(machine, with_adjustment(machine, state, step, amount))
     return _to_vanish(machine, moved, step)
 
@@ -167,7 +166,7 @@ def _check_not_bolted(machine: Machine, state: State, step: Adjust) -> None:
 
 
 def _closing_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
-    """Return the change for which closing a closure needs the least energy.
+    """Return the adjustment with which closing a loop needs the least energy.
 
     The changes are treated as free motions of the closed machine, whose energy is
     convex in the changes and the clearances together.  If several changes are equally
@@ -189,7 +188,7 @@ def _closing_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray
 
 
 def _least_change(machine: Machine, state: State, count: int) -> NDArray:
-    """Return the last a motions (k, a), less what other free motions can replace."""
+    """Return the smallest values (k, a) of the last a motions with equal openings."""
     motions = machine.movable((), tuple(state.bolted.values()), 1)[2][:-count]
     rows = np.vstack([hold.rows for hold in state.holds.values()])
     changing, free = rows @ machine.free[:, -count:], rows @ machine.free[:, :-count]
@@ -202,7 +201,7 @@ def _least_change(machine: Machine, state: State, count: int) -> NDArray:
 
 
 def _to_vanish(machine: Machine, state: State, step: Adjust) -> NDArray:
-    """Return what an adjustment minimises: a reading, or the strains of a closure."""
+    """Return the minimised quantities: a reading, or the strains of a closure."""
     part = step.reading.part
     if isinstance(part, str):
         return reading_of(machine, state, step.reading)

@@ -1,7 +1,7 @@
 """Simultaneous optimisation of all adjustments of a plan for one objective.
 
-Each adjustment by itself minimises its own reading.  From these changes, the
-Gauss-Newton method continues with finite differences of the whole plan. All trial
+The search starts from the changes with which each adjustment minimises its own reading.
+The Gauss-Newton method then uses finite differences of the whole plan. All trial
 changes are carried out together, as machines that differ in their adjustments.  A
 change is accepted only if the objective decreases, so the result is at least as good as
 the changes that minimise the readings. The result is a local minimum.
@@ -20,14 +20,11 @@ from forcefit.assembly.steps.run import StepResult, carry_out
 from forcefit.assembly.steps.state import State
 
 _STEP = 1e-7  # [rad, reference lengths] step of the finite differences
-_FLAT = (
-    1e-6  # slopes below this share of the steepest one are errors of the differences
-)
-_MOST_STEPS, _SHARES = (
-    20,
-    0.5 ** np.arange(8),
-)  # Gauss-Newton steps, and halvings of each step
-_SETTLED = 1e-7  # relative reduction below which the iteration ends
+# derivatives below this share of the largest one are finite-difference errors
+_FLAT = 1e-6
+# largest number of Gauss-Newton steps, and tried shares of each step
+_MOST_STEPS, _SHARES = 20, 0.5 ** np.arange(8)
+_SETTLED = 1e-7  # relative reduction of the objective below which the iteration ends
 
 # function from a number of machines to their state before the first step
 Start = Callable[[int], State]
@@ -84,7 +81,7 @@ def with_best_amounts(
 
 
 def _rounded(steps: list[Adjust], amounts: NDArray) -> NDArray:
-    """Return changes rounded to multiples of the increments of their steps."""
+    """Return adjustments rounded to multiples of the increments of their steps."""
     sizes = np.concatenate([np.full(len(s.components), s.increment) for s in steps])
     whole = np.where(sizes > 0, sizes, 1.0)
     return np.where(sizes > 0, whole * np.round(amounts / whole), amounts)
@@ -103,7 +100,7 @@ def _with_amounts(plan: Plan, amounts: NDArray) -> Plan:
 
 
 def _carried_out(plan: Plan, machine: Machine, state: State) -> list[StepResult]:
-    """Return the results of all steps."""
+    """Return the results of all steps of a plan."""
     results = []
     for step in plan.steps:
         state, result = carry_out(machine, state, step)
@@ -114,7 +111,7 @@ def _carried_out(plan: Plan, machine: Machine, state: State) -> list[StepResult]
 def _outcome(
     plan: Plan, machine: Machine, state: State, objective: str
 ) -> tuple[NDArray, NDArray]:
-    """Return residuals (k, p) for least squares, and the objective (k,)."""
+    """Return least-squares residuals (k, p) of a plan, and its objective (k,)."""
     forces = [np.zeros((len(state.errors), 3))]
     screw = machine.platform_screw(state.errors, state.found)
     for step in plan.steps:

@@ -136,7 +136,7 @@ def bolted_errors(
 def _loose_state(
     robot: Robot, frames: list[int], machine: Machine, errors: NDArray
 ) -> State:
-    """Return machines at the pose of a bolt, before the joint is bolted."""
+    """Return machines at the pose where a joint is bolted, before it is bolted."""
     try:
         return first_state(machine, Plan(()), errors, None)
     except (CannotAssemble, SolverFailed) as error:
@@ -147,7 +147,7 @@ def _loose_state(
 def _with_locked(
     machine: Machine, frames: list[int], errors: NDArray, u: NDArray
 ) -> NDArray:
-    """Return errors in which the clearances of bolted frames are locked in."""
+    """Return errors that include the locked-in clearances of bolted frames."""
     moved = np.where(np.abs(u) > _ROUNDED, u, 0.0) @ machine.cones.T
     total = errors.copy()
     total[:, frames] += moved.reshape(total.shape)[:, frames]
@@ -196,14 +196,14 @@ def _bolts(robot: Robot) -> list[tuple[list[int], Machine]]:
 
 
 def _pose(frame: Frame) -> tuple:
-    """Return the pose of a bolt, which is equal for frames that are bolted together."""
+    """Return the pose at which frames are bolted; it is equal for all of them."""
     bolt = frame.locked_at
     assert bolt is not None
     return sorted(bolt.pose.items()), sorted(bolt.joints.items()), bolt.left
 
 
 def _posture(robot: Robot, row: int, open_: set[int]) -> Posture:
-    """Return the posture of a bolt, in which joints not yet bolted are loose."""
+    """Return the posture at which joints are bolted; unbolted joints are loose."""
     frames = tuple(
         _loose(frame) if i in open_ else frame for i, frame in enumerate(robot.frames)
     )
@@ -225,7 +225,7 @@ def _loose(frame: Frame) -> Frame:
 
 
 def refuse_bolted(robot: Robot, what: str) -> None:
-    """Reject a robot with bolted joints where errors must act linearly.
+    """Reject a robot with bolted joints in computations that are linear in the errors.
 
     Args:
         robot: any robot.
@@ -244,7 +244,7 @@ def refuse_bolted(robot: Robot, what: str) -> None:
 
 
 def loose_over_poses(robot: Robot) -> list[str]:
-    """Return a remark on fixed joints that have loose clearance at every pose.
+    """Return a remark on fixed joints whose clearance is not bolted at any pose.
 
     Args:
         robot: robot that is solved at several poses.

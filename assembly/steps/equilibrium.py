@@ -1,8 +1,8 @@
 """Least energy of a partly assembled robot, for many sets of errors at once.
 
-The small screws of all frames are s = e + E y + U u + F q, with errors e, springs y,
-clearances u and free motions q (:mod:`forcefit.assembly.linear.closure`).  At each step
-of assembly the rows
+The small screws of all frames are s = e + E y + U u + F q. Here e are the errors, y the
+springs, u the clearances and q the free motions
+(:mod:`forcefit.assembly.linear.closure`).  At each step of assembly the rows
 
     R s + L y_f = b
 
@@ -11,9 +11,9 @@ fixtures.  The equilibrium minimises y.y / 2 minus the work of the loads.  Its
 multipliers are the wrenches of the rows.  The unknowns are eliminated as in
 :mod:`forcefit.assembly.linear.reference.reduction`.
 
-If the energy does not determine all clearances and free motions, they remain as close
-as possible to their values after the preceding step (least sum of squares, clearances
-in units of their bounds, lengths in reference lengths).
+Clearances and free motions that the energy does not determine remain as close as
+possible to their values after the preceding step. The distance is the sum of squares,
+with clearances in units of their bounds and lengths in reference lengths.
 """
 
 from dataclasses import dataclass
@@ -33,13 +33,13 @@ from forcefit.assembly.solvers.many_programmes import (
 )
 
 _OPEN = 1e-12  # [rad, reference lengths] closure error that counts as rounding
-_ROUNDING = 1e-14  # rounding error relative to the largest right side
-_SOLVED = 1e-11  # strains below this share of their terms are the solver's error
-_DRIVEN = 1e-8  # share of a load along a free motion that counts as rounding
+_ROUNDING = 1e-14  # rounding error of the equations, relative to the largest right side
+_SOLVED = 1e-11  # strains below this share of their summands are errors of the solver
+_DRIVEN = 1e-8  # a smaller share of a load along a free motion counts as rounding
 
 
 class Held(NamedTuple):
-    """Rows that hold a partly assembled robot: m rows for k machines.
+    """Constraint equations of k partly assembled machines, one row each (m rows).
 
     Attributes:
         rows: (m, 6n) rows on the screws of all frames, lengths in reference lengths.
@@ -96,13 +96,13 @@ class Equilibrium:
 
     @property
     def energy(self) -> NDArray:
-        """(k,) [J] energy of all springs, including those of the fixtures."""
+        """(k,) [J] energy of all springs, including the springs of fixtures."""
         links = np.vecdot(self.springs, self.springs)
         return (links + np.vecdot(self.fixtures, self.fixtures)) / 2
 
 
 class _Split(NamedTuple):
-    """Rows split into those with springs and those without."""
+    """Constraint rows, split into rows with springs and rows without springs."""
 
     basis: NDArray
     values: NDArray
@@ -152,7 +152,7 @@ def equilibrium(
 
 
 def without_idle_weight(movable: Movable, weight: NDArray, rows: NDArray) -> Movable:
-    """Return the loads without the weight along motions that nothing resists.
+    """Return the loads less the weight along motions that nothing resists.
 
     Args:
         movable: columns that may move, and the loads on them.
@@ -185,7 +185,7 @@ def _balancing(B_q: NDArray, drive: NDArray) -> NDArray:
 
 
 def _split(A: NDArray, tolerance: float, noise: float) -> _Split:
-    """Split rows by singular values into those with and those without springs."""
+    """Split constraint rows by singular values: with springs, without springs."""
     if not A.size:
         count = A.shape[0]
         none = np.zeros((count, 0)), np.eye(count), np.zeros((A.shape[1], 0))
@@ -199,7 +199,7 @@ def _least(
     split: _Split, A_u: NDArray, right: NDArray, movable: Movable, by_motions: NDArray,
     last: NDArray, noise: float,
 ) -> tuple[NDArray, NDArray, NDArray]:  # fmt: skip
-    """Return clearances, strains and multipliers of the rows with springs."""
+    """Return clearances, strains and multipliers of constraint rows with springs."""
     S = split.values
     h, rigid = right @ split.elastic / S, right @ split.rigid
     if not A_u.shape[1]:
@@ -213,7 +213,7 @@ def _least(
     d = movable.on_cones + by_motions
     least = minimise_energies(G, h, d, H, k, movable.group)
     if not least.feasible.all():
-        raise CannotAssemble("neither springs nor clearances can close the rows")
+        raise CannotAssemble("neither springs nor clearances can close the loops")
     u = _closest(G, h, d, H, least, last, movable.group)
     strains = u @ G.T + h
     terms = np.abs(u) @ np.abs(G).T + np.abs(h)
@@ -225,7 +225,7 @@ def _least(
 
 
 def _check_closed(rigid: NDArray, right: NDArray) -> None:
-    """Reject rows that neither springs nor clearances can close."""
+    """Reject constraint rows that neither springs nor clearances can satisfy."""
     left = np.abs(rigid).max(initial=0.0)
     if left > _OPEN + 1e-9 * np.abs(right).max(initial=0.0):
         raise CannotAssemble(
@@ -239,7 +239,7 @@ def _closest(
     group: NDArray,
 ) -> NDArray:  # fmt: skip
     """Return the clearances of least energy that are closest to the preceding ones."""
-    rows = np.vstack([G, H, d[:1]])  # one row of d: all machines have equal loads
+    rows = np.vstack([G, H, d[:1]])  # one row of d: machines have equal loads
     size = np.linalg.norm(rows, axis=1)
     rows = rows[size > 0] / size[size > 0, None]
     u = least.clearances
@@ -251,7 +251,7 @@ def _closest(
 
 
 def _moved(B_q: NDArray, right: NDArray, last: NDArray) -> NDArray:
-    """Return the free motions that satisfy the rows, closest to the preceding ones."""
+    """Return free motions that satisfy all constraints, closest to the last ones."""
     if not B_q.shape[1]:
         return last
     return last + (right - last @ B_q.T) @ np.linalg.pinv(B_q, rcond=RANK).T

@@ -1,6 +1,6 @@
 """Whether the order of the joins changes the assembled machine.
 
-A join that is bolted "as it lies" locks in the opening G_k x that it finds.  The set S
+A join that is bolted "as it lies" locks in the present opening G_k x.  The set S
 of earlier joins has changed this opening by A_kS lambda_S + B_k q, where
 
 ======  ======================  =====================================================
@@ -11,11 +11,12 @@ B_k     ``free``                opening at k by motions that nothing resists
 lambda                          wrenches of the earlier joins
 ======  ======================  =====================================================
 
-K is the stiffness of the machine before the first of these joins.  If A_kj = 0 for all
-other joins j, and no free motion changes the openings at k and j together, then k finds
-the same opening after every set of other joins. The place of k in the order then does
-not matter.  Free motions that change only the opening at j, such as the rotation of its
-own pin, are omitted, together with the wrenches that they do not transmit.
+K is the stiffness of the machine before the first of these joins.  Assume that A_kj = 0
+for all other joins j, and that no free motion changes the openings at k and j together.
+Then k finds the same opening after every set of other joins. The place of k in the
+order then does not matter.  Free motions that change only the opening at j, such as the
+rotation of its own pin, are omitted. The wrenches that they do not transmit are omitted
+too.
 """
 
 from collections.abc import Sequence
@@ -29,7 +30,7 @@ from forcefit.assembly.steps.machine import Machine
 from forcefit.assembly.steps.plan import Adjust, Fix, Join, Plan, Step, rows_of
 from forcefit.assembly.steps.state import State
 
-_ZERO = 1e-9  # influences below this share of the own coefficients are rounding errors
+_ZERO = 1e-9  # relative size below which an influence counts as rounding error
 _FREE = 1e-11  # stiffnesses below this share of the largest one count as zero
 
 
@@ -67,7 +68,7 @@ def why_order_matters(plan: Plan) -> str:
 
 
 def depends_on_state(step: Step) -> bool:
-    """Return whether a step locks in a position that it finds.
+    """Return whether a step locks in the position in which it finds a part.
 
     Args:
         step: any step.
@@ -82,7 +83,7 @@ def depends_on_state(step: Step) -> bool:
 
 
 def influences(machine: Machine, state: State, run: Sequence[Join]) -> list[Influence]:
-    """Return the influence of joins on those joins that lock in an opening.
+    """Return the influence of all joins on the joins that lock in an opening.
 
     Args:
         machine: columns and rows of the robot.
@@ -124,7 +125,7 @@ def _moving_alone(moved: list[NDArray], j: int) -> NDArray:
 
 
 def _carried(motions: NDArray) -> NDArray:
-    """Return the projector on wrenches that do no work on a part's own motions."""
+    """Return the projector on wrenches that do no work on one part's free motions."""
     return np.eye(len(motions)) - motions @ np.linalg.pinv(motions, rcond=_ZERO)
 
 
@@ -139,7 +140,7 @@ def _size(A: NDArray) -> float:
 
 
 def _unit(machine: Machine, join: Join) -> NDArray:
-    """Return the units of a join's rows, which convert reference lengths to m."""
+    """Return factors that convert a join's rows from reference lengths to m."""
     if isinstance(join.part, str):
         frames = np.abs(machine.free).reshape(-1, 6, machine.free.shape[1]).any(axis=1)
         return machine.free_size[frames[machine.posture.robot.index(join.part)]]
@@ -147,7 +148,7 @@ def _unit(machine: Machine, join: Join) -> NDArray:
 
 
 def _rows(machine: Machine, join: Join) -> NDArray:
-    """Return the rows of a join with respect to springs and free motions."""
+    """Return the derivatives of a join's opening by springs and by free motions."""
     ny = machine.springs.shape[1]
     if isinstance(join.part, str):
         row = machine.posture.robot.index(join.part)

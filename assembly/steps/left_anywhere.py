@@ -38,8 +38,8 @@ def positions_left_anywhere(
     of_cones, of_motions = _of_rows(machine, state)
     loaded = _loaded(machine, state, of_cones[1:])
     for i, rng in enumerate(rngs):
-        # if forces are as small as the solver's error, test the set instead: if it has
-        # an interior with all clearances, none is loaded
+        # forces as small as the solver's error do not show which clearances are loaded;
+        # if the set of all clearances has an interior, no clearance is loaded
         for free in (np.ones_like(loaded[i]), ~loaded[i]):
             Z = _directions(of_cones[:, free], of_motions)
             own, starts = u[i, free].copy(), _starts(machine.joints.group[free])
@@ -75,7 +75,7 @@ def free_positions(
 
 
 def _of_rows(machine: Machine, state: State) -> tuple[NDArray, NDArray]:
-    """Return all rows that hold, by clearances and free motions; row 0 is zero."""
+    """Return all constraint rows on clearances and free motions; row 0 is zero."""
     rows = np.vstack([
         np.zeros((1, len(machine.cones))),
         *(h.rows for h in state.holds.values()),
@@ -91,7 +91,7 @@ def _directions(of_cones: NDArray, of_motions: NDArray) -> NDArray:
 
 
 def _loaded(machine: Machine, state: State, of_cones: NDArray) -> NDArray:
-    """Return (k, nu) bool: whether a clearance transmits force at its bound."""
+    """Return (k, nu) bool, True if a clearance is at its bound and transmits force."""
     group, energy = machine.joints.group, state.found.energy
     cones = (group[:, None] == np.unique(group)).astype(float)
     forces = np.sqrt((state.found.multipliers @ of_cones) ** 2 @ cones)

@@ -1,4 +1,4 @@
-"""A robot at a posture as arrays: columns that move, rows of closures and frames."""
+"""A robot at a posture as arrays: columns of motions, rows of closures and frames."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -143,7 +143,7 @@ class Machine:
     def opening(
         self, errors: NDArray, found: Equilibrium, holds: Mapping[str, Any], hold: Any
     ) -> NDArray:
-        """Return the opening of rows that free motions cannot close.
+        """Return the part of an opening that free motions cannot close.
 
         Args:
             errors: (k, 6n) geometric errors.

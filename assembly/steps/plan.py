@@ -17,7 +17,7 @@ from forcefit.inputs.table import BadInput, quoted
 from forcefit.stiffness.screws import SCREW
 
 Closure = tuple[str, str]
-GRAVITY = "gravity"  # name of the weights among the loads that act
+GRAVITY = "gravity"  # name of the weight in the dictionary of acting loads
 
 
 @dataclass(frozen=True)
@@ -178,10 +178,10 @@ def check_plan(plan: Plan, robot: Robot) -> None:
         where = f"step[{number}] {quoted(step.name)}"
         if step.name in names:
             found = "found the name of an earlier step"
-            raise BadInput(f"{where}: {found}, expected a new one")
+            raise BadInput(f"{where}: {found}, expected a new name")
         if step.name in taken:
             found = f"found the name of {taken[step.name]}"
-            raise BadInput(f"{where}: {found}, expected a new one")
+            raise BadInput(f"{where}: {found}, expected a new name")
         names.add(step.name)
         for part in _parts_of(step):
             _check_part(where, part, robot)
@@ -231,7 +231,7 @@ def _check_join(where: str, step: Join, robot: Robot, held: Mapping) -> None:
 
 
 def _held(held: Mapping) -> str:
-    """Return the names that may be released as text."""
+    """Return the names of the steps that may be released, as text."""
     names = ", ".join(map(quoted, held))
     return f"one of {names}" if names else "an earlier step that holds something"
 

@@ -46,7 +46,7 @@ from forcefit.assembly.steps.state import (
     without,
 )
 
-_ROUNDED = 1e-13  # energy differences below this share of the energies are rounding
+_ROUNDED = 1e-13  # smaller relative energy differences are rounding errors
 _HALVINGS = 50  # bisections of the share of an opening that a limited force closes
 
 
@@ -182,7 +182,7 @@ def _row(machine: Machine, step: Join) -> int:
 def _join(
     machine: Machine, state: State, step: Join, blank: StepResult
 ) -> tuple[State, StepResult]:
-    """Close a closure, except for its locked components, which stay as they lie."""
+    """Close a closure, except for the components that are bolted as they lie."""
     assert not isinstance(step.part, str)
     hold = closed_rows(machine, state, step.part)
     opening = machine.opening(state.errors, state.found, state.holds, hold)
@@ -214,10 +214,10 @@ def _join(
 
 
 def _share(linear: bool, limit: float, needed: NDArray, force: Callable) -> NDArray:
-    """Return the shares (k,) of the openings that a limited force can close."""
+    """Return the share (k,) of each opening that the limited force can close."""
     share = np.minimum(1.0, limit / np.maximum(needed, 1e-300))
     if linear:
-        return share  # the force is proportional to the share
+        return share  # the closing force is proportional to the closed share
     low, high = np.zeros_like(needed), np.ones_like(needed)
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
@@ -227,7 +227,7 @@ def _share(linear: bool, limit: float, needed: NDArray, force: Callable) -> NDAr
 
 
 def _blank(machine: Machine, state: State, step: Step) -> StepResult:
-    """Return the result of a step that changes nothing."""
+    """Return the result of a step that does no work and moves no part."""
     k = len(state.errors)
     zero, six, empty = np.zeros(k), np.zeros((k, 6)), np.zeros((k, 0))
     return StepResult(
@@ -240,7 +240,7 @@ def _blank(machine: Machine, state: State, step: Step) -> StepResult:
 
 
 def _wrenches(machine: Machine, state: State) -> dict[str, NDArray]:
-    """Return the wrenches (k, 6) [N m, N] of all holds, each in its own axes."""
+    """Return the wrenches (k, 6) [N m, N] of all closures and fixtures that hold."""
     found = state.multipliers()
     wrenches = np.zeros((len(state.errors), len(found), 6))
     for i, (name, multipliers) in enumerate(found.items()):
@@ -254,7 +254,7 @@ def _wrenches(machine: Machine, state: State) -> dict[str, NDArray]:
 def _told(
     machine: Machine, before: State, after: State, result: StepResult
 ) -> tuple[State, StepResult]:
-    """Return the state after a step, and its result completed by energies."""
+    """Return the state after a step, and the step's result with its energies."""
     step = result.step
     kept = [after.loads[name] for name in after.loads if name in before.loads]
     load_work = machine.work(kept, after) - machine.work(kept, before)

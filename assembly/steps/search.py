@@ -6,9 +6,9 @@ no step locks in a position that it finds, the state depends only on the set of 
 joined so far. The least peak force is then a shortest path over the 2^n sets, in which
 the maximum replaces the sum.  The path is searched from its end, because the state of
 a set contains the closing forces of all its parts.  If joints are bolted as they lie,
-the orders are searched by branch and bound. The bounds are that the peak force never
-decreases, and that the energy is at least the energy of the state in which all pinned
-parts are joined and the locked ones are left open.  For the least error, no bound
+the orders are searched by branch and bound. Two bounds are used: The peak force never
+decreases.  The final energy is at least the energy of the state in which all pinned
+parts are joined and all locked parts are left open.  For the least error, no bound
 exists.
 """
 
@@ -35,11 +35,11 @@ from forcefit.inputs.table import BadInput, quoted
 
 Objective = Literal["force", "energy", "error"]
 OBJECTIVES: tuple[Objective, ...] = ("force", "energy", "error")
-_EQUAL = 1e-9  # relative improvement from which another order replaces the given one
+_EQUAL = 1e-9  # smallest relative improvement that replaces the given order
 MOST_STATES = 200_000  # largest number of states computed, which takes some minutes
 
 
-# a partial order: state, peak force, steps done and steps left
+# a partial order of steps: state, peak force, completed steps and remaining steps
 _Partial = tuple[State, float, tuple[Step, ...], tuple[Step, ...]]
 
 
@@ -51,8 +51,8 @@ class BestOrder:
         plan: the plan in the best order, with the changes of its adjustments.
         value: value of the objective [N, J or m].
         bound: lower bound over all orders. It equals ``value`` if all orders were
-            searched. It is 0 if changes of the adjustments other than those that
-            minimise the readings were found to be better.
+            searched. It is 0 if adjustments were found that are better than
+            the adjustments that minimise the readings.
         given: value for the order of the given plan; inf if it cannot be assembled.
         searched: number of sets, or of partial orders, that were computed.
         method: ``"sets"`` or ``"orders"``.
@@ -159,7 +159,7 @@ class _Search:
         return list(zip(joined, forces, strict=True))
 
     def value(self, peak: float, state: State) -> float:
-        """Return the objective of a state reached with a given peak force."""
+        """Return the objective of a state, given the peak force of its steps."""
         if self.objective == "force":
             return peak
         if self.objective == "energy":
@@ -257,7 +257,7 @@ def _bottleneck(
 
 
 def _joined_after(chosen: int, later: dict[int, int]) -> list[int]:
-    """Return the parts joined after a set, in the order of joining."""
+    """Return the parts that are joined after a set, in the order of joining."""
     order = []
     while (k := later[chosen]) >= 0:
         order.append(k)

@@ -1,4 +1,4 @@
-"""The state of a partly assembled machine: rows that hold, and the equilibrium."""
+"""The state of a partly assembled machine: its constraints and its equilibrium."""
 
 from dataclasses import dataclass, field, replace
 
@@ -25,10 +25,10 @@ from forcefit.assembly.steps.plan import (
 
 @dataclass(frozen=True, eq=False)
 class Hold:
-    """The rows of one joined closure or of one fixture.
+    """The constraint equations of one joined closure or of one fixture.
 
     Attributes:
-        rows: (m, 6n) rows on the frames' screws, lengths in reference lengths.
+        rows: (m, 6n) equations on the frames' screws, lengths in reference lengths.
         right: (k, m) right sides.
         roots: (m, nf) columns of the fixture's springs.
         part: frame or closure whose axes the rows refer to.
@@ -65,7 +65,7 @@ class State:
         return not machine.movable((), tuple(self.bolted.values()), 1)[1].any()
 
     def multipliers(self) -> dict[str, NDArray]:
-        """Return the multipliers (k, m) of each hold."""
+        """Return the multipliers (k, m) of each closure or fixture that holds."""
         ends = np.cumsum([len(hold.rows) for hold in self.holds.values()])[:-1]
         parts = np.split(self.found.multipliers, ends, axis=1) if self.holds else []
         return dict(zip(self.holds, parts, strict=True))
@@ -141,7 +141,7 @@ def settle(machine: Machine, state: State) -> State:
 
 
 def _blocks(blocks: list[NDArray], count: int) -> NDArray:
-    """Return the springs of all fixtures as a block matrix on the rows of all holds."""
+    """Return all fixture springs as a block matrix on all constraint rows."""
     columns = np.zeros((count, sum(block.shape[1] for block in blocks)))
     row = column = 0
     for block in blocks:
@@ -152,14 +152,14 @@ def _blocks(blocks: list[NDArray], count: int) -> NDArray:
 
 
 def closed_rows(machine: Machine, state: State, closure: tuple[str, str]) -> Hold:
-    """Return the rows of a closure that is closed."""
+    """Return the constraint equations of a closure that is closed."""
     rows = machine.rows(closure)
     none = np.zeros((len(state.errors), 6)), np.zeros((6, 0))
     return Hold(rows, *none, closure, np.arange(6))
 
 
 def fixture_rows(machine: Machine, state: State, step: Fix) -> Hold:
-    """Return the rows of a fixture."""
+    """Return the constraint equations of a fixture."""
     k, rows = len(state.errors), machine.rows(step.frame)
     if step.position is None:
         chosen = np.arange(6)
@@ -177,12 +177,12 @@ def fixture_rows(machine: Machine, state: State, step: Fix) -> Hold:
 
 
 def with_hold(state: State, name: str, hold: Hold) -> State:
-    """Return the state with an additional hold, before its equilibrium."""
+    """Return the state with one more closure or fixture, before its equilibrium."""
     return replace(state, holds=state.holds | {name: hold})
 
 
 def without(state: State, names: tuple[str, ...]) -> State:
-    """Return the state without the holds of some steps, before its equilibrium."""
+    """Return the state without the constraints of some steps, not yet settled."""
 
     def kept(given: dict) -> dict:
         return {name: value for name, value in given.items() if name not in names}

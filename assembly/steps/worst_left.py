@@ -1,4 +1,4 @@
-"""Worst position in which a fitter can leave a bolted joint (``left = "worst"``).
+"""Largest pose error over all positions in which a joint may have been bolted.
 
 At the pose where the joint is bolted, all positions of least energy form a convex set
 of clearances u.  At another pose, the locked-in clearance acts like an error, and the
@@ -9,7 +9,6 @@ platform's screw is
 which is linear in u and in the clearances v that are loose at that pose.  The largest
 rotation and translation over the set are found by convex maximisation, as intervals
 between a value attained and a certified bound:
-translation over the set are convex maximisations: certified brackets.
 
 ======================  ================================================================
 loose clearances        largest error
@@ -191,7 +190,7 @@ def _locked_in(machine: Machine, frames: list[int]) -> NDArray:
 
 
 def _largest(at: _Positions, half: int) -> tuple[tuple[float, float], list[NDArray]]:
-    """Bracket the largest rotation or translation; also return the corners visited."""
+    """Bracket the largest rotation or translation; also return the visited corners."""
     corners: list[NDArray] = [at.start]
     starts, right = cone_starts(at.group), (at.rows @ at.start)[None]
 
@@ -222,7 +221,7 @@ def _attained(
     posture: Posture, at: _Positions, corners: list[NDArray], half: int,
     offset: ArrayLike,
 ) -> float:  # fmt: skip
-    """Return the largest error of equilibria with the joints bolted at the corners."""
+    """Return the largest pose error at equilibrium if bolted at given corners."""
     moved = (np.array(corners) - at.start) @ at.errors.T
     errors = posture.robot.errors + moved.reshape(len(moved), -1, 6)
     bounds = bound_pose_error(solve_assembly(posture, errors=errors), offset=offset)

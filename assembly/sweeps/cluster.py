@@ -1,7 +1,7 @@
 """Parallel solution of a sweep with Dask, on this machine or on a cluster.
 
 The client submits a few tasks per worker at a time and writes their results to the
-journal, so the client and every worker hold only a few blocks in memory.  A task
+journal. The client and every worker therefore hold only a few blocks in memory.  A task
 contains as many blocks as can be solved in about half a second. The last tasks are
 smaller, so that workers finish at nearly the same time.  Dask reassigns the tasks of a
 lost worker.  The distribution of blocks does not change any result, because each
@@ -36,7 +36,7 @@ _TASK = 0.5  # [s] target duration of a task; Dask recommends at least 0.1
 _IN_FLIGHT = 3  # number of submitted tasks per thread of the cluster
 _LARGEST = 256  # largest number of blocks per task
 _LAST = 2  # number of tasks per thread into which the last blocks are divided
-# Dask's profiler samples every 10 ms, which makes workers a thirtieth slower
+# Dask's profiler samples every 10 ms, which makes workers about 3 % slower
 _QUIET = {"distributed.worker.profile.enabled": False}
 _PATIENCE = 60.0  # [s] longest wait for the first worker
 
@@ -54,8 +54,8 @@ def cluster_solver(
         workers: number of processes of a local cluster to start; None if
             ``scheduler`` is given.
         scheduler: address of a running cluster, such as ``tcp://10.0.0.1:8786``.
-        report: function called at the end with a line on the number and median duration
-            of the tasks.
+        report: function called at the end with a line of text: the number of tasks
+            and their median duration.
 
     Returns:
         The solver, which connects to the cluster or starts it when it is first used.
@@ -176,7 +176,7 @@ def _distribute(
 
 
 def _threads(client: "distributed.Client") -> int:
-    """Return the current number of threads of all workers; clusters may change."""
+    """Return the present number of threads of all workers, which may change."""
     from distributed.comm import CommClosedError
 
     try:
@@ -239,7 +239,7 @@ def solve_task(
 
 @lru_cache(maxsize=4)
 def _question(content: bytes, digest: str) -> Question:
-    """Return the unpickled quantities, cached because robots are cached by identity."""
+    """Return the unpickled quantities; a cache keeps one robot object per worker."""
     asked: Question = pickle.loads(content)
     question = replace(asked, robot=solve_links(asked.robot))
     if question_hash(question) != digest:

@@ -36,14 +36,14 @@ KINDS = {
 }  # fmt: skip
 _TEXT = {name: QUANTITIES[name].meaning for name in ("status", *TEXTS)}
 _TEXT["status"] += ": " + ", ".join(OF_POINTS[1:])
-# names in files of older releases, with their present names
+# variable names in files of older releases, and the present names
 _OLD_NAMES = {
     "rotation_error_play": "rotation_error_clearance",
     "translation_error_play": "translation_error_clearance",
     "play_mixed": "clearance_mixed",
 }
 _OLD_ATTRIBUTES = {"play": "clearance", "reading": "assumption"}
-# number of blocks per write; a write takes as long as solving a hundred points
+# number of blocks per write; one write lasts as long as solving a hundred points
 _TOGETHER = 256
 
 
@@ -53,7 +53,7 @@ def sweep_dataset(sweep: "Sweep", records: NDArray, texts: Texts) -> "xarray.Dat
     Args:
         sweep: sweep to which the results belong.
         records: (points,) records of all points.
-        texts: for each name, the texts of those points that have one.
+        texts: for each text variable, the texts of the points that have one.
 
     Returns:
         The data set; units are in the attribute ``units``.
@@ -94,7 +94,7 @@ def write_sweep(
 def _write(
     sweep: "Sweep", read: Callable[[int], tuple[NDArray, Texts]], file: Any
 ) -> None:
-    """Write the file, first the coordinates, then block after block."""
+    """Write the NetCDF file, first the coordinates, then block after block."""
     import h5py
 
     text = h5py.string_dtype()
@@ -170,7 +170,7 @@ def slabs(shape: tuple[int, ...], first: int, last: int) -> Iterator[tuple[slice
 
 
 def _joined(blocks: list[tuple[NDArray, Texts]]) -> tuple[NDArray, Texts]:
-    """Concatenate blocks and return them as one block."""
+    """Concatenate the results of several blocks."""
     texts: Texts = {name: {} for name in TEXTS}
     start = 0
     for records, texts_of_block in blocks:
@@ -183,7 +183,7 @@ def _joined(blocks: list[tuple[NDArray, Texts]]) -> tuple[NDArray, Texts]:
 
 
 def _text_column(name: str, records: NDArray, texts: Texts) -> NDArray:
-    """Return the texts (k,) of a variable as an object array."""
+    """Return a text variable's values (k,) as an object array."""
     if name == "status":
         return np.array(OF_POINTS, dtype=object)[records["status"]]
     column = np.full(len(records), "", dtype=object)
@@ -251,7 +251,7 @@ def check_dataset(path: Path | str, what: str) -> None:
 
 
 def _is(path: Path, what: str) -> bool:
-    """Return whether the attributes of a file mark it as the given kind."""
+    """Return whether a file's attributes mark it as a file of the given kind."""
     import h5py
 
     try:

@@ -41,7 +41,7 @@ def robot_hash(robot: Robot) -> str:
     """Return the SHA-256 of a robot file and of all that the file refers to.
 
     A robot file may refer to meshes, stiffness libraries, and effects of other
-    packages, which enter with their version.
+    packages, of which the version is hashed.
 
     Args:
         robot: the robot.

@@ -1,12 +1,12 @@
 """Journal of a sweep: a file of finished blocks that survives an interruption.
 
 The file begins with one line of JSON that identifies the sweep, and its check sum.
-Records follow. Each record is appended by one write and contains the number of a block,
-the length and a check sum, then the block's rows and texts.  Each check sum continues
-the check sum of the first line, so every record identifies its sweep.  A record with a
-wrong check sum is ignored, for example a damaged one or a last record that an
-interruption cut.  Records may be in any order and may occur twice.  Only one program at
-a time can lock the file.
+Records follow. Each record is appended by one write. It contains the number of a block,
+the length of the content and a check sum, then the block's rows and texts.  Each check
+sum continues the check sum of the first line, so every record identifies its sweep.  A
+record with a wrong check sum is ignored: it is damaged, or an interruption cut it
+short.  Records may be in any order and may occur twice.  Only one program at a time can
+lock the file.
 """
 
 import json
@@ -40,7 +40,7 @@ class Journal:
         path: path of the file.
         record_type: type of the rows.
         owner: check sum of the first line, from which the records' check sums continue.
-        places: offset and length of the content of each finished block.
+        places: file offset and length [bytes] of each finished block's content.
     """
 
     path: Path
@@ -56,7 +56,7 @@ class Journal:
         Args:
             block: number of the block.
             records: records of its points.
-            texts: for each name, the texts of those rows that have one.
+            texts: for each text variable, the texts of the rows that have one.
 
         Raises:
             BadInput: the file cannot be written, for example because the disk is full.
@@ -147,8 +147,8 @@ def open_journal(
             held.enter_context(locked_file(path, wait=False))
         except BlockingIOError:
             raise BadInput(
-                f"{path}: another run holds this journal; expected to be the only one "
-                "that writes this file (wait for it, or write to another file)"
+                f"{path}: another run holds this journal; expected no other run "
+                "that writes the same file (wait for its end, or write to another file)"
             ) from None
         except OSError as error:
             raise BadInput(unwritable(path, error)) from None
@@ -157,7 +157,7 @@ def open_journal(
 
 
 def _recover(path: Path, header: bytes, owner: int) -> dict[int, tuple[int, int]]:
-    """Return the places of finished blocks; repair the first line and a cut end."""
+    """Return file positions of finished blocks; repair the first line and the end."""
     try:
         with path.open("r+b") as file:
             size = os.fstat(file.fileno()).st_size
@@ -183,7 +183,7 @@ def _recover(path: Path, header: bytes, owner: int) -> dict[int, tuple[int, int]
 def _scan(
     content: mmap.mmap, start: int, owner: int
 ) -> tuple[dict[int, tuple[int, int]], int]:
-    """Return the places of all valid records, and the end of the last one."""
+    """Return the file positions of all valid records, and the end of the last one."""
     places: dict[int, tuple[int, int]] = {}
     end = start
     place = content.find(_MAGIC, start)
@@ -225,7 +225,7 @@ def _difference(first_line: bytes, header: bytes) -> str:
         )
     other = json.loads(line)
     keys = [k for k in expected if other.get(k) != expected[k]]
-    # omit the hash of the complete input if another line names the part that differs
+    # omit the hash of the whole input if another line names the differing part
     keys = [k for k in keys if k != "question_sha256"] or keys
     theirs = ", ".join(f"{k} {str(other.get(k))[:60]!r}" for k in keys)
     wanted = ", ".join(f"{k} {str(expected[k])[:60]!r}" for k in keys)

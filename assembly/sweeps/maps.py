@@ -33,12 +33,12 @@ def figure_of(
         at: values on further axes by name; the nearest points are shown.  If no draw is
             selected, the median over the draws is shown.
         quantities: quantities to show, by the names in
-            :mod:`forcefit.assembly.sweeps.panels`; by default those of the paper's
-            figure 5.
+            :mod:`forcefit.assembly.sweeps.panels`; by default the quantities in
+            figure 5 of the paper.
 
     Returns:
-        A figure with one panel per quantity, by default six.  Only a notebook shows it,
-        if it is the result of a cell.
+        A figure with one panel per quantity, by default six.  It is not shown, except
+        by a notebook where it is the result of a cell.
 
     Raises:
         BadInput: an axis or a quantity is unknown, or more than two axes remain.
@@ -119,7 +119,7 @@ def part_of_sweep(
 
 
 def _number(name: str, value: float | str) -> float:
-    """Return the number that was given for an axis."""
+    """Return the number at which an axis is fixed."""
     try:
         return float(value)
     except ValueError:
@@ -129,7 +129,7 @@ def _number(name: str, value: float | str) -> float:
 
 
 def _median(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Return the median over the draws, and the first status that is not ok."""
+    """Return each point's median over the draws, and its first status except ok."""
     numbers = [k for k, v in data.data_vars.items() if v.dtype.kind == "f"]
     middle = data[numbers].median("draw", skipna=True)
     first = data.isel(draw=0, drop=True)
@@ -146,7 +146,7 @@ def _median(data: "xarray.Dataset") -> "xarray.Dataset":
 
 
 def _squeezed(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Return the data set without those axes of the points that have one value."""
+    """Return the data set without axes that have only one value."""
     single = [d for d in data["status"].dims if data.sizes[d] == 1]
     return data.squeeze(single, drop=True)
 
@@ -244,7 +244,7 @@ def path_figure(
 
 
 def _along_numbers(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Return the data set with increasing axis values; labels become 1, 2, .."""
+    """Return the data set with increasing axis values; text labels become 1, 2, .."""
     for name in map(str, data["status"].dims):
         if data[name].dtype.kind not in "fiu":
             data = data.assign_coords({name: np.arange(data.sizes[name]) + 1})

@@ -171,7 +171,7 @@ class _Target:
         return self.file.seek(offset, whence)
 
     def tell(self) -> int:
-        """Return the position in the file."""
+        """Return the present position in the file [bytes]."""
         return self.file.tell()
 
     def truncate(self, size: int | None = None) -> int:

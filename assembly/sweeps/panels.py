@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _MOST = 12  # largest number of panels in a readable figure
 _HALVES = {"rotation": slice(0, 3), "translation": slice(3, 6)}
-# for each unit in the file: the factor to the unit of the figure, and that unit
+# for each unit in the file: the unit in the figure, and the conversion factor to it
 _SHOWN = {
     "rad": (1e3, "mrad"), "m": (1e3, "mm"), "N/m": (1e-6, "N/um"), "Pa": (1e-6, "MPa"),
     "1": (1.0, "-"),
@@ -139,7 +139,9 @@ def named_panels(data: "xarray.Dataset", names: Sequence[str]) -> tuple[Panel, .
             scale, unit = _SHOWN.get(known[key], (1.0, known[key]))
             panels.append(Panel(key, scale, f"{plot_label(key)} [{unit}]", "viridis"))
     if len(panels) > _MOST:
-        raise BadInput(f"--quantities: found {len(panels)}, expected at most {_MOST}")
+        raise BadInput(
+            f"--quantities: found {len(panels)} panels, expected at most {_MOST}"
+        )
     return tuple(panels)
 
 
@@ -190,5 +192,5 @@ def _quantities(data: "xarray.Dataset") -> dict[str, str]:
 
 
 def _further(data: "xarray.Dataset", name: str) -> list[str]:
-    """Return the axes of a variable other than the axes of the points."""
+    """Return the axes of a variable that are not axes of the points."""
     return [str(d) for d in data[name].dims if d not in data["status"].dims]

@@ -191,7 +191,7 @@ def unit_of(path: str) -> str:
 
 
 def _numbers(content: dict[str, Any]) -> Iterator[tuple[str, float, Setter]]:
-    """Yield path, value and setter of every number, including omitted zeros."""
+    """Yield path, value and setter function of every number, also of omitted zeros."""
     for frame in content.get("frame", ()):
         given = dict(_ABSENT) if "dh" in frame else _ABSENT | _PLACED
         if frame.get("joint", "fixed") != "fixed":
@@ -202,7 +202,7 @@ def _numbers(content: dict[str, Any]) -> Iterator[tuple[str, float, Setter]]:
 
 
 def _inside(path: str, table: dict[str, Any]) -> Iterator[tuple[str, float, Setter]]:
-    """Yield path, value and setter of the numbers of a table."""
+    """Yield path, value and setter function of each number in a table."""
     for key, value in table.items():
         path_of_key = f"{path}.{key}"
         if _is_number(value):

@@ -43,7 +43,7 @@ class Sweep:
     def __post_init__(self) -> None:
         if self.size > LARGEST_GRID:
             raise BadInput(
-                f"sweep: {self.size} points; expected at most {LARGEST_GRID}"
+                f"sweep: found {self.size} points, expected at most {LARGEST_GRID}"
             )
 
     @property
@@ -69,7 +69,7 @@ class Sweep:
         return -(-self.size // self.block_size)
 
     def points(self, block: int) -> Points:
-        """Return the points of a block."""
+        """Return the points of a block, by the block's number."""
         first = block * self.block_size
         numbers = np.arange(first, min(first + self.block_size, self.size))
         numbers, draws = np.divmod(numbers, max(1, self.draws))
@@ -127,6 +127,6 @@ class Sweep:
             "strength": str(question.strength),
             "conditions": str((question.load, question.gravity, dict(question.under))),
             "block": str(self.block_size),
-            # all values except those named above
+            # all attributes of the question except the ones named above
             "question_sha256": question_hash(question),
         }

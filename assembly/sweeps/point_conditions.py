@@ -40,7 +40,6 @@ def point_conditions(
 
     Returns:
         Conditions with k rows.
-        k rows of conditions.
     """
     many = Posture(
         robot.without_effects(),
@@ -69,7 +68,7 @@ def is_loaded(conditions: Conditions) -> bool:
 
 
 def assemble_rows(conditions: Conditions) -> tuple[Assembly, NDArray, NDArray]:
-    """Return the solutions of least energy (22) of all rows under their loads.
+    """Return the least-energy solutions, problem (22), of all rows under load.
 
     Args:
         conditions: conditions with k rows, for a robot of n frames.

@@ -1,8 +1,8 @@
 """Properties of a sweep's points that depend only on the nominal geometry.
 
-These are the joint coordinates, the distances to singularities, and whether the posture
-is usable: within the joint limits, regular, and not separated from the home posture by
-a singularity.
+The properties are the joint coordinates, the distances to singularities, and whether
+the posture is usable.  A usable posture is within the joint limits and regular, and no
+singularity separates it from the home posture.
 """
 
 from collections.abc import Sequence

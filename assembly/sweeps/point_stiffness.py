@@ -1,9 +1,9 @@
 """Platform stiffness K_C at the points of a sweep.
 
 Errors, loads and clearances do not change the nominal K_C, so all draws at a posture
-share one matrix.  A tangent stiffness is computed point by point, either of problem
-(22), with clearances free or in contact, or of the exact equilibrium, with its internal
-forces.
+share one matrix.  A tangent stiffness is computed for each point.  It belongs either to
+problem (22), with clearances free or in contact, or to the exact equilibrium, with its
+internal forces.
 """
 
 from dataclasses import replace
@@ -109,7 +109,7 @@ def tangent_stiffnesses(
 
 
 def _tangent(conditions: Conditions, i: int, state: str) -> PlatformStiffness:
-    """Return the tangent at one point; at a change of contact the compliant one."""
+    """Return the tangent stiffness at a point; at a contact change, the smaller one."""
     if conditions.laws or any(not place.linear for place in conditions.yields):
         raise SolverFailed(
             "tangent",
@@ -123,7 +123,7 @@ def _tangent(conditions: Conditions, i: int, state: str) -> PlatformStiffness:
 
 
 def _unknown(parts: int) -> dict[str, NDArray]:
-    """Return the stored quantities as NaN, for a point without a tangent."""
+    """Return NaN for all stored quantities of a point without tangent stiffness."""
     sizes = {
         "compliance": (6, 6), "stiffness": (6,), "eigen_stiffness": (6,),
         "stiffness_condition": (), "share": (parts, 6),

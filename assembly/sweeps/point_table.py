@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# variables whose axes are the row axes: of sweeps and draws, of tolerances
+# variables whose axes become table rows, in files of sweeps and draws, or of tolerances
 _OF_POINTS = ("status", "tolerance")
 
 

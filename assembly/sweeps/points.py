@@ -1,4 +1,4 @@
-"""Solution of the points of a sweep: margins, energy, wrenches, errors, singularities.
+"""Computation of all quantities at the points of a sweep.
 
 Points are solved in blocks.  If a point has no solution, ``status`` and ``reason``
 state why, and the other points are still solved.  The results of a point do not depend
@@ -83,7 +83,7 @@ class SolvedPoints:
 
     Attributes:
         records: (k,) records of :func:`record_type`; NaN for points without a solution.
-        texts: for each name in :data:`TEXTS`, the texts of those points that have one.
+        texts: for each name in :data:`TEXTS`, the texts of the points that have one.
     """
 
     records: NDArray
@@ -187,7 +187,7 @@ def _solve_or_split(
     question: Question, robot: Robot, perfect: Robot, postures: list[Posture],
     errors: NDArray | None, solved: SolvedPoints, rows: NDArray,
 ) -> None:  # fmt: skip
-    """Solve points whose posture exists together, or one by one if a solver fails."""
+    """Solve reachable points together, or one by one if a solver fails."""
     try:
         _solve_reached(question, robot, perfect, postures, errors, solved, rows)
     except (np.linalg.LinAlgError, SolverFailed) as error:
@@ -210,7 +210,7 @@ def _fail(solved: SolvedPoints, rows: range, status: str, reason: str) -> None:
 
 
 def _errors(question: Question, robot: Robot, draws: NDArray) -> NDArray:
-    """Return the errors (k, n, 6) [rad, m] of draws, with bolted joints locked in."""
+    """Return the errors (k, n, 6) [rad, m] of draws, with locked-in bolted joints."""
     pages = {page: _page(question, page) for page in np.unique(draws // _PAGE).tolist()}
     own, which = np.unique(draws, return_inverse=True)
     errors = np.array([pages[d // _PAGE][d % _PAGE] for d in own.tolist()])
@@ -231,7 +231,7 @@ def _solve_reached(
     question: Question, robot: Robot, perfect: Robot, postures: list[Posture],
     errors: NDArray | None, solved: SolvedPoints, rows: NDArray,
 ) -> None:  # fmt: skip
-    """Solve points whose posture exists; most failures are recorded as a status."""
+    """Solve reachable points; most failures are recorded as a status."""
     out = solved.records
     conditions = point_conditions(question, robot, postures, errors)
     if robot.has_effects:
@@ -352,7 +352,7 @@ def _record_frequencies(
 
 
 def _record_bounds(bounds: PoseError, solved: SolvedPoints, rows: NDArray) -> None:
-    """Record bounds of (27) at points with a solution of (22), and failures."""
+    """Record pose error bounds where a solution exists, and record failures."""
     out = solved.records
     for i in np.flatnonzero(out["status"][rows] == 0).tolist():
         row = int(rows[i])
@@ -366,7 +366,7 @@ def _record_bounds(bounds: PoseError, solved: SolvedPoints, rows: NDArray) -> No
 def _bound_clearance_only(
     perfect: Posture, solved: SolvedPoints, rows: NDArray
 ) -> None:
-    """Record bounds of (27) without errors, once for each posture."""
+    """Record pose error bounds, problem (27), at zero errors for each posture."""
     T = perfect.transforms
     runs = list(_runs(T.reshape(len(T), -1)))
     starts = [run.start for run in runs]
@@ -385,7 +385,7 @@ def _bound_clearance_only(
 def _compare_finite(
     conditions: Conditions, i: int, solved: SolvedPoints, row: int
 ) -> None:
-    """Record the linearisation error at a point."""
+    """Record the difference between linear and finite solution at a point."""
     out = solved.records
     try:
         exact = assemble_row(replace(conditions, exact=True), i)

@@ -23,7 +23,8 @@ BY_CLEARANCE = ("rotation_error_clearance", "translation_error_clearance")
 FINITE = ("linearisation_rotation", "linearisation_translation", "linearisation_energy")
 STRESS = ("stress", "stress_error", "safety")
 
-_READING = ("registration", "drift")  # effects that change readings but not screws
+# effects that change measured readings, but not the platform screw
+_READING = ("registration", "drift")
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +40,7 @@ class Question:
         sources: sources of drawn errors; None to use the errors of the robot file.
         seed: seed of the draws.
         assumption: assumption of problem (27); None if its bounds are not computed.
-        clearance_only: whether (27) is also bounded for the robot without errors.
+        clearance_only: whether the pose error is also bounded without errors.
         wrenches: frames whose wrenches are recorded.
         linearisation: whether each point is also solved with finite motions.
         near: distance below which a singularity is reported.
@@ -78,7 +79,7 @@ class Question:
 
     @property
     def reads_otherwise(self) -> bool:
-        """Whether a measuring device reads something other than the screw."""
+        """Whether an effect makes the measured pose differ from the platform screw."""
         robot = self.robot
         effects = [robot.effects, *robot.session_effects.values()]
         return any(name in every for every in effects for name in _READING) or any(
@@ -91,7 +92,7 @@ class Variable:
     """A variable of a sweep's data set.
 
     Attributes:
-        dims: axes other than those of the points, with their labels.
+        dims: axes in addition to the axes of the points, with their labels.
         quantity: entry in the table of quantities.
         condition: condition of the computation, appended to the meaning.
     """
@@ -129,7 +130,7 @@ def variables(question: Question) -> dict[str, Variable]:
 
 
 def computed(question: Question) -> dict[str, Variable]:
-    """Return the numeric variables that are computed, including those not stored.
+    """Return all numeric variables that are computed, stored or not.
 
     Args:
         question: quantities of a sweep.
@@ -175,7 +176,7 @@ def _moving(robot: Robot) -> tuple[str, ...]:
 
 
 def _stiffness_variables(robot: Robot, state: str) -> dict[str, Variable]:
-    """Return the variables of K_C and of its parts."""
+    """Return the variables of the stiffness K_C and of its parts' shares."""
     eigen, parts = tuple("123456"), stiffness_parts(robot, state)
     return {
         "compliance": _variable("compliance", f", at its origin, {STATES[state]}"),

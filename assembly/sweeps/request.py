@@ -141,7 +141,7 @@ def ask_sweep(robot: Robot | str | Path, options: SweepOptions) -> Sweep:
 def _check(options: SweepOptions, machine: Robot) -> None:
     """Reject options that contradict each other or the robot."""
     if (options.grid is None) == (options.poses is None):
-        raise BadInput("sweep: expected --grid or --poses, one of them")
+        raise BadInput("sweep: expected exactly one of --grid and --poses")
     assumption, near = options.assumption, options.near
     strength = options.yield_strength
     if assumption not in (*ASSUMPTIONS, "none"):
@@ -153,7 +153,7 @@ def _check(options: SweepOptions, machine: Robot) -> None:
         row_of(machine, name)
     if strength is not None:
         if not 0 < strength < float("inf"):
-            raise BadInput(f"--yield-strength: found {strength:g}, expected > 0")
+            raise BadInput(f"--yield-strength: found {strength:g}, expected > 0 Pa")
         if not stressed_names(machine):
             raise BadInput(
                 f"--yield-strength: no link of {machine.name} has a shape from which "
@@ -193,12 +193,12 @@ def _sources(
 
 
 def _short(value: float | str) -> str:
-    """Return a covariate as it is written on the command line."""
+    """Return a covariate's value as text for the command line."""
     return value if isinstance(value, str) else f"{value:g}"
 
 
 def _check_assumption(question: Question) -> None:
-    """Reject pose error bounds for a loaded robot, because (27) contains no load."""
+    """Reject pose error bounds under load, because problem (27) has no load."""
     home = point_conditions(
         question, question.robot, [home_posture(question.robot)], None
     )
@@ -218,7 +218,7 @@ def _targets(robot: Robot, grid: str | None, poses: Path | str | None) -> Target
 
 
 def _vary(design: Design, texts: Sequence[str]) -> dict[str, NDArray]:
-    """Return values by path; check the smallest and largest as in a robot file."""
+    """Return the varied values by path; check the extreme values like a robot file."""
     values_by_path: dict[str, NDArray] = {}
     owner: dict[str, str] = {}
     for text in texts:

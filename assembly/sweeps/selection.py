@@ -56,7 +56,7 @@ def select(question: Question, texts: Sequence[str]) -> Question:
 
 
 def _with_optional(question: Question) -> Question:
-    """Request all quantities whose options are given or have defaults."""
+    """Return a request for all quantities whose options are set or have defaults."""
     return replace(
         question, clearance_only=True, linearisation=True,
         stiffness=question.stiffness or "nominal",
@@ -65,7 +65,7 @@ def _with_optional(question: Question) -> Question:
 
 
 def _for(question: Question, kept: dict[str, Variable]) -> Question:
-    """Request exactly the given variables."""
+    """Return a sweep request for exactly the given variables."""
     every = _with_optional(question)
     return replace(
         question,

@@ -14,14 +14,15 @@ from forcefit.assembly.platform_stiffness.tangent_slopes import (
 from forcefit.assembly.sweeps.parameters import Design
 from forcefit.inputs.table import BadInput
 
-# step relative to the number, or 1 if it is zero; the derivative's error is 1e-8
+# difference step relative to the number, or to 1 if it is zero; the relative error of
+# the derivative is 1e-8
 _STEP = 1e-4
 _SMALL_STEP = 1e-8  # [rad, m] step for errors, because contacts change within some um
 _AS_ERROR = {"translation": "t", "rotation": "r"}
 
 
 class CannotChange(BadInput):
-    """A number cannot change by itself, because no robot exists for other values."""
+    """A design number cannot be varied, because no robot exists for other values."""
 
 
 def stiffness_slopes(
@@ -88,7 +89,7 @@ def stiffness_slopes(
 
 
 def _cannot_change(path: str, reason: str) -> str:
-    """Return an error message with the number, the reason, and an alternative."""
+    """Return the error message for a design number that cannot be varied."""
     frame, *keys = path.rsplit(".", 2)
     instead = ""
     if len(keys) == 2 and keys[0] in _AS_ERROR and keys[1] in {"x", "y", "z"}:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import xarray
 
 Progress = Callable[[int, int], None]
-# function that yields the number and results of each block, in any order
+# function that yields each block's number and results, in any order
 Solver = Callable[["Sweep", Iterable[int]], Iterator[tuple[int, SolvedPoints]]]
 
 
@@ -150,7 +150,7 @@ def sweep_poses(
     progress: Progress = lambda done, total: None,
     assumption: str | None = None,
 ) -> "xarray.Dataset":
-    """Solve (21), (22) and, if requested, (27) at every pose of a grid.
+    """Compute margins, energy and, if requested, pose error bounds on a pose grid.
 
     Args:
         robot: robot with its errors, clearances and stiffnesses.

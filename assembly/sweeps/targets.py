@@ -121,7 +121,10 @@ def parse_grid(text: str, robot: Robot | None = None) -> dict[str, NDArray]:
         axes[name] = parse_values(f"grid {name}", spec)
     _check_kind("grid", axes)
     if np.prod([float(len(v)) for v in axes.values()]) > LARGEST_GRID:
-        raise BadInput(f"grid: more than {LARGEST_GRID} points; is a step too small?")
+        raise BadInput(
+            f"grid: more than {LARGEST_GRID} points, which are too many; is a step too "
+            "small?"
+        )
     return axes
 
 
@@ -137,7 +140,7 @@ def _check_name(whose: str, what: str, name: str, robot: Robot | None) -> None:
 def _check_columns(
     whose: str, header: Sequence[str], extra: Sequence[str], robot: Robot
 ) -> None:
-    """Reject a column that no posture has, under the name that the file gives it."""
+    """Reject an unknown column of a table of postures, by its name in the file."""
     joints = [_JOINT + f.name for f in robot.frames if f.actuated]
     valid = [*(f"pose.{name}" for name in POSE), *joints, *extra]
     for name in header:
@@ -182,11 +185,13 @@ def parse_values(whose: str, spec: str) -> NDArray:
     if step == 0 or (stop - start) / step < 0:
         raise BadInput(
             f"{whose}: found a step of {step:g} that does not lead from "
-            f"{start:g} to {stop:g}; expected another sign, not 0"
+            f"{start:g} to {stop:g}; expected a nonzero step of the right sign"
         )
     count = (stop - start) / step
     if count > LARGEST_GRID:
-        raise BadInput(f"{whose}: {count:.3g} points; is the step too small?")
+        raise BadInput(
+            f"{whose}: {count:.3g} points, which are too many; is the step too small?"
+        )
     return start + step * np.arange(int(np.floor(count + 1e-9)) + 1)
 
 
@@ -249,7 +254,7 @@ def _cell(whose: str, text: str) -> float:
 
 
 def _check_labels(path: Path, labels: Sequence[str]) -> None:
-    """Reject a table with two rows of equal id."""
+    """Reject a table of postures in which two rows have the same id."""
     if len(set(labels)) < len(labels):
         twice = next(label for label in labels if labels.count(label) > 1)
         raise BadInput(f"{path}: id: found {quoted(twice)} twice; expected unique ids")

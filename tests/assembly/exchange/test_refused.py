@@ -67,7 +67,7 @@ REFUSED = {
     ("urdf", "nan"): (urdf(more='<origin xyz="0 0 nan"/>'),
         "origin.xyz: found '0 0 nan', expected 3 finite numbers [m]"),
     ("urdf", "an axis of zero"): (urdf(more='<axis xyz="0 0 0"/>'),
-        "axis.xyz: found [0.0, 0.0, 0.0], not a direction"),
+        "axis.xyz: found [0.0, 0.0, 0.0], expected a direction"),
     ("urdf", "an unknown leader"): (urdf(more='<mimic joint="k"/>'),
         'mimic.joint: found "k", expected a joint with one degree'),
     ("urdf", "a joint that follows itself"): (
@@ -81,7 +81,7 @@ REFUSED = {
     ("urdf", "a link without a name"): ("<robot><link/></robot>",
         "link.name: missing; expected a text"),
     ("urdf", "no link"): ("<robot/>",
-        "link: missing; expected at least one"),
+        "link: missing; expected at least one link"),
     ("urdf", "another element"): ("<robott/>",
         'found the root element "robott", expected robot'),
     ("urdf", "half a file"): ("<robot>",
@@ -200,7 +200,7 @@ REFUSED = {
         "found 2 models, expected exactly one"),
     ("sdf", "an axis of zero"): (
         four_bar().replace("<xyz>0 0 1</xyz>", "<xyz>0 0 0</xyz>"),
-        "xyz: found [0.0, 0.0, 0.0], not a direction"),
+        "xyz: found [0.0, 0.0, 0.0], expected a direction"),
     ("sdf", "a joint to its own parent"): (
         sdf('<frame name="f" attached_to="base"/>' + sdf_joint("j", "f", "base")),
         'joint "j".child: found "base", which is also its parent; expected another '

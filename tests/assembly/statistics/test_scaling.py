@@ -75,7 +75,7 @@ def test_limits_that_no_scale_meets_are_refused(least):
     constant = Known(lambda size: 2.0 + 0 * size, least)
     beyond = Known(lambda size: 2.0 + size, least)
     for known in (constant, beyond):
-        with pytest.raises(BadInput, match="^tolerances: even perfect parts violate a"):
+        with pytest.raises(BadInput, match="^tolerances: even a robot without geom"):
             scale_uniformly(known, ONE, np.ones(1))
 
 

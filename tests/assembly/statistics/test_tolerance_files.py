@@ -148,7 +148,7 @@ REFUSED = {
     "an unknown frame": ('"leg1.tip"', '"leg1.tap"',
         'tolerance[2].frames: irsbot2: no frame "leg1.tap"; did you mean "leg1.tip"?'),
     "no frame": ('["leg1.tip"]', "[]",
-        "tolerance[2].frames: expected at least one"),
+        "tolerance[2].frames: expected at least one frame"),
     "a word for frames": ('["leg1.tip"]', '"leg1.tip"',
         "tolerance[2].frames: expected a list of names"),
     "an unknown component": ('["RX", "RY"]', '["RX", "RQ"]',

@@ -174,7 +174,7 @@ def test_point_with_a_linear_algebra_error_has_its_own_status(robot, monkeypatch
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({}, "sweep: expected --grid or --poses, one of them"),
+        ({}, "sweep: expected exactly one of --grid and --poses"),
         ({"grid": "tx=0", "assumption": "fozen"},
          '--assumption: found "fozen"; did you'),
         ({"grid": "tx=0", "vary": ["link_a.link.beam.radius"]},
@@ -190,7 +190,7 @@ def test_point_with_a_linear_algebra_error_has_its_own_status(robot, monkeypatch
         ({"grid": "tx=0", "wrench_of": ["leg1.link_q"]}, 'no frame "leg1.link_q"'),
         ({"grid": "tx=0", "near": -1.0}, "--near: found -1, expected a number from 0"),
         ({"grid": "tx=0:1:1e-5,tz=0:1:0.1", "vary": ["tip.mass=1:100:1"]},
-         "sweep: 110001100 points; expected at most 10000000"),
+         "sweep: found 110001100 points, expected at most 10000000"),
     ],
 )  # fmt: skip
 def test_invalid_sweep_options_are_refused_with_one_message(options, message):

@@ -103,7 +103,7 @@ def test_grid_includes_both_ends_if_the_step_fits(text, values):
         ("tx=0:1:0", "grid tx: found a step of 0 that does not lead from"),
         ("x=0:1:0.1", 'grid: unknown pose component "x"'),
         ("tx=0,tx=1", 'grid: "tx" is given twice'),
-        ("tx=0:1:1e-9", "grid tx: 1e+09 points; is the step too small?"),
+        ("tx=0:1:1e-9", "grid tx: 1e+09 points, which are too many; is the step"),
         ("tx=0:1:1e-4,ty=0:1:1e-4", "grid: more than 10000000 points"),
         ("", 'grid: unknown pose component ""'),
         ("tx=0,q.leg1.drive=0",
