@@ -25,11 +25,11 @@ def read_locked_at(
         clearance: clearance given in the table.
 
     Returns:
-        The clearance and None if ``locked_at`` is absent; otherwise None and the bolt.
+        If ``locked_at`` is absent, the clearance and None.  Otherwise None, because a
+        bolted joint has no clearance, and the pose with the former clearance.
 
     Raises:
-        BadInput: the joint is not fixed or has no clearance, or the pose is not given
-            as expected.
+        BadInput: the joint is not fixed, it has no clearance, or the pose is invalid.
     """
     key = "locked_at"
     if not table.has(key):

@@ -42,14 +42,16 @@ from forcefit.inputs.table import BadInput, Table, describe, nearest, quoted
 
 _ZONES = (*LOCATIONS, *ORIENTATIONS, "length", "general")
 _LARGEST_CP = 5.0
-_ACROSS = 1e-3  # largest cosine of two perpendicular directions
+# largest cosine of the angle of two directions that count as perpendicular
+_ACROSS = 1e-3
 _NOT_ACROSS = "found a direction that is not perpendicular to the axis, expected 90 deg"
-_SIZES = {"axis": 1, "plane": 2, "point": 0}  # count of numbers in "extent"
+# number of lengths in "extent", by shape of the feature
+_SIZES = {"axis": 1, "plane": 2, "point": 0}
 _EXTENTS = {
     "axis": 'the length of the bore, such as "20 mm"',
     "plane": 'two sizes of the face, such as ["40 mm", "30 mm"], or "diameter"',
 }
-# keys that a shape cannot have
+# tolerance keys that a feature of each shape cannot have
 _EXCLUDED = {
     "axis": ("profile",),
     "plane": ("coaxiality",),
@@ -97,7 +99,7 @@ def read_drawn_callouts(
     """Yield the callouts of the bodies in a copy of a leg, and of the base.
 
     Args:
-        copied: a copy of a leg, or the bodies that belong to no leg.
+        copied: copy of a leg, or the bodies that belong to no leg.
         bodies: bodies of the whole robot.
         joints: joints of the whole robot.
 
@@ -122,7 +124,7 @@ def read_drawn_callouts(
 def _drawn(
     table: Table, copied: Copy, body: str, joints: list[DrawnJoint]
 ) -> DrawnCallout | None:
-    """The callouts of one joint of a body, None if only its form is stated."""
+    """Return the callouts of a body's feature; None if it has only a form tolerance."""
     here = {j.name: j for j in joints if body in (j.first, j.second)}
     short = body.removeprefix(copied.prefix)
 
@@ -173,7 +175,7 @@ def _callout(
     table: Table, name: str, feature: str, datums: tuple[Datum, ...], shape: str,
     after: bool, axis: Vector | None,
 ) -> Callout:  # fmt: skip
-    """Return a callout from the keys that both formats have."""
+    """Return a callout from the keys that occur in both file formats."""
     if len({replace(d, hole="", hole_of="") for d in datums}) < len(datums):
         names = [datum.frame for datum in datums]
         raise table.bad("datums", f"found {names}, expected each datum once")
@@ -246,7 +248,7 @@ def _check_widths(table: Table, widths: dict[str, float]) -> None:
 
 
 def _check_form(table: Table, form: float, widths: Mapping[str, float]) -> None:
-    """Refuse a form zone that is not smaller than every other zone of the feature."""
+    """Raise BadInput if the form zone is not the smallest zone of the feature."""
     least = min(widths.values(), default=1.0)
     if form and not form < least:
         word = next(word for word in FORMS if table.has(word))
@@ -277,7 +279,7 @@ def _extent(table: Table, shape: str, widths: dict[str, float]) -> tuple[float, 
 
 
 def _diameter(table: Table, shape: str) -> tuple[float, ...]:
-    """[m] the diameter of a round face."""
+    """Return the diameter [m] of a round face."""
     if shape != "plane":
         article = "an" if shape == "axis" else "a"
         fault = f"found one of a feature that is {article} {shape}, expected none"

@@ -55,7 +55,8 @@ def read_drawing(root: Table, name: str, description: str) -> Drawing:
     Raises:
         BadInput: the file violates a rule of the format.
     """
-    root.content = copy.deepcopy(root.content)  # texts with units become numbers
+    # a copy, because texts with units are replaced by numbers
+    root.content = copy.deepcopy(root.content)
     if root.get("format", 2) == 1:
         raise root.bad("format", "found 1 in a file of bodies and joints, expected 2")
     platform = root.text("platform", expected="the name of a body")
@@ -174,7 +175,7 @@ def _between(
 
 
 def _form_remarks(forms: dict[str, tuple[str, float]]) -> tuple[str, ...]:
-    """A remark on the clearances that the form of features widens."""
+    """Return a remark on the clearances that form tolerances increase."""
     texts = [
         f"{quoted(joint)} by {added * 1e6:.4g} um ({word})"
         for joint, (word, added) in forms.items()

@@ -17,7 +17,7 @@ from forcefit.assembly.model.robot import BASE
 from forcefit.inputs.table import Table, nearest, quoted
 from forcefit.stiffness.screws import transform
 
-LONGEST_NAME = 200  # largest number of characters
+LONGEST_NAME = 200  # largest number of characters of a name
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class Copy:
     Attributes:
         table: table in which the bodies and joints are written.
         prefix: prefix of their names, such as ``"leg1."``.
-        T: (4, 4) transform of the points and axes of the table to the copy.
+        T: (4, 4) transform from the leg as written in the table to the copy.
     """
 
     table: Table
@@ -58,13 +58,13 @@ def read_bodies(copied: Copy) -> Iterator[DrawnBody]:
         for key in ("from", "to"):
             if table.has(key) and link is None:
                 raise table.bad(key, 'found a joint without "link", expected both')
-        table.tables("tolerance")  # read when all joints are known
+        table.tables("tolerance")  # marked as used here; read when all joints are known
         table.finish()
         yield turned_body(body, copied.T)
 
 
 def place_of(owner: Table, kind: str, name: str) -> str:
-    """Return the place of a body or a joint for messages."""
+    """Return the text with which messages on a body or a joint begin."""
     return f"{owner.place + '.' if owner.place else ''}{kind} {quoted(name)}"
 
 
@@ -83,8 +83,8 @@ def with_ends(
         The body; a beam along a curve becomes a stiffness and a mass.
 
     Raises:
-        BadInput: there are no such joints, or the curve does not lead from one joint to
-            the other.
+        BadInput: a joint does not exist, or the curve does not lead from the first
+            joint to the second.
     """
     table = next(
         t for t in copied.table.tables("body")

@@ -60,7 +60,7 @@ def solve_links(robot: Robot) -> Robot:
 
 
 def _note(done: int, total: int) -> None:
-    """Report the number of known links to a progress display."""
+    """Report the number of solved links to a progress display."""
     known = {"done": done, "total": total}
     _LOG.debug("%d of %d links", done, total, extra=known)
 

@@ -1,4 +1,4 @@
-"""Plan files: the steps in which a robot is assembled (``docs/assembly_steps.md``)."""
+"""Plan files, which list the steps of an assembly (``docs/assembly_steps.md``)."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -87,7 +87,7 @@ def read_steps(path: Path | str, robot: Robot) -> Plan:
 
 
 def _named(steps: list[Step], tables: list[Table]) -> tuple[Step, ...]:
-    """Return the steps; default names that repeat are numbered."""
+    """Return the steps; repeated default names get numbers."""
     count: dict[str, int] = {}
     named = []
     for step, table in zip(steps, tables, strict=True):
@@ -119,7 +119,7 @@ def _name(table: Table, kind: str) -> str:
 
 
 def _fix(table: Table, name: str, robot: Robot) -> Fix:
-    """Return a fixture, by default at the nominal position."""
+    """Return a step that fixes a frame, by default at its nominal position."""
     position = _values(table, "at", "rad or m")
     if position is None:
         position = dict.fromkeys(SCREW, 0.0)
@@ -138,7 +138,7 @@ def _clamp(table: Table, name: str, robot: Robot) -> Step:
 
 
 def _held(table: Table, fix: Fix) -> Fix:
-    """Return a fixture with its stiffness."""
+    """Return a fixture with the stiffness stated in its table."""
     stiffness = _values(table, "stiffness", "N m/rad or N/m") or {}
     for component, value in stiffness.items():
         if not 0 < value <= LARGEST:
@@ -219,7 +219,7 @@ _READERS: dict[str, Callable[[Table, str, Robot], Step]] = {
 
 
 def _frame(table: Table, key: str, robot: Robot) -> str:
-    """Return the name of a frame; of a joint of several, of that in its axes."""
+    """Return a frame's name; for a joint of several frames, its main frame."""
     name = table.text(key, expected="the name of a frame")
     names = names_of(robot)
     if name not in names:
@@ -235,7 +235,8 @@ def _frame(table: Table, key: str, robot: Robot) -> str:
 def _part(table: Table, key: str, robot: Robot) -> tuple[str, str] | str:
     """Return a frame, or the closure of two frames in either order.
 
-    A closure after a drawn joint may be named by the joint: its frame is ``ball.end``.
+    The closure that completes a joint can be named by the joint: ``ball`` then means
+    its frame ``ball.end``.
     """
     value = table.require(key, "a frame, or the two frames of a closure")
     if isinstance(value, str):

@@ -4,8 +4,9 @@ A link is clamped at its base and loaded by its frame's wrench at the tip; a bea
 density is also loaded by its weight.  The formulas for beams are in
 :mod:`forcefit.stiffness.beam.beam_stress`.  For links given by a surface, finite
 elements compute the stress of unit wrenches (:mod:`forcefit.stiffness.fem.stress`).
-Points nearer than an interface's radius to a clamped, singular edge are omitted.  The
-stress of a link given only by its stiffness is unknown.
+The stress is singular at the edge of a clamped interface.  Points nearer to this edge
+than the radius of the interface are therefore omitted.  The stress of a link given only
+by its stiffness is unknown.
 """
 
 from collections.abc import Callable
@@ -67,7 +68,7 @@ def stressed_links(robot: Robot) -> tuple[LinkStress, ...]:
 
 
 def stressed_names(robot: Robot) -> tuple[str, ...]:
-    """Return the frames of :func:`stressed_links`, without solving any link."""
+    """Return the frame names of :func:`stressed_links` without solving a link."""
     return tuple(
         frame.name for frame in robot.frames
         if isinstance(frame.link, MeshLink)
@@ -119,7 +120,8 @@ def _of_beam(frame: Frame) -> Callable[..., NDArray]:
     def peak(wrench: NDArray, at_tip: NDArray = WEIGHTLESS) -> NDArray:
         tip = wrench - at_tip
         in_section_axes = np.hstack([tip[:, :3] @ R, tip[:, 3:] @ R])
-        weight = 2 * at_tip[..., 3:] @ R  # half of the weight acts at the tip
+        # weight of the beam, half of which acts at the tip
+        weight = 2 * at_tip[..., 3:] @ R
         return peak_beam_stress(section, length, in_section_axes, weight)[0]
 
     return peak
