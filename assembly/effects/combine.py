@@ -62,7 +62,7 @@ def _product(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _load(declared: Values, found: Values) -> dict[str, float]:
-    """Return the load gains: the found gain acts on the result of the declared gain."""
+    """Return the combined load gains; the found gain acts after the declared gain."""
     factor = found.get("factor", 1.0)
     offsets = {k: factor * v for k, v in declared.items() if k != "factor"}
     more = {k: v for k, v in found.items() if k != "factor"}
@@ -104,7 +104,7 @@ def _drift(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _contact(declared: Values, found: Values) -> dict[str, float]:
-    """Return the contact laws, which must be in different joints."""
+    """Return the combined contact laws, which must be in different joints."""
     if set(declared) & set(found):
         raise ValueError(
             "two contact laws of one joint in series cannot be combined into one law"
@@ -113,7 +113,7 @@ def _contact(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _delayed(declared: Values, found: Values) -> dict[str, float]:
-    """Return the expansions; for one body, the time constants must be equal."""
+    """Return the combined expansions; those of one body need equal time constants."""
     both = _sum(declared, found)
     for key in set(declared) & set(found):
         if key.endswith(".time_constant"):

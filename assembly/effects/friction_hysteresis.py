@@ -8,7 +8,7 @@ from forcefit.assembly.model.robot import Frame, Robot
 
 
 def elastic_joints(robot: Robot) -> tuple[str, ...]:
-    """Return joints with a spring about z: elastic drives, compliant joints."""
+    """Return the joints with a spring about z: elastic drives and compliant joints."""
     softened = robot.effects.get("drive_compliance", {})
     return tuple(
         f.name

@@ -5,7 +5,8 @@ A distribution names an :class:`forcefit.assembly.effects.effect.Effect`::
     [project.entry-points."forcefit.effects"]
     drive_gain = "their_package:DRIVE_GAIN"   # an Effect of this name
 
-It is imported when it is first used.  Names of forcefit's own effects cannot be taken.
+The effect is imported at its first use.  It cannot have the name of an effect of
+forcefit.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

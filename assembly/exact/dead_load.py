@@ -300,7 +300,7 @@ def drive_wrenches(posture: Posture, loads: DeadLoads, carried: NDArray) -> NDAr
 
 
 def _on_unknowns(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDArray]:
-    """Return (N, 6) dead loads on all parts that each unknown moves, and their M."""
+    """Return (N, 6) dead loads on the parts that each unknown moves, and matrices M."""
     model = place.model
     body, joint, M_body, M_joint = _on_frames(place, loads)
     link = (model.motion == LINK)[:, None]

@@ -1,17 +1,17 @@
-r"""One step towards the exact equilibrium: expand, solve, restore, accept or damp.
+r"""One step to the exact equilibrium: expand, solve, restore, then accept or damp.
 
 Near a placement x, the closures are linearised.  The Lagrangian
 
     L = |y|^2 / 2 - W(x) - lambda . r(x)
 
-is expanded to second order with its exact Hessian.  The curvature of the closures times
-their wrenches can exceed the stiffness of compliant springs; without this term,
-Gauss-Newton steps stall.  Springs and free motions are eliminated, and
-:mod:`forcefit.assembly.exact.contact_qp` solves the problem in the clearances.  A
-restoration (retraction) moves the result of the step back onto the closures.  The step
-is accepted if it reduces the energy plus a penalty on the residual.  Otherwise a
-proximal term damps the next attempt, as in the method of Levenberg and Marquardt; the
-term measures every screw in radians and reference lengths.
+is expanded to second order with its exact Hessian.  The Hessian contains the curvature
+of the closures, multiplied by their wrenches.  This term can exceed the stiffness of
+compliant springs.  Gauss-Newton steps omit it and then make no progress.  Springs and
+free motions are eliminated, and :mod:`forcefit.assembly.exact.contact_qp` solves the
+problem in the clearances.  A restoration (retraction) moves the result of the step back
+onto the closures.  The step is accepted if it reduces the energy plus a penalty on the
+residual.  Otherwise a proximal term damps the next attempt, as in the method of
+Levenberg and Marquardt; the term measures every screw in radians and reference lengths.
 
 ======  =============  =============  ===============================================
 symbol  code           shape          meaning
@@ -51,7 +51,7 @@ from forcefit.results.display import numbers
 
 CLOSED = 1e-12  # [rad, reference lengths] largest residual of a solution
 LONGEST_STEP = 1.0  # [rad, reference lengths] largest change in a step
-# [rad, reference lengths] residual whose wrenches are considered small
+# [rad, reference lengths] residual that defines which wrenches count as small
 _SMALL_RESIDUAL = 1e-9
 _LEAST_DAMPING = 1e-9  # relative to the largest closure wrench: smallest damping
 # relative to the largest closure wrench: first damping of a rejected step
@@ -61,7 +61,7 @@ _RESTORATIONS = 4  # number of corrections that move a step back onto the closur
 
 
 class NotConverged(SolverFailed):
-    """Error: no equilibrium with finite motions was found near the linear solution.
+    """Raised if no equilibrium with finite motions is found near the linear solution.
 
     Attributes:
         problem: name of the problem.
@@ -126,7 +126,7 @@ class Step:
             the closures.
         decrement: [J] predicted decrease of the potential without that cost.
         length: [rad, reference lengths] size of the change.
-        rigid: (6 K,) multipliers of the closures that depend only on clearances.
+        rigid: (6 K,) multipliers of the closure rows that only clearances can close.
         damping: [J/rad^2] damping of the next step; 0 if this step was not damped.
     """
 
@@ -231,7 +231,7 @@ def advance(
         The step.
 
     Raises:
-        NotConverged: no step reduces the sum, however short.
+        NotConverged: no step, however short, reduces this sum.
     """
     start = local.placement
     penalised = penalty * float(np.linalg.norm(start.residual))

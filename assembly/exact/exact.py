@@ -79,14 +79,18 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_STEPS = 160  # largest number of steps; usually 3 to 5, 80 for metres of travel
-# relative energy that can still be gained: below it, Newton's method is tried
+# largest number of steps; usually 3 to 5 are needed, and 80 for motions of metres
+_STEPS = 160
+# predicted decrease of the potential, relative to its scale, below which Newton's
+# method is tried
 _NEAR = 1e-2
-_DECREMENT = 1e-14  # relative energy that can still be gained at the last step
-# number of steps after which a state in equilibrium is accepted with moving clearances
+# largest relative decrease of the potential predicted at the last step
+_DECREMENT = 1e-14
+# number of steps after which an equilibrium is accepted even if clearances still move
 _RESTLESS = 100
 _STILL = 1e-9  # [rad, reference lengths] size of a last step without damping
-_STATIONARY = 1e-7  # largest relative imbalance of a solution; 1e-12 is usual
+# [-] largest accepted relative imbalance of a solution; usually it is 1e-12
+_STATIONARY = 1e-7
 # [J] energies below this are rounding errors; without errors they are about 1e-48 J
 _ROUNDING = 1e-30
 
@@ -326,7 +330,7 @@ def solve_exact(
         load: (6,) [N m, N] wrench on the platform at ``point``, base axes; or a mapping
             of components such as ``{"fz": -50}``.  The force is dead; the work of the
             moment is its product with the rotation vector.
-        start: the linear solution for this posture and these loads, if known.
+        start: linear solution for this posture and these loads; computed if not given.
         bodies: (n, 6) [N m, N] dead loads on the bodies of all frames, each at its
             frame's origin, base axes; moments are couples of dead forces.
         gravity: (3,) [m/s^2] gravity vector in base axes; for links see
@@ -334,7 +338,8 @@ def solve_exact(
         point: (3,) [m] point of the platform, in platform axes; the force moves with
             it.
         near: equilibrium of the same posture under another load, used as the start.
-        progress: function called with the number of steps and the largest number.
+        progress: function called with the number of steps made and the largest number
+            of steps.
         method: method of the linear solution and of every step: ``"compiled"``, with
             Clarabel if the compiled solution is not proved; or ``"reference"``, with
             numpy and Clarabel only.
@@ -345,7 +350,8 @@ def solve_exact(
     Raises:
         CannotAssemble: the linear model has no solution to start from.
         FreeMotion: a load acts along a motion without stiffness.
-        NotConverged: there is no equilibrium nearby; a :class:`SolverFailed`.
+        NotConverged: no equilibrium was found near the linear solution; a subclass of
+            :class:`SolverFailed`.
         ValueError: ``start`` belongs to another posture or other loads; or the method
             is unknown, or is ``"reference"`` while ``start`` or ``near`` is compiled.
     """

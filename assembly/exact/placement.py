@@ -1,4 +1,4 @@
-r"""A robot moved by finite screws, with first and second derivatives of its closures.
+r"""Robot displaced by finite screws, with first and second derivatives of its closures.
 
 ======  =================  ==========  =============================================
 symbol  code               shape       meaning
@@ -40,7 +40,7 @@ from forcefit.stiffness.screws import rotation_vector, screw_map, skew
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """Robot moved by finite screws; its closures can be open.
+    """Robot displaced by finite screws; its closures can be open.
 
     Attributes:
         model: the prepared robot.
@@ -245,11 +245,12 @@ class Placement:
         V = self.moves * self.model.on_platform
         later = np.sign(order - order[:, None])
         H = (V.T @ bracket_form(self.load_wrench(load)) @ V) * later / 2
-        # a rotation by w moves the origin, whose translation is v, by w x v / 2
+        # to second order, a rotation w also moves the origin, translated by v, by w x v
+        # / 2
         of_force = -W[:3].T @ skew(load[3:]) @ W[3:]
         H += (of_force + of_force.T) / 2
-        # exp(turn + h) = exp(J h + D(h, h) / 2) exp(turn), for a given rotation before
-        # h
+        # exp(turn + h) = exp(J h + D(h, h) / 2) exp(turn), for a given rotation
+        # exp(turn) and a small rotation h after it
         along, zero = np.linalg.solve(turn_jacobian(turn), W[:3]), np.zeros(3)
         moment = np.linalg.solve(turn_jacobian(turn).T, load[:3])
         form = second_form(np.append(turn, zero), np.append(moment, zero))

@@ -212,7 +212,7 @@ def _callout(
 
 
 def _widths(table: Table, shape: str) -> tuple[dict[str, float], str]:
-    """Return the widths of the zones, and the hole with maximum material condition."""
+    """Return the zone widths, and the hole with maximum material condition."""
     widths: dict[str, float] = {}
     used = False
     hole = table.text("hole", "") if table.has("hole") else ""

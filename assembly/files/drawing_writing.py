@@ -58,7 +58,7 @@ def drawing_text(robot: Robot, drawing: Drawing, folder: Path) -> str:
 
 
 def _point(values: NDArray) -> list[float]:
-    """Return the numbers to be written, with rounding errors replaced by 0."""
+    """Return the numbers of a point, with rounding errors replaced by 0."""
     least = _ROUNDING * max(1.0, float(np.abs(values).max()))
     return [float(v) if abs(v) > least else 0.0 for v in values]
 

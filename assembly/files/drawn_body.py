@@ -1,4 +1,4 @@
-"""Bodies of robot files of ``format = 2``, and the joints at the ends of links."""
+"""Bodies in robot files of ``format = 2``, and the joints at their links' ends."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -36,7 +36,7 @@ class Copy:
 
 
 def read_bodies(copied: Copy) -> Iterator[DrawnBody]:
-    """Yield the bodies of a copy; the joints at the links' ends are not yet known."""
+    """Yield the bodies of a copy, without the joints at the ends of their links."""
     for table in copied.table.tables("body"):
         name = table.text("name", longest=LONGEST_NAME)
         table.place = place_of(copied.table, "body", name)

@@ -71,7 +71,7 @@ def _in_bore(table: Table, kind: str, bounds: Clearance) -> _Clearance:
 
 
 def _in_bearings(table: Table, kind: str, bounds: Clearance) -> _Clearance:
-    """Return the bounds, and the contacts of a shaft in two bearings."""
+    """Return the remaining bounds of a joint, and the contacts in its two bearings."""
     _refuse_with(table, "bearings", ("radial", "tilt", "ball"))
     _refuse_without_shaft(table, "bearings", kind)
     value = table.get("bearings")
@@ -212,7 +212,7 @@ def _length(table: Table, key: str) -> float:
 
 
 def _refuse_free(table: Table, bounds: Clearance | None, kind: str) -> None:
-    """Raise BadInput for bounds of free motions, if a joint has several of them."""
+    """Raise BadInput for bounds of free motions in a joint with several of these."""
     free = set(FREE_ROWS[kind])
     for key, rows in zip(BOUNDS, CONES, strict=True):
         given = bounds is not None and getattr(bounds, key) is not None

@@ -73,7 +73,7 @@ def read_drawn_joint(table: Table, name: str, first: str, second: str) -> DrawnJ
 
 
 def _axes(table: Table, kind: str) -> tuple[NDArray, NDArray, NDArray]:
-    """Return three unit vectors: the axis, a perpendicular x axis, the second axis."""
+    """Return unit vectors along the z axis, a perpendicular x axis and ``axis2``."""
     needs = kind not in {"fixed", "spherical"}
     axis = _direction(table, "axis", needs)
     axis = np.array([0.0, 0.0, 1.0]) if axis is None else axis

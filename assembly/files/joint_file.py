@@ -128,7 +128,7 @@ def read_fit(table: Table) -> str:
 
 
 def read_fitted_end(table: Table) -> FittedEnd | None:
-    """Return the data by which a fit determines a frame's tilt; None for ``radial``."""
+    """Return the data of a fit that determines a tilt; None for ``radial``."""
     content = table.content.get("clearance")
     if not isinstance(content, dict) or "length" not in content:
         return None

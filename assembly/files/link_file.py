@@ -132,7 +132,7 @@ def _section(beam: Table) -> dict[str, float]:
 
 
 def _mesh_link(link: Table, frame: Table) -> MeshLink:
-    """Return the mesh of ``mesh = { surface, base, tip, ... }`` with its material."""
+    """Return the link of ``mesh = { surface, base, tip, ... }`` with its material."""
     from forcefit.stiffness.fem.part_text import read_parts
 
     mesh = link.table("mesh")

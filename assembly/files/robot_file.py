@@ -250,7 +250,7 @@ def _remarks(tables: list[Table]) -> tuple[str, ...]:
 
 
 def _fitted_ends(tables: list[Table]) -> dict[str, FittedEnd]:
-    """Return the fitted ends by frame; equal parts must have equal fits."""
+    """Return by frame the fits that determine a tilt; equal parts need equal fits."""
     ends: dict[str, FittedEnd] = {}
     fits: dict[str, str] = {}
     for table in tables:

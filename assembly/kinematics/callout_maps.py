@@ -1,12 +1,13 @@
 """Geometric errors delta l of the frames that tolerance callouts of drawings cause.
 
-The features of a body deviate from its ideal shape by small screws.  The screw of a
-feature is its screw within its tolerance zone plus the screw of the datum frame.  The
-datum frame is built from the datums A, B and C in this order: A fixes the components
-that its shape determines, B fixes components that A leaves free, and C the remaining
-ones.  A feature before its joint is the end of a body: its screw is delta l of the
-frame.  A feature after its joint is where the next body begins: all frames that the
-joint carries move relative to the feature by the negative screw.
+Each feature of a body deviates from its nominal position by a small screw.  The screw
+of a feature is its screw within its tolerance zone plus the screw of the datum frame.
+The datum frame is built from the datums A, B and C in this order: A fixes the
+components that its shape determines, B fixes components that A leaves free, and C the
+remaining ones.  A feature before its joint is the end of a body; its screw is the
+geometric error delta l of the frame.  A feature after its joint is the start of the
+next body.  All frames that the joint carries then move relative to the feature by the
+negative screw.
 """
 
 from collections.abc import Mapping
@@ -68,12 +69,13 @@ def place_callouts(home: Posture) -> tuple[PlacedCallout, ...]:
         home: home posture of the robot.
 
     Returns:
-        In the order of the robot's callouts, then the shifts of datums at maximum
-        material.
+        The callouts in the order of the robot, followed by the shifts of datums at
+        maximum material.
 
     Raises:
-        BadInput: a feature has callouts twice, a datum is not on the feature's body,
-            datums are circular, or a callout does not fit the nominal geometry.
+        BadInput: a feature has two callouts, a datum is not on the body of the feature,
+            datums refer to each other in a circle, or a callout contradicts the nominal
+            geometry.
     """
     callouts = home.robot.callouts
     if not callouts:
@@ -137,7 +139,8 @@ def _check_names(names: list[str], callouts: tuple[Callout, ...]) -> None:
 def _bodies(home: Posture) -> _Bodies:
     """Return the bodies: groups of frames that closures or fixed joints connect."""
     robot, n = home.robot, len(home.robot.frames)
-    group = list(range(n + 1))  # the base, whose parent index is -1, is the last
+    # the last entry is the base, because parent index -1 refers to it
+    group = list(range(n + 1))
 
     def root(i: int) -> int:
         while group[i] != i:
@@ -221,7 +224,7 @@ def _zone(
     offset = R.T @ (pose[:3, 3] - of_datum[:3, 3])
     axis = None if shape == "point" else R.T @ of_datum[:3, 2]
     try:
-        same = None  # a fixed joint may be a face or a bore
+        same = None  # the feature at a fixed joint can be a face or a bore
         if shape != "body":
             same = (shape == "plane") == (callout.shape == "plane")
         check_orientation(callout, np.eye(3)[2], axis, same)
@@ -249,7 +252,8 @@ def _datum_frame(
         if j in shifts:
             own = own + shifts[j]
         to_datum = _to_feature(pose)
-        # divide lengths by the distance from the feature: rad and m have equal weights
+        # divide lengths by the distance from the feature, so that rad and m have equal
+        # weights
         gap = pose[:3, 3] - _feature_pose(bodies, callout)[:3, 3]
         scale = np.repeat([1.0, 1.0 / max(float(np.linalg.norm(gap)), 1e-3)], 3)[
             :, None

@@ -20,49 +20,53 @@ from forcefit.assembly.kinematics.ranks import MISMATCH_FACTOR, rank_of
 from forcefit.assembly.model.contact_closures import contact_closures
 from forcefit.results.display import html_table
 
-# relative size below which singular values count as zero: rounding of files with 6
-# digits, and at singular postures the square root of the closure error 1e-10
+# relative size below which singular values count as zero: files are rounded to 6
+# digits, and the error of singular postures is the square root of the closure error
+# 1e-10
 ZERO = 1e-5
 # [rad, lengths] least motion of the platform for unit joint rates
 _PLATFORM_RANK = 1e-6
 _ERROR = 10.0  # assumed error of free motions times the ratio of singular values
 _NOISE = 1e-14  # relative rounding error of singular values
-_DISTANCE = 0.05  # [rad or lengths] distance of nearby postures
+_DISTANCE = 0.05  # [rad or reference lengths] distance to nearby postures
 _NEIGHBOURS = 16  # largest number of nearby postures
-_AGREEING = 3  # number of nearby postures that must agree
+_AGREEING = 3  # number of nearby postures whose counts must agree
 _EXACT = 1e-12  # [rad, m] closure error that is only rounding
 _LEAST = 1e-8  # relative size below which singular values count as zero at _EXACT
 _CLOSED = 1e-6  # [rad, m] largest closure error of a nearby posture
-_BACK = 0.1  # a posture nearer than this share of the distance counts as unmoved
+_BACK = 0.1  # share of the distance; a posture that moved less counts as not moved
 
 
 @dataclass(frozen=True)
 class Mobility:
-    """Degrees of freedom at one posture; every joint rigid except for its own motion.
+    """Degrees of freedom at one posture, if joints are rigid except for their motion.
 
     Attributes:
-        freedoms: number of joint motions that keep all closures, drives free.
+        freedoms: number of independent joint motions that keep all closures, with the
+            drives free.
         platform_freedoms: number of independent motions of the platform among them.
             The others are local motions of the legs, during which the platform is at
             rest.
-        freedoms_drives_locked: number of such joint motions, drives locked.
+        freedoms_drives_locked: number of independent joint motions that keep all
+            closures, with the drives locked.
         platform_freedoms_drives_locked: number of independent motions of the platform,
-            drives locked.
+            with the drives locked.
         redundant_constraints: number of constraints of all joints with drives locked,
             minus their rank: number of independent internal loads of the rigid robot.
         drives: number of actuated joints.
         locked_freedoms: equal to ``freedoms_drives_locked``.
-        overconstraint: number of closure equations that depend on the others, drives
-            free.
+        overconstraint: number of closure equations that depend linearly on the others,
+            with the drives free.
         smallest_singular_value: [-] least nonzero singular value of the constraint
             matrix, with lengths divided by the robot's size.  A value near zero shows
             that a singularity is near.
         local_freedoms: ``freedoms`` minus ``platform_freedoms``.
         actuation_redundancy: number of redundant drives: drives minus the freedoms that
             the drives lock.
-        singular_value_gap: [-] ratio of the least singular value that counts to the
-            largest that does not, or to rounding errors; the smaller ratio of drives
-            free and locked.  Below about 100 the counts are uncertain.
+        singular_value_gap: [-] least singular value that counts as nonzero, divided by
+            the largest that counts as zero, or by the rounding errors if there is none.
+            The value is the smaller one of two ratios, with the drives free and locked.
+            If it is below about 100, the counts are uncertain.
     """
 
     freedoms: int
@@ -164,7 +168,8 @@ def mobility_near(posture: Posture, here: Mobility) -> NearMobility:
         here: mobility at this posture.
 
     Returns:
-        The number of freedoms, and the counts at a nearby posture with that number.
+        The least number of freedoms, and the counts at a nearby posture with this
+        number.
     """
     robot, q = posture.robot, posture.coordinates
     if here.freedoms == 0 or _certainly_least(here):
@@ -196,7 +201,7 @@ def mobility_near(posture: Posture, here: Mobility) -> NearMobility:
 
 
 def _certainly_least(here: Mobility) -> bool:
-    """Return whether no posture has fewer freedoms, as all closures are independent."""
+    """Return whether all closures are independent, so no posture has fewer freedoms."""
     return here.overconstraint == 0 and here.freedoms_drives_locked == 0
 
 

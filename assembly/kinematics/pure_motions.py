@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-# for files rounded at 6 digits: parallel rods turn a platform by ten times that error
-_TURN = 1e-4  # [rad] largest rotation per reference length of a translation
-_PITCH = 1e-5  # [lengths] largest translation per rad of a rotation
+# both limits are for files rounded to 6 digits; parallel rods rotate a platform by ten
+# times this rounding error
+_TURN = 1e-4  # [rad] largest rotation per reference length of a pure translation
+_PITCH = 1e-5  # [reference lengths] largest translation per rad of a pure rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +110,8 @@ def _common_point(
         zero: [lengths] largest difference of velocities that counts as zero.
 
     Returns:
-        (3,) the point, None if there is none; and whether every point satisfies this.
+        (3,) the point, or None if there is none; and whether all axes can pass through
+        any point.
     """
     # p x axis must equal the rate, except for free translations
     rows = np.vstack([across @ -_cross(axis) for axis in axes])

@@ -1,4 +1,4 @@
-"""Test whether a posture is usable: joint limits, singularities, side of home."""
+"""Tests of a posture: joint limits, singularity, singularities between it and home."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,8 @@ def verdicts(
         target: k poses or sets of coordinates.
         q: (k, n) [rad or m] coordinates at the targets.
         T: (k, n, 4, 4) frames at the targets.
-        near: (k,) bool, True for postures that can be singular; None for all.
+        near: (k,) bool, True for postures that are tested for a singularity; None to
+            test all.
 
     Returns:
         For each posture :data:`BEYOND_LIMITS`, :data:`SINGULAR` or
@@ -83,7 +84,7 @@ def limits_passed(robot: Robot, q: NDArray) -> str:
         room = _ROUNDING * (size_of(robot) if slides else 1.0)
         low, high = frame.limits[0] - room, frame.limits[1] + room
         if frame.passive and frame.joint == "revolute":
-            # whole turns of a passive joint are not counted as motion
+            # full turns of a passive joint are subtracted from its coordinate
             value -= 2 * np.pi * np.floor((value - low) / (2 * np.pi))
         if not low <= value <= high:
             texts.append(

@@ -78,8 +78,8 @@ def compiled_bounds(assembly: Assembly, asked: Asked) -> tuple[dict[str, Any], N
         return rows, np.ones(count, dtype=bool)
     solution = assembly
     if asked.assumption == "free":
-        # the own axes turn without energy here: a clearance is fixed only if it remains
-        # loaded without the soft springs of these axes
+        # here, joints rotate about their own axes without energy. A clearance is fixed
+        # only if it remains loaded without the soft springs of these axes
         solution = with_free_own_axes(assembly)
         outcome[~np.isfinite(solution.clearances).all(axis=1)] = REFERENCE
     places = _places_of(robot, asked.assumption)

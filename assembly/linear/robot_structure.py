@@ -45,7 +45,8 @@ class Structure(NamedTuple):
         free_frame: (nq,) frame of each free motion.
         free_axis: (nq,) component of each free motion in its screw.
         free_lead: (nq,) [m/rad] translation along z per angle, of a helical joint.
-        free_bound: (nq,) [rad or m] bound that is not a cone; inf without a bound.
+        free_bound: (nq,) [rad or m] motion limit that is not included as a cone; inf
+            without a limit.
     """
 
     size: float

@@ -1,4 +1,4 @@
-r"""Exact equilibrium of a robot without clearances, for many rows together.
+r"""Exact equilibrium of a robot without clearances, for many measurements together.
 
 The equations are those of :mod:`forcefit.assembly.exact.exact`: closures hold on SE(3),
 every body and spring deforms by its compliance times its wrench, and free motions carry
@@ -34,9 +34,9 @@ _CLOSURE_TOLERANCE = 1e-11  # [rad, reference lengths] largest closure residual
 _FREE_FORCE = 1e-5  # relative to the largest wrench: largest force along a free motion
 # [rad, reference lengths] deformation below which a wrench counts as zero
 _ZERO_LOAD = 1e-9
-# largest ratio of two successive changes, after the first iterations
+# largest accepted ratio of two successive changes, after the initial iterations
 _CONTRACTION = 0.8
-_TRANSIENT = 3  # number of first iterations in which changes may increase
+_TRANSIENT = 3  # number of initial iterations in which the changes can increase
 _BATCH = 100  # number of rows solved together, which limits the memory
 
 
@@ -161,7 +161,7 @@ def _correction(state: RowState, first: bool) -> tuple[NDArray, NDArray, NDArray
 
 
 def _in_pieces(conditions: Conditions) -> Conditions:
-    """Return the conditions with a frame for every piece of a beam."""
+    """Return the conditions of the robot in which every piece of a beam is a frame."""
     cut = cut_beams(conditions.robot)
     if cut.robot is conditions.robot:
         return conditions

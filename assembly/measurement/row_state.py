@@ -1,4 +1,4 @@
-r"""Exact equilibrium equations of many rows, evaluated at an iterate.
+r"""Exact equilibrium equations of many measurements (rows), evaluated at an iterate.
 
 ======  =============  ===========  ==================================================
 symbol  code           shape        meaning
@@ -135,7 +135,7 @@ class Rows:
 
     @cached_property
     def times(self) -> Callable[[NDArray, NDArray], NDArray]:
-        """Function that multiplies matrices per posture with vectors per row."""
+        """Function that multiplies each row's vector by its posture's matrix."""
         return at_postures(self.posture_of_row)
 
     def corrected(self, right_side: NDArray) -> NDArray:
@@ -168,7 +168,7 @@ class Rows:
 
     @cached_property
     def commanded(self) -> NDArray:
-        """(R, n, 4, 4) commanded motions of the joints."""
+        """(R, n, 4, 4) motions of the joints by their commanded coordinates."""
         return along_own(self.conditions.robot, self.conditions.coordinates)
 
     @cached_property

@@ -145,7 +145,7 @@ class ErrorSources:
         return self.scale**2 * np.where(self.kind == 0, uniform, normal)
 
     def of_numbers(self, slopes: NDArray) -> NDArray:
-        """Return the columns (..., m) of these sources from slopes (..., n, 6)."""
+        """Return derivatives by source (..., m), given those by error (..., n, 6)."""
         return np.asarray(slopes[..., self.frame, self.component])
 
     @property

@@ -1,9 +1,10 @@
-r"""Load-deflection path beyond limit points by arc length, without clearance.
+r"""Load-deflection path beyond limit points, followed by arc length, without clearance.
 
-At a maximum of the load, the path of equilibria turns back, and there is no equilibrium
-nearby for larger loads.  The load is therefore treated as an unknown.  The path
-(x, lambda) is followed in steps of given length.  Each step is a prediction along the
-tangent, followed by corrections by Newton's method perpendicular to it,
+At a maximum of the load (a limit point), the path of equilibria turns back.  No
+equilibrium nearby exists for larger loads.  The load is therefore treated as an
+unknown.  The path (x, lambda) is followed in steps of given length.  Each step is a
+prediction along the tangent, followed by corrections by Newton's method perpendicular
+to it,
 
         [ Z'HZ   -Z'q ] [ t       ]     [ unbalanced force       ]
         [ tau_x   tau ] [ dlambda ] = - [ error of step's length ].
@@ -92,11 +93,12 @@ class _Path:
         component: component of the load that changes.
         rest: (6,) [N m, N] the other components of the load.
         gravity: (3,) [m/s^2] gravity vector, or None.
-        weight: weight of squared motions, relative to squared loads divided by the
-            squared largest load.
+        weight: factor of squared motions in the squared arc length.  The other term of
+            the squared arc length is the squared load divided by the squared largest
+            load.
         range: [N or N m] the largest load.
         parts: owner of each spring.
-        idle: number of motions without stiffness and load.
+        idle: number of motions that have no stiffness and on which no load acts.
     """
 
     posture: Posture
@@ -206,7 +208,7 @@ def follow_load(
 def _begin(
     path: _Path, start: ExactAssembly, first: float, last: float
 ) -> tuple[_Place, _Path]:
-    """Return the first equilibrium with its tangent, and the path with its weight."""
+    """Return the first equilibrium with its tangent, and the path to be followed."""
     local = start.expansion
     values, _ = path.modes(local)
     flat = np.abs(values) <= FLAT * np.abs(values).max(initial=0.0)
@@ -214,7 +216,7 @@ def _begin(
     values, Z = path.modes(local)
     motion = Z @ ((Z.T @ path.reference_load(local)) / values)
     size = np.linalg.norm(motion / local.placement.model.units) * path.range
-    weight = 1.0 / (size or 1.0) ** 2  # the size is zero if the robot is rigid
+    weight = 1.0 / (size or 1.0) ** 2  # if the robot is rigid, the size is zero
     # the load contributes half of the arc length
     rise = path.range / np.sqrt(2.0) * np.sign(last - first)
     place = _Place(first, local, motion * rise, float(rise), values, Z)
@@ -292,7 +294,7 @@ def _critical(path: _Path, low: _Place, high: _Place, step: float) -> Event:
     for _ in range(_HALVINGS):
         middle, _ = _advance(path, start, (short + long_) / 2)
         if middle is None:
-            break  # for example at a branch, where the equations are singular
+            break  # the equations are singular, for example at a branch
         if middle.unstable == start.unstable:
             low, short = middle, (short + long_) / 2
         else:

@@ -55,7 +55,7 @@ def platform_stiffness(
     side: Side = "holding",
     method: Method = "compiled",
 ) -> PlatformStiffness | Stiffnesses:
-    """Return the platform's stiffness: the tangent of its motion under a small wrench.
+    """Return the platform's tangent stiffness: small wrench per small motion.
 
     Args:
         posture: the robot's configuration; or many postures of one robot.

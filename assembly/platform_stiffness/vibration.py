@@ -48,8 +48,8 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_NULL = 1e-12  # eigenvalues below this share of the largest are zero
-_ROUNDING = 1e-14  # rounding of the mass matrix relative to its largest entry
+_NULL = 1e-12  # eigenvalues below this share of the largest count as zero
+_ROUNDING = 1e-14  # rounding error of the mass matrix, relative to its largest entry
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,8 @@ class NaturalModes:
 
     Attributes:
         posture: the robot's nominal configuration.
-        frequencies: (k,) [Hz]; 0 for motions without resistance, NaN if unstable.
+        frequencies: (k,) [Hz] natural frequencies; 0 for motions without resistance,
+            NaN for unstable modes.
         platform_screws: (6, k) [rad, m] motions of the platform for a modal mass of
             1 kg.
         shares: for each mode the share of every part in its elastic energy, largest
@@ -78,7 +79,7 @@ class NaturalModes:
     __repr__, _repr_html_ = short_repr, html_table
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return a data set over ``mode``; see :mod:`.tables`."""
+        """Return a data set with the dimension ``mode``; see :mod:`.tables`."""
         from forcefit.assembly.platform_stiffness.tables import modes_dataset
 
         return modes_dataset(self)
@@ -138,7 +139,7 @@ def natural_modes(
     if not np.trace(M) > 0.0:
         raise BadInput(_no_mass(posture.robot))
     squares, modes = _modes(H, M, rounding)
-    if not squares.size:  # the mass of the moving parts is only a rounding error
+    if not squares.size:  # the moving parts have no mass except for rounding errors
         raise BadInput(_no_mass(posture.robot))
     squares, modes, idle = _without_idle(
         squares, modes, platform_moves(equilibrium.expansion) @ D
@@ -200,10 +201,11 @@ def _modes(K: NDArray, M: NDArray, rounding: NDArray) -> tuple[NDArray, NDArray]
     Returns:
         (m,) squared frequencies and (k, m) modes.
     """
-    shift = np.trace(K) / np.trace(M) or 1.0  # 1 for a robot without elastic parts
+    # the shift is 1 for a robot without elastic parts
+    shift = np.trace(K) / np.trace(M) or 1.0
     values, vectors = np.linalg.eigh(K + shift * M)
     least = shift * np.sum(vectors * (rounding @ vectors), axis=0)
-    # omit motions without mass and spring
+    # omit motions on which neither a mass nor a spring acts
     kept = values > np.maximum(_NULL * values.max(), least)
     if not kept.any():
         return np.zeros(0), np.zeros((len(K), 0))

@@ -109,7 +109,8 @@ def irsbot2(
         placed = _leg(parameters, sign * x, z)
         if sign < 0:
             placed = {name: turned @ T for name, T in placed.items()}
-            placed["tip"] = placed["tip"] @ turned  # both tips are parallel to the base
+            # rotated so that the tips of both legs are parallel to the base
+            placed["tip"] = placed["tip"] @ turned
         frames += _frames(leg, placed, parameters)
     loops = [
         (f"{leg}.{a}", f"{leg}.{b}")
@@ -149,7 +150,7 @@ def drive_angle(parameters: IRSBot2Parameters, x: float, z: float) -> float:
 
 
 def _planar_length(P: IRSBot2Parameters) -> float:
-    """Return [m] length of the distal links projected along y."""
+    """Return the length [m] of the distal links projected along y."""
     return math.sqrt(P.L2**2 - (P.g - P.a) ** 2)
 
 

@@ -1,4 +1,4 @@
-"""Compiled billiard walk through the set of clearance positions.
+"""Compiled billiard walk (random sampling) through the set of clearance positions.
 
 Sources:
     Gryazina, Polyak (2014), Random sampling: billiard walk algorithm.
@@ -49,7 +49,7 @@ class Positions:
     def walk(
         self, u: NDArray, every: int, rng: np.random.Generator, trace: NDArray
     ) -> None:
-        """Continue a chain and record its platform screw at regular intervals.
+        """Continue a random chain and record its platform screw at regular intervals.
 
         Args:
             u: (nu,) current point of the chain, overwritten.

@@ -32,11 +32,11 @@ _TOLERANCE = 1e-13
 # Clarabel's default static regularisation, 1e-8, stops 3 of 12 points of the paper's
 # robot at a relative gap of 1e-6; without it the gap is 1e-13 for all of them
 _REGULARISATIONS = (0.0, 1e-10, 1e-8)
-# gap that counts as proved: relative to the energy, and to the energy without clearance
+# largest gap at which a solution counts as proved: relative to the energy, and to the
+# energy without clearance
 GAP, GAP_WITHOUT_CLEARANCE = 1e-8, 1e-12
 _GAP_WITHIN = 1e-12  # required relative gap of the interior-point method
-# share of the proved gap that is required here, because the full problem increases the
-# gap
+# share of that gap that is required here, because the full problem increases the gap
 _SHARE = 0.1
 _STOP = 1e-2  # share of this gap at which Newton's method stops
 # largest number of Newton steps, and first sigma of the method
@@ -48,7 +48,7 @@ _UNPROVED = "PrimalInfeasible, but its multipliers do not prove it"
 
 
 class SolverFailed(RuntimeError):
-    """Error: the solver found no solution of a problem.
+    """Raised if a solver finds no solution of a problem.
 
     Attributes:
         problem: name of the problem.
@@ -88,7 +88,7 @@ class ConicSolution:
 
 
 class ConeProgramme(NamedTuple):
-    """Arguments of :func:`minimise_energy`, scaled to size 1."""
+    """Arguments of :func:`minimise_energy`, scaled so that their size is about 1."""
 
     G: NDArray
     h: NDArray
@@ -368,7 +368,7 @@ def _clarabel(
     solution = clarabel.DefaultSolver(P, q, A, b, sets, settings).solve()
     status = str(solution.status)
     x, z = np.array(solution.x), np.array(solution.z)
-    # an inaccurate solution can be good enough, because its certificate decides
+    # an inaccurate solution is accepted here; its certificate decides later
     usable = {"Solved", "AlmostSolved", "InsufficientProgress", "MaxIterations"}
     if status not in usable or not (np.isfinite(x).all() and np.isfinite(z).all()):
         return None, z, status

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from forcefit.assembly.solvers.one_problem import Support
 
 _MOST = 400  # largest number of support functions
-# distance of every cut from the set, so that a flat set has corners too: relative to
-# the tolerance, and at least relative to the size of the set
+# distance of every cut from the set, so that the polytope around a flat set has corners
+# too: relative to the tolerance, and at least relative to the size of the set
 _SLACK, _LEAST_SLACK = 0.25, 1e-7
 
 

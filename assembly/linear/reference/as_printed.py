@@ -72,8 +72,8 @@ def margin_as_printed(posture: Posture, own_axes_free: bool = False) -> float | 
 
     Args:
         posture: the robot's configuration.
-        own_axes_free: whether compliant joints turn freely about their own axis; in the
-            printed problem they are rigid.
+        own_axes_free: whether compliant joints rotate freely about their own axis.  In
+            the printed problem, they are rigid.
 
     Returns:
         The factor; None if the problem is infeasible for every factor.
@@ -151,7 +151,8 @@ def _solve(problem: Any, allowed: set[str]) -> None:
 
     tight = {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
     try:
-        with warnings.catch_warnings():  # the status also reports inaccurate solutions
+        # the warning is redundant: the status also reports inaccurate solutions
+        with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             problem.solve(solver=cp.CLARABEL, **tight)
     except cp.error.SolverError as error:

@@ -44,13 +44,15 @@ from forcefit.assembly.linear.load import FrameLoads, loads_on_frames
 from forcefit.results.display import html_table, numbers, short_repr
 from forcefit.stiffness.screws import SCREW
 
-_STILL = 1e-6  # relative to the largest motion: smaller motions count as rounding
+# relative to the largest joint motion: smaller motions count as rounding errors
+_STILL = 1e-6
 _NAMED = 4  # largest number of joints that a message names
-_LOAD_ROUNDING = 1e-13  # relative to the largest load: smaller ones count as rounding
+# relative to the largest load: smaller loads count as rounding errors
+_LOAD_ROUNDING = 1e-13
 
 
 class FreeMotion(ValueError):
-    """The load drives a motion that nothing resists: there is no equilibrium."""
+    """Raised if a load drives a motion that nothing resists: no equilibrium exists."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,7 +235,7 @@ def _load_multipliers(
     """Return the multipliers that balance the loads along every free motion."""
     A_q, drive = lin.rows @ joints.free, joints.free.T @ frame_loads.joint
     multipliers = np.linalg.lstsq(A_q.T, -drive, rcond=RANK)[0]
-    # the residual, orthogonal to the rows of A_q, is a free motion that the load drives
+    # the part orthogonal to the rows of A_q is a free motion that the load drives
     left = A_q.T @ multipliers + drive
     most = np.maximum(
         1e-8 * np.abs(drive).max(initial=1e-300),
