@@ -38,7 +38,7 @@ def bodies(robot: Robot) -> tuple[str, ...]:
 
 
 def growing(robot: Robot) -> tuple[str, ...]:
-    """Return the frames whose length can differ: beams, or all bodies if no beams."""
+    """Return the bodies whose length can differ: beams, or all if there are none."""
     return beams(robot) or bodies(robot)
 
 

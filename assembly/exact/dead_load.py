@@ -312,7 +312,7 @@ def _on_unknowns(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDArray]:
 def _on_frames(
     place: Placement, loads: DeadLoads
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Return dead wrenches on all parts that bodies and joints carry, and their M."""
+    """Return dead wrenches on the parts that bodies and joints carry; matrices M."""
     posture = place.model.posture
     return resultants(posture, loads, place.body_ends, place.carried)
 
@@ -351,7 +351,7 @@ def resultants(
 
 
 def _read(G: NDArray, T: NDArray, origin: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Return moments and forces (..., n, 3) at the origin, and the M (..., n, 9)."""
+    """Return moments and forces (..., n, 3) at the origin; matrices M (..., n, 9)."""
     points = T[..., :3, :].copy()
     points[..., 3] -= origin
     moments = np.cross(points, G, axis=-2).sum(axis=-1)

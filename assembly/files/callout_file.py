@@ -143,7 +143,7 @@ def _drawn(
     form = read_form(table, shape)
     if form and not any(table.has(word) for word in _ZONES):
         for key in [k for k in table.content if k not in ("feature", "name", *FORMS)]:
-            fault = "found one of a feature whose form alone is stated"
+            fault = "found this key at a feature that has only a form tolerance"
             raise table.bad(key, f"{fault}, expected none")
         return None
     datums = joint_datums(table, feature.name, find)
@@ -194,7 +194,7 @@ def _callout(
     if table.has("length"):
         length = parsed_value(table, "length", parse_length)
     if envelope and shape != "plane":
-        fault = "found (E) of a feature that is no face"
+        fault = "found (E) at a feature that is not a face"
         raise table.bad("length", f"{fault}, expected none")
     if envelope and not extent:
         raise table.bad("extent", f"missing; expected {_EXTENTS[shape]}")
@@ -223,7 +223,7 @@ def _widths(table: Table, shape: str) -> tuple[dict[str, float], str]:
             continue
         if word in _EXCLUDED[shape]:
             article = "an" if shape == "axis" else "a"
-            fault = f"found for a feature that is {article} {shape}"
+            fault = f"found this zone at a feature that is {article} {shape}"
             raise table.bad(word, f"{fault}, expected none")
         widths[word], at_most = parsed_value(table, word, parse_width)
         if at_most and (word != "position" or shape != "axis" or not hole):
@@ -282,8 +282,8 @@ def _diameter(table: Table, shape: str) -> tuple[float, ...]:
     """Return the diameter [m] of a round face."""
     if shape != "plane":
         article = "an" if shape == "axis" else "a"
-        fault = f"found one of a feature that is {article} {shape}, expected none"
-        raise table.bad("diameter", f"{fault}; only a face has one")
+        fault = f"found it at a feature that is {article} {shape}, expected none"
+        raise table.bad("diameter", f"{fault}; only a face has a diameter")
     if table.has("extent"):
         fault = 'found it together with "extent", the sizes of a rectangular face'
         raise table.bad("diameter", f"{fault}; expected one of them")

@@ -27,7 +27,7 @@ def frame_datums(table: Table, frames: list[str]) -> tuple[Datum, ...]:
     """
     datums = tuple(_datum(table, value, frames) for value in _datum_list(table))
     if datums[0].hole:
-        fault = "found a hole at maximum material as datum A, whose tilt would shift"
+        fault = "found a hole at maximum material as datum A, whose tilt would change"
         raise table.bad("datums", f"{fault} too; expected it at B or C")
     return datums
 
@@ -70,8 +70,8 @@ def joint_datums(
         datums.append(Datum(joint.name, hole=hole if at_most else ""))
     shifting = [datum.frame for datum in datums if datum.hole]
     if hole and len(shifting) != 1:
-        fault = f"found one with {len(shifting)} datums at maximum material"
-        raise table.bad("datum_hole", f'{fault}, expected one such as "B (M)"')
+        fault = f"found a hole size, and {len(shifting)} datums with (M)"
+        raise table.bad("datum_hole", f'{fault}; expected one, such as "B (M)"')
     return datums
 
 
@@ -84,11 +84,13 @@ def _check_shifting(
         expected = f"expected (M) at a {' or '.join(_HOLES)} joint"
         raise table.bad("datums", f"{fault}; {expected}")
     if number == 0:
-        fault = f"found {quoted(value)} as datum A, whose tilt would shift too"
+        fault = f"found {quoted(value)} as datum A, whose tilt would change too"
         raise table.bad("datums", f"{fault}; expected (M) at datum B or C")
     if not hole:
         expected = 'expected "datum_hole" too, such as datum_hole = "12 H7"'
-        raise table.bad("datums", f"found {quoted(value)} without a size, {expected}")
+        raise table.bad(
+            "datums", f"found {quoted(value)} without a hole size, {expected}"
+        )
 
 
 def _datum_list(table: Table) -> list:
@@ -123,7 +125,7 @@ def _hole_of_datum(table: Table, name: str, shape: str) -> tuple[str, str]:
     if not table.has("hole"):
         return "", ""
     if shape != "axis":
-        fault = f"found one of a datum that is a {shape}"
+        fault = f"found a hole size for a datum of shape {shape}"
         raise table.bad("hole", f"{fault}, expected none")
     parsed_value(table, "hole", parse_hole)
     return table.text("hole"), table.text("hole_of", name)
@@ -150,7 +152,9 @@ def read_direction(table: Table, key: str) -> Vector | None:
     vector = table.array(key, (3,), "direction", largest=LARGEST_LENGTH)
     size = float(np.linalg.norm(vector))
     if size < 1e-12:
-        raise table.bad(key, "found no direction, expected 3 numbers, not all 0")
+        raise table.bad(
+            key, "found only zeros, expected a direction: 3 numbers, not all 0"
+        )
     x, y, z = (vector / size).tolist()
     return x, y, z
 

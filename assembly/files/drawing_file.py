@@ -102,7 +102,9 @@ def _copies(root: Table) -> Iterator[Copy]:
             name = leg.text("name", longest=LONGEST_NAME)
             leg.place = f"leg {quoted(name)}"
             if name in names:
-                raise leg.bad("name", "found a name twice, expected different names")
+                raise leg.bad(
+                    "name", "found the same name twice, expected different names"
+                )
             names.append(name)
             yield from _repeated(leg, name)
 
@@ -119,7 +121,9 @@ def _repeated(leg: Table, name: str) -> Iterator[Copy]:
     about = table.array("about", (3,), "direction", largest=LARGEST_LENGTH)
     size = float(np.linalg.norm(about))
     if size < 1e-12:
-        raise table.bad("about", "found no direction, expected 3 numbers, not all 0")
+        raise table.bad(
+            "about", "found only zeros, expected a direction: 3 numbers, not all 0"
+        )
     without_units(table, "at", "length")
     at = table.array("at", (3,), "m", np.zeros(3), largest=LARGEST_LENGTH)
     table.finish()

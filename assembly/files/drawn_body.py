@@ -57,7 +57,9 @@ def read_bodies(copied: Copy) -> Iterator[DrawnBody]:
         )
         for key in ("from", "to"):
             if table.has(key) and link is None:
-                raise table.bad(key, 'found a joint without "link", expected both')
+                raise table.bad(
+                    key, 'found a joint, but no "link"; expected both or neither'
+                )
         table.tables("tolerance")  # marked as used here; read when all joints are known
         table.finish()
         yield turned_body(body, copied.T)
@@ -127,7 +129,9 @@ def _ends(
         fault = f"found {len(here)} joint of the body" if here else "found no joint"
         raise table.bad("link", f"{fault}, expected two, between which the link is")
     if first == second:
-        raise table.bad("to", f"found {quoted(first)} at both ends, expected two")
+        raise table.bad(
+            "to", f"found {quoted(first)} at both ends, expected two joints"
+        )
     return first, second
 
 

@@ -83,7 +83,7 @@ def _axes(table: Table, kind: str) -> tuple[NDArray, NDArray, NDArray]:
         return axis, across, across
     if np.linalg.norm(np.cross(axis, axis2)) < _PARALLEL:
         raise table.bad(
-            "axis2", 'found a direction parallel to "axis", expected another'
+            "axis2", 'found a direction parallel to "axis", expected one across it'
         )
     return axis, perpendicular(axis, axis2), axis2
 
@@ -96,7 +96,9 @@ def _direction(table: Table, key: str, needed: bool) -> NDArray | None:
     vector = table.array(key, (3,), "direction", largest=LARGEST_LENGTH)
     size = float(np.linalg.norm(vector))
     if size < 1e-12:
-        raise table.bad(key, "found no direction, expected 3 numbers, not all 0")
+        raise table.bad(
+            key, "found only zeros, expected a direction: 3 numbers, not all 0"
+        )
     return np.asarray(vector / size)
 
 

@@ -122,7 +122,7 @@ def curve_link(
     pieces = read_pieces(tables, start, poisson)
     gap = float(np.linalg.norm(pieces[-1].place(1.0) - tip[:3, 3]))
     if gap > _GAP * float(np.linalg.norm(tip[:3, 3] - start)):
-        fault = f"found the end of the curve {gap:.3g} m from the joint there"
+        fault = f"found the end of the curve {gap:.3g} m away from the joint"
         raise table.bad("curve", f"{fault}, expected 0 m")
     try:
         C = curve_compliance(pieces, young, poisson, theory=theory)

@@ -51,7 +51,9 @@ def with_effects(robot: Robot, tables: Sequence[Table]) -> Robot:
             )
         effects = everywhere if session is None else sessions.setdefault(session, {})
         if name in effects:
-            raise table.bad("name", "found twice; expected one [[effect]] per name")
+            raise table.bad(
+                "name", "found this name twice; expected one [[effect]] per name"
+            )
         effects[name] = _parameters(table, robot, name)
     return replace(
         robot, effects=everywhere, session_effects=sessions, functions=tuple(functions)

@@ -41,11 +41,13 @@ def read_form(table: Table, shape: str) -> float:
             continue
         if shape != of_shape:
             article = "an" if shape == "axis" else "a"
-            fault = f"found one of a feature that is {article} {shape}"
+            fault = f"found this form at a feature that is {article} {shape}"
             raise table.bad(word, f"{fault}, expected none")
         width, at_most = parsed_value(table, word, parse_width)
         if at_most:
-            raise table.bad(word, "found (M), expected a width alone")
+            raise table.bad(
+                word, "found a width with (M), expected a width without (M)"
+            )
     return width
 
 

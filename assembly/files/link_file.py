@@ -233,7 +233,7 @@ def _direction(table: Table, key: str) -> tuple[float, float, float] | None:
 def _path(table: Table, key: str, path: str) -> Path:
     """Return a path that is written relative to the folder of the robot file."""
     if path.strip() in {"", ".", ".."}:
-        raise table.bad(key, f"found {describe(path)}, expected a file")
+        raise table.bad(key, f"found {describe(path)}, expected the path of a file")
     return Path(table.file).parent / path
 
 

@@ -62,7 +62,7 @@ def _computed(compute: Any, words: str, span: NDArray, values: dict) -> NDArray:
         K = np.asarray(found, dtype=float)
     except (TypeError, ValueError):
         raise BadInput(
-            f"{words} returned no array of numbers, expected (6, 6)"
+            f"{words} returned no array of numbers, expected a (6, 6) array"
         ) from None
     if K.shape != (6, 6) or not np.isfinite(K).all():
         raise BadInput(

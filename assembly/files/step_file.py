@@ -102,7 +102,7 @@ def _step(table: Table, robot: Robot) -> Step:
     """Return the step of one ``[[step]]`` table."""
     given = [kind for kind in KINDS if table.has(kind)]
     if len(given) != 1:
-        found = f"found {' and '.join(given)}" if given else "found none of its kinds"
+        found = f"found {' and '.join(given)}" if given else "found no kind of step"
         fault = f"{found}, expected one of {', '.join(KINDS)}"
         raise table.bad(given[-1] if given else "", fault)
     kind = given[0]
@@ -133,7 +133,7 @@ def _clamp(table: Table, name: str, robot: Robot) -> Step:
         position = _values(table, "at", "rad or m")
         return _held(table, Fix(name, frame, position, kind="clamp"))
     if table.has("at"):
-        raise table.bad("at", 'found together with "load", expected only one of them')
+        raise table.bad("at", 'found "at" and "load", expected only one of them')
     return Preload(name, frame, _wrench(table))
 
 
@@ -167,7 +167,7 @@ def _join(table: Table, name: str, robot: Robot) -> Join:
         fault = "found for a joint, which is bolted in its position; expected a closure"
         raise table.bad(key, fault)
     if leave_open and limit == inf:
-        raise table.bad("leave_open", 'found without "force_limit", expected both')
+        raise table.bad("leave_open", 'found no "force_limit" with it, expected both')
     return Join(name, part, locked, limit, leave_open)
 
 
@@ -278,7 +278,9 @@ def _values(table: Table, key: str, unit: str) -> dict[str, float] | None:
             values[name.upper()] = inner.number(name, unit, largest=largest)
     inner.finish()
     if not values:
-        raise table.bad(key, f"found none, expected some of {', '.join(_COMPONENTS)}")
+        raise table.bad(
+            key, f"found no component, expected some of {', '.join(_COMPONENTS)}"
+        )
     return values
 
 
@@ -290,5 +292,7 @@ def _wrench(table: Table) -> np.ndarray:
     values = [inner.number(name, "N m or N", 0.0, largest=LARGEST) for name in _LOADS]
     inner.finish()
     if not any(values):
-        raise table.bad("load", f"found none, expected some of {', '.join(_LOADS)}")
+        raise table.bad(
+            "load", f"found no component, expected some of {', '.join(_LOADS)}"
+        )
     return np.array(values)

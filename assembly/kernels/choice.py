@@ -49,7 +49,7 @@ def chosen() -> ModuleType:
     if wanted and wanted not in here:
         raise BadInput(
             f"{_VARIABLE} is {quoted(wanted)}; expected a level that this processor "
-            f"has, {', '.join(here) or 'of which there are none'}"
+            f"has, {', '.join(here) or 'but it has no such levels'}"
         )
     if not _on_x86_64():
         return _load("_portable")

@@ -52,7 +52,9 @@ def closing_of(
         BadInput: ``mismatch`` is not ``"spring"``.
     """
     if mismatch not in {None, "spring"}:
-        raise BadInput(f'--mismatch: found "{str(mismatch)[:60]}", expected spring')
+        raise BadInput(
+            f'--mismatch: found "{str(mismatch)[:60]}", expected the word spring'
+        )
     if rest is None and mismatch is None:
         return None
 

@@ -90,7 +90,7 @@ def check_holes(
             raise BadInput(fault_of(one.callout, f"{fault}, expected one hole"))
         fit = fits.get(one.hole_of)
         if parse_hole(size) != parse_hole(one.hole):
-            expected = f"{quoted(size)}, as before"
+            expected = f"{quoted(size)}, as stated before"
         elif fit is not None and _hole_of(fit) != parse_hole(one.hole):
             expected = f"that of the fit {quoted(fit)}"
         else:

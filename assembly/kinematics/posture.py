@@ -317,7 +317,7 @@ def place_robot(
             the pose is out of reach; the message contains the missing distance.
     """
     if pose and joints:
-        raise BadInput("found both a pose and joints, expected one of them")
+        raise BadInput("found both a pose and joints, expected only one of the two")
     if joints:
         target = joint_target(robot, joints)
     elif pose:

@@ -224,7 +224,7 @@ def _begin(
 
 
 def _advance(path: _Path, place: _Place, step: float) -> tuple[_Place | None, int]:
-    """Return the next equilibrium, None if not converged, and the correction count."""
+    """Return the next equilibrium or None, and the number of Newton corrections."""
     x0, load = place.local.placement.x, place.load
     x = x0 + step * place.motion
     load = load + step * place.rise

@@ -123,7 +123,9 @@ def natural_modes(
         ValueError: ``state`` or ``method`` is unknown.
     """
     if state not in {"nominal", "exact"}:
-        raise ValueError(f"natural_modes: no state {state!r}")
+        raise ValueError(
+            f"natural_modes: no state {state!r}; expected 'nominal' or 'exact'"
+        )
     if state == "nominal":
         # drive forces are loads, which the nominal state excludes
         frames = (

@@ -75,7 +75,7 @@ def minimise_energies(
 
 
 def into_cones_of_each(u: NDArray, group: NDArray) -> NDArray:
-    """Return (n, nu) vectors whose part in each cone is shortened to 1 if longer."""
+    """Return (n, nu) vectors; parts in a cone longer than 1 are shortened to 1."""
     return u / np.maximum(1.0, cone_sizes(u, group))[:, group]
 
 
