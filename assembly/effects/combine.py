@@ -44,7 +44,7 @@ def combined(declared: Effects, found: Effects) -> dict[str, dict[str, float]]:
 
 
 def _sum(declared: Values, found: Values) -> dict[str, float]:
-    """Return the sum of declared and found value of each parameter."""
+    """Return for each parameter the sum of its declared and its found value."""
     return dict(declared) | {k: declared.get(k, 0.0) + v for k, v in found.items()}
 
 
@@ -57,7 +57,7 @@ def _in_series(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _product(declared: Values, found: Values) -> dict[str, float]:
-    """Return the product of declared and found factor of each parameter."""
+    """Return for each parameter the product of its declared and its found factor."""
     return dict(declared) | {k: declared.get(k, 1.0) * v for k, v in found.items()}
 
 

@@ -36,7 +36,7 @@ class Unknown:
 
 
 def _as_they_are(robot: Robot, values: Values) -> dict[str, float]:
-    """Return the unknowns unchanged, because the unknowns are the parameters."""
+    """Return the unknowns unchanged, because they are equal to the parameters."""
     return dict(values)
 
 

@@ -26,7 +26,7 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
     C = joint_compliances(conditions.robot)
     for name, tau in values.items():
         row = conditions.robot.index(name)
-        # a torque inside the joint moves the joint by compliance x torque without
+        # an internal torque of the joint moves the joint by compliance x torque without
         # stress
         deflection = C[row, :, conditions.robot.frames[row].own_axis]
         conditions = with_screws(

@@ -1,9 +1,9 @@
 """Application of functions: general effects of a robot's file or of a diagnosis.
 
-A function changes the stress-free screws at a frame, the base, the reading or the load.
-If the function depends on a wrench, as every compliance does, its place is compliant.
-Such a function is solved together with the equilibrium
-(:mod:`forcefit.assembly.measurement.yields`).
+A function changes one of these: the stress-free screws at a frame, the pose of the
+base, the reading, or the load.  If the function depends on a wrench, as every
+compliance does, its place is compliant.  Such a function is solved together with the
+equilibrium (:mod:`forcefit.assembly.measurement.yields`).
 """
 
 from collections.abc import Iterable, Sequence
@@ -167,7 +167,7 @@ def inputs_of(conditions: Conditions, function: Function) -> NDArray:
         angle = inputs[0] if inputs else _now(conditions, first)
         return np.column_stack([history.direction(first)[row], angle])
     if form.name == "reversal":
-        # friction increases with the magnitude of the load, in both directions
+        # friction depends on the magnitude of the load, not on its sign
         sizes = [
             np.abs(x) if name.startswith("load.") else x
             for name, x in zip(further, inputs, strict=True)

@@ -1,4 +1,4 @@
-"""The library of effects: those of forcefit, and those of other distributions.
+"""The library of effects: effects of forcefit, and effects of other distributions.
 
 A distribution names an :class:`forcefit.assembly.effects.effect.Effect`::
 
@@ -76,7 +76,7 @@ class Library(Mapping[str, Effect]):
 
 
 def _naming_owner(effect: Effect, words: str) -> Effect:
-    """Return an effect whose functions name its distribution if they fail."""
+    """Return an effect whose errors name the distribution that defines it."""
     functions = {
         one.name: getattr(effect, one.name) for one in fields(effect)
         if callable(getattr(effect, one.name))

@@ -145,7 +145,7 @@ def _convex(p: ClearanceProblem, method: Method) -> tuple[NDArray, NDArray] | No
 def _conic(
     p: ClearanceProblem, S: NDArray, s: NDArray, method: Method
 ) -> tuple[NDArray, NDArray] | None:
-    """Return the step by the conic solver, for S without negative curvatures."""
+    """Return the step computed by the conic solver, with S made convex."""
     values, vectors = np.linalg.eigh(S)
     floor = _LEAST_CURVATURE * max(float(np.abs(values).max(initial=0.0)), 1e-150)
     G = np.sqrt(np.maximum(values, floor))[:, None] * vectors.T
@@ -156,7 +156,7 @@ def _conic(
 
 
 def _newton(p: ClearanceProblem) -> tuple[NDArray, NDArray] | None:
-    """Return the step by Newton's method on the active boundaries; None if it fails."""
+    """Return Newton's step on the boundaries of active cones; None if it fails."""
     force, rigid = p.multipliers
     u, active = p.start, force > 0.0
     for _ in range(_STEPS):

@@ -53,8 +53,8 @@ CLOSED = 1e-12  # [rad, reference lengths] largest residual of a solution
 LONGEST_STEP = 1.0  # [rad, reference lengths] largest change in a step
 # [rad, reference lengths] residual that defines which wrenches count as small
 _SMALL_RESIDUAL = 1e-9
-_LEAST_DAMPING = 1e-9  # relative to the largest closure wrench: smallest damping
-# relative to the largest closure wrench: first damping of a rejected step
+_LEAST_DAMPING = 1e-9  # smallest damping, relative to the largest closure wrench
+# damping after the first rejected step, relative to the largest closure wrench
 _FIRST_DAMPING = 1e-8
 _ATTEMPTS = 40  # largest number of attempts; each multiplies the damping by eight
 _RESTORATIONS = 4  # number of corrections that move a step back onto the closures
@@ -195,7 +195,7 @@ def _basis(unbounded: NDArray, closing: NDArray, null_space: NDArray) -> NDArray
 
 
 def _independent(rows: NDArray) -> tuple[NDArray, NDArray]:
-    """Return independent rows (p, nu) that span rows (m, nu), and the map (m, p)."""
+    """Return p independent rows that span m given rows (m, nu), and the map (m, p)."""
     if not rows.size:
         return np.zeros((0, rows.shape[1])), np.zeros((rows.shape[0], 0))
     U, S, _ = svd(rows, full_matrices=False)
@@ -243,8 +243,8 @@ def advance(
     # rounding errors of angles and positions, multiplied by the forces on them
     noise += 1e-14 * (penalty + pull)
     for attempt in range(_ATTEMPTS):
-        # if a Newton step is rejected, the conic solver repeats the step before it is
-        # damped
+        # if a Newton step is rejected, the conic solver repeats the step before the
+        # step is damped
         newton = near and attempt != 1
         step = _solve(local, damping + _LEAST_DAMPING * least, newton, method)
         if step is not None and step.length <= LONGEST_STEP:
@@ -272,7 +272,7 @@ def problem_name(at: Placement, loads: DeadLoads) -> str:
 
 
 def _solve(local: Expansion, damping: float, near: bool, method: Method) -> Step | None:
-    """Return the step to the minimum of the expansion; None if there is none."""
+    """Return the step to the minimum of the expansion; None if no minimum exists."""
     at, model = local.placement, local.placement.model
     normal = np.zeros(len(at.x))
     normal[local.unbounded] = -local.inverse @ at.residual
@@ -315,7 +315,7 @@ def _solve(local: Expansion, damping: float, near: bool, method: Method) -> Step
 
 
 def _restored(local: Expansion, change: NDArray) -> Placement:
-    """Return the placement after a step that is restored onto the closures."""
+    """Return the placement after a step, moved back onto the closures."""
     model = local.placement.model
     x = local.placement.x + change
     x[model.bounded] = into_cones(x[model.bounded], model.joints.group)

@@ -40,7 +40,8 @@ def imbalance(local: Expansion) -> float:
     # in an open chain, the forces on unloaded parts are only rounding errors
     unit = np.sqrt(np.diag(model.metric))
     acting = np.maximum(acting, local.small_wrench * unit)
-    # inside a cone the force is zero; at its boundary it is normal to the boundary
+    # a clearance inside its cone carries no force; at the boundary, its force is normal
+    # to the boundary
     u, group = at.x[model.bounded], model.joints.group
     force = cone_multipliers(u, unbalanced[model.bounded], group)
     unbalanced[model.bounded] += force[group] * u

@@ -154,7 +154,7 @@ class ExactAssembly:
         }
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return frames, closures and platform, see ``assembly.model.tables``."""
+        """Return the results by frame and closure; see ``assembly.model.tables``."""
         from forcefit.assembly.model.tables import assembly_dataset
 
         return assembly_dataset(self)
@@ -167,7 +167,7 @@ class ExactAssembly:
 
     @property
     def placement(self) -> Placement:
-        """Positions of all frames."""
+        """Displaced positions of all frames."""
         return self.expansion.placement
 
     @property
@@ -386,13 +386,14 @@ def solve_exact(
 
     assembly = search(start.joints)
     if assembly.clearance_excess() > 1e-9 and has_bounded_motion(posture.robot):
-        # an omitted bound of a passive joint is active: solve with all bounds
+        # an omitted motion limit of a passive joint is active: solve again with all
+        # limits
         assembly = search(virtual_joints(cut.robot, bounded_motion=True))
     return assembly
 
 
 def _refuse_compiled(*starts: Assembly | ExactAssembly | None) -> None:
-    """Reject a compiled solution as the start of the reference method."""
+    """Raise ValueError for a compiled solution as start of the reference method."""
     if any(start is not None and start.method != "reference" for start in starts):
         raise ValueError(
             "solve_exact: start or near: found a solution of the compiled "
@@ -402,7 +403,7 @@ def _refuse_compiled(*starts: Assembly | ExactAssembly | None) -> None:
 
 
 def _count(joints: VirtualJoints) -> int:
-    """Return the number of unknowns."""
+    """Return the number of unknowns of the problem."""
     return sum(part.shape[1] for part in (joints.elastic, joints.cones, joints.free))
 
 
@@ -410,7 +411,7 @@ def _search(
     joints: VirtualJoints, linear: Assembly, loads: DeadLoads, first: NDArray | None,
     progress: Callable[[int, int], None], method: Method,
 ) -> tuple[Expansion, float, int]:  # fmt: skip
-    """Iterate from a guess; return the expansion, imbalance and number of steps."""
+    """Iterate to an equilibrium; return its expansion, imbalance and step count."""
     model = FiniteRobot(linear.posture, joints)
     current = place(model, _first_guess(model, linear) if first is None else first)
     rigid = np.zeros(len(current.residual))

@@ -76,7 +76,7 @@ class FiniteRobot:
 
     @property
     def _free(self) -> int:
-        """Number of motions without a bound."""
+        """Number of free joint motions, which have no bound."""
         return self.joints.free.shape[1]
 
     @property
@@ -122,7 +122,7 @@ class FiniteRobot:
 
     @cached_property
     def _order(self) -> NDArray:
-        """(N,) position of each unknown's motion along any chain that contains it."""
+        """(N,) rank of each unknown's motion in the order of any chain with it."""
         return 4 * self.frame + self.motion
 
     @cached_property

@@ -119,7 +119,7 @@ class Placement:
 
     @cached_property
     def _open(self) -> NDArray:
-        """(K, 4, 4) residual motion of each closure, at the platform's origin."""
+        """(K, 4, 4) motion by which each closure is open, at the platform's origin."""
         first, second = self.transforms[self.model.closed_frames.T]
         G = first @ self.model.nominal_closures @ inverse(second)
         origin = self.model.posture.platform[:3, 3]
@@ -128,7 +128,7 @@ class Placement:
 
     @cached_property
     def _open_screws(self) -> NDArray:
-        """(K, 6) [rad, m] logarithms of the open closures."""
+        """(K, 6) [rad, m] screws by which the closures are open (logarithms)."""
         return logarithm(self._open)
 
     @cached_property
@@ -143,7 +143,7 @@ class Placement:
 
     @cached_property
     def _readings(self) -> NDArray:
-        """(N, 6, 6) maps from each unknown's screw to the platform's origin."""
+        """(N, 6, 6) maps that move each unknown's screw to the platform's origin."""
         m = self.model
         before = self._poses[m.motion, m.frame]
         offset = before[:, :3, 3] - m.posture.platform[:3, 3]
@@ -214,7 +214,7 @@ class Placement:
         return H + self.exponential_curvature(through)
 
     def exponential_curvature(self, through: NDArray) -> NDArray:
-        """Return the curvature that is due to the individual exponentials.
+        """Return the part of the curvature that the individual exponentials cause.
 
         Args:
             through: (N, 6) wrench on all parts that each unknown moves, at the

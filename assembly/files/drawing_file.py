@@ -1,4 +1,4 @@
-"""Robot files of ``format = 2``: bodies and joints by points and axes at home.
+"""Reading of robot files of ``format = 2``: bodies and joints in the home pose.
 
 The keys are described in ``docs/drawn_robots.md``.
 """

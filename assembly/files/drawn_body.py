@@ -76,13 +76,13 @@ def with_ends(
     """Return the body with the joints at the ends of its link.
 
     Args:
-        body: body as read.
-        copied: copy in which the body is written.
+        body: body as read from the file.
+        copied: copy of a leg to which the body belongs.
         joints: joints of the whole robot.
         point: (3,) [m] the platform's point if the body is the platform.
 
     Returns:
-        The body; a beam along a curve becomes a stiffness and a mass.
+        The body; a beam along a curve is replaced by its stiffness matrix and its mass.
 
     Raises:
         BadInput: a joint does not exist, or the curve does not lead from the first

@@ -138,7 +138,8 @@ def _solve(
     ends = parse_interface(link.base, "base"), parse_interface(link.tip, "tip")
     base = interface_center(surface, ends[0], "base")
     tip = interface_center(surface, ends[1], "tip")
-    _check_place(frame, link, tip - base)  # check before the finite elements run
+    # before the finite elements run, because they take long
+    _check_place(frame, link, tip - base)
     material = Material(link.young, link.poisson, link.density or 0.0)
     parts = [parse_part("parts", text) for text in link.parts]
     _LOG.info("finite elements of frame %s, %s", quoted(frame.name), link.surface)

@@ -1,4 +1,4 @@
-"""Ball joints that are modelled as three revolute frames.
+"""Detection of ball joints that are modelled as three revolute frames.
 
 In the home pose, the three axes are at right angles.  If the middle joint rotates by 90
 degrees, two axes coincide, and the model loses a freedom.  A real ball joint does not:

@@ -107,7 +107,7 @@ def rest_in(robot: Robot, name: str) -> Robot:
 
 
 def _corrected(robot: Robot, row: int, X: NDArray) -> Robot:
-    """Return the robot whose frame is moved by X, and whose error is the inverse."""
+    """Return the robot with a frame moved by X, and the inverse of X as its error."""
     frame = robot.frames[row]
     body = transform(frame.translation, rotation_matrix(frame.rotation)) @ X
     error = frame.geometric_error
@@ -205,7 +205,7 @@ def _independent(robot: Robot, T: NDArray) -> NDArray:
     driven = np.array([f.actuated for f in robot.frames])[mobile(robot)]
     loose = ~driven
     for column in np.flatnonzero(driven)[::-1]:
-        # a drive can be free if the other drives fix it through the closures
+        # a drive is redundant if the other drives fix it through the closures
         others = np.append(np.flatnonzero(loose), column)
         if _rank(A[:, others]) > _rank(A[:, loose]):
             loose[column] = True

@@ -70,7 +70,7 @@ def locked_closures(robot: Robot, T: NDArray) -> NDArray:
 
 
 def locked_ranks(robot: Robot, T: NDArray) -> NDArray:
-    """Return the (k,) ranks of :func:`locked_closures`."""
+    """Return the (k,) ranks of the matrices of :func:`locked_closures`."""
     values = np.linalg.svd(locked_closures(robot, T), compute_uv=False)
     return (values > SINGULAR * values[:, :1].clip(1e-300)).sum(axis=1)
 

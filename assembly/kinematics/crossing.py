@@ -55,7 +55,7 @@ def beyond_singularity(robot: Robot, target: Target, T: NDArray) -> NDArray:
 
 @lru_cache(maxsize=16)
 def home_rank(robot: Robot) -> int:
-    """Return the rank of the locked closures at home or nearby."""
+    """Return the rank of the closures with locked drives, at home or nearby."""
     home = home_posture(robot)
     return rank_near(robot, home.coordinates, home.transforms)
 

@@ -92,7 +92,8 @@ class NearMobility:
     Attributes:
         freedoms: the least number of freedoms at these postures; 0 if no motion leaves
             the given posture, because its freedoms are only infinitesimal.
-        there: the counts at a posture with that number; None if there is none.
+        there: the counts at a nearby posture with this number; None if no posture was
+            found.
     """
 
     freedoms: int
@@ -183,7 +184,8 @@ def mobility_near(posture: Posture, here: Mobility) -> NearMobility:
         if np.linalg.norm((to - q) / scale) < _BACK * _DISTANCE:
             returned += 1
         elif open_by < _CLOSED:
-            # singular values grow with the square of the distance from a singularity
+            # near a singularity, singular values are proportional to the squared
+            # distance
             zero = _LEAST if open_by < _EXACT else ZERO
             near = mobility(Posture(robot, to, track.transforms[0], open_by), zero)
             found.append(near)
@@ -194,7 +196,7 @@ def mobility_near(posture: Posture, here: Mobility) -> NearMobility:
         if _AGREEING in {returned, *agreeing.values()}:
             break
     if not found:
-        # no correction converged, so no smaller number of freedoms is known
+        # no nearby posture was found, so no smaller number of freedoms is known
         return NearMobility(0 if returned == _AGREEING else here.freedoms, None)
     least = min(found, key=lambda m: (m.freedoms, m.freedoms_drives_locked))
     return NearMobility(min(least.freedoms, here.freedoms), least)
@@ -265,7 +267,7 @@ class _Motions:
 
     @property
     def gap(self) -> float:
-        """Ratio of the least singular value that counts to the largest other one."""
+        """Least singular value that counts as nonzero, relative to the next one."""
         rank = self.joints.shape[1] - len(self.joints)
         if not rank:
             return np.inf

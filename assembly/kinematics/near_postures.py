@@ -26,7 +26,7 @@ def near_postures(
         robot: robot of n frames.
         q: (n,) [rad or m] coordinates of all joints.
         T: (n, 4, 4) frames seen from the base.
-        distance: [rad or lengths] norm of the motion.
+        distance: [rad or reference lengths] norm of the joint motion.
         count: number of postures.
 
     Yields:

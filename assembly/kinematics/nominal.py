@@ -83,7 +83,7 @@ def motion_screws(robot: Robot, T: NDArray) -> NDArray:
 def _tree(robot: Robot) -> dict[str, Any]:
     """Return the fields of a compiled tree, cached for each robot."""
     pairs = [[robot.index(name) for name in pair] for pair in robot.closures]
-    # the motion of a joint does not move its own frame
+    # a frame is defined before its joint, so the joint does not move it
     carries = robot.on_path - np.eye(len(robot.frames))
     moved = [carries[a] - carries[b] for a, b in pairs]
     moved.append(carries[robot.index(robot.platform)])

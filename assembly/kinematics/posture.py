@@ -174,7 +174,7 @@ def _paths(transforms: Unchanged, platform: int) -> NDArray:
 def _distinct(
     coordinates: Unchanged, transforms: Unchanged
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Return the rows with distinct coordinates, and the index of each row in them."""
+    """Return the distinct postures, and for each given posture its index among them."""
     q = coordinates.numbers
     _, first, which = np.unique(q, axis=0, return_index=True, return_inverse=True)
     return q[first], transforms.numbers[first], which.reshape(-1)
@@ -404,7 +404,7 @@ def place_many_joints(
 def _follow_many(
     robot: Robot, target: Target
 ) -> tuple[list[Posture | None], list[str]]:
-    """Return the posture of each target, or None and the reason."""
+    """Return for each target its posture, or None and the reason for failure."""
     track = _follow(robot, target)
     postures = [
         _posture(robot, track, i) if reached else None
@@ -460,7 +460,7 @@ def unreached(robot: Robot, track: Track, target: Target, i: int) -> str:
 
 
 def _posture(robot: Robot, track: Track, i: int) -> Posture:
-    """Return row i of a track as a posture with read-only arrays."""
+    """Return the end of track i as a posture with read-only arrays."""
     q, T = track.coordinates[i].copy(), track.transforms[i].copy()
     q.setflags(write=False)
     T.setflags(write=False)

@@ -62,7 +62,7 @@ def pure_motions(
     if not turning:
         return slides
     axes = _plain_basis(Wt[:turning], zero)
-    # velocities at c for these rotations, up to free translations
+    # velocities at c due to these rotations, without free translations
     across = _complement(free, zero)
     rates = axes @ np.linalg.pinv(w, rcond=zero) @ v @ across.T @ across
     point, anywhere = _common_point(axes, rates, across, exact)
@@ -113,7 +113,7 @@ def _common_point(
         (3,) the point, or None if there is none; and whether all axes can pass through
         any point.
     """
-    # p x axis must equal the rate, except for free translations
+    # p x axis must equal the velocity at the origin, except for free translations
     rows = np.vstack([across @ -_cross(axis) for axis in axes])
     goal = np.concatenate([across @ rate for rate in rates])
     point = np.linalg.lstsq(rows, goal, rcond=zero)[0]

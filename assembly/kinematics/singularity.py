@@ -128,7 +128,7 @@ def find_singularities(robot: Robot, transforms: NDArray) -> Singularities:
 
 @dataclass(frozen=True)
 class _Ranks:
-    """Ranks of closures, of Q and of its platform part, away from singularities."""
+    """Ranks of the closures, of Q and of its platform part, without singularity."""
 
     closures: int
     motions: int
@@ -221,7 +221,7 @@ def _drives_and_platform(
     drives = B.shape[2] - 6
     W, t, Q = np.linalg.svd(N @ B, full_matrices=False)
     Q = Q[:, : ranks.motions]
-    # joint rates that belong to the rows of Q
+    # joint rates that correspond to the rows of Q
     rates = np.swapaxes(W[:, :, : ranks.motions], 1, 2) @ N
     rates = rates / np.maximum(t[:, : ranks.motions, None], 1e-300)
     serial, still_platform = _least(Q[..., drives:], ranks.platform)

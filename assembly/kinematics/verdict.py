@@ -18,7 +18,8 @@ from forcefit.assembly.model.statuses import BEYOND_LIMITS, BEYOND_SINGULARITY, 
 
 SINGULAR_WORDS = "singular posture: the first-order analysis is inconclusive"
 _FAR_SIDE = "not connected to home without passing a singularity"
-_ROUNDING = 1e-8  # [rad, reference lengths] accepted excess over a limit
+# [rad, reference lengths] accepted excess of a coordinate over its limit
+_ROUNDING = 1e-8
 
 
 def verdicts(
@@ -56,7 +57,7 @@ def verdicts(
 
 
 def _singular(robot: Robot, q: NDArray, T: NDArray, near: NDArray) -> NDArray:
-    """Return (k,) bool, True for postures whose locked closures have too low a rank."""
+    """Return (k,) bool, True if the closures with locked drives lose rank."""
     singular = near.copy()
     if near.any():
         singular[near] = locked_ranks(robot, T[near]) < home_rank(robot)

@@ -362,12 +362,12 @@ class Assembly(Solution[N]):
 
 
 def _flat(screws: NDArray) -> NDArray:
-    """Reshape screws (..., n, 6) to (..., 6n)."""
+    """Return screws (..., n, 6) in the shape (..., 6n)."""
     return screws.reshape(*screws.shape[:-2], -1)
 
 
 def _by_frames(screws: NDArray) -> NDArray:
-    """Reshape screws (..., 6n) to (..., n, 6)."""
+    """Return screws (..., 6n) in the shape (..., n, 6)."""
     return screws.reshape(*screws.shape[:-1], -1, 6)
 
 

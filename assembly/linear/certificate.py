@@ -139,7 +139,7 @@ def unproved_screw(assembly: Assembly, bound: ScrewBound) -> list[str]:
 
 
 def _allowed(assembly: Assembly) -> NDArray:
-    """Return the (2,) [rad, m] largest accepted error of the platform screw."""
+    """Return the largest accepted rotation [rad] and translation [m] error."""
     halves = assembly.platform_screw.reshape(2, 3)
     return _SCREW + _SCREW_SHARE * np.linalg.norm(halves, axis=1)
 

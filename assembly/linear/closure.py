@@ -46,7 +46,7 @@ from forcefit.results.display import html_table, short_repr
 
 @dataclass(frozen=True, eq=False)
 class VirtualJoints:
-    """Columns of small screws of all parts that can move in a robot, except its drives.
+    """Columns of the small screws of all links, clearances, springs and free joints.
 
     Attributes:
         robot: robot of n frames.
@@ -155,7 +155,7 @@ def _virtual_joints(
 def _elastic(
     links: NDArray, joints: NDArray, robot: Robot
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the spring columns of links and joints, and (ny,) bool, True for links."""
+    """Return the columns of all springs, and (ny,) bool, True for springs of links."""
     count = len(robot.frames)
     columns, is_link = [np.zeros((6 * count, 0))], []
     for compliances, link in ((links, True), (joints, False)):

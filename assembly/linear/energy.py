@@ -228,7 +228,7 @@ def _solve_one(
     return with_known(assembly, known)
 
 
-@lru_cache(maxsize=32)  # called for one robot at many postures
+@lru_cache(maxsize=32)  # cached, because it is called for one robot at many postures
 def _rounding_of(robot: Robot) -> float:
     """Return the largest closure error [rad, lengths] that rounding can cause."""
     joints, _ = structure_of(robot)

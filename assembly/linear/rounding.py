@@ -35,7 +35,7 @@ def closure_rounding(errors: NDArray, joints: VirtualJoints, size: float) -> NDA
 
 @lru_cache(maxsize=64)
 def _clearance_sum(joints: VirtualJoints, size: float) -> float:
-    """Return the sum [rad, lengths] of all clearances."""
+    """Return the sum [rad, reference lengths] of the bounds of all clearances."""
     clearances = np.abs(joints.cones[:, joints.scaled]).sum(axis=1).reshape(-1, 6)
     return float((clearances @ in_reference_lengths(size)).sum())
 

@@ -94,7 +94,7 @@ class Solution(PointResults, Generic[N]):
         return self.linearisation.posture
 
     def __getitem__(self, rows: Any) -> Self:
-        """Return one point or a selection; raise the exception of a failed point."""
+        """Return one or several points; raise the exception of a failed point."""
         if not isinstance(rows, (int, np.integer)):
             return self._taken(np.arange(len(self))[rows])
         i = range(len(self))[rows]
@@ -122,7 +122,7 @@ class Solution(PointResults, Generic[N]):
         return with_known(alone, known)
 
     def _taken(self, rows: NDArray) -> Self:
-        """Return a selection of points, perhaps with repetitions."""
+        """Return a selection of points, in which a point can occur repeatedly."""
         lin, held = self.linearisation, self.held
         if self.posture.transforms.ndim > 3:
             lin = replace(lin, posture=self.posture[rows])
@@ -191,7 +191,7 @@ class Solution(PointResults, Generic[N]):
 
     @property
     def as_many(self) -> Self:
-        """The same point with a leading axis of length 1."""
+        """The solution of one point as a solution of many points, with k = 1."""
         lin = self.linearisation
         rows: dict[str, Any] = {
             name: np.asarray(getattr(self, name))[None]

@@ -88,7 +88,7 @@ class Zone(PointResults, Generic[N]):
 
     @property
     def assemblable(self) -> Any:
-        """(...) whether the rigid manipulator can be assembled."""
+        """(...) bool, True if the manipulator can be assembled without deformation."""
         return self.margin <= ASSEMBLABLE
 
     @property
@@ -194,7 +194,7 @@ def _erring(posture: Posture, errors: NDArray, i: int) -> Posture:
 def _compiled(
     posture: Posture, compliant: Compliant, own: NDArray, method: Method
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Return margins, bounds, forces, and a mask of points left to the reference."""
+    """Return margins, bounds, forces, and a mask of points for the reference method."""
     if compliant not in {"rigid", "free"}:
         raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
     joints, structure = structure_of(posture.robot, False, compliant == "free")

@@ -160,7 +160,7 @@ class Conditions:
 
     @property
     def measured_points(self) -> NDArray:
-        """(R, 3) [m] nominal positions of the measured points, base axes."""
+        """(R, 3) [m] nominal position of the measured point in each row, base axes."""
         T = self.postures.platform
         return T[:, :3, 3] + self.measured_arms
 

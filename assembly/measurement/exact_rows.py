@@ -72,7 +72,7 @@ def solve_rows(
 
 
 def _of_passive_joints(free: NDArray, robot: Robot) -> bool:
-    """Return whether all free motions (6n, q) are motions of passive joints."""
+    """Return whether all q free motions (6n, q) are motions of passive joints."""
     passive = np.array([frame.passive for frame in robot.frames])
     own = own_screws(robot) * passive[:, None]
     for column in free.T.reshape(-1, len(robot.frames), 6):
@@ -114,7 +114,7 @@ def _solve(rows: Rows) -> tuple[NDArray, NDArray]:
     converged &= np.abs(state.residual).max(axis=1, initial=0.0) <= _CLOSURE_TOLERANCE
     converged &= np.all(np.abs(state.motions) <= flexible.limit, axis=1)
     _, free_forces, _ = state.imbalance()
-    # without load, wrenches are due to rounding
+    # without loads, wrenches are only rounding errors
     zero_load = _ZERO_LOAD / flexible.softness
     largest = np.abs(state.total_wrenches / rows.scale).max(
         axis=(0, 2, 3), initial=zero_load

@@ -107,7 +107,7 @@ def predict(conditions: Conditions) -> Prediction:
 def _platform_screws(
     conditions: Conditions, one_by_one: int | None = None
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Return the platform screws; some rows are solved one by one.
+    """Return the platform screws of all rows; solve rows one by one where necessary.
 
     Returns:
         (R, 6) screws, (R,) reasons why there is no solution, and (R,) bool, True if
@@ -277,7 +277,7 @@ def _turned(R: NDArray, vectors: NDArray) -> NDArray:
 
 
 def assemble_row(conditions: Conditions, row: int) -> Assembly | ExactAssembly:
-    """Solve one row completely, with every screw and wrench of the robot.
+    """Solve one row and return all screws and wrenches of the robot.
 
     Args:
         conditions: conditions of all rows.
@@ -297,7 +297,7 @@ def assemble_row(conditions: Conditions, row: int) -> Assembly | ExactAssembly:
     load = conditions.load_at_origin()[row]
     gravity = conditions.gravity[row] if conditions.gravity[row].any() else None
     compliances = np.zeros(len(conditions.laws))
-    # the contacts of the linear model are nearly converged
+    # the contacts start from the linear model and are nearly converged
     if conditions.exact and conditions.laws:
         linear = assemble_row(replace(conditions, exact=False), row)
         compliances = secants(linear, conditions.laws)
@@ -341,7 +341,8 @@ def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
         np.zeros(len(conditions), dtype=bool),
     )
     if conditions.exact:
-        return unsolved  # these rows are solved one by one, with finite motions
+        # all rows unsolved: they are solved one by one, with finite motions
+        return unsolved
     distinct, which = conditions.postures.distinct
 
     def solve(held: Conditions) -> tuple[tuple[NDArray, NDArray], NDArray]:

@@ -64,13 +64,13 @@ class Rows:
 
     @cached_property
     def loads(self) -> DeadLoads:
-        """Loads and weights as dead loads."""
+        """All loads, including weights, as dead loads."""
         c = self.conditions
         return dead_loads_of_rows(c.postures, c.errors, c.load, c.gravity, c.point)
 
     @cached_property
     def elastic_frames(self) -> tuple[NDArray, NDArray]:
-        """Frames with elastic bodies, and frames with elastic joints."""
+        """Indices of frames with elastic bodies, and of frames with elastic joints."""
         with_contact = [
             self.conditions.robot.index(law.frame) for law in self.conditions.laws
         ]
@@ -80,7 +80,7 @@ class Rows:
 
     @cached_property
     def free_frames(self) -> NDArray:
-        """Frames whose joints have free motions."""
+        """Indices of the frames whose joints have free motions."""
         moved = self.flexible.free.any(axis=1).reshape(-1, 6)
         return np.flatnonzero(moved.any(axis=1))
 

@@ -82,7 +82,7 @@ class Flexibility:
 
     @cached_property
     def compliance(self) -> NDArray:
-        """(n, 6, 6) compliances of body and joint together."""
+        """(n, 6, 6) sums of the compliances of each body and its joint."""
         return self.body_compliances + self.joint_compliances
 
     def solve(
@@ -206,8 +206,8 @@ class FlexibleAssembly:
 
 @lru_cache(maxsize=4)
 def _under_load(flexible: Flexibility, loads: FrameLoads) -> NDArray | None:
-    """Return (R, 6n) screws of bodies and joints that loads cause in open chains."""
-    # the result is the same for all conditions that differ only in errors
+    """Return the (R, 6n) deformations that loads cause in an open chain."""
+    # cached: conditions that differ only in errors have the same result
     if not loads:
         return None
     screws = _each(flexible.body_compliances, loads.body)

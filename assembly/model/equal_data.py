@@ -77,7 +77,7 @@ def _feed(update: Callable[[bytes], None], value: Any) -> None:
 
 
 def _feed_parts(update: Callable[[bytes], None], value: Any) -> None:
-    """Add a value that consists of parts, or its text, to a digest."""
+    """Add the parts of a value to a digest, or the text of a value without parts."""
     if is_dataclass(value):
         update(type(value).__name__.encode())
         parts = _fields_of(value)

@@ -112,7 +112,7 @@ def peak_stresses(
 
 
 def _of_beam(frame: Frame) -> Callable[..., NDArray]:
-    """Return the function that computes the peak stress of a beam."""
+    """Return the peak stress of a beam as a function of its wrench."""
     assert isinstance(frame.link, BeamLink)
     length, axis = beam_axis(frame)
     section, R = frame.link.section, section_axes(axis, frame.link.up)
@@ -128,7 +128,7 @@ def _of_beam(frame: Frame) -> Callable[..., NDArray]:
 
 
 def _of_mesh(frame: Frame, row: int) -> LinkStress:
-    """Return the peak stress of a link given by its surface."""
+    """Return the peak stress of a mesh link as a function of its wrench."""
     from forcefit.stiffness.fem.stress import stress_influence, von_mises
 
     solved = mesh_solution(frame).solved

@@ -156,7 +156,7 @@ def motion_map(frame: Frame) -> NDArray:
 
 
 def in_series(stiffness: NDArray | None, row: int, compliance: float) -> NDArray:
-    """Return K_B with a spring in series in one direction of its own axes.
+    """Return K_B of a joint with an additional spring in series in one direction.
 
     Args:
         stiffness: (6, 6) declared stiffness, None if rigid.

@@ -142,7 +142,7 @@ def mesh_rotation(
 
 
 def _triad(along: NDArray, up: NDArray) -> NDArray:
-    """Return right-handed axes: first along, third as near to up as possible."""
+    """Return right-handed axes: the first along a span, the third near ``up``."""
     side = np.cross(up, along)
     side = side / np.linalg.norm(side)
     return np.column_stack([along, side, np.cross(along, side)])

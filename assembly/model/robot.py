@@ -64,11 +64,11 @@ class Robot(EqualData):
             :mod:`forcefit.assembly.effects`.
         session_effects: for each session, the effects that act only in this session.
         functions: known general effects of the machine.
-        learned_range: least and largest value of each variable in the data from which
-            the effects were identified, by public name.
+        learned_range: for each variable, by public name, its least and largest value in
+            the data from which the effects were identified.
         reference_point: (3,) [m] point at which the robot was identified, in platform
             axes; None if it was not identified.
-        diagnosis: information from the file about the robot's diagnosis: verdict,
+        diagnosis: data in the file on the diagnosis that identified the robot: verdict,
             fitted rows, hold-out error, hash of the campaign, path of the covariance.
         remarks: sentences on default values of the file that are easily overlooked.
         callouts: tolerance callouts of features, as stated in the drawing.
@@ -238,7 +238,7 @@ class Robot(EqualData):
 
 
 def _with_error(frame: Frame, error: NDArray) -> Frame:
-    """Return a frame with another geometric error and no locked-in clearance."""
+    """Return a frame with a new geometric error, without locked-in clearance."""
     bolt = frame.locked_at
     if bolt is not None:
         bolt = replace(bolt, screw=np.zeros(6))

@@ -99,7 +99,7 @@ def settle(assembly: Assembly) -> Assembly:
 
 
 def _settled(assembly: Assembly, pressed: NDArray) -> Assembly:
-    """Return the equilibrium with these clearances at their bounds."""
+    """Return the equilibrium with the given clearances at their bounds."""
     joints, group = assembly.joints, assembly.joints.group
     x, multipliers = unknowns(assembly), assembly.multipliers
     bounded = bounded_unknowns(joints)

@@ -217,7 +217,7 @@ def _begin(
     motion = Z @ ((Z.T @ path.reference_load(local)) / values)
     size = np.linalg.norm(motion / local.placement.model.units) * path.range
     weight = 1.0 / (size or 1.0) ** 2  # if the robot is rigid, the size is zero
-    # the load contributes half of the arc length
+    # the weight is chosen so that the load contributes half of the arc length
     rise = path.range / np.sqrt(2.0) * np.sign(last - first)
     place = _Place(first, local, motion * rise, float(rise), values, Z)
     return place, replace(path, weight=float(weight))
@@ -258,7 +258,7 @@ def _solve(
     path: _Path, local: Expansion, modes: tuple[NDArray, NDArray], tangent: NDArray,
     left: NDArray,
 ) -> NDArray | None:  # fmt: skip
-    """Return the motion along the modes and the load change that remove a residual."""
+    """Return the motion and the change of the load that remove a residual."""
     values, Z = modes
     M = np.zeros((len(left), len(left)))
     M[:-1, :-1] = np.diag(values)
@@ -273,7 +273,7 @@ def _solve(
 def _oriented(
     path: _Path, local: Expansion, load: float, normal_to: NDArray, rise: float
 ) -> _Place | None:
-    """Return an equilibrium with its unit tangent in the direction of travel."""
+    """Return an equilibrium with its unit tangent, in the direction of the path."""
     values, Z = path.modes(local)
     left = np.zeros(len(values) + 1)
     left[-1] = -1.0

@@ -260,7 +260,7 @@ def _solve(
             posture, wrench, gravity=gravity, progress=progress, method=method
         )
     active, force = active_clearances(equilibrium.expansion)
-    # omit contacts with forces due to rounding errors only
+    # omit contacts whose forces are only rounding errors
     active &= force > _CARRIES * force.max(initial=0.0)
     names = clearance_names(equilibrium.expansion.placement.model.joints, active)
     return _Point(value, equilibrium, exact_tangent(equilibrium, "letting go"), names)
@@ -345,7 +345,7 @@ def _event(point: _Point, kind: str, what: str, component: int) -> Event:
 def _bracket(
     low: _Point, high: _Point, at: _Solver, same: Callable[[_Point], bool]
 ) -> tuple[_Point, _Point]:
-    """Return two close loads between which a property changes for the first time."""
+    """Bracket the first change of a property between two close loads."""
     for _ in range(_HALVINGS):
         try:
             middle = at((low.load + high.load) / 2, low)

@@ -82,7 +82,7 @@ def in_contact(assembly: Assembly, side: Side = "holding") -> PlatformStiffness:
 
 
 def active_tangent(assembly: Assembly, side: Side = "holding") -> PlatformStiffness:
-    """Return the tangent of an assembly that may be slightly out of equilibrium.
+    """Return the tangent stiffness of an assembly that is nearly in equilibrium.
 
     Args:
         assembly: assembly with clearances that are accurate to rounding.

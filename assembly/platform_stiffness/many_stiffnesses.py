@@ -122,7 +122,7 @@ class Stiffnesses:
     def _roots(self) -> tuple[NDArray, NDArray]:
         """Singular values (k, 6), vectors (k, 6, 6) of the scaled compliance roots."""
         scale = np.repeat([self.length, 1.0], 3)
-        # reduce to six rows by a triangular factor, because there can be many springs
+        # a triangular factor reduces the many rows of springs to six
         known = np.isfinite(self.springs).all(axis=(1, 2))
         values = np.full((len(self.springs), 6), np.nan)
         vectors = np.full((len(self.springs), 6, 6), np.nan)

@@ -209,7 +209,7 @@ class PlatformStiffness:
 
     @cached_property
     def _resisted(self) -> tuple[NDArray, NDArray, NDArray]:
-        """Basis of resisted wrenches (6, r), stiffness in it, and rigid wrenches."""
+        """Basis (6, r) of resisted wrenches, stiffness in it, and rigid wrenches."""
         scale = self._scale[:, None]
         basis = null_space((scale * self.free).T) if self.free.size else np.eye(6)
         whole = scale * self.root
@@ -232,7 +232,7 @@ class PlatformStiffness:
         way, core, rigid = self._resisted
         values, vectors = np.linalg.eigh(core)
         scale = self._scale[:, None]
-        # screws that are orthonormal if rotations are multiplied by the length
+        # these screws are orthonormal after multiplication of rotations by the length
         screws = np.hstack([
             np.linalg.qr(scale * self.free)[0],
             way @ vectors / scale,

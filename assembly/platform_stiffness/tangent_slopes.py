@@ -223,7 +223,7 @@ def _difference(
     conditions: Callable[[Posture], tuple[NDArray, NDArray]],
     ahead: Posture, back: Posture, step: float,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the derivatives of closures and gradient for fixed unknowns."""
+    """Return the derivatives of closures and gradient with the unknowns fixed."""
     there, behind = conditions(ahead), conditions(back)
     return (there[0] - behind[0]) / (2 * step), (there[1] - behind[1]) / (2 * step)
 

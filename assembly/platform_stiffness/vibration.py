@@ -321,7 +321,7 @@ def _beam_mass(frame: Frame) -> NDArray:
     e, f, g = 3 * length, 4 * length**2, length**2
     bends = ((4, 2, 10, 8), 1, section.I_z), ((5, 1, 11, 7), -1, section.I_y)
     for plane, sign, second in bends:
-        # a rotation about y lowers points that are ahead along x
+        # a positive rotation about y moves points at positive x in the direction -z
         s = np.array([1, sign, 1, sign])
         shift = np.array([
             [156, a, 54, -b], [a, c, b, -d], [54, b, 156, -a], [-b, -d, -a, c]

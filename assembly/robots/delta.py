@@ -115,7 +115,7 @@ def drive_angle(
 
 
 def _radial(azimuth: float) -> tuple[NDArray, NDArray]:
-    """Return the unit vectors outward and across, in the base's plane."""
+    """Return the unit vectors outward and tangential, in the plane of the base."""
     c, s = math.cos(azimuth), math.sin(azimuth)
     return np.array([c, s, 0.0]), np.array([-s, c, 0.0])
 

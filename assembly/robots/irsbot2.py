@@ -13,7 +13,7 @@ counted from 1.  Errors act at the frames :data:`ERROR_FRAMES` of the paper.
 ======  ===========================================================================
 symbol  meaning [m, rad]
 ======  ===========================================================================
-b       from the base's origin to the parallelogram's first joint
+b       distance from the base's origin to the parallelogram's first joint
 d       fixed side of the parallelogram, alpha its angle to the platform's plane
 f g e   from the parallelogram's end to the universal joints, base axes
 p a     from the far universal joints to the platform, base axes

@@ -190,7 +190,8 @@ def _by_clarabel(
     r, nu = G.shape
     cones, radii = _unit_cones(group, np.ones(nu))
     rows = np.vstack([G, H, cones.toarray()])
-    # dense, because assembling a small sparse matrix takes longer than its solution
+    # the matrix is dense, because assembling a small sparse matrix takes longer than
+    # solving
     A = csc_matrix(np.hstack([rows, np.eye(len(rows), r)]))
     b = np.concatenate([-h, k, radii])
     P = csc_matrix(np.diag(np.repeat([0.0, 1.0], [nu, r])))
@@ -251,7 +252,7 @@ def _certify(
     value = float(strain @ strain) / 2 - float(problem.d @ u)
     bound = _energy_bound(problem, springs, rigid)
     if not problem.d.any():
-        # a multiple f of the multipliers is a valid proof: f gain - f^2 cost / 2
+        # every multiple f of the multipliers proves a bound: f gain - f^2 cost / 2
         cost = float(springs @ springs)
         factor = max(0.0, bound + cost / 2) / cost if cost > 0.0 else 0.0
         better = _energy_bound(problem, factor * springs, factor * rigid)
@@ -300,7 +301,8 @@ def least_factor(
     """
     m, nu = B.shape
     rows = np.linalg.norm(B, axis=1)
-    # if every cone is scaled, t is proportional to ``right``; it is scaled to length 1
+    # if every cone is scaled, t is proportional to ``right``, which is scaled to length
+    # 1
     size = np.linalg.norm(right / rows) if scaled.all() else 1.0
     unit_cones, radii = _unit_cones(group, np.where(scaled, 0.0, 1.0))
     _, factors = _unit_cones(group, np.where(scaled, -1.0, 0.0))

@@ -40,7 +40,7 @@ def farthest(
     part = slice(half, half + 3)
     best, low = centre, float(np.linalg.norm(centre[part]))
     cuts: list[NDArray] = []
-    room: list[float] = []  # distance from the centre to each cut
+    room: list[float] = []  # distance [rad or m] from the centre of the set to each cut
     directions = [*np.eye(3), *-np.eye(3)]
     while True:
         for direction in directions:

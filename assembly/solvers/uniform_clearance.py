@@ -122,7 +122,7 @@ def is_mixed(trace: NDArray) -> bool:
     """Return whether the chains of all varying components have mixed."""
     moving = trace[:, :, trace.std(axis=(0, 1)) > _CONSTANT]
     return all(
-        # written so that NaN counts as not mixed
+        # the condition is written so that NaN counts as not mixed
         r_hat <= R_HAT and effective >= EFFECTIVE
         for r_hat, effective in map(diagnose, np.moveaxis(moving, 2, 0))
     )

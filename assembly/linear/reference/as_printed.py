@@ -94,7 +94,7 @@ def margin_as_printed(posture: Posture, own_axes_free: bool = False) -> float | 
 
 
 def _root_of_stiffness(C: NDArray) -> NDArray:
-    """Return (6, 6) R; R^T R is the stiffness, with zeros in rigid directions."""
+    """Return a (6, 6) root R of the stiffness R^T R, zero in rigid directions."""
     soft = np.flatnonzero(np.diag(C) > 0)
     root = np.zeros_like(C)
     root[np.ix_(soft, soft)] = np.linalg.cholesky(
@@ -146,7 +146,7 @@ def _assembly_constraints(
 
 
 def _solve(problem: Any, allowed: set[str]) -> None:
-    """Solve with tight tolerances; raise if the status is not allowed."""
+    """Solve with tight tolerances; raise RuntimeError unless the status is allowed."""
     import cvxpy as cp
 
     tight = {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}

@@ -368,7 +368,7 @@ def clearances_in(assembly: Assembly, joints: VirtualJoints) -> NDArray:
 
 
 def _rows(A: NDArray, noise: float) -> NDArray:
-    """Return an orthonormal basis of the rows of A, up to rounding."""
+    """Return an orthonormal basis of the span of the rows of A, up to rounding."""
     _, S, Vt = svd(A, full_matrices=False)
     return Vt[: rank_of(S, ROWS_RANK, noise)]
 
