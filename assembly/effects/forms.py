@@ -53,7 +53,7 @@ _INDEX = re.compile("0|-?[1-9][0-9]{0,8}")
 
 @dataclass(frozen=True)
 class Form:
-    """One form of a function.
+    """A form: the shape of a function of one or two variables.
 
     Attributes:
         name: name of the form in robot files.

@@ -39,7 +39,7 @@ from forcefit.stiffness.screws import rotation_matrix, skew, transform
 
 @dataclass(frozen=True, eq=False)
 class DeadLoads:
-    """All loads on a robot with finite motions.
+    """All dead loads on a robot that makes finite motions.
 
     Attributes:
         load: (6,) [N m, N] wrench on the platform at its origin, base axes.
@@ -59,7 +59,7 @@ class DeadLoads:
 
     @cached_property
     def beyond_platform(self) -> bool:
-        """Whether a body or joint other than the platform is loaded."""
+        """Whether a load acts on a body or joint other than the platform."""
         return bool(np.any(self.bodies) or np.any(self.carried))
 
 

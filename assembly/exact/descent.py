@@ -160,8 +160,9 @@ def expand(at: Placement, loads: DeadLoads, rigid: NDArray) -> Expansion:
     U, S, Vt = svd(A[:, unbounded] * unit, full_matrices=True)
     tolerance = rank_tolerance(model.posture.mismatch)
     rank = int(np.sum(S > tolerance * S.max(initial=0.0)))
-    # left singular vectors of the range divided by their singular values, left singular
-    # vectors of the complement, right singular vectors in the units of the unknowns
+    # three parts of a singular value decomposition: left vectors of the range, divided
+    # by their singular values; left vectors of the complement; right vectors in the
+    # units of the unknowns
     range_, rigid_space, V = U[:, :rank] / S[:rank], U[:, rank:], unit[:, None] * Vt.T
     inverse = V[:, :rank] @ range_.T
     multipliers = inverse.T @ gradient[unbounded]

@@ -1,4 +1,4 @@
-"""The key ``locked_at`` of a fixed joint: the pose at which it is bolted."""
+"""Reader of the key ``locked_at``: the pose at which a fixed joint is bolted."""
 
 from typing import Any
 
@@ -70,7 +70,7 @@ def bolt_table(bolt: LockedAt) -> Any:
     """Return the value of ``locked_at`` for a robot file.
 
     Args:
-        bolt: the pose at which a joint is bolted.
+        bolt: pose at which the joint is bolted, and its clearance before bolting.
 
     Returns:
         Plain values of the file format.

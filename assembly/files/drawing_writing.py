@@ -122,7 +122,7 @@ def _drive_stiffness(joint: DrawnJoint) -> float | None:
 
 
 def _none(key: str) -> Any:
-    """Return the value that is written for an absent clearance, stiffness or error."""
+    """Return the value that means no clearance, no stiffness or no error in a file."""
     free = [np.inf, np.inf, 0.0, np.inf, np.inf, np.inf]
     return {"clearance": {}, "joint_stiffness": free}.get(key, [0.0] * 6)
 

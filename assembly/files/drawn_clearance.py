@@ -114,7 +114,7 @@ def _of_shaft(bounds: Clearance) -> Clearance | None:
 
 
 def _refuse_without_shaft(table: Table, key: str, kind: str) -> None:
-    """Raise BadInput for a bore or bearings of a joint without a shaft."""
+    """Raise BadInput if a joint without a shaft has a bore or bearings."""
     if not {0, 1, 3, 4}.isdisjoint(FREE_ROWS[kind]):
         fault = f"found the clearance of a shaft on a {kind} joint"
         raise table.bad(key, f"{fault}, which has no shaft; expected none")

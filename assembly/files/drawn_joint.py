@@ -103,7 +103,7 @@ def _direction(table: Table, key: str, needed: bool) -> NDArray | None:
 
 
 def _limits(table: Table, unit: str) -> tuple[float, float] | None:
-    """Return the least and largest coordinate; None if not given."""
+    """Return the least and largest commanded coordinate; None if not given."""
     if not table.has("limits"):
         return None
     least, most = table.array("limits", (2,), unit, largest=LARGEST_LENGTH)

@@ -136,7 +136,7 @@ def read_fitted_end(table: Table) -> FittedEnd | None:
 
 
 def _fitted_end(inner: Table) -> FittedEnd | None:
-    """Return ``length``, ``parts`` and ``bound`` of a clearance with a fit."""
+    """Return ``length``, ``parts`` and ``bound`` of a clearance table with a fit."""
     if not inner.has("length"):
         return None
     for key, fault in (("fit", "missing"), ("parts", "missing")):

@@ -341,7 +341,7 @@ def _drive_force(table: Table, passive: bool) -> float:
 
 
 def _limits(table: Table) -> tuple[float, float] | None:
-    """Return the least and largest coordinate of a command; None if not given."""
+    """Return the least and largest commanded coordinate; None if not given."""
     if not table.has("limits"):
         return None
     least, most = table.array("limits", (2,), "rad or m", largest=LARGEST_LENGTH)

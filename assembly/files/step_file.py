@@ -127,7 +127,7 @@ def _fix(table: Table, name: str, robot: Robot) -> Fix:
 
 
 def _clamp(table: Table, name: str, robot: Robot) -> Step:
-    """Return a clamp at the frame's current pose, at a position, or with a force."""
+    """Return a step that clamps a frame where it is, at a position, or by a force."""
     frame = _frame(table, "clamp", robot)
     if not table.has("load"):
         position = _values(table, "at", "rad or m")
@@ -172,7 +172,7 @@ def _join(table: Table, name: str, robot: Robot) -> Join:
 
 
 def _preload(table: Table, name: str, robot: Robot) -> Preload:
-    """Return a load that acts until it is released."""
+    """Return a step that applies a load, which acts until it is released."""
     return Preload(name, _frame(table, "preload", robot), _wrench(table))
 
 
@@ -193,7 +193,7 @@ def _measure(table: Table, name: str, robot: Robot) -> Measure:
 
 
 def _adjust(table: Table, name: str, robot: Robot) -> Adjust:
-    """Return an adjustment, with the reading that it minimises."""
+    """Return an adjustment step, with the reading that the adjustment minimises."""
     components = _names(table, "components")
     reading = _part(table, "reading", robot)
     of: tuple[str, ...] = SCREW

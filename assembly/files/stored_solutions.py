@@ -111,7 +111,7 @@ def _one_process(mark: Path) -> Generator[None, None, None]:
 
 
 def _read(path: Path, key: str) -> MeshSolution | None:
-    """Return a stored solution; None if it is absent or invalid."""
+    """Return the stored solution of a key; None if it is absent or invalid."""
     try:
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as stored:
             content = json.loads(str(stored["content"]))

@@ -1,4 +1,4 @@
-"""Text of values and tables in TOML: all digits of numbers, arrays on one line."""
+"""TOML text of values and tables, with all digits of numbers and arrays on one line."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any

@@ -236,7 +236,7 @@ def _drives_and_platform(
 
 
 def _least(half: NDArray, rank: int) -> tuple[NDArray, NDArray]:
-    """Return singular value ``rank`` of matrices (k, r, c), and its left vector."""
+    """Return the singular value number ``rank`` of each matrix, and its left vector."""
     if not rank:
         return np.ones(len(half)), np.zeros(half.shape[:2])
     U, values, _ = np.linalg.svd(half, full_matrices=True)

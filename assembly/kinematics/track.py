@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """End points of the continuation to many targets.
+    """Postures at which the continuation to each of many targets ended.
 
     Attributes:
         coordinates: (k, n) joint coordinates at the end points.

@@ -220,8 +220,8 @@ def _room(
 
     Returns:
         Columns of the clearances; their values in this assembly; the cone of each
-        column; and (nu,) ranges relative to the size of the cone.  A range of 1 means
-        the complete cone.  A smaller range is the largest distance between this
+        column; and (nu,) [-] ranges relative to the sizes of the cones.  A range of 1
+        means the complete cone.  A smaller range is the largest distance between this
         assembly and any assembly of least energy.
     """
     group = joints.group

@@ -214,7 +214,8 @@ def with_known(solution: One, known: Mapping[str, Any]) -> One:
 
     Args:
         solution: solution of one point or of many points.
-        known: values by the names in :data:`KNOWN`; other names are ignored.
+        known: known values by name.  Only the names in :data:`KNOWN` are used; others
+            are ignored.
 
     Returns:
         The given object.

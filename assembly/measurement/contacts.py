@@ -54,7 +54,7 @@ def wrenches_through(assembly: Assembly | ExactAssembly) -> NDArray:
 
 
 def contact_columns(conditions: Conditions) -> NDArray:
-    """Return the (6n, s) unit screws of the joints with a contact law."""
+    """Return the (6n, s) unit screws of the motions at s contact springs."""
     columns = np.zeros((6 * len(conditions.robot.frames), len(conditions.laws)))
     for k, law in enumerate(conditions.laws):
         i = conditions.robot.index(law.frame)

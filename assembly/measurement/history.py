@@ -129,7 +129,7 @@ def in_order(
     Args:
         values: (H,) values by public name of the variable, including ``time``; rows
             without a time keep their order.
-        session: (H,) names; None if there is one session.
+        session: (H,) name of each row's session; None if there is one session.
 
     Returns:
         The history, and (H,) the index of each given row in the history.

@@ -47,12 +47,12 @@ _LINEAR_BELOW = 1e-9  # [rad or m] deflection below which the law of a contact i
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Rows to be solved, and the quantities that remain constant during the iteration.
+    """Rows to be solved, with the quantities that do not change in the iteration.
 
     Attributes:
         conditions: R rows.
         flexible: linear model at the distinct postures.
-        posture_of_row: (R,) index of each row's posture among the distinct ones.
+        posture_of_row: (R,) index of each row's posture among the distinct postures.
         linear_deflections: (R, s) [rad or m] deflections of contacts in the linear
             model.
     """

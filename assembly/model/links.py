@@ -104,7 +104,7 @@ def spring_compliances(robot: Robot) -> NDArray:
 
 
 def compliance_factor(C: NDArray) -> NDArray:
-    """Return a factor L of a compliance, C = L L^T: the screw L y has energy y^2/2.
+    """Return a factor L of a compliance C = L L^T; a screw L y has energy y.y/2.
 
     Args:
         C: (6, 6) symmetric positive semidefinite compliance in mixed units.

@@ -32,7 +32,7 @@ class PlacedRobot(Protocol):
 
     @property
     def robot(self) -> Robot:
-        """The manipulator."""
+        """The robot that is placed."""
 
     def pose(self) -> dict[str, float]:
         """Return the nominal platform pose by component."""

@@ -59,7 +59,7 @@ _HALVINGS = 20  # number of bisections that bracket a critical load within a ste
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """An equilibrium of the path.
+    """An equilibrium on the load-deflection path.
 
     Attributes:
         load: [N or N m] load at the equilibrium.
@@ -86,7 +86,7 @@ class _Place:
 
 @dataclass(frozen=True, eq=False)
 class _Path:
-    """A path to be followed, and the definition of its arc length.
+    """A load-deflection path to be followed, and the definition of its arc length.
 
     Attributes:
         posture: posture of the robot without clearance, with beams cut into pieces.

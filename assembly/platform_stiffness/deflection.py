@@ -68,7 +68,7 @@ _NO_LOAD = 1e-9
 
 @dataclass(frozen=True)
 class Event:
-    """An event on the curve.
+    """An event on the load-deflection curve, such as a change of contact.
 
     Attributes:
         load: [N or N m] load at the event, or directly after it.
@@ -135,7 +135,7 @@ class DeflectionCurve:
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """An equilibrium on the curve."""
+    """An equilibrium on the load-deflection curve."""
 
     load: float
     equilibrium: Assembly | ExactAssembly
@@ -191,7 +191,7 @@ def deflection_curve(
     if component not in range(6) or not len(loads):
         raise BadInput(
             f"deflection_curve: found component {component} and {len(loads)} loads, "
-            "expected one of 0 to 5 and at least one load"
+            "expected a component from 0 to 5 and at least one load"
         )
     rest = np.zeros(6) if load is None else one_load(load)
     loads = numbers_of("loads", loads, len(loads), "N m or N").tolist()

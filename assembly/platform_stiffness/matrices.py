@@ -245,7 +245,7 @@ class PlatformStiffness:
         return EigenStiffnesses(values[order], screws[:, order] / scale, self.length)
 
     def along(self, direction: ArrayLike) -> tuple[float, float]:
-        """Return the stiffness along one direction, with the others free or blocked.
+        """Return the stiffness along a direction, with other motions free, or blocked.
 
         Args:
             direction: (6,) direction of a wrench and of a screw, such as

@@ -1,4 +1,4 @@
-"""Stiffness, curves and modes as labelled arrays, with the names of a sweep's file.
+"""Labelled arrays of stiffness, curves and modes, named as in the file of a sweep.
 
 ========================  ======================================================
 ``compliance``            matrix C

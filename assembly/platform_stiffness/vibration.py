@@ -54,7 +54,7 @@ _ROUNDING = 1e-14  # rounding error of the mass matrix, relative to its largest 
 
 @dataclass(frozen=True, eq=False)
 class NaturalModes:
-    """The lowest natural modes, slowest first.
+    """Lowest natural modes of a robot, in order of increasing frequency.
 
     Attributes:
         posture: the robot's nominal configuration.

@@ -79,5 +79,5 @@ def arm6(parameters: Arm6Parameters | None = None) -> Robot:
 
 
 def after_joint(d: float, a: float, alpha: float) -> NDArray:
-    """Return (4, 4) transform from one joint to the next at joint angle zero."""
+    """Return the (4, 4) transform from a joint to the next at joint angle zero."""
     return transform([a, 0.0, d], rotation_matrix([alpha, 0.0, 0.0]))

@@ -53,7 +53,7 @@ class Positions:
 
         Args:
             u: (nu,) current point of the chain, overwritten.
-            every: number of trajectories between two recorded screws.
+            every: number of trajectories of the walk between two recorded screws.
             rng: generator of random numbers.
             trace: (kept, 6) [rad, m] overwritten with the recorded screws.
         """

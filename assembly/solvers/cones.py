@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 
 def cone_starts(group: NDArray) -> NDArray:
-    """Return (cones + 1,) the index of the first column of each cone, then nu."""
+    """Return (cones + 1,) indices: the first column of each cone, then nu."""
     return np.append(0, np.cumsum(np.bincount(group)))
 
 

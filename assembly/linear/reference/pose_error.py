@@ -113,7 +113,7 @@ class ReachableSet:
     __repr__, _repr_html_ = short_repr, html_table
 
     def unbounded(self, part: int) -> bool:
-        """Return whether a part is unbounded: rotation (0) or translation (3)."""
+        """Return whether the rotation (part 0) or translation (part 3) is unbounded."""
         free = self.free[part : part + 3]
         return bool(np.abs(free).max(initial=0.0) > UNBOUNDED)
 
