@@ -1,6 +1,6 @@
 """Effects that the declared model of a robot may lack, each in a separate module.
 
-Begin at ``effect.py``, which defines an effect. ``library.py`` adds the effects of
+Begin at ``effect.py``, which defines an effect.  ``library.py`` adds the effects of
 other distributions.  Effects are applied in the order of :data:`LIBRARY`.  Friction
 acts on a joint's spring, so drive compliance comes before friction.  The elastic
 foundation adds a frame, so it comes last.

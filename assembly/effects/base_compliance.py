@@ -18,7 +18,7 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
 
 
 def on_foundation(conditions: Conditions) -> Conditions:
-    """Return conditions with a frame at the base that carries all others.
+    """Return conditions with a new frame at the base that carries all other frames.
 
     Args:
         conditions: R rows.

@@ -84,7 +84,7 @@ def _eccentricity(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _registration(declared: Values, found: Values) -> dict[str, float]:
-    """Return the found rotation and shift applied after the declared ones."""
+    """Return the composition of the declared and the found registration."""
     first, second = (np.array([v.get(k, 0.0) for k in BASE]) for v in (declared, found))
     R = rotation_matrix(second[:3])
     turn = rotation_vector(R @ rotation_matrix(first[:3]))

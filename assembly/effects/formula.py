@@ -161,7 +161,7 @@ class _Units:
     known: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def of(self, node: ast.AST) -> dict[str, float]:
-        """Return the unit of a part of a formula; raise BadInput for a conflict."""
+        """Return the unit of a part of a formula; BadInput if units contradict."""
         match node:
             case ast.Name(id=name) if name in self.variables:
                 return dict(self.variables[name])

@@ -96,7 +96,7 @@ def read_frame_callouts(root: Table, frames: list[str]) -> tuple[Callout, ...]:
 def read_drawn_callouts(
     copied: Copy, bodies: list[DrawnBody], joints: list[DrawnJoint]
 ) -> Iterator[DrawnCallout]:
-    """Yield the callouts of the bodies in a copy of a leg, and of the base.
+    """Yield the callouts of the bodies in a copy of a leg, and those of the base.
 
     Args:
         copied: copy of a leg, or the bodies that belong to no leg.

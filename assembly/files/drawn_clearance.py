@@ -159,7 +159,7 @@ def _guide_fits(inner: Table) -> tuple[Fit, Fit] | None:
     inner.has("fit")
     if len(value) != 2:
         expected = 'expected one fit, or two, such as ["40 H7/g6", "30 H7/g6"]'
-        raise inner.bad("fit", f"found a list of {len(value)}, {expected}")
+        raise inner.bad("fit", f"found a list of length {len(value)}, {expected}")
     one, other = (fit_of(Table({"fit": v}, inner.file, inner.place)) for v in value)
     assert one is not None
     assert other is not None

@@ -149,8 +149,8 @@ def platform_screws(posture: Posture) -> tuple[NDArray, float]:
 
     Returns:
         (k, 6) [rad, m] screws of the k ``platform_freedoms``, at the platform's origin
-        in base axes; orthonormal if lengths are divided by the robot's size.  Also
-        [rad, lengths] the error of these screws.
+        in base axes; orthonormal if lengths are divided by the robot's size.  Also the
+        error [rad, reference lengths] of these screws.
     """
     A, P = _rates(posture)
     moves = mobile(posture.robot)
@@ -262,7 +262,7 @@ class _Motions:
 
     @property
     def error(self) -> float:
-        """[rad, lengths] platform motions below this size count as zero."""
+        """[rad, reference lengths] platform motions below this size count as zero."""
         return max(_PLATFORM_RANK, _ERROR / self.gap)
 
     @property

@@ -198,7 +198,7 @@ class Content:
 def content_of(
     postures: Posture, arrays: tuple[NDArray, ...], names: object
 ) -> Content:
-    """Return the key of a result that depends only on postures and arrays.
+    """Return the cache key of a result that depends only on postures and arrays.
 
     Args:
         postures: one or many postures; the key contains their transforms and the

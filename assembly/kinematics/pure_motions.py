@@ -48,7 +48,8 @@ def pure_motions(
         screws: (k, 6) [rad, m] independent screws at a point, base axes.
         at: (3,) [m] that point.
         size: [m] reference length by which translations are compared with rotations.
-        error: [rad, lengths] error of the screws; smaller components count as zero.
+        error: [rad, reference lengths] error of the screws; smaller components count as
+            zero.
 
     Returns:
         k motions in base axes.

@@ -123,7 +123,7 @@ def posture_remarks(posture: Posture) -> list[str]:
 
 
 def _mode(home: Posture, posture: Posture) -> str:
-    """Return the name of the mode in which the platform moved away from home."""
+    """Return the name of the operation mode in which the platform left home."""
     moved = posture.platform @ np.linalg.inv(home.platform)
     turned = np.abs(moved[:3, :3] - np.eye(3)).max() > _ROUNDING
     shift = posture.platform[:3, 3] - home.platform[:3, 3]

@@ -38,7 +38,8 @@ from forcefit.assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE, SolverFa
 LARGEST_RESIDUAL = 1e-9
 # [-] largest accepted relative excess of a clearance over its bound
 LARGEST_EXCESS = 1e-9
-_SCREW, _SCREW_SHARE = 1e-5, 1e-3  # accepted error of the screw: [rad, m] and relative
+# largest accepted error of the screw: absolute [rad, m], and relative to the screw
+_SCREW, _SCREW_SHARE = 1e-5, 1e-3
 _AMPLIFIED = 10.0  # assumed upper limit of frame motion divided by spring deformation
 # [-] required difference of upper and lower bound of a distance, relative to it
 _WIDTH = 3e-5

@@ -383,7 +383,7 @@ def _unsaid(count: int) -> _Rows:
 
 
 def _certify(rows: _Rows, points: Assembly) -> None:
-    """Compute the gap, the potential and its lower bound of each point in ``rows``."""
+    """Add the gap, the potential and its lower bound of each point to ``rows``."""
     energy, bound, loads = rows["energy"], rows["bound"], points.frame_loads
     rows["gap"][:] = np.maximum(0.0, energy - bound)
     on_errors = loads.body @ points.posture.robot.errors.ravel()

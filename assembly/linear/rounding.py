@@ -52,7 +52,7 @@ def differs_from_zero(
         energy: (...,) [J] least energies.
         gap: (...,) [J] energy minus its certified bound.
         multipliers: (..., 6 closures) multipliers of the scaled closures.
-        residual: (...,) [rad, lengths] residual of the closures, rounding included.
+        residual: (...,) [rad, reference lengths] closure residual, rounding included.
 
     Returns:
         (...,) bool; True also if the energy is NaN.

@@ -31,7 +31,8 @@ _MOST_ITERATIONS = 60  # largest number of iterations; usually 5 to 12
 # [rad, reference lengths] largest change of a screw in the last iteration
 _CONVERGED = 1e-12
 _CLOSURE_TOLERANCE = 1e-11  # [rad, reference lengths] largest closure residual
-_FREE_FORCE = 1e-5  # relative to the largest wrench: largest force along a free motion
+# largest accepted force along a free motion, relative to the largest wrench
+_FREE_FORCE = 1e-5
 # [rad, reference lengths] deformation below which a wrench counts as zero
 _ZERO_LOAD = 1e-9
 # largest accepted ratio of two successive changes, after the initial iterations

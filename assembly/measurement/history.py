@@ -104,7 +104,7 @@ class History:
             if self.first[i]:
                 state = 0.0
             before = float(u[i - 1]) if even[i] else value
-            # exact if u is linear from ``before`` to ``value``
+            # this step is exact if u changes linearly from ``before`` to ``value``
             late = (value - before) * share[i]
             state = value - late + (state - before) * decay[i]
             response[i] = state

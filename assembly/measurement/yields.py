@@ -34,7 +34,7 @@ _STEPS = 40
 
 @dataclass(frozen=True, eq=False)
 class Yields:
-    """Compliant places of conditions, described by columns of small screws.
+    """Compliant places of a robot, described by columns of small screws.
 
     Attributes:
         conditions: R rows of a robot of n frames.

@@ -83,7 +83,7 @@ class ErrorSources:
         return len(self.frame)
 
     def standard(self, uniform: NDArray) -> NDArray:
-        """Return the (..., m) values s for numbers that are uniform between 0 and 1."""
+        """Return the (..., m) values s for uniform random numbers between 0 and 1."""
         v = 2.0 * uniform - 1.0
         size = self.least + (1.0 - self.least) * np.where(self.signed, abs(v), uniform)
         uniform_values = np.where(self.signed, np.copysign(size, v), size)

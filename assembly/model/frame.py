@@ -113,7 +113,7 @@ class Frame(EqualData):
             after the motion of the parent's joint.
         rotation: (3,) [rad] rotation vector of the frame's axes relative to the same
             axes of the parent's frame.
-        joint: type of the joint. ``"revolute"`` rotates about the frame's z axis,
+        joint: type of the joint.  ``"revolute"`` rotates about the frame's z axis,
             ``"prismatic"`` translates along it, ``"helical"`` does both, and
             ``"fixed"`` does not move.  The coordinate of a helical joint is the angle.
         actuated: whether a drive holds the joint at its commanded coordinate; otherwise
@@ -127,7 +127,7 @@ class Frame(EqualData):
         clearance: clearance of the joint; None if it has none.
         locked_at: pose at which a fixed joint is bolted, with its clearance before
             bolting; None if it is not bolted.
-        joint_stiffness: (6, 6) stiffness K_B of the joint, or None. ``inf`` on the
+        joint_stiffness: (6, 6) stiffness K_B of the joint, or None.  ``inf`` on the
             diagonal means a rigid direction.  Zeros in the row and column of a passive
             joint's own motion leave this motion free.  If (6,) numbers are given, as in
             robot files, they become the diagonal of the matrix.

@@ -130,7 +130,7 @@ def frame_table(data: "xarray.Dataset", *rows: str) -> "pandas.DataFrame":
     Returns:
         Table whose columns are pairs (variable, component).  The component is empty for
         a variable without further dimensions.  For several further dimensions, it
-        consists of their labels, joined by dots. ``attrs["units"]`` contains the unit
+        consists of their labels, joined by dots.  ``attrs["units"]`` contains the unit
         of every variable and dimension.
     """
     import pandas

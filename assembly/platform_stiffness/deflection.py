@@ -58,7 +58,7 @@ _CHANGES = 8
 # platform motion, relative to the largest motion in a mode, below which the platform
 # counts as fixed
 _STAYS = 1e-6
-_STILL = 1e-12  # [characteristic lengths] smaller motions count as rounding errors
+_STILL = 1e-12  # smaller motions, in characteristic lengths, count as rounding errors
 # a motion is a jump if it exceeds the motion predicted by both tangents by this factor
 _JUMP = 5.0
 # relative to the largest load: under smaller loads, clearances can leave the pose
@@ -122,7 +122,7 @@ class DeflectionCurve:
         return curve_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a row for each load, columns (variable, component)."""
+        """Return a table with one row per load and columns (variable, component)."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "point")

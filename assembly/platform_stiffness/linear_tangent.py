@@ -53,7 +53,7 @@ _NOISE = 1e-12  # relative rounding error of a column that a projection removes
 
 
 def without_clearance(posture: Posture) -> PlatformStiffness:
-    """Return the classical virtual-joint model, with every clearance fixed at zero.
+    """Return the stiffness by the classical model, with clearances fixed at zero.
 
     Args:
         posture: the robot's configuration.

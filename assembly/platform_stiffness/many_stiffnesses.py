@@ -92,7 +92,7 @@ class Stiffnesses:
         return stiffnesses_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a row for each point, columns (variable, component)."""
+        """Return a table with one row per point and columns (variable, component)."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "point")
@@ -206,7 +206,7 @@ class Stiffnesses:
 
 
 def many_without_clearance(posture: Posture, method: Method) -> Stiffnesses:
-    """Return the classical virtual-joint model, with every clearance fixed at zero.
+    """Return stiffnesses by the classical model, with clearances fixed at zero.
 
     Args:
         posture: k postures.

@@ -152,7 +152,7 @@ class PlatformStiffness:
         return stiffness_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a row for each part: its shares in the compliance along each axis."""
+        """Return a table: the share of each part in the compliance along each axis."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "part")

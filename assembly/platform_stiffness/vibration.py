@@ -85,7 +85,7 @@ class NaturalModes:
         return modes_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a row for each mode, columns (variable, component)."""
+        """Return a table with one row per mode and columns (variable, component)."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "mode")

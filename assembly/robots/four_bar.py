@@ -48,7 +48,7 @@ def four_bar(parameters: FourBarParameters | None = None) -> Robot:
 
     Returns:
         The linkage with 8 frames and 1 closure; the platform ``point`` is the tracing
-        point. ``crank`` is driven; its coordinate is the angle to the ground link.
+        point.  ``crank`` is driven; its coordinate is the angle to the ground link.
     """
     P = parameters or FourBarParameters()
     foot, tip, middle, point = (P.crank * p for p in corners(P.home))

@@ -38,7 +38,7 @@ GAP, GAP_WITHOUT_CLEARANCE = 1e-8, 1e-12
 _GAP_WITHIN = 1e-12  # required relative gap of the interior-point method
 # share of that gap that is required here, because the full problem increases the gap
 _SHARE = 0.1
-_STOP = 1e-2  # share of this gap at which Newton's method stops
+_STOP = 1e-2  # share of the required gap at which Newton's method stops
 # largest number of Newton steps, and first sigma of the method
 _STEPS, _FIRST_SIGMA = 150, 1e6
 _RESIDUAL = 1e-11  # accepted residual of rows without springs

@@ -1,4 +1,4 @@
-"""Cone programmes with the same matrices and many right sides, compiled.
+"""Compiled solution of cone programmes with equal matrices and many right sides.
 
 Each programme has the form of :func:`forcefit.assembly.solvers.conic.minimise_energy`.
 Each lane of the processor's vector registers solves one programme.  Programmes whose

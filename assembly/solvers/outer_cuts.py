@@ -59,7 +59,7 @@ def farthest(
 
 
 def _farthest_corner(cuts: NDArray, room: NDArray, centre: NDArray) -> NDArray:
-    """Return the (3,) corner of {cuts (x - centre) <= room} with the largest size."""
+    """Return the corner (3,) of {cuts (x - centre) <= room} with the largest norm."""
     from scipy.spatial import HalfspaceIntersection
 
     unit = room.max()
