@@ -1,9 +1,9 @@
-"""Effects that a declared model may lack, each in a separate file.
+"""Effects that the declared model of a robot may lack, each in a separate module.
 
-Begin at ``effect.py``, which defines an effect; ``library.py`` adds those of other
-distributions.  Effects are applied in the order of
-:data:`LIBRARY`.  Friction acts on a joint's spring, so drive compliance comes before
-it; the foundation adds a frame, so it comes last.
+Begin at ``effect.py``, which defines an effect.  ``library.py`` adds the effects of
+other distributions.  Effects are applied in the order of :data:`LIBRARY`.  Friction
+acts on a joint's spring, so drive compliance comes before friction.  The elastic
+foundation adds a frame, so it comes last.
 """
 
 from collections.abc import Mapping
@@ -62,7 +62,7 @@ def apply_effects(conditions: Conditions, effects: Mapping[str, Values]) -> Cond
         effects: for each effect its parameters by public name.
 
     Returns:
-        The conditions with all of the effects.
+        The conditions changed by all of these effects.
 
     Raises:
         KeyError: an effect is not in the library.

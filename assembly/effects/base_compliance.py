@@ -18,7 +18,7 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
 
 
 def on_foundation(conditions: Conditions) -> Conditions:
-    """Return conditions with a frame at the base that carries all others.
+    """Return conditions with a new frame at the base that carries all other frames.
 
     Args:
         conditions: R rows.
@@ -36,7 +36,7 @@ def on_foundation(conditions: Conditions) -> Conditions:
 
 
 def _standing(conditions: Conditions, robot: Robot) -> Conditions:
-    """Return the rows with an additional fixed frame at the beginning."""
+    """Return the conditions with an additional fixed frame before all other frames."""
     still = np.broadcast_to(np.eye(4), (len(conditions), 1, 4, 4))
     zero = np.zeros((len(conditions), 1, 6))
     rest = (
@@ -74,7 +74,7 @@ def with_foundation(robot: Robot, values: Values) -> Robot:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Return stiffnesses from compliances; negative ones mean a stiffer foundation."""
+    """Return stiffnesses from compliances; negative for a stiffer foundation."""
     return {
         f"stiffness.{name.removeprefix('compliance.')}": 1 / c
         for name, c in values.items()

@@ -1,4 +1,4 @@
-"""Mass and centre of mass of a body that differ from the declared ones.
+"""Mass and centre of mass of a body that differ from the declared values.
 
 Let m and c be the declared mass and centre, and M and C the true ones.  The parameter
 ``mass`` is M - m, and ``moment`` is M C - m c.  The weight is linear in both; the true

@@ -44,7 +44,7 @@ def combined(declared: Effects, found: Effects) -> dict[str, dict[str, float]]:
 
 
 def _sum(declared: Values, found: Values) -> dict[str, float]:
-    """Return the sum of declared and found value of each parameter."""
+    """Return for each parameter the sum of its declared and its found value."""
     return dict(declared) | {k: declared.get(k, 0.0) + v for k, v in found.items()}
 
 
@@ -57,12 +57,12 @@ def _in_series(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _product(declared: Values, found: Values) -> dict[str, float]:
-    """Return the product of declared and found factor of each parameter."""
+    """Return for each parameter the product of its declared and its found factor."""
     return dict(declared) | {k: declared.get(k, 1.0) * v for k, v in found.items()}
 
 
 def _load(declared: Values, found: Values) -> dict[str, float]:
-    """Return the load gains: the found gain acts on the result of the declared gain."""
+    """Return the combined load gains; the found gain acts after the declared gain."""
     factor = found.get("factor", 1.0)
     offsets = {k: factor * v for k, v in declared.items() if k != "factor"}
     more = {k: v for k, v in found.items() if k != "factor"}
@@ -84,7 +84,7 @@ def _eccentricity(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _registration(declared: Values, found: Values) -> dict[str, float]:
-    """Return the found rotation and shift applied after the declared ones."""
+    """Return the composition of the declared and the found registration."""
     first, second = (np.array([v.get(k, 0.0) for k in BASE]) for v in (declared, found))
     R = rotation_matrix(second[:3])
     turn = rotation_vector(R @ rotation_matrix(first[:3]))
@@ -104,7 +104,7 @@ def _drift(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _contact(declared: Values, found: Values) -> dict[str, float]:
-    """Return the contact laws, which must be in different joints."""
+    """Return the combined contact laws, which must be in different joints."""
     if set(declared) & set(found):
         raise ValueError(
             "two contact laws of one joint in series cannot be combined into one law"
@@ -113,7 +113,7 @@ def _contact(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _delayed(declared: Values, found: Values) -> dict[str, float]:
-    """Return the expansions; for one body, the time constants must be equal."""
+    """Return the combined expansions; those of one body need equal time constants."""
     both = _sum(declared, found)
     for key in set(declared) & set(found):
         if key.endswith(".time_constant"):

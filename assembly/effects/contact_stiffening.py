@@ -1,4 +1,4 @@
-"""Nonlinear contact in a joint: load = coefficient |deflection|^exponent.
+"""Nonlinear contact stiffness of a joint: load = coefficient |deflection|^exponent.
 
 Sources:
     Johnson, Contact Mechanics, section 4.2 (Hertz: exponent 1.5 for spheres).

@@ -1,8 +1,9 @@
 """Thermal expansion of a body whose temperature lags behind the recorded temperature.
 
 The body becomes longer by coefficient x length x its temperature, along its beam or
-along the line between its joints.  In the first row of a session, its temperature
-equals that of the sensor; later it follows the sensor with a time constant.
+along the line between its joints.  In the first row of a session, the temperature of
+the body equals that of the sensor.  Later, it follows the temperature of the sensor
+with a first-order lag.
 """
 
 import numpy as np
@@ -21,7 +22,7 @@ from forcefit.assembly.measurement.variables import past
 from forcefit.assembly.model.robot import Robot
 
 _SENSOR, _LATE = "cov.temperature", "time_constant"
-# time constants in the search, relative to the campaign's duration
+# start values of the time constant in a search, relative to the campaign's duration
 _SCAN = (0.03, 0.1, 0.3)
 
 

@@ -1,4 +1,4 @@
-"""Scale of the measuring device: measured lengths are a multiple of the true ones.
+"""Scale error of the measuring device: measured length = factor x true length.
 
 Positions are measured from the origin of the registration, or from the origin of the
 base if there is no registration.

@@ -1,4 +1,4 @@
-"""Elastic actuated joints, in series with any declared stiffness."""
+"""Compliance of actuated joints, in series with their declared stiffness, if any."""
 
 from dataclasses import replace
 from functools import partial
@@ -26,7 +26,7 @@ def _unit(robot: Robot, name: str) -> str:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Return stiffnesses from compliances; negative for drives that are stiffer."""
+    """Return stiffnesses from compliances; negative for stiffer drives."""
     ends = len(".compliance")
     return {name[:-ends]: 1 / c for name, c in values.items() if abs(c) > RIGID}
 

@@ -18,10 +18,10 @@ class Unknown:
         name: name of a parameter, or of a part of a parameter.  For an effect that acts
             at frames, the name is appended to the frame's name (``""`` if the frame's
             name is sufficient).
-        scale: plausible size, in the unit of the parameter or of its part.
-        lower: physical lower bound.
-        upper: physical upper bound.
-        start: value without the effect, at which the first derivative is computed.
+        scale: plausible absolute value, in the unit of the parameter or of its part.
+        lower: smallest value that is physically possible.
+        upper: largest value that is physically possible.
+        start: value that means no effect, at which the first derivative is computed.
         scan: start values of the search, if the model is strongly nonlinear.
         scan_by: name of a covariate whose range multiplies ``scan``, if any.
     """
@@ -36,7 +36,7 @@ class Unknown:
 
 
 def _as_they_are(robot: Robot, values: Values) -> dict[str, float]:
-    """Return the unknowns unchanged, because the unknowns are the parameters."""
+    """Return the unknowns unchanged, because they are equal to the parameters."""
     return dict(values)
 
 
@@ -53,13 +53,13 @@ class Effect:
             unit.
         frames: function from a robot to the frames at which the effect can act; None if
             the effect does not act at frames.
-        device_alone: whether the effect is an error of the measuring device.  A
-            function with the same influence belongs to the machine, and is more
-            probable.
+        device_alone: whether the effect is an error of the measuring device.  If a
+            function of the robot has the same influence on the readings, that function
+            is more probable.
         refines: name of the effect that is a limiting case of this one; ``""`` for
             none.
-        tried: function for the frames at which the effect is searched; None for all
-            frames at which it can act.
+        tried: function from a robot to the frames at which a diagnosis searches the
+            effect; None for all frames at which it can act.
         components: public parameters at each frame (``""`` for the frame's name
             itself), or of the effect as a whole.
         unknowns: unknowns of the fit, at each frame or for the effect as a whole.
@@ -68,15 +68,15 @@ class Effect:
         needs: covariates that are required to apply or identify the effect.
         linear: whether the platform's deviation is linear in the unknowns, to first
             order in all small motions.
-        by_row: whether the effect changes individual rows, and so can act in some of
-            them only; otherwise the effect changes the robot.
+        by_row: whether the effect changes individual measurements (rows).  Such an
+            effect can act in only one session.  Otherwise the effect changes the robot.
         finite: whether the effect requires finite motions.
         clearance: whether the effect adds clearance to joints.
         device: unknowns that move the measuring frame as a whole.
-        splits: whether each of its unknowns can act without the others.
-        follows_load: whether its unknowns ``offset.<c>`` correspond to the components
-            of the load that a campaign records.
-        weighs: whether the effect acts only by gravity.
+        splits: whether each unknown of the effect can act without the others.
+        follows_load: whether the unknowns ``offset.<c>`` correspond to the load
+            components that a campaign records.
+        weighs: whether the effect acts only through gravity.
     """
 
     name: str

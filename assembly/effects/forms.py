@@ -46,13 +46,14 @@ from numpy.typing import NDArray
 
 Shapes = Mapping[str, float]
 Inputs = Sequence[NDArray]
-_MOST = 999  # largest number of powers, waves and knots
-_INDEX = re.compile("0|-?[1-9][0-9]{0,8}")  # text of an integer in a column's name
+_MOST = 999  # largest number of powers, of waves and of knots
+# pattern of an integer in the name of a column
+_INDEX = re.compile("0|-?[1-9][0-9]{0,8}")
 
 
 @dataclass(frozen=True)
 class Form:
-    """One form of a function.
+    """A form: the shape of a function of one or two variables.
 
     Attributes:
         name: name of the form in robot files.
@@ -60,8 +61,9 @@ class Form:
         most: largest number of variables.
         shapes: names of the nonlinear parameters, and whether each is required.
         indices: smallest and largest integer at the beginning of a column's name; None
-            if the name has none.
-        words: possible ends of a column's name; ``""`` for no end.
+            if the names contain no integers.
+        words: possible ends of a column's name, such as ``"sine"``; ``""`` if a name
+            can consist of integers only.
         basis: function from column names, inputs (R,) and shapes to (R, p) columns.
         remembers: whether earlier values of the first variable influence the result.
         least: smallest number of variables.
@@ -169,7 +171,7 @@ def roughness(count: int) -> NDArray:
 
 
 def _remembered(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Return columns of the lagged variable and of the decaying initial state."""
+    """Return two columns: the lagged variable, and the decaying initial state."""
     return np.column_stack([inputs[name == "start"] for name in names])
 
 
@@ -219,7 +221,7 @@ _WAVES = ("sine", "cosine")
 
 
 def _memory(name: str, summary: str) -> Form:
-    """Return a form that lags behind its variable."""
+    """Return a form in which the state lags behind the variable."""
     return Form(
         name, summary, 1, {"time_constant": True}, None, ("gain", "start"), _remembered,
         remembers=True,

@@ -30,8 +30,9 @@ _OPERATIONS: dict[type, Callable[[NDArray, NDArray], NDArray]] = {
 }  # fmt: skip
 _LONGEST = 500  # largest number of characters of a formula
 _DEEPEST = 50  # largest depth of nested brackets and operations
-_SAME = 1e-9  # difference below which two exponents of units are equal
-Unit = Mapping[str, float]  # exponents of m, N, s, K ..; rad has none
+_SAME = 1e-9  # difference below which two exponents of units count as equal
+# exponents of the units m, N, s, K ..; rad counts as a pure number
+Unit = Mapping[str, float]
 
 
 def parse_formula(text: str) -> ast.expr:
@@ -154,13 +155,13 @@ def parameter_units(
 
 @dataclass
 class _Units:
-    """Equations between units, which have exponents of m, N .. and of ``?name``."""
+    """Equations between units; ``?name`` is the unknown unit of a parameter."""
 
     variables: Mapping[str, Unit]
     known: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def of(self, node: ast.AST) -> dict[str, float]:
-        """Return the unit of a part of a formula; raise BadInput for a conflict."""
+        """Return the unit of a part of a formula; BadInput if units contradict."""
         match node:
             case ast.Name(id=name) if name in self.variables:
                 return dict(self.variables[name])
@@ -225,7 +226,7 @@ class _Units:
 
 
 def _number(node: ast.AST) -> float | None:
-    """Return the value of a part without names; None if it has names."""
+    """Return the value of a part of a formula; None if the part contains names."""
     if any(isinstance(n, ast.Name) and n.id != "pi" for n in ast.walk(node)):
         return None
     return float(_value(node, {}))

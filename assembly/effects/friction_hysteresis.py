@@ -8,7 +8,7 @@ from forcefit.assembly.model.robot import Frame, Robot
 
 
 def elastic_joints(robot: Robot) -> tuple[str, ...]:
-    """Return joints with a spring about z: elastic drives, compliant joints."""
+    """Return the joints with a spring about z: elastic drives and compliant joints."""
     softened = robot.effects.get("drive_compliance", {})
     return tuple(
         f.name
@@ -26,7 +26,7 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
     C = joint_compliances(conditions.robot)
     for name, tau in values.items():
         row = conditions.robot.index(name)
-        # a torque inside the joint moves the joint by compliance x torque without
+        # an internal torque of the joint moves the joint by compliance x torque without
         # stress
         deflection = C[row, :, conditions.robot.frames[row].own_axis]
         conditions = with_screws(

@@ -1,9 +1,9 @@
 """Application of functions: general effects of a robot's file or of a diagnosis.
 
-A function changes the stress-free screws at a frame, the base, the reading or the load.
-If the function depends on a wrench, as every compliance does, its place is compliant.
-Such a function is solved together with the equilibrium
-(:mod:`forcefit.assembly.measurement.yields`).
+A function changes one of these: the stress-free screws at a frame, the pose of the
+base, the reading, or the load.  If the function depends on a wrench, as every
+compliance does, its place is compliant.  Such a function is solved together with the
+equilibrium (:mod:`forcefit.assembly.measurement.yields`).
 """
 
 from collections.abc import Iterable, Sequence
@@ -33,7 +33,7 @@ _parsed = lru_cache(maxsize=256)(parse_formula)
 
 
 def along(robot: Robot, where: str, component: str, values: NDArray) -> NDArray:
-    """Return the part of screws or wrenches along a component at a place.
+    """Return the component of screws or wrenches along one direction of a frame.
 
     Args:
         robot: any robot.
@@ -42,7 +42,7 @@ def along(robot: Robot, where: str, component: str, values: NDArray) -> NDArray:
         values: (..., 6) by component of a frame's screw, or of the wrench on it.
 
     Returns:
-        (...) the product with the unit screw.
+        (...) products of the values with the unit screw.
     """
     if component == THREAD:
         return values @ unit_screw(robot, where, component)
@@ -50,7 +50,7 @@ def along(robot: Robot, where: str, component: str, values: NDArray) -> NDArray:
 
 
 def is_loaded(function: Function) -> bool:
-    """Return whether a function depends on the loads through the robot."""
+    """Return whether a function depends on wrenches that the robot transmits."""
     wrench = any(name.startswith("wrench.") for name in function.variables)
     return wrench or function.kind == "compliance"
 
@@ -167,7 +167,7 @@ def inputs_of(conditions: Conditions, function: Function) -> NDArray:
         angle = inputs[0] if inputs else _now(conditions, first)
         return np.column_stack([history.direction(first)[row], angle])
     if form.name == "reversal":
-        # friction increases with the magnitude of the load, in both directions
+        # friction depends on the magnitude of the load, not on its sign
         sizes = [
             np.abs(x) if name.startswith("load.") else x
             for name, x in zip(further, inputs, strict=True)
@@ -175,7 +175,8 @@ def inputs_of(conditions: Conditions, function: Function) -> NDArray:
         return np.column_stack([history.direction(first)[row], *sizes])
     shapes = parameters_of(function, function.components[0])
     late = shapes["time_constant"]
-    if first in CLOCKS:  # time is the input: lag of a unit step at time 0
+    # the variable is a time, so the input is the lag of a unit step at time 0
+    if first in CLOCKS:
         return np.column_stack([1.0 - history.fading(late), history.fading(late)])[row]
     lagged = history.lagged(first, late, held=form.name == "creep")
     return np.column_stack([lagged[row], history.fading(late)[row]])
@@ -220,8 +221,9 @@ def variable_names(variables: Sequence[str]) -> dict[str, int]:
         variables: public names of the variables.
 
     Returns:
-        Index of the variable by name.  Names are the last part of the public name, the
-        first part if it is unique, and the whole name with ``_`` for dots.
+        Index of the variable for each possible name: the last part of the public name;
+        its first part, if that is unique; and the whole public name with ``_`` in place
+        of dots.
     """
     indices: dict[str, list[int]] = {}
     for k, name in enumerate(variables):
@@ -309,7 +311,7 @@ def _yielding(
     acts: NDArray,
 ) -> Conditions:
     """Return conditions with a compliant place that depends on the wrench there."""
-    slots: dict[int, int] = {}  # column of the inputs, by the index of the wrench
+    slots: dict[int, int] = {}  # column of the inputs for each wrench, by its index
     through: list[tuple[str, int]] = []
     for k, name in enumerate(function.variables):
         if name.startswith("wrench."):

@@ -1,4 +1,4 @@
-"""Change of stiffness by preload and finite rotations, with the exact model."""
+"""Stiffness change due to preload and finite rotations, computed by the exact model."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Clearance in joints that are declared without clearance; loads close it."""
+"""Clearance of joints that are declared without; loads close this clearance."""
 
 from dataclasses import replace
 from functools import partial
@@ -44,7 +44,7 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Return the clearances without those that were fitted as zero."""
+    """Return the fitted clearances, without those that are zero."""
     return {key: size for key, size in values.items() if size > _NONE_BELOW}
 
 

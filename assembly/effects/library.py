@@ -1,11 +1,12 @@
-"""The library of effects: those of forcefit, and those of other distributions.
+"""The library of effects: effects of forcefit, and effects of other distributions.
 
 A distribution names an :class:`forcefit.assembly.effects.effect.Effect`::
 
     [project.entry-points."forcefit.effects"]
     drive_gain = "their_package:DRIVE_GAIN"   # an Effect of this name
 
-It is imported when it is first used.  Names of forcefit's own effects cannot be taken.
+The effect is imported at its first use.  It cannot have the name of an effect of
+forcefit.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -75,7 +76,7 @@ class Library(Mapping[str, Effect]):
 
 
 def _naming_owner(effect: Effect, words: str) -> Effect:
-    """Return an effect whose functions name its distribution if they fail."""
+    """Return an effect whose errors name the distribution that defines it."""
     functions = {
         one.name: getattr(effect, one.name) for one in fields(effect)
         if callable(getattr(effect, one.name))

@@ -1,4 +1,4 @@
-"""Load gain: the applied load is a multiple of the recorded one, plus a constant."""
+"""Load gain: applied load = gain x recorded load + constant."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Scale of a link's modulus: Young's modulus is a multiple of the declared one."""
+"""Scale of a link's modulus: Young's modulus = factor x declared modulus."""
 
 from dataclasses import replace
 from functools import partial

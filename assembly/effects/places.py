@@ -1,4 +1,4 @@
-"""Frames at which effects act, and changes to conditions at a frame."""
+"""Frames at which effects act, and changes of the conditions at one frame."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -38,7 +38,7 @@ def bodies(robot: Robot) -> tuple[str, ...]:
 
 
 def growing(robot: Robot) -> tuple[str, ...]:
-    """Return the frames whose length can differ: beams, or all bodies if no beams."""
+    """Return the bodies whose length can differ: beams, or all if there are none."""
     return beams(robot) or bodies(robot)
 
 
@@ -49,8 +49,9 @@ def body_axis(frame: Frame) -> tuple[float, NDArray]:
         frame: the frame of the body.
 
     Returns:
-        Length [m], and (3,) unit vector in the frame's axes, of the beam.  Without a
-        beam, both are those of the line from the parent's origin to the frame's.
+        Length [m] of the beam, and its direction as a (3,) unit vector in the frame's
+        axes.  Without a beam, both describe the line from the parent's origin to the
+        frame's.
     """
     if isinstance(frame.link, BeamLink):
         return beam_axis(frame)

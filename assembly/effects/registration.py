@@ -1,4 +1,4 @@
-"""Registration: rotation and translation of the measuring frame and of the point."""
+"""Registration: pose of the measuring frame, and position of the measured point."""
 
 from dataclasses import replace
 

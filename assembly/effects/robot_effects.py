@@ -1,4 +1,4 @@
-"""Effects of a robot's file, applied at one posture."""
+"""Known effects in a robot file, applied at one posture."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

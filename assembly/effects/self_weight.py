@@ -1,4 +1,4 @@
-"""Weight of links and bodies, if the model declares no gravity."""
+"""Weight of links and bodies, for a model that is declared without gravity."""
 
 from dataclasses import replace
 

@@ -21,7 +21,7 @@ _ANGLE: Unit = {}  # rad counts as a pure number
 
 
 def variable_unit(robot: Robot, name: str) -> Unit:
-    """Return the exponents of m, N, s, K of a variable; for a covariate, its name.
+    """Return a variable's unit, as exponents of m, N, s, K or of a covariate's name.
 
     Args:
         robot: robot with the variable.
@@ -114,7 +114,7 @@ def _parameter_unit(
 
 
 def turning_variables(function: Function) -> tuple[str, ...]:
-    """Return the variables whose waves have one turn per ``period``."""
+    """Return the variables of which one ``period`` is one full wave."""
     if function.form == "reversal_waves":
         return function.variables[-1:]
     if function.form == "scaled_waves":

@@ -4,9 +4,9 @@ A step of the exact equilibrium requires the change v of the clearances u that m
 
         s . v + v . S v / 2   subject to   |u_k + v_k| <= 1,  H (u + v) = k.
 
-S has directions of negative curvature.  Those normal to the active constraint
-boundaries are harmless; sometimes there are others.  Far from the solution, S is made
-convex, and :mod:`forcefit.assembly.solvers.conic` solves the problem.  Near the
+S has directions of negative curvature.  Directions normal to the boundaries of active
+constraints are harmless, but other directions occur too.  Far from the solution, S is
+made convex, and :mod:`forcefit.assembly.solvers.conic` solves the problem.  Near the
 solution, Newton's method on the active boundaries is accurate to rounding, while the
 conic solver reaches only half of the digits.
 
@@ -34,14 +34,15 @@ from forcefit.assembly.solvers.cones import cone_sizes
 from forcefit.assembly.solvers.conic import minimise_energy
 from forcefit.assembly.solvers.method import Method
 
-AT_BOUNDARY = 1e-5  # [-] distance from size 1 within which a cone can be active
+AT_BOUNDARY = 1e-5  # [-] distance from the boundary within which a cone can be active
 _STEPS = 15  # largest number of Newton steps on the active boundaries
 # [-] size of the last step of a solution, relative to the size of the cones
 _STILL = 1e-6
-# relative to the largest multiplier: a cone with a smaller negative multiplier stays
+# relative to the largest multiplier: a cone with a smaller negative multiplier remains
 # active
 _ZERO_MULTIPLIER = 1e-11
-_LONGEST = 0.3  # [-] longest step along a boundary, which is curved
+# [-] longest step along a boundary, relative to its radius; boundaries are curved
+_LONGEST = 0.3
 _SHIFTS = (
     0.0,
     1e-9,
@@ -49,7 +50,7 @@ _SHIFTS = (
     1e-7,
     1e-6,
     1e-5,
-)  # shifts that are tried, relative to the largest curvature
+)  # shifts of the curvature that are tried, relative to the largest curvature
 # relative to the largest curvature: smaller curvatures are replaced by this value
 _LEAST_CURVATURE = 1e-10
 
@@ -144,7 +145,7 @@ def _convex(p: ClearanceProblem, method: Method) -> tuple[NDArray, NDArray] | No
 def _conic(
     p: ClearanceProblem, S: NDArray, s: NDArray, method: Method
 ) -> tuple[NDArray, NDArray] | None:
-    """Return the step by the conic solver, for S without negative curvatures."""
+    """Return the step computed by the conic solver, with S made convex."""
     values, vectors = np.linalg.eigh(S)
     floor = _LEAST_CURVATURE * max(float(np.abs(values).max(initial=0.0)), 1e-150)
     G = np.sqrt(np.maximum(values, floor))[:, None] * vectors.T
@@ -155,7 +156,7 @@ def _conic(
 
 
 def _newton(p: ClearanceProblem) -> tuple[NDArray, NDArray] | None:
-    """Return the step by Newton's method on the active boundaries; None if it fails."""
+    """Return Newton's step on the boundaries of active cones; None if it fails."""
     force, rigid = p.multipliers
     u, active = p.start, force > 0.0
     for _ in range(_STEPS):
@@ -181,7 +182,7 @@ def _newton(p: ClearanceProblem) -> tuple[NDArray, NDArray] | None:
 def _active_step(
     p: ClearanceProblem, S: NDArray, gradient: NDArray, u: NDArray, active: NDArray
 ) -> tuple[NDArray, NDArray, NDArray] | None:
-    """Return the step, and the multipliers of cones and rows; None without minimum."""
+    """Return the step, and multipliers of cones and rows; None if no minimum exists."""
     C = np.hstack([boundary_normals(u, active, p.group), p.rows.T])
     count, boundaries = C.shape[1], int(active.sum())
     if count > len(u):

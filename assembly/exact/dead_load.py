@@ -39,7 +39,7 @@ from forcefit.stiffness.screws import rotation_matrix, skew, transform
 
 @dataclass(frozen=True, eq=False)
 class DeadLoads:
-    """All loads on a robot with finite motions.
+    """All dead loads on a robot that makes finite motions.
 
     Attributes:
         load: (6,) [N m, N] wrench on the platform at its origin, base axes.
@@ -59,7 +59,7 @@ class DeadLoads:
 
     @cached_property
     def beyond_platform(self) -> bool:
-        """Whether a body or joint other than the platform is loaded."""
+        """Whether a load acts on a body or joint other than the platform."""
         return bool(np.any(self.bodies) or np.any(self.carried))
 
 
@@ -300,7 +300,7 @@ def drive_wrenches(posture: Posture, loads: DeadLoads, carried: NDArray) -> NDAr
 
 
 def _on_unknowns(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDArray]:
-    """Return (N, 6) dead loads on all parts that each unknown moves, and their M."""
+    """Return (N, 6) dead loads on the parts that each unknown moves, and matrices M."""
     model = place.model
     body, joint, M_body, M_joint = _on_frames(place, loads)
     link = (model.motion == LINK)[:, None]
@@ -312,7 +312,7 @@ def _on_unknowns(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDArray]:
 def _on_frames(
     place: Placement, loads: DeadLoads
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Return dead wrenches on all parts that bodies and joints carry, and their M."""
+    """Return dead wrenches on the parts that bodies and joints carry; matrices M."""
     posture = place.model.posture
     return resultants(posture, loads, place.body_ends, place.carried)
 
@@ -351,7 +351,7 @@ def resultants(
 
 
 def _read(G: NDArray, T: NDArray, origin: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Return moments and forces (..., n, 3) at the origin, and the M (..., n, 9)."""
+    """Return moments and forces (..., n, 3) at the origin; matrices M (..., n, 9)."""
     points = T[..., :3, :].copy()
     points[..., 3] -= origin
     moments = np.cross(points, G, axis=-2).sum(axis=-1)

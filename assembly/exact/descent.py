@@ -1,17 +1,17 @@
-r"""One step towards the exact equilibrium: expand, solve, restore, accept or damp.
+r"""One step to the exact equilibrium: expand, solve, restore, then accept or damp.
 
 Near a placement x, the closures are linearised.  The Lagrangian
 
     L = |y|^2 / 2 - W(x) - lambda . r(x)
 
-is expanded to second order with its exact Hessian.  The curvature of the closures times
-their wrenches can exceed the stiffness of compliant springs; without this term,
-Gauss-Newton steps stall.  Springs and free motions are eliminated, and
-:mod:`forcefit.assembly.exact.contact_qp` solves the problem in the clearances.  A
-restoration (retraction) moves the result of the step back onto the closures.  The step
-is accepted if it reduces the energy plus a penalty on the residual.  Otherwise a
-proximal term damps the next attempt, as in the method of Levenberg and Marquardt; the
-term measures every screw in radians and reference lengths.
+is expanded to second order with its exact Hessian.  The Hessian contains the curvature
+of the closures, multiplied by their wrenches.  This term can exceed the stiffness of
+compliant springs.  Gauss-Newton steps omit it and then make no progress.  Springs and
+free motions are eliminated, and :mod:`forcefit.assembly.exact.contact_qp` solves the
+problem in the clearances.  A restoration (retraction) moves the result of the step back
+onto the closures.  The step is accepted if it reduces the energy plus a penalty on the
+residual.  Otherwise a proximal term damps the next attempt, as in the method of
+Levenberg and Marquardt; the term measures every screw in radians and reference lengths.
 
 ======  =============  =============  ===============================================
 symbol  code           shape          meaning
@@ -51,17 +51,17 @@ from forcefit.results.display import numbers
 
 CLOSED = 1e-12  # [rad, reference lengths] largest residual of a solution
 LONGEST_STEP = 1.0  # [rad, reference lengths] largest change in a step
-# [rad, reference lengths] residual whose wrenches are considered small
+# [rad, reference lengths] residual that defines which wrenches count as small
 _SMALL_RESIDUAL = 1e-9
-_LEAST_DAMPING = 1e-9  # relative to the largest closure wrench: smallest damping
-# relative to the largest closure wrench: first damping of a rejected step
+_LEAST_DAMPING = 1e-9  # smallest damping, relative to the largest closure wrench
+# damping after the first rejected step, relative to the largest closure wrench
 _FIRST_DAMPING = 1e-8
 _ATTEMPTS = 40  # largest number of attempts; each multiplies the damping by eight
 _RESTORATIONS = 4  # number of corrections that move a step back onto the closures
 
 
 class NotConverged(SolverFailed):
-    """Error: no equilibrium with finite motions was found near the linear solution.
+    """Raised if no equilibrium with finite motions is found near the linear solution.
 
     Attributes:
         problem: name of the problem.
@@ -126,7 +126,7 @@ class Step:
             the closures.
         decrement: [J] predicted decrease of the potential without that cost.
         length: [rad, reference lengths] size of the change.
-        rigid: (6 K,) multipliers of the closures that depend only on clearances.
+        rigid: (6 K,) multipliers of the closure rows that only clearances can close.
         damping: [J/rad^2] damping of the next step; 0 if this step was not damped.
     """
 
@@ -160,8 +160,9 @@ def expand(at: Placement, loads: DeadLoads, rigid: NDArray) -> Expansion:
     U, S, Vt = svd(A[:, unbounded] * unit, full_matrices=True)
     tolerance = rank_tolerance(model.posture.mismatch)
     rank = int(np.sum(S > tolerance * S.max(initial=0.0)))
-    # left singular vectors of the range divided by their singular values, left singular
-    # vectors of the complement, right singular vectors in the units of the unknowns
+    # three parts of a singular value decomposition: left vectors of the range, divided
+    # by their singular values; left vectors of the complement; right vectors in the
+    # units of the unknowns
     range_, rigid_space, V = U[:, :rank] / S[:rank], U[:, rank:], unit[:, None] * Vt.T
     inverse = V[:, :rank] @ range_.T
     multipliers = inverse.T @ gradient[unbounded]
@@ -195,7 +196,7 @@ def _basis(unbounded: NDArray, closing: NDArray, null_space: NDArray) -> NDArray
 
 
 def _independent(rows: NDArray) -> tuple[NDArray, NDArray]:
-    """Return independent rows (p, nu) that span rows (m, nu), and the map (m, p)."""
+    """Return p independent rows that span m given rows (m, nu), and the map (m, p)."""
     if not rows.size:
         return np.zeros((0, rows.shape[1])), np.zeros((rows.shape[0], 0))
     U, S, _ = svd(rows, full_matrices=False)
@@ -231,7 +232,7 @@ def advance(
         The step.
 
     Raises:
-        NotConverged: no step reduces the sum, however short.
+        NotConverged: no step, however short, reduces this sum.
     """
     start = local.placement
     penalised = penalty * float(np.linalg.norm(start.residual))
@@ -243,8 +244,8 @@ def advance(
     # rounding errors of angles and positions, multiplied by the forces on them
     noise += 1e-14 * (penalty + pull)
     for attempt in range(_ATTEMPTS):
-        # if a Newton step is rejected, the conic solver repeats the step before it is
-        # damped
+        # if a Newton step is rejected, the conic solver repeats the step before the
+        # step is damped
         newton = near and attempt != 1
         step = _solve(local, damping + _LEAST_DAMPING * least, newton, method)
         if step is not None and step.length <= LONGEST_STEP:
@@ -272,7 +273,7 @@ def problem_name(at: Placement, loads: DeadLoads) -> str:
 
 
 def _solve(local: Expansion, damping: float, near: bool, method: Method) -> Step | None:
-    """Return the step to the minimum of the expansion; None if there is none."""
+    """Return the step to the minimum of the expansion; None if no minimum exists."""
     at, model = local.placement, local.placement.model
     normal = np.zeros(len(at.x))
     normal[local.unbounded] = -local.inverse @ at.residual
@@ -315,7 +316,7 @@ def _solve(local: Expansion, damping: float, near: bool, method: Method) -> Step
 
 
 def _restored(local: Expansion, change: NDArray) -> Placement:
-    """Return the placement after a step that is restored onto the closures."""
+    """Return the placement after a step, moved back onto the closures."""
     model = local.placement.model
     x = local.placement.x + change
     x[model.bounded] = into_cones(x[model.bounded], model.joints.group)

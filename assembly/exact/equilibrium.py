@@ -17,7 +17,8 @@ from forcefit.assembly.exact.dead_load import load_magnitudes
 from forcefit.assembly.exact.descent import Expansion
 from forcefit.assembly.solvers.cones import cone_sizes
 
-_ANGLE_ROUNDING = 1e-5  # rounding error of an angle, relative to a small residual
+# [-] rounding error of an angle, relative to the residual that counts as small
+_ANGLE_ROUNDING = 1e-5
 
 
 def imbalance(local: Expansion) -> float:
@@ -36,10 +37,11 @@ def imbalance(local: Expansion) -> float:
     wrench = float(np.linalg.norm(local.multipliers)) + local.small_wrench
     loads = load_magnitudes(at, local.loads)
     acting = np.linalg.norm(A, axis=0) * wrench + np.abs(local.gradient) + loads
-    # the forces on unloaded parts of an open chain are only rounding errors
+    # in an open chain, the forces on unloaded parts are only rounding errors
     unit = np.sqrt(np.diag(model.metric))
     acting = np.maximum(acting, local.small_wrench * unit)
-    # inside a cone the force is zero; at its boundary it is normal to the boundary
+    # a clearance inside its cone carries no force; at the boundary, its force is normal
+    # to the boundary
     u, group = at.x[model.bounded], model.joints.group
     force = cone_multipliers(u, unbalanced[model.bounded], group)
     unbalanced[model.bounded] += force[group] * u

@@ -79,14 +79,18 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_STEPS = 160  # largest number of steps; usually 3 to 5, 80 for metres of travel
-# relative energy that can still be gained: below it, Newton's method is tried
+# largest number of steps; usually 3 to 5 are needed, and 80 for motions of metres
+_STEPS = 160
+# predicted decrease of the potential, relative to its scale, below which Newton's
+# method is tried
 _NEAR = 1e-2
-_DECREMENT = 1e-14  # relative energy that can still be gained at the last step
-# number of steps after which a state in equilibrium is accepted with moving clearances
+# largest relative decrease of the potential predicted at the last step
+_DECREMENT = 1e-14
+# number of steps after which an equilibrium is accepted even if clearances still move
 _RESTLESS = 100
 _STILL = 1e-9  # [rad, reference lengths] size of a last step without damping
-_STATIONARY = 1e-7  # largest relative imbalance of a solution; 1e-12 is usual
+# [-] largest accepted relative imbalance of a solution; usually it is 1e-12
+_STATIONARY = 1e-7
 # [J] energies below this are rounding errors; without errors they are about 1e-48 J
 _ROUNDING = 1e-30
 
@@ -150,7 +154,7 @@ class ExactAssembly:
         }
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return frames, closures and platform, see ``assembly.model.tables``."""
+        """Return the results by frame and closure; see ``assembly.model.tables``."""
         from forcefit.assembly.model.tables import assembly_dataset
 
         return assembly_dataset(self)
@@ -163,7 +167,7 @@ class ExactAssembly:
 
     @property
     def placement(self) -> Placement:
-        """Positions of all frames."""
+        """Displaced positions of all frames."""
         return self.expansion.placement
 
     @property
@@ -326,7 +330,7 @@ def solve_exact(
         load: (6,) [N m, N] wrench on the platform at ``point``, base axes; or a mapping
             of components such as ``{"fz": -50}``.  The force is dead; the work of the
             moment is its product with the rotation vector.
-        start: the linear solution for this posture and these loads, if known.
+        start: linear solution for this posture and these loads; computed if not given.
         bodies: (n, 6) [N m, N] dead loads on the bodies of all frames, each at its
             frame's origin, base axes; moments are couples of dead forces.
         gravity: (3,) [m/s^2] gravity vector in base axes; for links see
@@ -334,7 +338,8 @@ def solve_exact(
         point: (3,) [m] point of the platform, in platform axes; the force moves with
             it.
         near: equilibrium of the same posture under another load, used as the start.
-        progress: function called with the number of steps and the largest number.
+        progress: function called with the number of steps made and the largest number
+            of steps.
         method: method of the linear solution and of every step: ``"compiled"``, with
             Clarabel if the compiled solution is not proved; or ``"reference"``, with
             numpy and Clarabel only.
@@ -345,7 +350,8 @@ def solve_exact(
     Raises:
         CannotAssemble: the linear model has no solution to start from.
         FreeMotion: a load acts along a motion without stiffness.
-        NotConverged: there is no equilibrium nearby; a :class:`SolverFailed`.
+        NotConverged: no equilibrium was found near the linear solution; a subclass of
+            :class:`SolverFailed`.
         ValueError: ``start`` belongs to another posture or other loads; or the method
             is unknown, or is ``"reference"`` while ``start`` or ``near`` is compiled.
     """
@@ -380,13 +386,14 @@ def solve_exact(
 
     assembly = search(start.joints)
     if assembly.clearance_excess() > 1e-9 and has_bounded_motion(posture.robot):
-        # an omitted bound of a passive joint is active: solve with all bounds
+        # an omitted motion limit of a passive joint is active: solve again with all
+        # limits
         assembly = search(virtual_joints(cut.robot, bounded_motion=True))
     return assembly
 
 
 def _refuse_compiled(*starts: Assembly | ExactAssembly | None) -> None:
-    """Reject a compiled solution as the start of the reference method."""
+    """Raise ValueError for a compiled solution as start of the reference method."""
     if any(start is not None and start.method != "reference" for start in starts):
         raise ValueError(
             "solve_exact: start or near: found a solution of the compiled "
@@ -396,7 +403,7 @@ def _refuse_compiled(*starts: Assembly | ExactAssembly | None) -> None:
 
 
 def _count(joints: VirtualJoints) -> int:
-    """Return the number of unknowns."""
+    """Return the number of unknowns of the problem."""
     return sum(part.shape[1] for part in (joints.elastic, joints.cones, joints.free))
 
 
@@ -404,7 +411,7 @@ def _search(
     joints: VirtualJoints, linear: Assembly, loads: DeadLoads, first: NDArray | None,
     progress: Callable[[int, int], None], method: Method,
 ) -> tuple[Expansion, float, int]:  # fmt: skip
-    """Iterate from a guess; return the expansion, imbalance and number of steps."""
+    """Iterate to an equilibrium; return its expansion, imbalance and step count."""
     model = FiniteRobot(linear.posture, joints)
     current = place(model, _first_guess(model, linear) if first is None else first)
     rigid = np.zeros(len(current.residual))

@@ -7,8 +7,8 @@ screw:
 
 F_i is the nominal body.  exp(dl)^ is the geometric error: a rotation vector and a
 translation, both in the frame's axes.  The motion of the joint is a rotation about z or
-a translation along z; its size is the joint's coordinate plus the motion of a passive
-joint.
+a translation along z.  Its size is the nominal joint coordinate, plus the additional
+motion if the joint is passive.
 """
 
 from dataclasses import dataclass
@@ -26,7 +26,8 @@ from forcefit.assembly.model.links import own_screws
 from forcefit.assembly.model.robot import Robot
 from forcefit.stiffness.screws import rotation_matrix, transform
 
-# the motions at a frame, in this order; OWN is the motion of the joint
+# kinds of motion at a frame, in the order of composition; OWN is the motion of the
+# joint
 LINK, CLEARANCE, SPRING, OWN = range(4)
 
 
@@ -75,7 +76,7 @@ class FiniteRobot:
 
     @property
     def _free(self) -> int:
-        """Number of motions without a bound."""
+        """Number of free joint motions, which have no bound."""
         return self.joints.free.shape[1]
 
     @property
@@ -121,7 +122,7 @@ class FiniteRobot:
 
     @cached_property
     def _order(self) -> NDArray:
-        """(N,) position of each unknown's motion along any chain that contains it."""
+        """(N,) rank of each unknown's motion in the order of any chain with it."""
         return 4 * self.frame + self.motion
 
     @cached_property
@@ -177,7 +178,8 @@ class FiniteRobot:
     def nominal_closures(self) -> NDArray:
         """(K, 4, 4) nominal second frame of each closure relative to the first."""
         first, second = self.posture.transforms[self.closed_frames.T]
-        return inverse(first) @ second  # not exactly 1 for rounded robot files
+        # not exactly the identity, because robot files are rounded
+        return inverse(first) @ second
 
 
 def along_own(robot: Robot, coordinates: NDArray) -> NDArray:

@@ -1,4 +1,4 @@
-r"""A robot moved by finite screws, with first and second derivatives of its closures.
+r"""Robot displaced by finite screws, with first and second derivatives of its closures.
 
 ======  =================  ==========  =============================================
 symbol  code               shape       meaning
@@ -40,7 +40,7 @@ from forcefit.stiffness.screws import rotation_vector, screw_map, skew
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """Robot moved by finite screws; its closures can be open.
+    """Robot displaced by finite screws; its closures can be open.
 
     Attributes:
         model: the prepared robot.
@@ -119,7 +119,7 @@ class Placement:
 
     @cached_property
     def _open(self) -> NDArray:
-        """(K, 4, 4) residual motion of each closure, at the platform's origin."""
+        """(K, 4, 4) motion by which each closure is open, at the platform's origin."""
         first, second = self.transforms[self.model.closed_frames.T]
         G = first @ self.model.nominal_closures @ inverse(second)
         origin = self.model.posture.platform[:3, 3]
@@ -128,7 +128,7 @@ class Placement:
 
     @cached_property
     def _open_screws(self) -> NDArray:
-        """(K, 6) [rad, m] logarithms of the open closures."""
+        """(K, 6) [rad, m] screws by which the closures are open (logarithms)."""
         return logarithm(self._open)
 
     @cached_property
@@ -143,7 +143,7 @@ class Placement:
 
     @cached_property
     def _readings(self) -> NDArray:
-        """(N, 6, 6) maps from each unknown's screw to the platform's origin."""
+        """(N, 6, 6) maps that move each unknown's screw to the platform's origin."""
         m = self.model
         before = self._poses[m.motion, m.frame]
         offset = before[:, :3, 3] - m.posture.platform[:3, 3]
@@ -214,7 +214,7 @@ class Placement:
         return H + self.exponential_curvature(through)
 
     def exponential_curvature(self, through: NDArray) -> NDArray:
-        """Return the curvature that is due to the individual exponentials.
+        """Return the part of the curvature that the individual exponentials cause.
 
         Args:
             through: (N, 6) wrench on all parts that each unknown moves, at the
@@ -245,11 +245,12 @@ class Placement:
         V = self.moves * self.model.on_platform
         later = np.sign(order - order[:, None])
         H = (V.T @ bracket_form(self.load_wrench(load)) @ V) * later / 2
-        # a rotation by w moves the origin, whose translation is v, by w x v / 2
+        # to second order, a rotation w also moves the origin, translated by v, by w x v
+        # / 2
         of_force = -W[:3].T @ skew(load[3:]) @ W[3:]
         H += (of_force + of_force.T) / 2
-        # exp(turn + h) = exp(J h + D(h, h) / 2) exp(turn), for a given rotation before
-        # h
+        # exp(turn + h) = exp(J h + D(h, h) / 2) exp(turn), for a given rotation
+        # exp(turn) and a small rotation h after it
         along, zero = np.linalg.solve(turn_jacobian(turn), W[:3]), np.zeros(3)
         moment = np.linalg.solve(turn_jacobian(turn).T, load[:3])
         form = second_form(np.append(turn, zero), np.append(moment, zero))

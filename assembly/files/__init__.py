@@ -1,4 +1,4 @@
-"""Reading and writing of robot files, with a module each for links, joints and effects.
+"""Reading and writing of robot files; links, joints and effects have their own modules.
 
 Start with ``robot_file.py``; ``docs/robot_files.md`` describes the format.
 """

@@ -1,4 +1,4 @@
-"""The key ``locked_at`` of a fixed joint: the pose at which it is bolted."""
+"""Reader of the key ``locked_at``: the pose at which a fixed joint is bolted."""
 
 from typing import Any
 
@@ -25,11 +25,11 @@ def read_locked_at(
         clearance: clearance given in the table.
 
     Returns:
-        The clearance and None if ``locked_at`` is absent; otherwise None and the bolt.
+        If ``locked_at`` is absent, the clearance and None.  Otherwise None, because a
+        bolted joint has no clearance, and the pose with the former clearance.
 
     Raises:
-        BadInput: the joint is not fixed or has no clearance, or the pose is not given
-            as expected.
+        BadInput: the joint is not fixed, it has no clearance, or the pose is invalid.
     """
     key = "locked_at"
     if not table.has(key):
@@ -70,7 +70,7 @@ def bolt_table(bolt: LockedAt) -> Any:
     """Return the value of ``locked_at`` for a robot file.
 
     Args:
-        bolt: the pose at which a joint is bolted.
+        bolt: pose at which the joint is bolted, and its clearance before bolting.
 
     Returns:
         Plain values of the file format.

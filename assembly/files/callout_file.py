@@ -42,14 +42,16 @@ from forcefit.inputs.table import BadInput, Table, describe, nearest, quoted
 
 _ZONES = (*LOCATIONS, *ORIENTATIONS, "length", "general")
 _LARGEST_CP = 5.0
-_ACROSS = 1e-3  # largest cosine of two perpendicular directions
+# largest cosine of the angle of two directions that count as perpendicular
+_ACROSS = 1e-3
 _NOT_ACROSS = "found a direction that is not perpendicular to the axis, expected 90 deg"
-_SIZES = {"axis": 1, "plane": 2, "point": 0}  # count of numbers in "extent"
+# number of lengths in "extent", by shape of the feature
+_SIZES = {"axis": 1, "plane": 2, "point": 0}
 _EXTENTS = {
     "axis": 'the length of the bore, such as "20 mm"',
     "plane": 'two sizes of the face, such as ["40 mm", "30 mm"], or "diameter"',
 }
-# keys that a shape cannot have
+# tolerance keys that a feature of each shape cannot have
 _EXCLUDED = {
     "axis": ("profile",),
     "plane": ("coaxiality",),
@@ -94,10 +96,10 @@ def read_frame_callouts(root: Table, frames: list[str]) -> tuple[Callout, ...]:
 def read_drawn_callouts(
     copied: Copy, bodies: list[DrawnBody], joints: list[DrawnJoint]
 ) -> Iterator[DrawnCallout]:
-    """Yield the callouts of the bodies in a copy of a leg, and of the base.
+    """Yield the callouts of the bodies in a copy of a leg, and those of the base.
 
     Args:
-        copied: a copy of a leg, or the bodies that belong to no leg.
+        copied: copy of a leg, or the bodies that belong to no leg.
         bodies: bodies of the whole robot.
         joints: joints of the whole robot.
 
@@ -122,7 +124,7 @@ def read_drawn_callouts(
 def _drawn(
     table: Table, copied: Copy, body: str, joints: list[DrawnJoint]
 ) -> DrawnCallout | None:
-    """The callouts of one joint of a body, None if only its form is stated."""
+    """Return the callouts of a body's feature; None if it has only a form tolerance."""
     here = {j.name: j for j in joints if body in (j.first, j.second)}
     short = body.removeprefix(copied.prefix)
 
@@ -141,7 +143,7 @@ def _drawn(
     form = read_form(table, shape)
     if form and not any(table.has(word) for word in _ZONES):
         for key in [k for k in table.content if k not in ("feature", "name", *FORMS)]:
-            fault = "found one of a feature whose form alone is stated"
+            fault = "found this key at a feature that has only a form tolerance"
             raise table.bad(key, f"{fault}, expected none")
         return None
     datums = joint_datums(table, feature.name, find)
@@ -173,7 +175,7 @@ def _callout(
     table: Table, name: str, feature: str, datums: tuple[Datum, ...], shape: str,
     after: bool, axis: Vector | None,
 ) -> Callout:  # fmt: skip
-    """Return a callout from the keys that both formats have."""
+    """Return a callout from the keys that occur in both file formats."""
     if len({replace(d, hole="", hole_of="") for d in datums}) < len(datums):
         names = [datum.frame for datum in datums]
         raise table.bad("datums", f"found {names}, expected each datum once")
@@ -192,7 +194,7 @@ def _callout(
     if table.has("length"):
         length = parsed_value(table, "length", parse_length)
     if envelope and shape != "plane":
-        fault = "found (E) of a feature that is no face"
+        fault = "found (E) at a feature that is not a face"
         raise table.bad("length", f"{fault}, expected none")
     if envelope and not extent:
         raise table.bad("extent", f"missing; expected {_EXTENTS[shape]}")
@@ -210,7 +212,7 @@ def _callout(
 
 
 def _widths(table: Table, shape: str) -> tuple[dict[str, float], str]:
-    """Return the widths of the zones, and the hole with maximum material condition."""
+    """Return the zone widths, and the hole with maximum material condition."""
     widths: dict[str, float] = {}
     used = False
     hole = table.text("hole", "") if table.has("hole") else ""
@@ -221,7 +223,7 @@ def _widths(table: Table, shape: str) -> tuple[dict[str, float], str]:
             continue
         if word in _EXCLUDED[shape]:
             article = "an" if shape == "axis" else "a"
-            fault = f"found for a feature that is {article} {shape}"
+            fault = f"found this zone at a feature that is {article} {shape}"
             raise table.bad(word, f"{fault}, expected none")
         widths[word], at_most = parsed_value(table, word, parse_width)
         if at_most and (word != "position" or shape != "axis" or not hole):
@@ -246,7 +248,7 @@ def _check_widths(table: Table, widths: dict[str, float]) -> None:
 
 
 def _check_form(table: Table, form: float, widths: Mapping[str, float]) -> None:
-    """Refuse a form zone that is not smaller than every other zone of the feature."""
+    """Raise BadInput if the form zone is not the smallest zone of the feature."""
     least = min(widths.values(), default=1.0)
     if form and not form < least:
         word = next(word for word in FORMS if table.has(word))
@@ -277,11 +279,11 @@ def _extent(table: Table, shape: str, widths: dict[str, float]) -> tuple[float, 
 
 
 def _diameter(table: Table, shape: str) -> tuple[float, ...]:
-    """[m] the diameter of a round face."""
+    """Return the diameter [m] of a round face."""
     if shape != "plane":
         article = "an" if shape == "axis" else "a"
-        fault = f"found one of a feature that is {article} {shape}, expected none"
-        raise table.bad("diameter", f"{fault}; only a face has one")
+        fault = f"found it at a feature that is {article} {shape}, expected none"
+        raise table.bad("diameter", f"{fault}; only a face has a diameter")
     if table.has("extent"):
         fault = 'found it together with "extent", the sizes of a rectangular face'
         raise table.bad("diameter", f"{fault}; expected one of them")

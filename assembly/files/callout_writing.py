@@ -7,7 +7,7 @@ from forcefit.assembly.files.datum_file import ORIGIN, Z_AXIS
 
 
 def callout_table(callout: Callout) -> dict[str, Any]:
-    """Return the content of ``[[tolerance]]`` of a frames file, without defaults."""
+    """Return the content of a ``[[tolerance]]`` table without default values."""
     table: dict[str, Any] = {"feature": callout.feature}
     if callout.name != callout.feature:
         table["name"] = callout.name
@@ -47,7 +47,7 @@ def callout_table(callout: Callout) -> dict[str, Any]:
 
 
 def _datum_table(datum: Datum) -> str | dict[str, Any]:
-    """A datum as it is written."""
+    """Return the value that describes a datum in a robot file."""
     if datum == Datum(datum.frame):
         return datum.frame
     table = {"frame": datum.frame, "shape": datum.shape, "axis": list(datum.axis)}

@@ -1,4 +1,4 @@
-"""Datums of ``[[tolerance]]`` in robot files, and the values of its keys."""
+"""Datums of ``[[tolerance]]`` tables in robot files, and readers of other keys."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -15,7 +15,8 @@ Parsed = TypeVar("Parsed")
 Vector = tuple[float, float, float]
 Z_AXIS = (0.0, 0.0, 1.0)
 ORIGIN = (0.0, 0.0, 0.0)
-_HOLES = ("revolute", "cylindrical")  # joints with one hole on a body
+# types of joints whose feature on a body is a single hole
+_HOLES = ("revolute", "cylindrical")
 
 
 def frame_datums(table: Table, frames: list[str]) -> tuple[Datum, ...]:
@@ -26,7 +27,7 @@ def frame_datums(table: Table, frames: list[str]) -> tuple[Datum, ...]:
     """
     datums = tuple(_datum(table, value, frames) for value in _datum_list(table))
     if datums[0].hole:
-        fault = "found a hole at maximum material as datum A, whose tilt would shift"
+        fault = "found a hole at maximum material as datum A, whose tilt would change"
         raise table.bad("datums", f"{fault} too; expected it at B or C")
     return datums
 
@@ -37,12 +38,14 @@ def joint_datums(
     """Return the datums of a feature in a file of bodies and joints.
 
     Args:
-        table: of the tolerances of the feature.
+        table: table of the feature's tolerances.
         feature: name of its joint in the whole robot.
-        find: function of a name as written and its key, which returns the joint.
+        find: function that returns the joint for a name in the file; its second
+            argument is the key that contains the name.
 
     Returns:
-        The datums by names of joints; ``"B (M)"`` is at maximum material.
+        The datums, named by their joints.  The text ``"B (M)"`` means datum B with the
+        maximum material condition.
 
     Raises:
         BadInput: a rule of the format is broken.
@@ -67,29 +70,31 @@ def joint_datums(
         datums.append(Datum(joint.name, hole=hole if at_most else ""))
     shifting = [datum.frame for datum in datums if datum.hole]
     if hole and len(shifting) != 1:
-        fault = f"found one with {len(shifting)} datums at maximum material"
-        raise table.bad("datum_hole", f'{fault}, expected one such as "B (M)"')
+        fault = f"found a hole size, and {len(shifting)} datums with (M)"
+        raise table.bad("datum_hole", f'{fault}; expected one, such as "B (M)"')
     return datums
 
 
 def _check_shifting(
     table: Table, value: str, number: int, kind: str, hole: str
 ) -> None:
-    """Refuse (M) at a datum that is no hole, and at one that holds a tilt."""
+    """Raise BadInput for (M) at datum A, or at a datum that is not a sized hole."""
     if kind not in _HOLES:
         fault = f"found {quoted(value)}, a {kind} joint"
         expected = f"expected (M) at a {' or '.join(_HOLES)} joint"
         raise table.bad("datums", f"{fault}; {expected}")
     if number == 0:
-        fault = f"found {quoted(value)} as datum A, whose tilt would shift too"
+        fault = f"found {quoted(value)} as datum A, whose tilt would change too"
         raise table.bad("datums", f"{fault}; expected (M) at datum B or C")
     if not hole:
         expected = 'expected "datum_hole" too, such as datum_hole = "12 H7"'
-        raise table.bad("datums", f"found {quoted(value)} without a size, {expected}")
+        raise table.bad(
+            "datums", f"found {quoted(value)} without a hole size, {expected}"
+        )
 
 
 def _datum_list(table: Table) -> list:
-    """The datums as written: at least one, at most three."""
+    """Return the datums as written in the file: one to three."""
     value = table.require("datums", "names of features, A first")
     if not isinstance(value, list) or not 1 <= len(value) <= 3:
         fault = f"found {describe(value)}, expected a list of one to three names"
@@ -98,7 +103,7 @@ def _datum_list(table: Table) -> list:
 
 
 def _datum(table: Table, value: Any, frames: list[str]) -> Datum:
-    """A datum: the name of a frame, or a table with shape and axis."""
+    """Return a datum, written as the name of a frame or as a table."""
     if isinstance(value, dict):
         inner = Table(value, table.file, f"{table.place}.datums")
         name = inner.text("frame", expected="the name of a frame")
@@ -116,48 +121,50 @@ def _datum(table: Table, value: Any, frames: list[str]) -> Datum:
 
 
 def _hole_of_datum(table: Table, name: str, shape: str) -> tuple[str, str]:
-    """Size of a datum at maximum material, and the fit or joint of this hole."""
+    """Return the size of a datum hole with (M), and the name of the hole."""
     if not table.has("hole"):
         return "", ""
     if shape != "axis":
-        fault = f"found one of a datum that is a {shape}"
+        fault = f"found a hole size for a datum of shape {shape}"
         raise table.bad("hole", f"{fault}, expected none")
     parsed_value(table, "hole", parse_hole)
     return table.text("hole"), table.text("hole_of", name)
 
 
 def check_frame(table: Table, key: str, name: str, frames: list[str]) -> None:
-    """Refuse a name that is not that of a frame."""
+    """Raise BadInput if a name is not the name of a frame."""
     if name not in frames:
         fault = f"found {quoted(name)}, expected the name of a frame"
         raise table.bad(key, fault + nearest(name, frames))
 
 
 def read_point(table: Table) -> Vector:
-    """[m] the middle of a feature in its frame's axes."""
+    """Return the middle [m] of a feature in the axes of its frame."""
     default = np.zeros(3)
     x, y, z = table.array("at", (3,), "m", default, largest=LARGEST_LENGTH).tolist()
     return x, y, z
 
 
 def read_direction(table: Table, key: str) -> Vector | None:
-    """A unit vector, None if absent."""
+    """Return a unit vector; None if the key is absent."""
     if not table.has(key):
         return None
     vector = table.array(key, (3,), "direction", largest=LARGEST_LENGTH)
     size = float(np.linalg.norm(vector))
     if size < 1e-12:
-        raise table.bad(key, "found no direction, expected 3 numbers, not all 0")
+        raise table.bad(
+            key, "found only zeros, expected a direction: 3 numbers, not all 0"
+        )
     x, y, z = (vector / size).tolist()
     return x, y, z
 
 
 def parsed_value(table: Table, key: str, parse: Callable[[Any], Parsed]) -> Parsed:
-    """The value of a key by a function that refuses what it is not."""
+    """Return the value of a key, converted by a function that rejects wrong values."""
     try:
         return parse(table.content[key])
     except BadInput as error:
         raise table.bad(key, str(error)) from None
-    except TypeError:  # a text was expected
+    except TypeError:  # the value is not a text
         fault = f"found {describe(table.content[key])}, expected a text"
         raise table.bad(key, fault) from None

@@ -1,4 +1,4 @@
-"""Robot files of ``format = 2``: bodies and joints by points and axes at home.
+"""Reading of robot files of ``format = 2``: bodies and joints in the home pose.
 
 The keys are described in ``docs/drawn_robots.md``.
 """
@@ -55,7 +55,8 @@ def read_drawing(root: Table, name: str, description: str) -> Drawing:
     Raises:
         BadInput: the file violates a rule of the format.
     """
-    root.content = copy.deepcopy(root.content)  # texts with units become numbers
+    # a copy, because texts with units are replaced by numbers
+    root.content = copy.deepcopy(root.content)
     if root.get("format", 2) == 1:
         raise root.bad("format", "found 1 in a file of bodies and joints, expected 2")
     platform = root.text("platform", expected="the name of a body")
@@ -101,7 +102,9 @@ def _copies(root: Table) -> Iterator[Copy]:
             name = leg.text("name", longest=LONGEST_NAME)
             leg.place = f"leg {quoted(name)}"
             if name in names:
-                raise leg.bad("name", "found a name twice, expected different names")
+                raise leg.bad(
+                    "name", "found the same name twice, expected different names"
+                )
             names.append(name)
             yield from _repeated(leg, name)
 
@@ -118,7 +121,9 @@ def _repeated(leg: Table, name: str) -> Iterator[Copy]:
     about = table.array("about", (3,), "direction", largest=LARGEST_LENGTH)
     size = float(np.linalg.norm(about))
     if size < 1e-12:
-        raise table.bad("about", "found no direction, expected 3 numbers, not all 0")
+        raise table.bad(
+            "about", "found only zeros, expected a direction: 3 numbers, not all 0"
+        )
     without_units(table, "at", "length")
     at = table.array("at", (3,), "m", np.zeros(3), largest=LARGEST_LENGTH)
     table.finish()
@@ -174,7 +179,7 @@ def _between(
 
 
 def _form_remarks(forms: dict[str, tuple[str, float]]) -> tuple[str, ...]:
-    """A remark on the clearances that the form of features widens."""
+    """Return a remark on the clearances that form tolerances increase."""
     texts = [
         f"{quoted(joint)} by {added * 1e6:.4g} um ({word})"
         for joint, (word, added) in forms.items()

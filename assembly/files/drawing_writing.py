@@ -24,8 +24,9 @@ from forcefit.assembly.model.inertia import six_moments
 from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput
 
-_ROUNDING = 1e-15  # relative: smaller parts of points and directions are written as 0
-_AT_ZERO = 1e-12  # [rad or m] coordinates nearer to 0 are not written
+# relative to the vector: smaller components of points and directions are written as 0
+_ROUNDING = 1e-15
+_AT_ZERO = 1e-12  # [rad or m] smaller joint coordinates count as 0 and are not written
 
 
 def drawing_text(robot: Robot, drawing: Drawing, folder: Path) -> str:
@@ -40,7 +41,7 @@ def drawing_text(robot: Robot, drawing: Drawing, folder: Path) -> str:
         The text.
 
     Raises:
-        BadInput: the robot has tolerances of a drawing or fits.
+        BadInput: the robot has tolerance callouts or fits.
     """
     if robot.callouts or robot.fits:
         raise BadInput(
@@ -57,7 +58,7 @@ def drawing_text(robot: Robot, drawing: Drawing, folder: Path) -> str:
 
 
 def _point(values: NDArray) -> list[float]:
-    """Return the numbers to be written, with rounding errors replaced by 0."""
+    """Return the numbers of a point, with rounding errors replaced by 0."""
     least = _ROUNDING * max(1.0, float(np.abs(values).max()))
     return [float(v) if abs(v) > least else 0.0 for v in values]
 
@@ -74,7 +75,8 @@ def _body_table(body: DrawnBody, folder: Path) -> dict[str, Any]:
     if body.link is not None and body.ends is not None:
         link = link_table(body.link, folder)
         beam = link["link"].get("beam", {})
-        if beam.get("theory") == "timoshenko":  # the default
+        # this theory is the default and is not written
+        if beam.get("theory") == "timoshenko":
             del beam["theory"]
         for key in ("axis", "up"):
             if key in beam:
@@ -120,13 +122,13 @@ def _drive_stiffness(joint: DrawnJoint) -> float | None:
 
 
 def _none(key: str) -> Any:
-    """Return the value that is written for an absent clearance, stiffness or error."""
+    """Return the value that means no clearance, no stiffness or no error in a file."""
     free = [np.inf, np.inf, 0.0, np.inf, np.inf, np.inf]
     return {"clearance": {}, "joint_stiffness": free}.get(key, [0.0] * 6)
 
 
 def _numbers_table(own: JointNumbers) -> dict[str, Any]:
-    """Return the keys for the numbers of a joint or a bearing."""
+    """Return the keys for error, clearance and stiffness of a joint or a bearing."""
     table = joint_table(own.clearance, own.locked_at, own.stiffness)
     if own.error.any():
         table["geometric_error"] = own.error.tolist()

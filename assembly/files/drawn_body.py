@@ -1,4 +1,4 @@
-"""Bodies of robot files of ``format = 2``, and the joints at the ends of links."""
+"""Bodies in robot files of ``format = 2``, and the joints at their links' ends."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -17,7 +17,7 @@ from forcefit.assembly.model.robot import BASE
 from forcefit.inputs.table import Table, nearest, quoted
 from forcefit.stiffness.screws import transform
 
-LONGEST_NAME = 200  # largest number of characters
+LONGEST_NAME = 200  # largest number of characters of a name
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class Copy:
     Attributes:
         table: table in which the bodies and joints are written.
         prefix: prefix of their names, such as ``"leg1."``.
-        T: (4, 4) transform of the points and axes of the table to the copy.
+        T: (4, 4) transform from the leg as written in the table to the copy.
     """
 
     table: Table
@@ -36,7 +36,7 @@ class Copy:
 
 
 def read_bodies(copied: Copy) -> Iterator[DrawnBody]:
-    """Yield the bodies of a copy; the joints at the links' ends are not yet known."""
+    """Yield the bodies of a copy, without the joints at the ends of their links."""
     for table in copied.table.tables("body"):
         name = table.text("name", longest=LONGEST_NAME)
         table.place = place_of(copied.table, "body", name)
@@ -57,14 +57,16 @@ def read_bodies(copied: Copy) -> Iterator[DrawnBody]:
         )
         for key in ("from", "to"):
             if table.has(key) and link is None:
-                raise table.bad(key, 'found a joint without "link", expected both')
-        table.tables("tolerance")  # read when all joints are known
+                raise table.bad(
+                    key, 'found a joint, but no "link"; expected both or neither'
+                )
+        table.tables("tolerance")  # marked as used here; read when all joints are known
         table.finish()
         yield turned_body(body, copied.T)
 
 
 def place_of(owner: Table, kind: str, name: str) -> str:
-    """Return the place of a body or a joint for messages."""
+    """Return the text with which messages on a body or a joint begin."""
     return f"{owner.place + '.' if owner.place else ''}{kind} {quoted(name)}"
 
 
@@ -74,17 +76,17 @@ def with_ends(
     """Return the body with the joints at the ends of its link.
 
     Args:
-        body: body as read.
-        copied: copy in which the body is written.
+        body: body as read from the file.
+        copied: copy of a leg to which the body belongs.
         joints: joints of the whole robot.
         point: (3,) [m] the platform's point if the body is the platform.
 
     Returns:
-        The body; a beam along a curve becomes a stiffness and a mass.
+        The body; a beam along a curve is replaced by its stiffness matrix and its mass.
 
     Raises:
-        BadInput: there are no such joints, or the curve does not lead from one joint to
-            the other.
+        BadInput: a joint does not exist, or the curve does not lead from the first
+            joint to the second.
     """
     table = next(
         t for t in copied.table.tables("body")
@@ -127,7 +129,9 @@ def _ends(
         fault = f"found {len(here)} joint of the body" if here else "found no joint"
         raise table.bad("link", f"{fault}, expected two, between which the link is")
     if first == second:
-        raise table.bad("to", f"found {quoted(first)} at both ends, expected two")
+        raise table.bad(
+            "to", f"found {quoted(first)} at both ends, expected two joints"
+        )
     return first, second
 
 

@@ -1,4 +1,4 @@
-"""Clearance of a joint of a robot file of ``format = 2``: bounds, or contacts."""
+"""Clearance of a joint in a robot file of ``format = 2``, as bounds or as contacts."""
 
 from forcefit.assembly.callouts.fits import Fit
 from forcefit.assembly.drawing.contacts import (
@@ -17,7 +17,8 @@ from forcefit.assembly.model.largest import LARGEST_LENGTH
 from forcefit.assembly.model.robot import Clearance
 from forcefit.inputs.table import Table, describe, quoted
 
-_LEAST_LENGTH = 1e-9  # [m] a shorter contact would allow a tilt of many turns
+# [m] smallest length of a contact; a shorter one would allow unlimited tilt
+_LEAST_LENGTH = 1e-9
 _ANGLES = ("tilt", "spin")
 _Clearance = tuple[Clearance | None, tuple[Contact, ...]]
 
@@ -60,7 +61,7 @@ def read_drawn_clearance(table: Table, kind: str) -> _Clearance:
 
 
 def _in_bore(table: Table, kind: str, bounds: Clearance) -> _Clearance:
-    """Return the bounds without ``radial``, and the contacts of a bore."""
+    """Return the remaining bounds of the joint, and the contacts in its bore."""
     _refuse_with(table, "length", ("tilt", "ball"))
     _refuse_without_shaft(table, "length", kind)
     half = _length(table, "length") / 2
@@ -70,7 +71,7 @@ def _in_bore(table: Table, kind: str, bounds: Clearance) -> _Clearance:
 
 
 def _in_bearings(table: Table, kind: str, bounds: Clearance) -> _Clearance:
-    """Return the bounds, and the contacts of a shaft in two bearings."""
+    """Return the remaining bounds of a joint, and the contacts in its two bearings."""
     _refuse_with(table, "bearings", ("radial", "tilt", "ball"))
     _refuse_without_shaft(table, "bearings", kind)
     value = table.get("bearings")
@@ -88,7 +89,7 @@ def _in_bearings(table: Table, kind: str, bounds: Clearance) -> _Clearance:
 
 
 def _bearing(table: Table, number: int, content: dict) -> tuple[float, float, str, str]:
-    """Return height and radial gap [m] of one bearing, its fit and its parts' name."""
+    """Return position and radial gap [m] of a bearing, its fit, and its parts' name."""
     inner = Table(dict(content), table.file, f"{table.place}.bearings[{number}]")
     for key in ("z", "radial"):
         without_units(inner, key, "length")
@@ -107,13 +108,13 @@ def _gap(table: Table) -> tuple[float, str]:
 
 
 def _of_shaft(bounds: Clearance) -> Clearance | None:
-    """Return the bounds that remain in addition to bearings; None without bounds."""
+    """Return the bounds ``axial`` and ``spin``; None if neither is given."""
     kept = Clearance(axial=bounds.axial, spin=bounds.spin)
     return None if kept == Clearance() else kept
 
 
 def _refuse_without_shaft(table: Table, key: str, kind: str) -> None:
-    """Raise BadInput for a bore or bearings of a joint without a shaft."""
+    """Raise BadInput if a joint without a shaft has a bore or bearings."""
     if not {0, 1, 3, 4}.isdisjoint(FREE_ROWS[kind]):
         fault = f"found the clearance of a shaft on a {kind} joint"
         raise table.bad(key, f"{fault}, which has no shaft; expected none")
@@ -137,7 +138,7 @@ def _in_guide(table: Table, kind: str, bounds: Clearance) -> _Clearance:
 
 
 def _guide_gaps(inner: Table) -> tuple[float, float]:
-    """[m] c_x and c_y of a guide."""
+    """Return the gaps c_x and c_y [m] of a guide along x and along y."""
     if not isinstance(inner.content.get("gap"), list):
         gap = inner.number("gap", "m", least=0.0, largest=LARGEST_LENGTH)
         return gap, gap
@@ -148,7 +149,7 @@ def _guide_gaps(inner: Table) -> tuple[float, float]:
 
 
 def _guide_fits(inner: Table) -> tuple[Fit, Fit] | None:
-    """The fits of a guide along x and y, None if its gaps are stated."""
+    """Return the fits of a guide along x and y; None if its gaps are given instead."""
     value = inner.content.get("fit")
     if value is not None and inner.has("gap"):
         raise inner.bad("gap", 'found it together with "fit", expected one of them')
@@ -158,7 +159,7 @@ def _guide_fits(inner: Table) -> tuple[Fit, Fit] | None:
     inner.has("fit")
     if len(value) != 2:
         expected = 'expected one fit, or two, such as ["40 H7/g6", "30 H7/g6"]'
-        raise inner.bad("fit", f"found a list of {len(value)}, {expected}")
+        raise inner.bad("fit", f"found a list of length {len(value)}, {expected}")
     one, other = (fit_of(Table({"fit": v}, inner.file, inner.place)) for v in value)
     assert one is not None
     assert other is not None
@@ -166,7 +167,7 @@ def _guide_fits(inner: Table) -> tuple[Fit, Fit] | None:
 
 
 def _on_pad(table: Table, kind: str, bounds: Clearance) -> _Clearance:
-    """Return None for the bounds, and the contacts of a pad."""
+    """Return the contacts of a pad; its first result, the bounds, is None."""
     _refuse_type(table, "pad", kind, "planar")
     _refuse_with(table, "pad", ("axial", "tilt", "ball"))
     inner = _sizes(table, "pad", ("gap", "length", "width"))
@@ -182,14 +183,14 @@ _CONTACTS = {
 
 
 def _refuse_type(table: Table, key: str, kind: str, of_kind: str) -> None:
-    """Raise BadInput for contacts of another type of joint."""
+    """Raise BadInput if the joint is not of the type that has these contacts."""
     if kind != of_kind:
         fault = f"found on a {kind} joint, expected none"
         raise table.bad(key, f"{fault}; only a {of_kind} joint has a {key}")
 
 
 def _refuse_with(table: Table, key: str, others: tuple[str, ...]) -> None:
-    """Raise BadInput for contacts together with bounds of the same motions."""
+    """Raise BadInput if contacts and bounds limit the same motions."""
     for other in others:
         if table.has(other):
             fault = f"found together with {quoted(key)}, which bounds that motion"
@@ -197,7 +198,7 @@ def _refuse_with(table: Table, key: str, others: tuple[str, ...]) -> None:
 
 
 def _sizes(table: Table, key: str, keys: tuple[str, ...]) -> Table:
-    """Return a table of lengths, with texts replaced by numbers."""
+    """Return a table of lengths, with texts such as ``"2 mm"`` replaced by numbers."""
     given = table.table(key)
     inner = Table(dict(given.content), given.file, given.place)
     for name in keys:
@@ -206,12 +207,12 @@ def _sizes(table: Table, key: str, keys: tuple[str, ...]) -> Table:
 
 
 def _length(table: Table, key: str) -> float:
-    """Return a length of a contact."""
+    """Return a length [m] that describes a contact."""
     return table.number(key, "m", above=_LEAST_LENGTH, largest=LARGEST_LENGTH)
 
 
 def _refuse_free(table: Table, bounds: Clearance | None, kind: str) -> None:
-    """Raise BadInput for bounds of free motions, if a joint has several of them."""
+    """Raise BadInput for bounds of free motions in a joint with several of these."""
     free = set(FREE_ROWS[kind])
     for key, rows in zip(BOUNDS, CONES, strict=True):
         given = bounds is not None and getattr(bounds, key) is not None

@@ -1,4 +1,4 @@
-"""A joint of a robot file of ``format = 2``: type, axes, drive, error and contact."""
+"""A joint of a robot file of ``format = 2``: type, axes, drive, error and clearance."""
 
 from typing import Any
 
@@ -23,7 +23,7 @@ from forcefit.assembly.model.largest import LARGEST, LARGEST_LENGTH
 from forcefit.inputs.table import Table
 
 ONE_FREEDOM = ("revolute", "prismatic", "helical")
-_PARALLEL = 1e-3  # sine of the angle between two axes below which they are parallel
+_PARALLEL = 1e-3  # sine of the angle below which two axes count as parallel
 _KEYS = ("clearance", "joint_stiffness", "geometric_error", "tolerance")
 _ROWS = ("RX", "RY", "RZ", "TX", "TY", "TZ")
 
@@ -73,7 +73,7 @@ def read_drawn_joint(table: Table, name: str, first: str, second: str) -> DrawnJ
 
 
 def _axes(table: Table, kind: str) -> tuple[NDArray, NDArray, NDArray]:
-    """Return three unit vectors: the axis, a perpendicular x axis, the second axis."""
+    """Return unit vectors along the z axis, a perpendicular x axis and ``axis2``."""
     needs = kind not in {"fixed", "spherical"}
     axis = _direction(table, "axis", needs)
     axis = np.array([0.0, 0.0, 1.0]) if axis is None else axis
@@ -83,7 +83,7 @@ def _axes(table: Table, kind: str) -> tuple[NDArray, NDArray, NDArray]:
         return axis, across, across
     if np.linalg.norm(np.cross(axis, axis2)) < _PARALLEL:
         raise table.bad(
-            "axis2", 'found a direction parallel to "axis", expected another'
+            "axis2", 'found a direction parallel to "axis", expected one across it'
         )
     return axis, perpendicular(axis, axis2), axis2
 
@@ -96,12 +96,14 @@ def _direction(table: Table, key: str, needed: bool) -> NDArray | None:
     vector = table.array(key, (3,), "direction", largest=LARGEST_LENGTH)
     size = float(np.linalg.norm(vector))
     if size < 1e-12:
-        raise table.bad(key, "found no direction, expected 3 numbers, not all 0")
+        raise table.bad(
+            key, "found only zeros, expected a direction: 3 numbers, not all 0"
+        )
     return np.asarray(vector / size)
 
 
 def _limits(table: Table, unit: str) -> tuple[float, float] | None:
-    """Return the least and largest coordinate; None if not given."""
+    """Return the least and largest commanded coordinate; None if not given."""
     if not table.has("limits"):
         return None
     least, most = table.array("limits", (2,), unit, largest=LARGEST_LENGTH)
@@ -112,7 +114,7 @@ def _limits(table: Table, unit: str) -> tuple[float, float] | None:
 
 
 def _numbers(table: Table, kind: str, actuated: bool) -> tuple[JointNumbers, ...]:
-    """Return error, clearance and stiffness; for a universal joint one per bearing."""
+    """Return error, clearance and stiffness; of a universal joint, for each bearing."""
     if kind != "universal":
         return (_one(table, kind, actuated),)
     for key in ("clearance", "geometric_error", "tolerance"):
@@ -126,7 +128,7 @@ def _numbers(table: Table, kind: str, actuated: bool) -> tuple[JointNumbers, ...
 
 
 def _refuse_count(table: Table, key: str) -> None:
-    """Raise BadInput for a list that has not one value for each of two bearings."""
+    """Raise BadInput if a list does not contain one value for each of two bearings."""
     value = table.content.get(key)
     parts = dict if key == "clearance" else list
     if not isinstance(value, list) or not all(isinstance(v, parts) for v in value):
@@ -137,14 +139,14 @@ def _refuse_count(table: Table, key: str) -> None:
 
 
 def _bearing(table: Table, key: str, which: int) -> Any:
-    """Return a bearing's value from ``[first, second]`` or from a common value."""
+    """Return the value of one bearing, from ``[first, second]`` or a common value."""
     value = table.content[key]
     pair = isinstance(value, list) and len(value) == 2
     return value[which] if pair else value
 
 
 def _one(table: Table, kind: str, actuated: bool) -> JointNumbers:
-    """Return the numbers of one joint or bearing."""
+    """Return error, clearance and stiffness of one joint or bearing."""
     for key in ("geometric_error", "tolerance"):
         without_units(table, key, SCREW)
     zero = np.zeros(6)
@@ -163,7 +165,7 @@ def _one(table: Table, kind: str, actuated: bool) -> JointNumbers:
 
 
 def _tolerance(table: Table) -> NDArray | None:
-    """Return (6,) standard deviations; None if not given."""
+    """Return (6,) standard deviations of the geometric error; None if not given."""
     if not table.has("tolerance"):
         return None
     sigma = table.array("tolerance", (6,), "rad, m", largest=LARGEST_LENGTH)
@@ -174,7 +176,7 @@ def _tolerance(table: Table) -> NDArray | None:
 
 
 def _stiffness(table: Table, kind: str, actuated: bool) -> NDArray | None:
-    """Return (6, 6) K_B with the drive, 0 along free motions; None if rigid."""
+    """Return (6, 6) K_B including the drive, 0 along free motions; None if rigid."""
     free = FREE_ROWS[kind]
     if len(free) > 1:
         return _several_free(table, kind)
@@ -218,7 +220,7 @@ def _several_free(table: Table, kind: str) -> NDArray | None:
 
 
 def copy_rows(value: Any) -> Any:
-    """Return a list with its inner lists copied; any other value unchanged."""
+    """Return a list whose inner lists are copies; return any other value unchanged."""
     if not isinstance(value, list):
         return value
     return [list(row) if isinstance(row, list) else row for row in value]

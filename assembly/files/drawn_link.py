@@ -19,15 +19,18 @@ _LENGTHS = ("radius", "inner_radius", "width", "height", "length", "wall", "web"
             "flange")  # fmt: skip
 _CURVE = ("curve", "young", "poisson", "density", "theory")
 _KINDS = ("beam", "curve", "stiffness", "mesh", "library", "model")
-_GAP = 1e-6  # [-] accepted distance from the end joint, relative to the beam's reach
+# [-] accepted distance of a curve's end from the joint, relative to the distance of
+# both joints
+_GAP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A beam along a curve, or a model of another distribution, by its table.
+    """Table of a link that can be read only when the points of the joints are known.
 
     Attributes:
-        table: of the link; its keys are checked when the joints' points are known.
+        table: table of a beam along a curve, or of a link model of another
+            distribution.  Its keys are checked when the points of the joints are known.
     """
 
     table: Table
@@ -64,7 +67,7 @@ def read_drawn_link(body: Table) -> Link | Curve | None:
 
 
 def _refuse_no_kind(link: Table) -> NoReturn:
-    """Raise BadInput for a link without a known kind, which can be misspelt."""
+    """Raise BadInput for a link of unknown kind; suggest a name for a misspelt key."""
     unknown = [key for key in link.content if key not in (*_CURVE, "pieces", "up")]
     if unknown:
         hint = nearest(unknown[0], _KINDS)
@@ -83,19 +86,21 @@ def _plain_lengths(content: dict[str, Any], body: Table, place: str) -> None:
 def curve_link(
     curve: Curve, start: NDArray, tip: NDArray
 ) -> tuple[MatrixLink, float, NDArray, NDArray]:
-    """Return stiffness and mass of a beam along a curve, or of a model.
+    """Return stiffness and mass of a curved beam or of a link model.
 
     Args:
-        curve: as read.
+        curve: link as read from the file.
         start: (3,) [m] point of the joint at which the link begins, axes of the file.
         tip: (4, 4) point and axes of the joint at its end, axes of the file.
 
     Returns:
-        The stiffness at the tip in its axes, [kg], (3,) [m] centre of the beam and its
-        (3, 3) [kg m^2] about the centre; no mass without a density.
+        The stiffness at the tip, in the axes of the tip; the mass [kg]; its centre (3,)
+        [m]; and its moments of inertia (3, 3) [kg m^2] about this centre.  The mass is
+        0 without a density.
 
     Raises:
-        BadInput: a piece or a material is not proper, or the curve ends elsewhere.
+        BadInput: a piece or a material constant is invalid, or the curve does not end
+            at the joint.
     """
     table = curve.table
     if table.has("model"):
@@ -117,7 +122,7 @@ def curve_link(
     pieces = read_pieces(tables, start, poisson)
     gap = float(np.linalg.norm(pieces[-1].place(1.0) - tip[:3, 3]))
     if gap > _GAP * float(np.linalg.norm(tip[:3, 3] - start)):
-        fault = f"found the end of the curve {gap:.3g} m from the joint there"
+        fault = f"found the end of the curve {gap:.3g} m away from the joint"
         raise table.bad("curve", f"{fault}, expected 0 m")
     try:
         C = curve_compliance(pieces, young, poisson, theory=theory)

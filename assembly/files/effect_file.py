@@ -41,7 +41,7 @@ def with_effects(robot: Robot, tables: Sequence[Table]) -> Robot:
             continue
         try:
             effect = LIBRARY[name]
-        except BadInput as error:  # of another distribution
+        except BadInput as error:  # raised by an effect of another distribution
             raise table.bad("name", str(error)) from None
         session = table.text("session", longest=200) if table.has("session") else None
         if session is not None and not effect.by_row:
@@ -51,7 +51,9 @@ def with_effects(robot: Robot, tables: Sequence[Table]) -> Robot:
             )
         effects = everywhere if session is None else sessions.setdefault(session, {})
         if name in effects:
-            raise table.bad("name", "found twice; expected one [[effect]] per name")
+            raise table.bad(
+                "name", "found this name twice; expected one [[effect]] per name"
+            )
         effects[name] = _parameters(table, robot, name)
     return replace(
         robot, effects=everywhere, session_effects=sessions, functions=tuple(functions)
@@ -69,7 +71,7 @@ def _parameters(table: Table, robot: Robot, effect: str) -> Values:
             hint = nearest(key, allowed)
             message = f"found {quoted(key)}, which is not a parameter of {effect}"
             raise table.bad("parameters", f"{message}{hint}")
-    # time constants must be given and positive
+    # every time constant must be given and positive
     times = {key for key in allowed if LIBRARY[effect].unit(robot, key) == "s"}
     for key in sorted(times - set(given)):
         owner = key.rpartition(".")[0]

@@ -1,7 +1,8 @@
-"""Flatness and cylindricity of the features of joints, which widen their clearance.
+"""Flatness and cylindricity of the features of joints, which increase the clearance.
 
-The form of a feature turns and shifts nothing, so it has no screw.  A face that is flat
-within t, or a bore that is round within t, leaves up to t/2 more to the part in it.
+A form deviation neither rotates nor shifts a feature, so it has no screw.  If a face is
+flat within t, or a bore is cylindrical within t, the gap to the mating part can be up
+to t/2 larger.
 """
 
 from collections.abc import Iterator, Sequence
@@ -22,17 +23,17 @@ _WITH_GAP = {
 
 
 def read_form(table: Table, shape: str) -> float:
-    """Return the width of the form zone of a feature, 0 if it has none.
+    """Return the width of the form zone of a feature; 0 without a form tolerance.
 
     Args:
-        table: of the tolerances of the feature.
-        shape: ``"axis"``, ``"plane"`` or ``"point"``.
+        table: table of the feature's tolerances.
+        shape: shape of the feature: ``"axis"``, ``"plane"`` or ``"point"``.
 
     Returns:
-        [m].
+        [m] width of the zone.
 
     Raises:
-        BadInput: it is no width, or that of a feature of another shape.
+        BadInput: the value is not a width, or the feature's shape has no such form.
     """
     width = 0.0
     for word, of_shape in FORMS.items():
@@ -40,26 +41,29 @@ def read_form(table: Table, shape: str) -> float:
             continue
         if shape != of_shape:
             article = "an" if shape == "axis" else "a"
-            fault = f"found one of a feature that is {article} {shape}"
+            fault = f"found this form at a feature that is {article} {shape}"
             raise table.bad(word, f"{fault}, expected none")
         width, at_most = parsed_value(table, word, parse_width)
         if at_most:
-            raise table.bad(word, "found (M), expected a width alone")
+            raise table.bad(
+                word, "found a width with (M), expected a width without (M)"
+            )
     return width
 
 
 def forms_of_joints(copies: Sequence[Copy]) -> dict[str, tuple[str, float]]:
-    """Return the forms of the features of joints, by the names of the joints.
+    """Return the form tolerances of joints, by the names of the joints.
 
     Args:
-        copies: of the legs, and the robot's own bodies.
+        copies: copies of the legs, and the bodies that belong to no leg.
 
     Returns:
-        The word, and half the widths of both features together [m]: by how much they
-        widen the clearance of the joint.
+        For each joint, ``"flatness"`` or ``"cylindricity"``, and the increase of the
+        joint's clearance [m].  The increase is half of the sum of both features' zone
+        widths.
 
     Raises:
-        BadInput: a width is none.
+        BadInput: the text of a width cannot be read.
     """
     tables = [(c, t) for c in copies for t in c.table.tables("joint")]
     names = {c.prefix + str(t.content.get("name")) for c, t in tables}
@@ -75,7 +79,7 @@ def forms_of_joints(copies: Sequence[Copy]) -> dict[str, tuple[str, float]]:
 
 
 def _with_form(copies: Sequence[Copy]) -> Iterator[tuple[Copy, Table, str]]:
-    """The tables of tolerances that state a form, and its word."""
+    """Yield the tolerance tables with a form tolerance, and the key of the form."""
     for copied in copies:
         owners = copied.table.tables("body")
         if not copied.prefix:
@@ -86,15 +90,15 @@ def _with_form(copies: Sequence[Copy]) -> Iterator[tuple[Copy, Table, str]]:
 
 
 def widen_clearance(joint: Table, word: str, added: float) -> None:
-    """Add half the widths of form zones to the gap of a joint.
+    """Increase the gap of a joint by the effect of form tolerances.
 
     Args:
-        joint: its table, whose content is replaced.
-        word: flatness or cylindricity.
-        added: [m].
+        joint: table of the joint, whose content is replaced.
+        word: ``"flatness"`` or ``"cylindricity"``.
+        added: [m] increase of the gap.
 
     Raises:
-        BadInput: the joint has no gap between such features.
+        BadInput: the joint has no gap between features with such a form.
     """
     given = joint.content.get("clearance")
     wider = _widened(joint, given, word, added) if isinstance(given, dict) else None
@@ -107,7 +111,7 @@ def widen_clearance(joint: Table, word: str, added: float) -> None:
 def _widened(
     joint: Table, given: dict[str, Any], word: str, added: float
 ) -> dict[str, Any] | None:
-    """The clearance with a wider gap, None if it has none."""
+    """Return the clearance with a larger gap; None without a gap."""
     if word == "flatness":
         pad = given.get("pad")
         return (
@@ -133,7 +137,7 @@ def _widened(
 def _added(
     joint: Table, given: dict[str, Any], key: str, added: float
 ) -> dict[str, Any]:
-    """A table with a larger length [m]; what is no length is left to its reader."""
+    """Return a table with a larger length [m]; its reader rejects other values."""
     inner = Table(dict(given), joint.file, f"{joint.place}.clearance")
     without_units(inner, key, "length")
     value = inner.content.get(key)
@@ -143,7 +147,7 @@ def _added(
 
 
 def _looser(fit: Any, added: float) -> Any:
-    """The fit with more clearance; what is no fit is left to its reader."""
+    """Return the fit with more clearance; its reader rejects other texts later."""
     try:
         clearance_fit(fit)
     except (BadInput, TypeError):

@@ -92,7 +92,7 @@ def read_function(table: Table, robot: Robot) -> Function:
 
 
 def _words(table: Table, key: str, most: int) -> tuple[str, ...]:
-    """Return one or more distinct names."""
+    """Return one or more different names from a key of the table."""
     value = table.require(key, f"1 to {most} names")
     if isinstance(value, list) and all(isinstance(v, str) for v in value):
         if 1 <= len(value) <= most and len(set(value)) == len(value):
@@ -103,7 +103,7 @@ def _words(table: Table, key: str, most: int) -> tuple[str, ...]:
 def _numbers(
     table: Table, key: str, least: float = -math.inf
 ) -> Mapping[str, float]:  # fmt: skip
-    """Return the numbers by name; none if the key is absent."""
+    """Return the numbers of a table by name; empty if the key is absent."""
     if not table.has(key):
         return {}
     inner = table.table(key)
@@ -111,7 +111,7 @@ def _numbers(
 
 
 def _of_main(variable: str, robot: Robot) -> str:
-    """Return a variable with the frame in place of a joint of several frames."""
+    """Return a variable in which a joint of several frames is replaced by its frame."""
     kind, _, rest = variable.partition(".")
     name, _, axis = rest.rpartition(".")
     if kind == "wrench" and name in robot.joints:
@@ -120,7 +120,7 @@ def _of_main(variable: str, robot: Robot) -> str:
 
 
 def _check_variable(table: Table, name: str, robot: Robot) -> None:
-    """Raise BadInput for a variable that measurements do not have."""
+    """Raise BadInput for a variable that is not recorded in measurements."""
     kind, _, rest = name.partition(".")
     frames = [frame.name for frame in robot.frames]
     if kind == "q":

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from forcefit.assembly.model.inertia import inertia_fault, inertia_matrix
 from forcefit.inputs.table import Table
 
-_LARGEST = 1e40  # [kg m^2] equal to the limit of masses in SI units
+_LARGEST = 1e40  # [kg m^2] upper limit, numerically equal to the limit of masses
 
 
 def read_inertia(table: Table) -> NDArray:

@@ -15,11 +15,12 @@ from forcefit.assembly.model.robot import LOCKED, NO_SPIN, Clearance, LockedAt
 from forcefit.inputs.number_arrays import find_fault, number_array
 from forcefit.inputs.table import BadInput, Table
 
-# [rad, m] smaller values are refused, because their square is 0
+# [rad, m] smallest positive bound; the square of a smaller number would be 0
 _LEAST_CLEARANCE = 1e-30
-_LEAST_LENGTH = 1e-9  # [m] a shorter one would allow tilts of many turns
-LEAST_PITCH = 1e-9  # [m] smaller pitches are refused
-LARGEST_PITCH = 1.0  # [m] larger pitches are refused
+# [m] smallest length of a fit; a shorter one would allow unlimited tilt
+_LEAST_LENGTH = 1e-9
+LEAST_PITCH = 1e-9  # [m] smallest accepted pitch of a screw
+LARGEST_PITCH = 1.0  # [m] largest accepted pitch of a screw
 _CLEARANCE = {"radial": "m", "axial": "m", "tilt": "rad", "spin": "rad", "ball": "m"}
 
 
@@ -67,7 +68,7 @@ def read_clearance(table: Table, joint: str) -> Clearance | None:
     end = _fitted_end(inner)
     bounds = read_bounds(inner, joint)
     if end is not None:
-        # the rotation follows from the fit, in place of the radial clearance
+        # here the fit determines the bound of the rotation, not of the radial clearance
         rotation = end.bounds(bounds.radial or 0.0)
         bounds = replace(bounds, radial=None, **rotation)
     inner.finish()
@@ -85,9 +86,9 @@ def read_bounds(table: Table, joint: str) -> Clearance:
         The given bounds.
 
     Raises:
-        BadInput: a value is not a number >= 0; it is ``inf`` for a joint that is not
-            fixed; its square is 0; or ``ball`` is given together with another bound of
-            the same motion.
+        BadInput: a bound is not a number >= 0; it is ``inf`` and the joint is not
+            fixed; it is so small that its square is 0; or ``ball`` is given together
+            with another bound of the same motion.
     """
     bounds = {
         key: _bound(table, key, unit, joint)
@@ -113,7 +114,7 @@ def read_bounds(table: Table, joint: str) -> Clearance:
 
 
 def _bound(table: Table, key: str, unit: str, joint: str) -> float:
-    """Return a bound; ``inf`` makes a motion of a fixed joint unbounded."""
+    """Return one bound; ``inf`` is accepted only for fixed joints."""
     if joint == "fixed" and table.content[key] == math.inf:
         return float(table.get(key))
     return table.number(key, unit, least=0.0, largest=LARGEST_LENGTH)
@@ -127,7 +128,7 @@ def read_fit(table: Table) -> str:
 
 
 def read_fitted_end(table: Table) -> FittedEnd | None:
-    """Return the data by which a fit determines a frame's tilt; None for ``radial``."""
+    """Return the data of a fit that determines a tilt; None for ``radial``."""
     content = table.content.get("clearance")
     if not isinstance(content, dict) or "length" not in content:
         return None
@@ -135,7 +136,7 @@ def read_fitted_end(table: Table) -> FittedEnd | None:
 
 
 def _fitted_end(inner: Table) -> FittedEnd | None:
-    """Return ``length``, ``parts`` and ``bound`` of a clearance with a fit."""
+    """Return ``length``, ``parts`` and ``bound`` of a clearance table with a fit."""
     if not inner.has("length"):
         return None
     for key, fault in (("fit", "missing"), ("parts", "missing")):

@@ -20,15 +20,18 @@ from forcefit.inputs.table import Table, describe, quoted
 from forcefit.inputs.writing import path_from
 from forcefit.stiffness.surface.surface import UNITS
 
-_SMALLEST_LENGTH = 1e-12  # [m] shorter than any part of a machine
-_MOST_PIECES = 100  # for 8 pieces, the error for a bend of 90 degrees is 1e-4
+_SMALLEST_LENGTH = 1e-12  # [m] smallest accepted length of a part
+# largest number of pieces of a beam; for a bend of 90 degrees, 8 pieces already have a
+# relative error of 1e-4
+_MOST_PIECES = 100
 _ONE_SECTION = (
     '"radius" [, "inner_radius"] or "width", "height" or '
     '"area", "I_y", "I_z", "J", "shear_y", "shear_z"'
 )
 _KINDS = ("beam", "stiffness", "mesh", "library", "model")
 _MATERIAL = ("young", "poisson", "density")
-_SECTIONS: dict[str, dict[str, str]] = {  # keys of each kind of section, with units
+# for each kind of section its keys, with their units
+_SECTIONS: dict[str, dict[str, str]] = {
     "round": {"radius": "m", "inner_radius": "m"},
     "rectangular": {"width": "m", "height": "m"},
     "general": {
@@ -39,18 +42,18 @@ _SECTIONS: dict[str, dict[str, str]] = {  # keys of each kind of section, with u
 
 
 def read_link(frame: Table, span: NDArray) -> Link | None:
-    """Return link of a ``[[frame]]``, of exactly one kind.
+    """Return the link of a ``[[frame]]`` table, which has exactly one kind.
 
     Args:
         frame: the frame's table; its keys ``link`` and ``up`` are read.
-        span: (3,) [m] from the parent's origin to the frame's, in the frame's axes, for
-            models of other distributions.
+        span: (3,) [m] vector from the parent's origin to the frame's, in the frame's
+            axes.  It is required for link models of other distributions.
 
     Returns:
-        The link, None if the body is rigid.
+        The link; None if the body is rigid.
 
     Raises:
-        BadInput: a rule of the format is broken.
+        BadInput: the table violates a rule of the format.
     """
     if not frame.has("link"):
         return None
@@ -79,7 +82,7 @@ def read_link(frame: Table, span: NDArray) -> Link | None:
 
 
 def _beam_link(link: Table) -> BeamLink:
-    """Return the beam of ``beam = { ... }`` with its material."""
+    """Return the beam link of ``beam = { ... }`` with its material."""
     beam = link.table("beam")
     theory = beam.choice("theory", ("timoshenko", "euler"), "timoshenko")
     length = _size(beam, "length", "m") if beam.has("length") else None
@@ -97,7 +100,7 @@ def _beam_link(link: Table) -> BeamLink:
 
 
 def _pieces(link: Table) -> int:
-    """Return the number of springs in series, by default 1."""
+    """Return the number of pieces of a beam (springs in series), by default 1."""
     count = link.number("pieces", "-", 1.0, least=1.0, below=_MOST_PIECES + 1.0)
     if count != round(count):
         raise link.bad("pieces", f"found {count:g}, expected a whole number")
@@ -105,7 +108,7 @@ def _pieces(link: Table) -> int:
 
 
 def _section(beam: Table) -> dict[str, float]:
-    """Return the dimensions of the section, which is one of three kinds."""
+    """Return the dimensions of a beam's section; there are three kinds of section."""
     keys_of_kind = {
         kind: [key for key in keys if beam.has(key)] for kind, keys in _SECTIONS.items()
     }
@@ -129,7 +132,7 @@ def _section(beam: Table) -> dict[str, float]:
 
 
 def _mesh_link(link: Table, frame: Table) -> MeshLink:
-    """Return the mesh of ``mesh = { surface, base, tip, ... }`` with its material."""
+    """Return the link of ``mesh = { surface, base, tip, ... }`` with its material."""
     from forcefit.stiffness.fem.part_text import read_parts
 
     mesh = link.table("mesh")
@@ -161,7 +164,7 @@ def _mesh_link(link: Table, frame: Table) -> MeshLink:
 
 
 def _interface(mesh: Table, key: str) -> Any:
-    """Return the interface of a mesh with a joint as written, after a syntax check."""
+    """Return an interface between mesh and joint as written, after a syntax check."""
     from forcefit.stiffness.surface.interface import parse_interface
 
     value = mesh.require(key, 'an interface such as "z=0.452"')
@@ -205,7 +208,7 @@ def _material(link: Table) -> dict[str, Any]:
 
 
 def _size(table: Table, key: str, unit: str) -> float:
-    """Return a positive number whose powers neither overflow nor vanish."""
+    """Return a positive number within limits that exclude overflow of its powers."""
     length = unit == "m"
     largest = LARGEST_LENGTH if length else LARGEST
     smallest = _SMALLEST_LENGTH if length else 1 / LARGEST
@@ -217,7 +220,7 @@ def _size(table: Table, key: str, unit: str) -> float:
 
 
 def _direction(table: Table, key: str) -> tuple[float, float, float] | None:
-    """Return a direction; None if absent."""
+    """Return a direction; None if the key is absent."""
     if not table.has(key):
         return None
     vector = table.array(key, (3,), "direction", largest=LARGEST_LENGTH)
@@ -228,9 +231,9 @@ def _direction(table: Table, key: str) -> tuple[float, float, float] | None:
 
 
 def _path(table: Table, key: str, path: str) -> Path:
-    """Return a path relative to the file that contains it."""
+    """Return a path that is written relative to the folder of the robot file."""
     if path.strip() in {"", ".", ".."}:
-        raise table.bad(key, f"found {describe(path)}, expected a file")
+        raise table.bad(key, f"found {describe(path)}, expected the path of a file")
     return Path(table.file).parent / path
 
 
@@ -270,7 +273,7 @@ def link_table(link: Link, folder: Path | None = None) -> dict[str, Any]:
 
 
 def _from(folder: Path | None, path: Path) -> str:
-    """Return a path relative to the new file's folder."""
+    """Return the text of a path relative to the folder of the new file."""
     if folder is None or path.is_absolute():
         return str(path)
     return path_from(folder.resolve(), path.resolve())

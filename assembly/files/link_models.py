@@ -6,9 +6,9 @@ A distribution names a function for a kind of link::
     cone = "their_package:cone"
 
 ``cone(span, values)`` returns K_E, (6, 6) [N m/rad .. N/m], at the end of the link in
-the axes of its frame.  ``span`` is (3,) [m], from the start of the link to its end in
-these axes; ``values`` are the numbers and texts of the robot file.  A ``BadInput`` that
-the function raises is the message for the user.
+the axes of its frame. ``span`` is the vector (3,) [m] from the start of the link to its
+end, in these axes. ``values`` contains the numbers and texts that the robot file states
+for the link.  A ``BadInput`` that the function raises is the message for the user.
 """
 
 from typing import Any
@@ -35,8 +35,8 @@ def model_link(link: Table, span: NDArray) -> MatrixLink:
         The link, with the stiffness that the model computes.
 
     Raises:
-        BadInput: no distribution installed the model, it cannot be imported, or its
-            result is no stiffness.
+        BadInput: no installed distribution has this model, it cannot be imported, or
+            its result is not a stiffness matrix.
     """
     inner = link.table("model")
     name, names = inner.text("name"), installed_names(GROUP)
@@ -56,13 +56,13 @@ def model_link(link: Table, span: NDArray) -> MatrixLink:
 
 
 def _computed(compute: Any, words: str, span: NDArray, values: dict) -> NDArray:
-    """Return the (6, 6) stiffness of a model, after a check."""
+    """Return the (6, 6) stiffness that a link model computes, after a check."""
     found = naming_owner(compute, words)(span, values)
     try:
         K = np.asarray(found, dtype=float)
     except (TypeError, ValueError):
         raise BadInput(
-            f"{words} returned no array of numbers, expected (6, 6)"
+            f"{words} returned no array of numbers, expected a (6, 6) array"
         ) from None
     if K.shape != (6, 6) or not np.isfinite(K).all():
         raise BadInput(

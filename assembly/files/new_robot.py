@@ -12,7 +12,7 @@ import numpy as np
 from forcefit.inputs.errors import BadInput, nearest, quoted
 
 MOST_LEGS = 12
-Vector = tuple[int, int, int]  # a point in mm, or a direction
+Vector = tuple[int, int, int]  # point [mm], or direction of any length
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,8 @@ class Kind:
     Attributes:
         about: short description.
         legs: usual number of legs.
-        step: divisor of all possible numbers of legs.
+        step: step between the possible numbers of legs; every number is a multiple of
+            it.
         platform: [mm] the platform's point.
         body: function from the number of legs to the text of the legs.
     """
@@ -140,13 +141,13 @@ def _joint(name: str, kind: str, between: str, at: Vector, *lines: str) -> str:
 
 
 def _axis(vector: Vector, key: str = "axis", comment: str = "") -> str:
-    """Return the line of text for a direction."""
+    """Return the line of a robot file that states a direction."""
     line = f"{key} = {_direction(vector)}"
     return f"{line:<33}# {comment}" if comment else line
 
 
 def _minus(a: Vector, b: Vector) -> Vector:
-    """Return the vector from b to a."""
+    """Return the difference a - b of two vectors."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 

@@ -58,8 +58,9 @@ from forcefit.inputs.writing import (
 from forcefit.stiffness.screws import rotation_matrix, rotation_vector
 
 Closing = Callable[[Robot], Robot]
-_LONGEST_NAME = 200  # largest number of characters
-MOST_FRAMES = 2000  # largest number of frames; more closures would require minutes
+_LONGEST_NAME = 200  # largest number of characters of a name
+# largest number of frames; the closures of more frames would require minutes
+MOST_FRAMES = 2000
 
 
 def read_robot(path: Path | str, close: Closing | None = None) -> Robot:
@@ -99,7 +100,7 @@ def robot_of(root: Table, name: str, close: Closing | None = None) -> Robot:
     try:
         robot = robot if close is None else close(robot)
         home = home_posture(robot)
-        place_callouts(home)  # check that callouts fit the geometry
+        place_callouts(home)  # only checks that the callouts fit the geometry
         return with_spans(robot, home.coordinates)
     except BadInput as error:
         raise BadInput(f"{root.file}: {error}") from None
@@ -155,7 +156,7 @@ def _framed(root: Table, name: str, description: str) -> Robot:
     """Return the robot of a file of frames and closures."""
     platform = root.text("platform", expected="the name of a frame")
     tables = root.tables("frame"), root.tables("closure")
-    root.tables("tolerance")  # read when all frames are known
+    root.tables("tolerance")  # marked as used here; read when all frames are known
     root.finish()
     if not 0 < len(tables[0]) <= MOST_FRAMES:
         fault = f"found {len(tables[0])}" if tables[0] else "missing"
@@ -182,7 +183,7 @@ def _framed(root: Table, name: str, description: str) -> Robot:
 
 
 def _learned_range(root: Table) -> dict[str, tuple[float, float]]:
-    """Return least and largest values by variable; empty if the file has none."""
+    """Return the range of each variable in the identification data; may be empty."""
     ranges: dict[str, tuple[float, float]] = {}
     if not root.has("learned_range"):
         return ranges
@@ -207,7 +208,7 @@ def _reference_point(root: Table) -> tuple[float, float, float] | None:
 
 def _diagnosis(root: Table) -> dict[str, Any]:
     """Return the diagnosis recorded in the file, with an absolute path."""
-    # texts, numbers and lists are stored unchanged
+    # texts, numbers and lists of the diagnosis are stored unchanged
     content: dict[str, Any] = {}
     if root.has("diagnosis"):
         table = root.table("diagnosis")
@@ -227,7 +228,7 @@ def _diagnosis(root: Table) -> dict[str, Any]:
 
 
 def _is_record(value: object) -> bool:
-    """Return whether a value is a text, finite number, truth value or list of these."""
+    """Return whether a value is a text, finite number, bool or list of these."""
     if isinstance(value, list):
         return all(_is_record(one) for one in value)
     if isinstance(value, float):
@@ -237,7 +238,8 @@ def _is_record(value: object) -> bool:
 
 def _remarks(tables: list[Table]) -> tuple[str, ...]:
     """Return a remark on frames with ``dh`` but without ``alpha``."""
-    # the other parameters are often zero; a forgotten alpha changes the machine
+    # other missing parameters are often meant to be zero, but a forgotten alpha changes
+    # the robot
     dh = {table.content["name"]: table.content.get("dh") for table in tables}
     without_alpha = [
         quoted(name) for name, given in dh.items() if given and "alpha" not in given
@@ -248,7 +250,7 @@ def _remarks(tables: list[Table]) -> tuple[str, ...]:
 
 
 def _fitted_ends(tables: list[Table]) -> dict[str, FittedEnd]:
-    """Return the fitted ends by frame; equal parts must have equal fits."""
+    """Return by frame the fits that determine a tilt; equal parts need equal fits."""
     ends: dict[str, FittedEnd] = {}
     fits: dict[str, str] = {}
     for table in tables:
@@ -265,7 +267,7 @@ def _fitted_ends(tables: list[Table]) -> dict[str, FittedEnd]:
 
 
 def _fit_remarks(robot: Robot) -> tuple[str, ...]:
-    """Return a remark on the fits, whose mean clearance is used."""
+    """Return a remark that the mean clearance of every fit is used."""
     texts = []
     for name, text in fits_by_parts(robot).items():
         fit = parse_fit(text)
@@ -325,13 +327,13 @@ def _frame(table: Table) -> Frame:
 
 
 def _numbers(table: Table, key: str, count: int, unit: str) -> NDArray:
-    """Return the lengths or angles of a key; zeros if absent."""
+    """Return the lengths or angles of a key; zeros if the key is absent."""
     zero = np.zeros(count)
     return table.array(key, (count,), unit, zero, largest=LARGEST_LENGTH)
 
 
 def _drive_force(table: Table, passive: bool) -> float:
-    """Return the force of a drive on a passive joint, 0 if not given."""
+    """Return the force of a drive on a passive joint; 0 if it is not given."""
     if table.has("drive_force") and not passive:
         fault = f"found a force on a joint that is not passive; {FORCE_CONTROL}"
         raise table.bad("drive_force", fault)
@@ -339,7 +341,7 @@ def _drive_force(table: Table, passive: bool) -> float:
 
 
 def _limits(table: Table) -> tuple[float, float] | None:
-    """Return the least and largest coordinate of a command; None if not given."""
+    """Return the least and largest commanded coordinate; None if not given."""
     if not table.has("limits"):
         return None
     least, most = table.array("limits", (2,), "rad or m", largest=LARGEST_LENGTH)

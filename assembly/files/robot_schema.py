@@ -1,4 +1,4 @@
-"""Schema of a robot file for editors: the keys that the reader accepts."""
+"""JSON schema of a robot file for text editors: the keys that the reader accepts."""
 
 from forcefit.assembly.callouts.callout import HELD, LOCATIONS, ORIENTATIONS, SHAPES
 from forcefit.assembly.callouts.zone import DISTRIBUTIONS
@@ -168,7 +168,7 @@ _CONTACTS = record(
         width=number("width along y", "m"),
     ),
 )  # fmt: skip
-# a universal joint can have one value for each of its two bearings
+# in a universal joint, each of the two bearings can have its own value
 _OF_JOINT = record(**{
     f"{key}_": Either((one, Listed(one)))
     for key, one in (

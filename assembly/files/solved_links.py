@@ -60,7 +60,7 @@ def solve_links(robot: Robot) -> Robot:
 
 
 def _note(done: int, total: int) -> None:
-    """Report the number of known links to a progress display."""
+    """Report the number of solved links to a progress display."""
     known = {"done": done, "total": total}
     _LOG.debug("%d of %d links", done, total, extra=known)
 
@@ -138,7 +138,8 @@ def _solve(
     ends = parse_interface(link.base, "base"), parse_interface(link.tip, "tip")
     base = interface_center(surface, ends[0], "base")
     tip = interface_center(surface, ends[1], "tip")
-    _check_place(frame, link, tip - base)  # check before the finite elements run
+    # before the finite elements run, because they take long
+    _check_place(frame, link, tip - base)
     material = Material(link.young, link.poisson, link.density or 0.0)
     parts = [parse_part("parts", text) for text in link.parts]
     _LOG.info("finite elements of frame %s, %s", quoted(frame.name), link.surface)

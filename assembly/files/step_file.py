@@ -1,4 +1,4 @@
-"""Plan files: the steps in which a robot is assembled (``docs/assembly_steps.md``)."""
+"""Plan files, which list the steps of an assembly (``docs/assembly_steps.md``)."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -87,7 +87,7 @@ def read_steps(path: Path | str, robot: Robot) -> Plan:
 
 
 def _named(steps: list[Step], tables: list[Table]) -> tuple[Step, ...]:
-    """Return the steps; default names that repeat are numbered."""
+    """Return the steps; repeated default names get numbers."""
     count: dict[str, int] = {}
     named = []
     for step, table in zip(steps, tables, strict=True):
@@ -102,7 +102,7 @@ def _step(table: Table, robot: Robot) -> Step:
     """Return the step of one ``[[step]]`` table."""
     given = [kind for kind in KINDS if table.has(kind)]
     if len(given) != 1:
-        found = f"found {' and '.join(given)}" if given else "found none of its kinds"
+        found = f"found {' and '.join(given)}" if given else "found no kind of step"
         fault = f"{found}, expected one of {', '.join(KINDS)}"
         raise table.bad(given[-1] if given else "", fault)
     kind = given[0]
@@ -119,7 +119,7 @@ def _name(table: Table, kind: str) -> str:
 
 
 def _fix(table: Table, name: str, robot: Robot) -> Fix:
-    """Return a fixture, by default at the nominal position."""
+    """Return a step that fixes a frame, by default at its nominal position."""
     position = _values(table, "at", "rad or m")
     if position is None:
         position = dict.fromkeys(SCREW, 0.0)
@@ -127,18 +127,18 @@ def _fix(table: Table, name: str, robot: Robot) -> Fix:
 
 
 def _clamp(table: Table, name: str, robot: Robot) -> Step:
-    """Return a clamp at the frame's current pose, at a position, or with a force."""
+    """Return a step that clamps a frame where it is, at a position, or by a force."""
     frame = _frame(table, "clamp", robot)
     if not table.has("load"):
         position = _values(table, "at", "rad or m")
         return _held(table, Fix(name, frame, position, kind="clamp"))
     if table.has("at"):
-        raise table.bad("at", 'found together with "load", expected only one of them')
+        raise table.bad("at", 'found "at" and "load", expected only one of them')
     return Preload(name, frame, _wrench(table))
 
 
 def _held(table: Table, fix: Fix) -> Fix:
-    """Return a fixture with its stiffness."""
+    """Return a fixture with the stiffness stated in its table."""
     stiffness = _values(table, "stiffness", "N m/rad or N/m") or {}
     for component, value in stiffness.items():
         if not 0 < value <= LARGEST:
@@ -167,12 +167,12 @@ def _join(table: Table, name: str, robot: Robot) -> Join:
         fault = "found for a joint, which is bolted in its position; expected a closure"
         raise table.bad(key, fault)
     if leave_open and limit == inf:
-        raise table.bad("leave_open", 'found without "force_limit", expected both')
+        raise table.bad("leave_open", 'found no "force_limit" with it, expected both')
     return Join(name, part, locked, limit, leave_open)
 
 
 def _preload(table: Table, name: str, robot: Robot) -> Preload:
-    """Return a load that acts until it is released."""
+    """Return a step that applies a load, which acts until it is released."""
     return Preload(name, _frame(table, "preload", robot), _wrench(table))
 
 
@@ -193,7 +193,7 @@ def _measure(table: Table, name: str, robot: Robot) -> Measure:
 
 
 def _adjust(table: Table, name: str, robot: Robot) -> Adjust:
-    """Return an adjustment, with the reading that it minimises."""
+    """Return an adjustment step, with the reading that the adjustment minimises."""
     components = _names(table, "components")
     reading = _part(table, "reading", robot)
     of: tuple[str, ...] = SCREW
@@ -219,7 +219,7 @@ _READERS: dict[str, Callable[[Table, str, Robot], Step]] = {
 
 
 def _frame(table: Table, key: str, robot: Robot) -> str:
-    """Return the name of a frame; of a joint of several, of that in its axes."""
+    """Return a frame's name; for a joint of several frames, its main frame."""
     name = table.text(key, expected="the name of a frame")
     names = names_of(robot)
     if name not in names:
@@ -235,7 +235,8 @@ def _frame(table: Table, key: str, robot: Robot) -> str:
 def _part(table: Table, key: str, robot: Robot) -> tuple[str, str] | str:
     """Return a frame, or the closure of two frames in either order.
 
-    A closure after a drawn joint may be named by the joint: its frame is ``ball.end``.
+    The closure that completes a joint can be named by the joint: ``ball`` then means
+    its frame ``ball.end``.
     """
     value = table.require(key, "a frame, or the two frames of a closure")
     if isinstance(value, str):
@@ -277,7 +278,9 @@ def _values(table: Table, key: str, unit: str) -> dict[str, float] | None:
             values[name.upper()] = inner.number(name, unit, largest=largest)
     inner.finish()
     if not values:
-        raise table.bad(key, f"found none, expected some of {', '.join(_COMPONENTS)}")
+        raise table.bad(
+            key, f"found no component, expected some of {', '.join(_COMPONENTS)}"
+        )
     return values
 
 
@@ -289,5 +292,7 @@ def _wrench(table: Table) -> np.ndarray:
     values = [inner.number(name, "N m or N", 0.0, largest=LARGEST) for name in _LOADS]
     inner.finish()
     if not any(values):
-        raise table.bad("load", f"found none, expected some of {', '.join(_LOADS)}")
+        raise table.bad(
+            "load", f"found no component, expected some of {', '.join(_LOADS)}"
+        )
     return np.array(values)

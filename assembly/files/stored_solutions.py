@@ -31,7 +31,8 @@ from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import whole_file
 
 _CACHE = logging.getLogger("forcefit.cache")
-# libraries that read surfaces, mesh and solve: other versions can round differently
+# packages that read surfaces, mesh or solve; other versions of them can round
+# differently
 _LIBRARIES = ("numpy", "scipy", "pytetwild", "pypardiso", "mkl", "pyvista", "vtk",
               "gmsh", "meshio")  # fmt: skip
 _UNUSED = 90 * 86_400  # [s] time without use after which a solution is deleted
@@ -53,7 +54,8 @@ def solution_key(link: MeshLink, digest: str, options: object) -> str:
     from forcefit.stiffness.surface.surface_files import named_solid
 
     file, solid = named_solid(link.surface)
-    name = Path(f"{file.suffix.lower()}#{solid}")  # the suffix determines the reader
+    # only the suffix counts, because it determines the reader
+    name = Path(f"{file.suffix.lower()}#{solid}")
     content = replace(link, surface=name, up=None, frame_up=None, axis=None)
     text = "\n".join([digest, repr(content), repr(options), _program()])
     return hashlib.sha256(text.encode()).hexdigest()
@@ -87,7 +89,8 @@ def stored_solution(key: str, solve: Callable[[], MeshSolution]) -> MeshSolution
         _CACHE.info("finite elements of a link: stored in %s", path)
     else:
         with _one_process(path.with_suffix(".solving")):
-            found = _read(path, key)  # another process may have stored it meanwhile
+            # another process may have stored the solution meanwhile
+            found = _read(path, key)
             if found is None:
                 found = solve()
                 _write(path, key, found)
@@ -96,7 +99,7 @@ def stored_solution(key: str, solve: Callable[[], MeshSolution]) -> MeshSolution
 
 @contextmanager
 def _one_process(mark: Path) -> Generator[None, None, None]:
-    """Admit one process at a time; all processes if the disk does not support locks."""
+    """Let one process at a time continue; let all continue if the disk has no locks."""
     with ExitStack() as stack:
         with suppress(OSError):
             stack.enter_context(locked_file(mark))
@@ -108,7 +111,7 @@ def _one_process(mark: Path) -> Generator[None, None, None]:
 
 
 def _read(path: Path, key: str) -> MeshSolution | None:
-    """Return a stored solution; None if it is absent or invalid."""
+    """Return the stored solution of a key; None if it is absent or invalid."""
     try:
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as stored:
             content = json.loads(str(stored["content"]))
@@ -138,7 +141,7 @@ def _write(path: Path, key: str, solution: MeshSolution) -> None:
 
 
 def _remove_unused(folder: Path) -> None:
-    """Delete solutions that were not used recently, such as those of older programs."""
+    """Delete solutions that were not used for 90 days."""
     for path in folder.glob("link-*.npz"):
         if time.time() - path.stat().st_mtime > _UNUSED:
             path.unlink()

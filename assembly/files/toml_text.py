@@ -1,4 +1,4 @@
-"""Text of values and tables in TOML: all digits of numbers, arrays on one line."""
+"""TOML text of values and tables, with all digits of numbers and arrays on one line."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -38,7 +38,7 @@ def _lines(table: Mapping[str, Any]) -> list[str]:
 
 def toml_value(value: Any) -> str:
     """Return the text of a value in TOML."""
-    # tomli-w writes every number of an array on a separate line
+    # not written by tomli-w, which puts every number of an array on a separate line
     if isinstance(value, bool | np.bool_):
         return str(value).lower()
     if isinstance(value, str):

@@ -6,7 +6,7 @@ from typing import Any
 
 from forcefit.inputs.table import BadInput, Table, describe
 
-UNITS = {  # factors of the units of each dimension, in m or rad
+UNITS = {  # for each dimension its units, as factors in m or rad
     "length": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
     "angle": {"rad": 1.0, "mrad": 1e-3, "deg": 0.017453292519943295},
 }
@@ -45,7 +45,7 @@ def _plain(table: Table, key: str, value: Any, dimension: str | Sequence[str]) -
 
 
 def _number(table: Table, key: str, text: str, dimension: str) -> float:
-    """Return the number that a text states, in m or rad."""
+    """Return the value of a text such as ``"200 mm"``, in m or rad."""
     match = _TEXT.fullmatch(text)
     factor = UNITS[dimension].get(match.group(2)) if match else None
     if match is None or factor is None:

@@ -1,9 +1,9 @@
-"""Selection of the compiled module for the processor, at import.
+"""Selection of the compiled module that fits the processor, at import.
 
-On x86-64 there is one module for each level of instructions (x86-64 psABI).  The
-results of all modules are bit-identical.  The variable ``FORCEFIT_MARCH`` selects
-another level than the processor's highest.  There is one module for all other
-processors.
+For x86-64 processors, there is one module for each level of the instruction set (x86-64
+psABI).  The results of all modules are bit-identical.  By default, the highest level of
+the processor is used.  The environment variable ``FORCEFIT_MARCH`` selects another
+level.  For all other processors, there is a single module.
 """
 
 import os
@@ -41,14 +41,15 @@ def chosen() -> ModuleType:
         The compiled functions.
 
     Raises:
-        BadInput: ``FORCEFIT_MARCH`` is not a level, or not one of this processor.
+        BadInput: the value of ``FORCEFIT_MARCH`` is not a level that this processor
+            has.
         ImportError: the module is missing, or the processor lacks the lowest level.
     """
     wanted, here = os.environ.get(_VARIABLE), levels_here()
     if wanted and wanted not in here:
         raise BadInput(
             f"{_VARIABLE} is {quoted(wanted)}; expected a level that this processor "
-            f"has, {', '.join(here) or 'of which there are none'}"
+            f"has, {', '.join(here) or 'but it has no such levels'}"
         )
     if not _on_x86_64():
         return _load("_portable")

@@ -1,4 +1,4 @@
-"""Postures: solution of the nominal closures, and the maps of equations (13)-(15).
+"""Postures: solution of the nominal closures, and maps of small screws, eqs (13)-(15).
 
 Start with ``posture.py``.
 """

@@ -1,8 +1,9 @@
-"""Ball joints that are modelled as three revolute frames.
+"""Detection of ball joints that are modelled as three revolute frames.
 
-Three axes at right angles in the home pose lose a freedom where the middle joint has
-turned by 90 degrees.  A ball joint does not: it can turn about any axis through its
-centre.  The module therefore counts such frames as a ball joint at every posture.
+In the home pose, the three axes are at right angles.  If the middle joint rotates by 90
+degrees, two axes coincide, and the model loses a freedom.  A real ball joint does not:
+it can rotate about any axis through its centre.  This module therefore treats such
+frames as a ball joint at every posture.
 """
 
 from collections import Counter
@@ -15,7 +16,9 @@ from forcefit.assembly.kinematics.nominal import size_of
 from forcefit.assembly.model.robot import Robot
 from forcefit.stiffness.screws import rotation_matrix
 
-_SAME = 1e-9  # accepted error of common points [lengths] and right angles [cosine]
+# accepted distance of axes from a common point [reference lengths], and cosine of right
+# angles
+_SAME = 1e-9
 
 
 @lru_cache(maxsize=64)
@@ -58,7 +61,7 @@ def ball_joints(robot: Robot) -> tuple[tuple[int, int, int], ...]:
 
 
 def _turns(robot: Robot, i: int) -> bool:
-    """Return whether the joint of a frame turns freely, without a spring or drive."""
+    """Return whether the joint of a frame rotates freely, without spring or drive."""
     frame = robot.frames[i]
     return frame.joint == "revolute" and frame.passive and not frame.compliant
 

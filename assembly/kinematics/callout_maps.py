@@ -1,12 +1,13 @@
 """Geometric errors delta l of the frames that tolerance callouts of drawings cause.
 
-The features of a body deviate from its ideal shape by small screws.  The screw of a
-feature is its screw within its tolerance zone plus the screw of the datum frame.  The
-datum frame is built from the datums A, B and C in this order: A fixes the components
-that its shape determines, B fixes components that A leaves free, and C the remaining
-ones.  A feature before its joint is the end of a body: its screw is delta l of the
-frame.  A feature after its joint is where the next body begins: all frames that the
-joint carries move relative to the feature by the negative screw.
+Each feature of a body deviates from its nominal position by a small screw.  The screw
+of a feature is its screw within its tolerance zone plus the screw of the datum frame.
+The datum frame is built from the datums A, B and C in this order: A fixes the
+components that its shape determines, B fixes components that A leaves free, and C the
+remaining ones.  A feature before its joint is the end of a body; its screw is the
+geometric error delta l of the frame.  A feature after its joint is the start of the
+next body.  All frames that the joint carries then move relative to the feature by the
+negative screw.
 """
 
 from collections.abc import Mapping
@@ -39,12 +40,13 @@ from forcefit.stiffness.screws import screw_map, transform
 
 _RANK = 1e-9  # singular values below this are rounding errors
 
-Side = tuple[str, bool]  # name of a frame, True for the body after its joint
+# name of a frame; True for the body after its joint, False for that before
+Side = tuple[str, bool]
 
 
 @dataclass(frozen=True, eq=False)
 class _Bodies:
-    """Rigid bodies of a robot in its home pose, with the frames of their features."""
+    """Rigid bodies of a robot in its home pose, and the frames at their features."""
 
     robot: Robot
     before: NDArray  # (n, 4, 4) frames before the motion of their joints, base axes
@@ -57,7 +59,7 @@ class _Bodies:
         return self.groups[row if side[1] else self.robot.parents[row]]
 
     def pose(self, side: Side) -> NDArray:
-        """Return the (4, 4) frame at home, before or after its joint."""
+        """Return the (4, 4) pose of a frame at home, before or after its joint."""
         return (self.after if side[1] else self.before)[self.robot.index(side[0])]
 
 
@@ -68,12 +70,13 @@ def place_callouts(home: Posture) -> tuple[PlacedCallout, ...]:
         home: home posture of the robot.
 
     Returns:
-        In the order of the robot's callouts, then the shifts of datums at maximum
-        material.
+        The callouts in the order of the robot, followed by the shifts of datums at
+        maximum material.
 
     Raises:
-        BadInput: a feature has callouts twice, a datum is not on the feature's body,
-            datums are circular, or a callout does not fit the nominal geometry.
+        BadInput: a feature has two callouts, a datum is not on the body of the feature,
+            datums refer to each other in a circle, or a callout contradicts the nominal
+            geometry.
     """
     callouts = home.robot.callouts
     if not callouts:
@@ -120,7 +123,7 @@ def place_callouts(home: Posture) -> tuple[PlacedCallout, ...]:
 
 
 def _own_screw(zone: Zone, end: int, total: int) -> NDArray:
-    """(6, total) screw of a zone whose coordinates end before a column."""
+    """Return the (6, total) screw of a zone per unit coordinate of all zones."""
     screw = np.zeros((6, total))
     screw[:, end - sum(zone.dimensions) : end] = zone.columns
     return screw
@@ -137,7 +140,8 @@ def _check_names(names: list[str], callouts: tuple[Callout, ...]) -> None:
 def _bodies(home: Posture) -> _Bodies:
     """Return the bodies: groups of frames that closures or fixed joints connect."""
     robot, n = home.robot, len(home.robot.frames)
-    group = list(range(n + 1))  # the base, whose parent index is -1, is the last
+    # the last entry is the base, because parent index -1 refers to it
+    group = list(range(n + 1))
 
     def root(i: int) -> int:
         while group[i] != i:
@@ -159,7 +163,7 @@ def _bodies(home: Posture) -> _Bodies:
 def _datum_sides(
     bodies: _Bodies, callout: Callout, sides: Mapping[Side, int]
 ) -> list[Side]:
-    """Return the datums as sides of frames on the feature's body."""
+    """Return for each datum its frame, and the side of it on the feature's body."""
     body = bodies.body((callout.feature, callout.after))
     found = []
     for name in (datum.frame for datum in callout.datums):
@@ -172,7 +176,8 @@ def _datum_sides(
             fault = f"found the datum {quoted(name)}, which is the feature itself"
             fault += ", expected another feature of the body"
             raise BadInput(fault_of(callout, fault))
-        # of the two sides of a rigid connection, prefer the side that has callouts
+        # if both sides of a rigid connection are possible, prefer the side that has
+        # callouts
         found.append(next((side for side in here if side in sides), here[0]))
     return found
 
@@ -180,7 +185,7 @@ def _datum_sides(
 def _order(
     callouts: tuple[Callout, ...], datums: list[list[Side]], sides: Mapping[Side, int]
 ) -> list[int]:
-    """Return the callouts in an order in which datums precede their features."""
+    """Return the callouts sorted so that datums precede features that refer to them."""
     needs = {
         k: [sides[side] for side in datums[k] if side in sides]
         for k in range(len(callouts))
@@ -194,7 +199,7 @@ def _order(
 
 
 def _feature_pose(bodies: _Bodies, callout: Callout) -> NDArray:
-    """Return the (4, 4) feature at home: origin in its middle, z along its axis."""
+    """Return the (4, 4) home pose of a feature: origin in its middle, z its axis."""
     pose = bodies.pose((callout.feature, callout.after))
     return pose @ transform(np.array(callout.at), callout.axes)
 
@@ -203,7 +208,7 @@ def _datum_pose(
     bodies: _Bodies, datum: Datum, side: Side, callouts: tuple[Callout, ...],
     sides: Mapping[Side, int],
 ) -> NDArray:  # fmt: skip
-    """Return the (4, 4) datum at home, in the axes of its own callouts if any."""
+    """Return the (4, 4) home pose of a datum, in the axes of its callouts if any."""
     if side in sides:
         return _feature_pose(bodies, callouts[sides[side]])
     return bodies.pose(side) @ transform(np.array(datum.at), axes_along(datum.axis))
@@ -213,7 +218,7 @@ def _zone(
     bodies: _Bodies, callout: Callout, datum: Side, callouts: tuple[Callout, ...],
     sides: Mapping[Side, int],
 ) -> Zone:  # fmt: skip
-    """Return the zone of a callout relative to its datum A."""
+    """Return the tolerance zone of a callout, oriented relative to its datum A."""
     pose = _feature_pose(bodies, callout)
     of_datum = _datum_pose(bodies, callout.datums[0], datum, callouts, sides)
     shape = callout.datums[0].shape
@@ -221,7 +226,7 @@ def _zone(
     offset = R.T @ (pose[:3, 3] - of_datum[:3, 3])
     axis = None if shape == "point" else R.T @ of_datum[:3, 2]
     try:
-        same = None  # a fixed joint may be a face or a bore
+        same = None  # the feature at a fixed joint can be a face or a bore
         if shape != "body":
             same = (shape == "plane") == (callout.shape == "plane")
         check_orientation(callout, np.eye(3)[2], axis, same)
@@ -241,7 +246,7 @@ def _datum_frame(
     callouts: tuple[Callout, ...], sides: Mapping[Side, int], screws: NDArray,
     shifts: Mapping[int, NDArray],
 ) -> NDArray:  # fmt: skip
-    """Return the (6, M) screw of the datum frame per unit coordinate, base's origin."""
+    """Return the (6, M) screw of the datum frame per unit of each zone coordinate."""
     D, free = np.zeros(screws.shape[1:]), np.eye(6)
     for j, (datum, side) in enumerate(zip(callout.datums, datums, strict=True)):
         pose = _datum_pose(bodies, datum, side, callouts, sides)
@@ -249,7 +254,8 @@ def _datum_frame(
         if j in shifts:
             own = own + shifts[j]
         to_datum = _to_feature(pose)
-        # divide lengths by the distance from the feature: rad and m have equal weights
+        # divide lengths by the distance from the feature, so that rad and m have equal
+        # weights
         gap = pose[:3, 3] - _feature_pose(bodies, callout)[:3, 3]
         scale = np.repeat([1.0, 1.0 / max(float(np.linalg.norm(gap)), 1e-3)], 3)[
             :, None
@@ -270,7 +276,7 @@ def _datum_frame(
 def _add_errors(
     errors: NDArray, bodies: _Bodies, callout: Callout, screw: NDArray
 ) -> None:
-    """Add the errors delta l that a feature's screw (6, M), in its axes, causes."""
+    """Add the errors delta l of frames that a feature's screw (6, M) causes."""
     robot, row = bodies.robot, bodies.robot.index(callout.feature)
     pose = _feature_pose(bodies, callout)
     if not callout.after:

@@ -1,9 +1,9 @@
 """Robots whose nominal closures do not hold: the mismatch becomes a geometric error.
 
-Published dimensions are rounded, and so are the coordinates of redundant drives.  The
-body of a frame, or the elastic drives, therefore take up the mismatch of the closures.
-The nominal geometry of the returned robot closes.  Together with its geometric errors,
-the returned robot equals the given robot.
+Published dimensions and coordinates of redundant drives are rounded, so closures can be
+open.  The mismatch is assigned to the body of a frame as a geometric error, or to the
+elastic drives as a preload.  The nominal geometry of the returned robot closes.
+Nominal geometry and geometric errors together equal the given robot.
 """
 
 from collections.abc import Callable, Mapping
@@ -24,8 +24,8 @@ from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, nearest
 from forcefit.stiffness.screws import rotation_matrix, rotation_vector, transform
 
-_OPEN = 1e-9  # [rad, m] largest mismatch of closures that hold
-_SMALL = 0.1  # [rad, m] largest error that counts as a small motion
+_OPEN = 1e-9  # [rad, m] mismatch up to which a closure counts as closed
+_SMALL = 0.1  # [rad, m] limit below which a mismatch counts as a small motion
 
 
 def closing_of(
@@ -40,18 +40,21 @@ def closing_of(
         rest: name of a frame, see :func:`rest_in`.
         mismatch: ``"spring"``, see :func:`preloaded`.
         joints: coordinates of drives for ``mismatch``.
-        own_errors: whether the robot keeps its geometric errors.  If not, the robot has
-            only the errors due to its closures, because drawn errors replace the
+        own_errors: whether the robot keeps its geometric errors.  If not, it keeps only
+            the errors due to its closures, because randomly drawn errors replace the
             others.
 
     Returns:
-        A function of the robot as declared; None if neither is given.
+        A function that returns the closed robot for a declared robot; None if neither
+        ``rest`` nor ``mismatch`` is given.
 
     Raises:
         BadInput: ``mismatch`` is not ``"spring"``.
     """
     if mismatch not in {None, "spring"}:
-        raise BadInput(f'--mismatch: found "{str(mismatch)[:60]}", expected spring')
+        raise BadInput(
+            f'--mismatch: found "{str(mismatch)[:60]}", expected the word spring'
+        )
     if rest is None and mismatch is None:
         return None
 
@@ -72,7 +75,8 @@ def rest_in(robot: Robot, name: str) -> Robot:
         robot: any robot.  Its drives are at their ``position``, and its passive joints
             are moved as near to closing as possible.
         name: name of a frame, or of a joint of several frames, in the loop that does
-            not close; of a universal joint the first bearing takes the mismatch.
+            not close.  For a universal joint, the mismatch is assigned to its first
+            bearing.
 
     Returns:
         A robot whose nominal geometry closes.  With its geometric errors, it equals the
@@ -103,7 +107,7 @@ def rest_in(robot: Robot, name: str) -> Robot:
 
 
 def _corrected(robot: Robot, row: int, X: NDArray) -> Robot:
-    """Return the robot whose frame is moved by X, and whose error is the inverse."""
+    """Return the robot with a frame moved by X, and the inverse of X as its error."""
     frame = robot.frames[row]
     body = transform(frame.translation, rotation_matrix(frame.rotation)) @ X
     error = frame.geometric_error
@@ -129,7 +133,7 @@ def _corrected(robot: Robot, row: int, X: NDArray) -> Robot:
 
 
 def preloaded(robot: Robot, joints: Mapping[str, float] | None = None) -> Robot:
-    """Return a robot with preloaded drives, because their coordinates do not close.
+    """Return a robot whose elastic drives are preloaded by the closures' mismatch.
 
     Args:
         robot: robot with redundant drives that are elastic.
@@ -201,7 +205,7 @@ def _independent(robot: Robot, T: NDArray) -> NDArray:
     driven = np.array([f.actuated for f in robot.frames])[mobile(robot)]
     loose = ~driven
     for column in np.flatnonzero(driven)[::-1]:
-        # a drive can be free if the other drives fix it through the closures
+        # a drive is redundant if the other drives fix it through the closures
         others = np.append(np.flatnonzero(loose), column)
         if _rank(A[:, others]) > _rank(A[:, loose]):
             loose[column] = True

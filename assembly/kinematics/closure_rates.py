@@ -1,4 +1,4 @@
-"""Closures at first order in the joint rates, with drives free or locked."""
+"""Velocities of the closures for given joint rates, with drives free or locked."""
 
 from functools import lru_cache
 
@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from forcefit.assembly.kinematics.nominal import mobile, motion_screws, size_of
 from forcefit.assembly.model.robot import Robot
 
-# relative size below which a singular value of the closures counts as zero: closures
-# hold to 1e-10, and the error of a posture near a singularity is the square root of it
+# relative size below which a singular value of the closures counts as zero. Closures
+# hold to 1e-10; near a singularity, the error of the posture is the square root of this
+# error
 SINGULAR = 1e-6
 _NOISE = 30.0  # assumed noise of the singular values divided by the closure error
 
@@ -69,7 +70,7 @@ def locked_closures(robot: Robot, T: NDArray) -> NDArray:
 
 
 def locked_ranks(robot: Robot, T: NDArray) -> NDArray:
-    """Return the (k,) ranks of :func:`locked_closures`."""
+    """Return the (k,) ranks of the matrices of :func:`locked_closures`."""
     values = np.linalg.svd(locked_closures(robot, T), compute_uv=False)
     return (values > SINGULAR * values[:, :1].clip(1e-300)).sum(axis=1)
 

@@ -40,8 +40,8 @@ def follow_side_by_side(
         poses: (k, 6) ``[tx ty tz rx ry rz]``, NaN for free components; no rows if no
             poses are given.
         held: (k, n) coordinates, NaN for free coordinates.
-        guess: whether the start is a guess that does not close; then a single step of
-            any length is made.
+        guess: whether ``start`` is a guess at which the closures are open.  In this
+            case, one step of any length is made.
         track: track to fill.
     """
     out = (track.coordinates, track.progress, track.transforms, track.closure_mismatch)

@@ -1,4 +1,4 @@
-"""Postures beyond a singularity, which every path from the home pose crosses.
+"""Test whether a posture is separated from the home pose by a singularity.
 
 With drives locked, the closure matrix A (6 c, p) of the passive joints has the rank r
 at almost all postures.  Expressed in bases of its range and its row space, which are
@@ -17,7 +17,7 @@ from forcefit.assembly.kinematics.posture import Posture, home_posture, pose_com
 from forcefit.assembly.kinematics.singular_posture import rank_near
 from forcefit.assembly.model.robot import Robot
 
-_ALIKE = 0.3  # least overlap of the bases at the start and end of a step
+_ALIKE = 0.3  # least accepted overlap of the bases at the start and the end of a step
 _STEPS = (
     4,
     32,
@@ -55,13 +55,13 @@ def beyond_singularity(robot: Robot, target: Target, T: NDArray) -> NDArray:
 
 @lru_cache(maxsize=16)
 def home_rank(robot: Robot) -> int:
-    """Return the rank of the locked closures at home or nearby."""
+    """Return the rank of the closures with locked drives, at home or nearby."""
     home = home_posture(robot)
     return rank_near(robot, home.coordinates, home.transforms)
 
 
 def _compared(A: NDArray, B: NDArray, rank: int) -> tuple[NDArray, NDArray]:
-    """Return the signs of B (k, m, p) in the bases of A, and the overlap of the bases.
+    """Return the signs of det B in the bases of A, and the overlap of the bases.
 
     Returns:
         (k,) signs of the determinants; (k,) overlaps, 1 if the bases of A and B span
@@ -91,7 +91,7 @@ def _along(
         if k < steps:
             track = follow(robot, home.coordinates, _part(home, target, k / steps))
             A = locked_closures(robot, track.transforms)
-            # a point of the path that cannot be reached separately is omitted
+            # a point of the path is omitted if it cannot be reached
             A = np.where(track.reached[:, None, None], A, before)
         sign, near = _compared(before, A, rank)
         signs, alike, before = signs * sign, np.minimum(alike, near), A

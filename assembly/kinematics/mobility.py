@@ -20,49 +20,53 @@ from forcefit.assembly.kinematics.ranks import MISMATCH_FACTOR, rank_of
 from forcefit.assembly.model.contact_closures import contact_closures
 from forcefit.results.display import html_table
 
-# relative size below which singular values count as zero: rounding of files with 6
-# digits, and at singular postures the square root of the closure error 1e-10
+# relative size below which singular values count as zero: files are rounded to 6
+# digits, and the error of singular postures is the square root of the closure error
+# 1e-10
 ZERO = 1e-5
 # [rad, lengths] least motion of the platform for unit joint rates
 _PLATFORM_RANK = 1e-6
 _ERROR = 10.0  # assumed error of free motions times the ratio of singular values
 _NOISE = 1e-14  # relative rounding error of singular values
-_DISTANCE = 0.05  # [rad or lengths] distance of nearby postures
+_DISTANCE = 0.05  # [rad or reference lengths] distance to nearby postures
 _NEIGHBOURS = 16  # largest number of nearby postures
-_AGREEING = 3  # number of nearby postures that must agree
+_AGREEING = 3  # number of nearby postures whose counts must agree
 _EXACT = 1e-12  # [rad, m] closure error that is only rounding
 _LEAST = 1e-8  # relative size below which singular values count as zero at _EXACT
 _CLOSED = 1e-6  # [rad, m] largest closure error of a nearby posture
-_BACK = 0.1  # a posture nearer than this share of the distance counts as unmoved
+_BACK = 0.1  # share of the distance; a posture that moved less counts as not moved
 
 
 @dataclass(frozen=True)
 class Mobility:
-    """Degrees of freedom at one posture; every joint rigid except for its own motion.
+    """Degrees of freedom at one posture, if joints are rigid except for their motion.
 
     Attributes:
-        freedoms: number of joint motions that keep all closures, drives free.
+        freedoms: number of independent joint motions that keep all closures, with the
+            drives free.
         platform_freedoms: number of independent motions of the platform among them.
             The others are local motions of the legs, during which the platform is at
             rest.
-        freedoms_drives_locked: number of such joint motions, drives locked.
+        freedoms_drives_locked: number of independent joint motions that keep all
+            closures, with the drives locked.
         platform_freedoms_drives_locked: number of independent motions of the platform,
-            drives locked.
+            with the drives locked.
         redundant_constraints: number of constraints of all joints with drives locked,
             minus their rank: number of independent internal loads of the rigid robot.
         drives: number of actuated joints.
         locked_freedoms: equal to ``freedoms_drives_locked``.
-        overconstraint: number of closure equations that depend on the others, drives
-            free.
+        overconstraint: number of closure equations that depend linearly on the others,
+            with the drives free.
         smallest_singular_value: [-] least nonzero singular value of the constraint
             matrix, with lengths divided by the robot's size.  A value near zero shows
             that a singularity is near.
         local_freedoms: ``freedoms`` minus ``platform_freedoms``.
         actuation_redundancy: number of redundant drives: drives minus the freedoms that
             the drives lock.
-        singular_value_gap: [-] ratio of the least singular value that counts to the
-            largest that does not, or to rounding errors; the smaller ratio of drives
-            free and locked.  Below about 100 the counts are uncertain.
+        singular_value_gap: [-] least singular value that counts as nonzero, divided by
+            the largest that counts as zero, or by the rounding errors if there is none.
+            The value is the smaller one of two ratios, with the drives free and locked.
+            If it is below about 100, the counts are uncertain.
     """
 
     freedoms: int
@@ -88,7 +92,8 @@ class NearMobility:
     Attributes:
         freedoms: the least number of freedoms at these postures; 0 if no motion leaves
             the given posture, because its freedoms are only infinitesimal.
-        there: the counts at a posture with that number; None if there is none.
+        there: the counts at a nearby posture with this number; None if no posture was
+            found.
     """
 
     freedoms: int
@@ -144,8 +149,8 @@ def platform_screws(posture: Posture) -> tuple[NDArray, float]:
 
     Returns:
         (k, 6) [rad, m] screws of the k ``platform_freedoms``, at the platform's origin
-        in base axes; orthonormal if lengths are divided by the robot's size.  Also
-        [rad, lengths] the error of these screws.
+        in base axes; orthonormal if lengths are divided by the robot's size.  Also the
+        error [rad, reference lengths] of these screws.
     """
     A, P = _rates(posture)
     moves = mobile(posture.robot)
@@ -164,7 +169,8 @@ def mobility_near(posture: Posture, here: Mobility) -> NearMobility:
         here: mobility at this posture.
 
     Returns:
-        The number of freedoms, and the counts at a nearby posture with that number.
+        The least number of freedoms, and the counts at a nearby posture with this
+        number.
     """
     robot, q = posture.robot, posture.coordinates
     if here.freedoms == 0 or _certainly_least(here):
@@ -178,7 +184,8 @@ def mobility_near(posture: Posture, here: Mobility) -> NearMobility:
         if np.linalg.norm((to - q) / scale) < _BACK * _DISTANCE:
             returned += 1
         elif open_by < _CLOSED:
-            # singular values grow with the square of the distance from a singularity
+            # near a singularity, singular values are proportional to the squared
+            # distance
             zero = _LEAST if open_by < _EXACT else ZERO
             near = mobility(Posture(robot, to, track.transforms[0], open_by), zero)
             found.append(near)
@@ -189,14 +196,14 @@ def mobility_near(posture: Posture, here: Mobility) -> NearMobility:
         if _AGREEING in {returned, *agreeing.values()}:
             break
     if not found:
-        # no correction converged, so no smaller number of freedoms is known
+        # no nearby posture was found, so no smaller number of freedoms is known
         return NearMobility(0 if returned == _AGREEING else here.freedoms, None)
     least = min(found, key=lambda m: (m.freedoms, m.freedoms_drives_locked))
     return NearMobility(min(least.freedoms, here.freedoms), least)
 
 
 def _certainly_least(here: Mobility) -> bool:
-    """Return whether no posture has fewer freedoms, as all closures are independent."""
+    """Return whether all closures are independent, so no posture has fewer freedoms."""
     return here.overconstraint == 0 and here.freedoms_drives_locked == 0
 
 
@@ -255,12 +262,12 @@ class _Motions:
 
     @property
     def error(self) -> float:
-        """[rad, lengths] platform motions below this size count as zero."""
+        """[rad, reference lengths] platform motions below this size count as zero."""
         return max(_PLATFORM_RANK, _ERROR / self.gap)
 
     @property
     def gap(self) -> float:
-        """Ratio of the least singular value that counts to the largest other one."""
+        """Least singular value that counts as nonzero, relative to the next one."""
         rank = self.joints.shape[1] - len(self.joints)
         if not rank:
             return np.inf

@@ -16,8 +16,10 @@ from forcefit.assembly.kinematics.nominal import Target, follow
 from forcefit.assembly.kinematics.track import Track
 from forcefit.assembly.model.robot import Robot
 
-_CLOSED = 1e-8  # [rad, m] largest error of closures and pose in a mode
-# components [tx ty tz rx ry rz] that keep their values, in the order of the attempts
+# [rad, m] largest error of closures and pose at which a target counts as reached
+_CLOSED = 1e-8
+# pose components [tx ty tz rx ry rz] that keep their home values, in the order of the
+# attempts
 _KEPT = (range(6), range(3, 6), range(3))
 
 
@@ -51,7 +53,7 @@ def follow_in_mode(
 
 
 def _held(target: Target, pose: NDArray, kept: range) -> Target:
-    """Return the target with missing components replaced by those of the pose."""
+    """Return the target in which selected missing components have their home values."""
     goal = np.full((len(target), 6), np.nan)
     if target.pose is not None:
         goal = np.array(target.pose, dtype=float)
@@ -63,7 +65,7 @@ def _try(
     robot: Robot, home: NDArray, target: Target, track: Track, rows: NDArray,
     whatever: bool,
 ) -> None:  # fmt: skip
-    """Follow other targets; fill the given rows of a track with reached targets."""
+    """Follow modified targets, and store those that were reached in a track."""
     found = follow(robot, home, target)
     good = whatever | (found.reached & (found.mismatch < _CLOSED))
     for one in fields(Track):

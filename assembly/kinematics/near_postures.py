@@ -26,7 +26,7 @@ def near_postures(
         robot: robot of n frames.
         q: (n,) [rad or m] coordinates of all joints.
         T: (n, 4, 4) frames seen from the base.
-        distance: [rad or lengths] norm of the motion.
+        distance: [rad or reference lengths] norm of the joint motion.
         count: number of postures.
 
     Yields:
@@ -43,7 +43,7 @@ def near_postures(
 
 
 def _steps_aside(robot: Robot, T: NDArray, distance: float, count: int) -> NDArray:
-    """Return (count, n) joint steps that satisfy the closures to first order."""
+    """Return (count, n) random joint steps that keep the closures to first order."""
     A = closure_matrices(robot, T[None])[0][0]
     _, values, Vt = np.linalg.svd(A)
     rank = int((values > SINGULAR * values[:1]).sum())

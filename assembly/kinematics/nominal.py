@@ -49,7 +49,7 @@ class Target:
 
 
 def size_of(robot: Robot) -> float:
-    """Return the longest length of a body [m], or 1 if all lengths are zero."""
+    """Return the length of the longest body [m], or 1 if all lengths are zero."""
     lengths = np.linalg.norm(robot.fixed_transforms[:, :3, 3], axis=1)
     return float(lengths.max()) or 1.0
 
@@ -83,7 +83,7 @@ def motion_screws(robot: Robot, T: NDArray) -> NDArray:
 def _tree(robot: Robot) -> dict[str, Any]:
     """Return the fields of a compiled tree, cached for each robot."""
     pairs = [[robot.index(name) for name in pair] for pair in robot.closures]
-    # the motion of a joint does not move its own frame
+    # a frame is defined before its joint, so the joint does not move it
     carries = robot.on_path - np.eye(len(robot.frames))
     moved = [carries[a] - carries[b] for a, b in pairs]
     moved.append(carries[robot.index(robot.platform)])
@@ -114,7 +114,8 @@ def follow(robot: Robot, start: NDArray, target: Target, guess: bool = False) ->
         robot: robot of n frames.
         start: (n,) coordinates that close.
         target: k poses or sets of prescribed coordinates.
-        guess: whether the start is a guess that need not close; then one step is made.
+        guess: whether ``start`` is a guess at which the closures can be open.  In this
+            case, one step is made.
 
     Returns:
         The ends of the tracks, and their progress.

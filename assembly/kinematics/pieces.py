@@ -55,7 +55,7 @@ class CutRobot:
         return Posture(self.robot, q, T, posture.mismatch)
 
     def spread(self, rows: NDArray) -> NDArray:
-        """Return (..., m, k) rows: those of frames at ends of beams, zero elsewhere."""
+        """Return (..., m, k): the given rows at the ends of beams, zeros elsewhere."""
         spread = np.zeros((*rows.shape[:-2], len(self.owner), rows.shape[-1]))
         spread[..., self.last, :] = rows
         return spread

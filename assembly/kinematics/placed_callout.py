@@ -1,4 +1,4 @@
-"""A callout with its zone and the errors that it causes, and the holes of callouts."""
+"""Tolerance callouts with the frame errors that they cause, and checks of holes."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,14 +14,15 @@ from forcefit.inputs.table import BadInput, quoted
 
 @dataclass(frozen=True, eq=False)
 class PlacedCallout:
-    """A callout with its zone, and the errors of the frames that it causes.
+    """A tolerance callout with its zone, and the errors of frames that it causes.
 
     Attributes:
-        callout: as the drawing states it.
-        zone: of the feature, in its axes.
-        errors: (n, 6, m) [rad, m] delta l of all frames for unit coordinates of the
-            zone.
-        datum: of which the zone is the shift at maximum material, or None.
+        callout: callout as stated in the drawing.
+        zone: tolerance zone of the feature, in the feature's axes.
+        errors: (n, 6, m) [rad, m] delta l of all n frames per unit of each of the
+            zone's m coordinates.
+        datum: datum at maximum material if the zone describes the shift of this datum;
+            None for a zone of the feature itself.
     """
 
     callout: Callout
@@ -31,34 +32,34 @@ class PlacedCallout:
 
     @property
     def words(self) -> str:
-        """What is called out, or which datum shifts."""
+        """Text with the toleranced characteristic, or with the datum that shifts."""
         if self.datum is None:
             return self.callout.words
         return f"shift of datum {self.datum.hole_of}"
 
     @property
     def name(self) -> str:
-        """Name in tables: ``"position of bore 2 on link_a"``."""
+        """Name in tables, such as ``"position of bore 2 on link_a"``."""
         return f"{self.words} of {self.callout.name}"
 
     @property
     def hole_of(self) -> str:
-        """Name of the hole whose size decides how large the zone is, or empty."""
+        """Name of the hole whose actual size changes the zone's width; may be empty."""
         return self.callout.hole_of if self.datum is None else self.datum.hole_of
 
     @property
     def hole(self) -> str:
-        """Size of that hole, or empty."""
+        """Size of the hole :attr:`hole_of`, such as ``"12 H7"``, or an empty text."""
         return self.callout.hole if self.datum is None else self.datum.hole
 
 
 def fault_of(callout: Callout, found: str) -> str:
-    """Return the message on a callout."""
+    """Return an error message that begins with the name of the callout's feature."""
     return f"tolerance of {quoted(callout.name)}: {found}"
 
 
 def fits_by_parts(robot: Robot) -> dict[str, str]:
-    """Return the fits by the name of their parts: the frame, unless the file says."""
+    """Return the fits by the name of their parts; by default, the frame's name."""
     ends = robot.fitted_ends
     return {ends[f].parts if f in ends else f: text for f, text in robot.fits.items()}
 
@@ -67,16 +68,16 @@ def check_holes(
     robot: Robot, placed: Sequence[PlacedCallout],
     body_of: Callable[[tuple[str, bool]], int],
 ) -> None:  # fmt: skip
-    """Refuse holes at maximum material that one part cannot have.
+    """Reject contradictory data of holes with the maximum material condition.
 
     Args:
-        robot: of the callouts.
-        placed: its callouts and shifts of datums.
-        body_of: number of the body of a side of a frame.
+        robot: robot to which the callouts belong.
+        placed: callouts of the robot, and shifts of its datums.
+        body_of: function that returns the number of the body on a side of a frame.
 
     Raises:
-        BadInput: the same hole has two sizes, its fit has another one, or it is on two
-            bodies.
+        BadInput: one hole has two sizes, its size differs from that of its fit, or it
+            is on two bodies.
     """
     fits, seen = fits_by_parts(robot), dict[str, tuple[str, int]]()
     for one in placed:
@@ -89,7 +90,7 @@ def check_holes(
             raise BadInput(fault_of(one.callout, f"{fault}, expected one hole"))
         fit = fits.get(one.hole_of)
         if parse_hole(size) != parse_hole(one.hole):
-            expected = f"{quoted(size)}, as before"
+            expected = f"{quoted(size)}, as stated before"
         elif fit is not None and _hole_of(fit) != parse_hole(one.hole):
             expected = f"that of the fit {quoted(fit)}"
         else:
@@ -99,6 +100,6 @@ def check_holes(
 
 
 def _hole_of(text: str) -> tuple[float, Limits]:
-    """Nominal size and deviations of the hole of a fit."""
+    """Return the nominal size and the deviations of the hole of a fit."""
     fit = parse_fit(text)
     return fit.size, fit.hole

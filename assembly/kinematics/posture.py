@@ -56,8 +56,8 @@ class Posture:
         robot: the manipulator.
         coordinates: (..., n) [rad or m] coordinate of every joint, 0 for fixed joints.
         transforms: (..., n, 4, 4) frames seen from the base, without imperfections.
-        mismatch: (...) [rad, m] largest nominal closure error, due to rounded files; it
-            is neglected.
+        mismatch: (...) [rad, m] largest nominal closure error.  It is caused by rounded
+            numbers in the file, and it is neglected.
     """
 
     robot: Robot
@@ -107,7 +107,7 @@ class Posture:
 
     @property
     def distinct(self) -> "tuple[Posture, NDArray]":
-        """Distinct postures (c of R), and (R,) the index of each posture among them."""
+        """The c distinct ones of R postures, and (R,) the index of each among them."""
         coordinates, transforms, which = _distinct(
             Unchanged(self.coordinates), Unchanged(self.transforms)
         )
@@ -174,7 +174,7 @@ def _paths(transforms: Unchanged, platform: int) -> NDArray:
 def _distinct(
     coordinates: Unchanged, transforms: Unchanged
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Return the rows with distinct coordinates, and the index of each row in them."""
+    """Return the distinct postures, and for each given posture its index among them."""
     q = coordinates.numbers
     _, first, which = np.unique(q, axis=0, return_index=True, return_inverse=True)
     return q[first], transforms.numbers[first], which.reshape(-1)
@@ -198,16 +198,16 @@ class Content:
 def content_of(
     postures: Posture, arrays: tuple[NDArray, ...], names: object
 ) -> Content:
-    """Return the key of a result that depends only on postures and arrays.
+    """Return the cache key of a result that depends only on postures and arrays.
 
     Args:
         postures: one or many postures; the key contains their transforms and the
             parents of their frames.
         arrays: arrays of numbers.
-        names: any other data on which the result depends, compared by ``repr``.
+        names: all other data on which the result depends, compared by their ``repr``.
 
     Returns:
-        The key; it also stores the given objects.
+        The key, which also contains the given objects.
     """
     digest = blake2b(repr((names, [a.shape for a in arrays])).encode())
     for array in (postures.robot.parents, *arrays):
@@ -255,7 +255,7 @@ def home_posture(robot: Robot) -> Posture:
 
 
 def _left_open(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the (closures,) largest rotation [rad] and translation [m] errors."""
+    """Return the largest rotation [rad] and translation [m] error of each closure."""
     pairs = [[robot.index(name) for name in pair] for pair in robot.closures]
     first, second = (T[[pair[k] for pair in pairs]] for k in (0, 1))
     between = first[:, :3, :3] @ np.swapaxes(second[:, :3, :3], -1, -2)
@@ -264,14 +264,14 @@ def _left_open(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def _either(turned: float, shifted: float, least: float) -> str:
-    """Return a text on the mismatch, in the unit in which it is too large."""
+    """Return a text on a mismatch, either the rotation or the translation."""
     if shifted < least:
         return f"{turned:.3g} rad with the actuated joints held, expected < 1e-06"
     return f"{shifted:.3g} m with the actuated joints held, expected < {least:.3g}"
 
 
 def _way_out(robot: Robot, T: NDArray, left_open: float = 0.0) -> str:
-    """Return advice on redundant drives, if there are any."""
+    """Return advice on redundant drives; empty if the robot has none."""
     count = redundant_drives(robot, T, left_open)
     if count <= 0:
         return ""
@@ -298,9 +298,9 @@ def place_robot(
 
     The closures are followed from the home pose along a straight line, so the assembly
     mode is that of the home pose.  Components that the input leaves undetermined stay
-    near their home values.  At a singular home pose, operation modes meet.  The
-    platform then keeps the components that are not given, the rotation first, if
-    possible.
+    near their home values.  At a singular home pose, several operation modes meet.  The
+    platform then keeps its home values of the components that are not given, if
+    possible.  The rotation has priority.
 
     Args:
         robot: any robot.
@@ -317,7 +317,7 @@ def place_robot(
             the pose is out of reach; the message contains the missing distance.
     """
     if pose and joints:
-        raise BadInput("found both a pose and joints, expected one of them")
+        raise BadInput("found both a pose and joints, expected only one of the two")
     if joints:
         target = joint_target(robot, joints)
     elif pose:
@@ -354,7 +354,7 @@ def joint_target(robot: Robot, joints: Mapping[str, float]) -> Target:
 
 
 def _finite(whose: str, value: float, largest: float) -> float:
-    """Return the value; raise BadInput if it is not finite or beyond any machine."""
+    """Return the value; raise BadInput if it is not finite or its size is too large."""
     if not np.isfinite(value):
         raise BadInput(f"{whose}: found {value}, expected a finite number")
     if abs(value) > largest:
@@ -373,8 +373,8 @@ def place_many(
         poses: (k, 6) ``[tx ty tz rx ry rz]`` [m, rad], NaN for free components.
 
     Returns:
-        For each pose its posture, or None if it is out of reach; and for each pose an
-        empty string, or the reason why there is no posture.
+        Two lists with one entry for each pose: the posture, or None if the pose is out
+        of reach; and an empty string, or the reason why there is no posture.
 
     Raises:
         BadInput: the robot's closures do not hold in its home pose.
@@ -404,7 +404,7 @@ def place_many_joints(
 def _follow_many(
     robot: Robot, target: Target
 ) -> tuple[list[Posture | None], list[str]]:
-    """Return the posture of each target, or None and the reason."""
+    """Return for each target its posture, or None and the reason for failure."""
     track = _follow(robot, target)
     postures = [
         _posture(robot, track, i) if reached else None
@@ -460,7 +460,7 @@ def unreached(robot: Robot, track: Track, target: Target, i: int) -> str:
 
 
 def _posture(robot: Robot, track: Track, i: int) -> Posture:
-    """Return row i of a track as a posture with read-only arrays."""
+    """Return the end of track i as a posture with read-only arrays."""
     q, T = track.coordinates[i].copy(), track.transforms[i].copy()
     q.setflags(write=False)
     T.setflags(write=False)

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-# for files rounded at 6 digits: parallel rods turn a platform by ten times that error
-_TURN = 1e-4  # [rad] largest rotation per reference length of a translation
-_PITCH = 1e-5  # [lengths] largest translation per rad of a rotation
+# both limits are for files rounded to 6 digits; parallel rods rotate a platform by ten
+# times this rounding error
+_TURN = 1e-4  # [rad] largest rotation per reference length of a pure translation
+_PITCH = 1e-5  # [reference lengths] largest translation per rad of a pure rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +48,8 @@ def pure_motions(
         screws: (k, 6) [rad, m] independent screws at a point, base axes.
         at: (3,) [m] that point.
         size: [m] reference length by which translations are compared with rotations.
-        error: [rad, lengths] error of the screws; smaller components count as zero.
+        error: [rad, reference lengths] error of the screws; smaller components count as
+            zero.
 
     Returns:
         k motions in base axes.
@@ -61,7 +63,7 @@ def pure_motions(
     if not turning:
         return slides
     axes = _plain_basis(Wt[:turning], zero)
-    # velocities at c for these rotations, up to free translations
+    # velocities at c due to these rotations, without free translations
     across = _complement(free, zero)
     rates = axes @ np.linalg.pinv(w, rcond=zero) @ v @ across.T @ across
     point, anywhere = _common_point(axes, rates, across, exact)
@@ -109,9 +111,10 @@ def _common_point(
         zero: [lengths] largest difference of velocities that counts as zero.
 
     Returns:
-        (3,) the point, None if there is none; and whether every point satisfies this.
+        (3,) the point, or None if there is none; and whether all axes can pass through
+        any point.
     """
-    # p x axis must equal the rate, except for free translations
+    # p x axis must equal the velocity at the origin, except for free translations
     rows = np.vstack([across @ -_cross(axis) for axis in axes])
     goal = np.concatenate([across @ rate for rate in rates])
     point = np.linalg.lstsq(rows, goal, rcond=zero)[0]

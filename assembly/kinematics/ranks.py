@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 RANK = 1e-10  # relative size below which a singular value counts as zero
-ROWS_RANK = 1e-9  # threshold for rows that only clearances can satisfy
-# factor of the nominal closure error that is added to RANK, for rounded robot files
+ROWS_RANK = 1e-9  # the same threshold for closure rows that only clearances can satisfy
+# factor; this factor times the nominal closure error is added to RANK, for rounded
+# robot files
 MISMATCH_FACTOR = 30.0
-# rounding error, relative to their size, of columns that a projection removes
+# relative rounding error of columns that a projection removes
 NOISE = 1e-12
 UNBOUNDED = 1e-8  # [rad, m] least platform motion per unit of a free motion
 

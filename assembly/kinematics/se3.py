@@ -26,7 +26,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from forcefit.stiffness.screws import rotation_vector, skew, transform
 
-_SERIES = 9  # number of terms of the Stumpff series: error 1e-17 at 1 rad
+# number of terms of the Stumpff series; its error is 1e-17 at an angle of 1 rad
+_SERIES = 9
 _STUMPFF = np.array([
     [1 / math.factorial(2 * j + k) for k in range(6)] for j in range(_SERIES)
 ])  # fmt: skip

@@ -1,11 +1,11 @@
 """Singular postures, at which the robot with locked drives gains a freedom.
 
-With its drives locked, a robot keeps the freedoms that its closures leave.  If it has
-more freedoms at a posture than at nearby postures, its closures are dependent only to
-first order.  Small errors then move the robot far, or not at all.  Equations (17) to
-(27) are linear in the errors.  At such a posture, they determine neither whether the
-robot can be assembled nor the size of its errors.  Operation modes meet at singular
-postures (Zlatanov, Bonev, Gosselin 2002).
+With locked drives, a robot keeps the freedoms that its closures allow.  At a singular
+posture, it has more freedoms than at nearby postures, because its closures are linearly
+dependent there to first order.  Small errors can then cause large motions, or none.
+Equations (17) to (27) are linear in the errors.  At such a posture, they determine
+neither whether the robot can be assembled nor the size of its errors.  Operation modes
+meet at singular postures (Zlatanov, Bonev, Gosselin 2002).
 
 Start with :func:`is_singular`.
 """
@@ -20,9 +20,10 @@ from forcefit.assembly.kinematics.near_postures import near_postures
 from forcefit.assembly.kinematics.nominal import Target, follow
 from forcefit.assembly.model.robot import Robot
 
-_ASIDE = 0.02  # [rad or lengths] distance of nearby postures
+_ASIDE = 0.02  # [rad or reference lengths] distance to nearby postures
 _NEIGHBOURS = 6  # number of nearby postures, of which one must not be singular
-_APART = 1e-5  # relative size above which a singular value nearby counts as nonzero
+# relative size above which a singular value at a nearby posture counts as nonzero
+_APART = 1e-5
 _CLOSED = 1e-8  # [rad, m] largest closure error of a nearby posture
 _NOISE = 1e3  # singular values below this factor times the closure error count as zero
 
@@ -40,7 +41,7 @@ def is_singular(robot: Robot, q: NDArray, T: NDArray) -> bool:
         which includes robots without drives.
     """
     rank = int(locked_ranks(robot, T[None])[0])
-    # no posture has a rank larger than the number of columns
+    # if the rank equals the number of columns, no posture has a larger rank
     most = sum(f.passive for f in robot.frames)
     return rank < most and rank < rank_near(robot, q, T)
 

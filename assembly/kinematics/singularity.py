@@ -1,4 +1,4 @@
-r"""Distance of a posture to singularities of each kind, and the joints involved.
+r"""Distances of a posture from singularities by kind, and the joints that move there.
 
 The closures of the rigid robot allow its drives and its platform a space of motions.
 In an orthonormal basis of this space, with rates (q_a, t) of drives and platform,
@@ -50,7 +50,8 @@ class Singularities:
     Attributes:
         serial: (k,) sine of the least angle a_i, 0 at a serial singularity; at most 1.
         parallel: (k,) cosine of the largest angle a_i, 0 at a parallel singularity.
-        closure: (k,) least singular value of the closures that is not always zero.
+        closure: (k,) least singular value of the closures, without those that are zero
+            at every posture.
         serial_joints: (k, n) joint rates of the motion at the serial singularity.
         parallel_joints: (k, n) joint rates of the motion at the parallel singularity.
         parallel_screws: (k, 6) the platform's motion at the parallel singularity.
@@ -127,7 +128,7 @@ def find_singularities(robot: Robot, transforms: NDArray) -> Singularities:
 
 @dataclass(frozen=True)
 class _Ranks:
-    """Ranks of closures, of Q and of its platform part, away from singularities."""
+    """Ranks of the closures, of Q and of its platform part, without singularity."""
 
     closures: int
     motions: int
@@ -156,7 +157,7 @@ def _generic_ranks(robot: Robot) -> _Ranks:
 
 
 def _rank(A: NDArray, least: float = _RANK) -> int:
-    """Return the number of singular values above rounding, or above another size."""
+    """Return the number of singular values above rounding, or above a given size."""
     return rank_of(np.linalg.svd(A, compute_uv=False), least, noise=least)
 
 
@@ -177,7 +178,8 @@ def _measure(robot: Robot, T: NDArray, ranks: _Ranks) -> Singularities:
     measured = _drives_and_platform(N, B, ranks)
     closure = np.where(closure > SINGULAR, closure, 0.0)
     for i in np.flatnonzero(closure == 0.0).tolist():
-        # the closures leave more motions than elsewhere; all of them count here
+        # the closures allow more motions than at other postures; all of these motions
+        # count here
         here = slice(i, i + 1)
         more, _, _ = _null_space(A[here], _rank(A[i], SINGULAR))
         own = _ranks_there(more[0] @ B[i], ranks)
@@ -205,7 +207,7 @@ def _measure(robot: Robot, T: NDArray, ranks: _Ranks) -> Singularities:
 
 
 def _ranks_there(moved: NDArray, generic: _Ranks) -> _Ranks:
-    """Return the ranks where the closures leave more motions than elsewhere."""
+    """Return ranks at postures where the closures allow more motions than elsewhere."""
     motions = _rank(moved, SINGULAR)
     # motions that never move the platform are not a serial singularity either
     always = generic.motions - generic.platform
@@ -219,7 +221,7 @@ def _drives_and_platform(
     drives = B.shape[2] - 6
     W, t, Q = np.linalg.svd(N @ B, full_matrices=False)
     Q = Q[:, : ranks.motions]
-    # joint rates that belong to the rows of Q
+    # joint rates that correspond to the rows of Q
     rates = np.swapaxes(W[:, :, : ranks.motions], 1, 2) @ N
     rates = rates / np.maximum(t[:, : ranks.motions, None], 1e-300)
     serial, still_platform = _least(Q[..., drives:], ranks.platform)
@@ -234,7 +236,7 @@ def _drives_and_platform(
 
 
 def _least(half: NDArray, rank: int) -> tuple[NDArray, NDArray]:
-    """Return singular value ``rank`` of matrices (k, r, c), and its left vector."""
+    """Return the singular value number ``rank`` of each matrix, and its left vector."""
     if not rank:
         return np.ones(len(half)), np.zeros(half.shape[:2])
     U, values, _ = np.linalg.svd(half, full_matrices=True)

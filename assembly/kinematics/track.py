@@ -7,12 +7,13 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """End points of the continuation to many targets.
+    """Postures at which the continuation to each of many targets ended.
 
     Attributes:
         coordinates: (k, n) joint coordinates at the end points.
         transforms: (k, n, 4, 4) frames at the end points.
-        progress: (k,) fraction of the path; 1 if the target was reached.
+        progress: (k,) [-] fraction of the path that was followed; 1 if the target was
+            reached.
         closure_mismatch: (k, closures) [rad, m] largest component of each closure
             error.
     """

@@ -1,4 +1,4 @@
-"""Test whether a posture is usable: joint limits, singularities, side of home."""
+"""Tests of a posture: joint limits, singularity, singularities between it and home."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,8 @@ from forcefit.assembly.model.statuses import BEYOND_LIMITS, BEYOND_SINGULARITY, 
 
 SINGULAR_WORDS = "singular posture: the first-order analysis is inconclusive"
 _FAR_SIDE = "not connected to home without passing a singularity"
-_ROUNDING = 1e-8  # [rad, reference lengths] accepted excess over a limit
+# [rad, reference lengths] accepted excess of a coordinate over its limit
+_ROUNDING = 1e-8
 
 
 def verdicts(
@@ -31,7 +32,8 @@ def verdicts(
         target: k poses or sets of coordinates.
         q: (k, n) [rad or m] coordinates at the targets.
         T: (k, n, 4, 4) frames at the targets.
-        near: (k,) bool, True for postures that can be singular; None for all.
+        near: (k,) bool, True for postures that are tested for a singularity; None to
+            test all.
 
     Returns:
         For each posture :data:`BEYOND_LIMITS`, :data:`SINGULAR` or
@@ -55,7 +57,7 @@ def verdicts(
 
 
 def _singular(robot: Robot, q: NDArray, T: NDArray, near: NDArray) -> NDArray:
-    """Return (k,) bool, True for postures whose locked closures have too low a rank."""
+    """Return (k,) bool, True if the closures with locked drives lose rank."""
     singular = near.copy()
     if near.any():
         singular[near] = locked_ranks(robot, T[near]) < home_rank(robot)
@@ -83,7 +85,7 @@ def limits_passed(robot: Robot, q: NDArray) -> str:
         room = _ROUNDING * (size_of(robot) if slides else 1.0)
         low, high = frame.limits[0] - room, frame.limits[1] + room
         if frame.passive and frame.joint == "revolute":
-            # whole turns of a passive joint are not counted as motion
+            # full turns of a passive joint are subtracted from its coordinate
             value -= 2 * np.pi * np.floor((value - low) / (2 * np.pi))
         if not low <= value <= high:
             texts.append(
@@ -121,7 +123,7 @@ def posture_remarks(posture: Posture) -> list[str]:
 
 
 def _mode(home: Posture, posture: Posture) -> str:
-    """Return the name of the mode in which the platform moved away from home."""
+    """Return the name of the operation mode in which the platform left home."""
     moved = posture.platform @ np.linalg.inv(home.platform)
     turned = np.abs(moved[:3, :3] - np.eye(3)).max() > _ROUNDING
     shift = posture.platform[:3, 3] - home.platform[:3, 3]

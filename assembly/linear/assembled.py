@@ -1,4 +1,4 @@
-"""Assembled manipulator of least energy: screws, wrenches, energy and certificate.
+"""Manipulator assembled with least energy: screws, wrenches, energy, certificate.
 
 ======  ====================  ========  ==============================================
 symbol  code                  shape     meaning
@@ -13,7 +13,7 @@ E       ``energy``            J         elastic energy of all springs
 
 The wrenches are computed from the multipliers of the closures, not from eqs (23)-(26).
 Eq. (23) adds the wrenches of springs in series, although these springs carry one and
-the same wrench.  Eqs (24)-(26) include only the path to the platform.  Their wrenches
+the same wrench.  Eqs (24)-(26) include only the path to the platform, so their wrenches
 add up to zero if the platform carries no load.
 """
 
@@ -62,7 +62,8 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_ROUNDED = 1e-9  # share of the largest wrench below which a component is rounding error
+# relative to the largest wrench: smaller components are rounding errors
+_ROUNDED = 1e-9
 _NOTHING = 1e-12  # [N m, N] components of a wrench below this are rounding errors
 
 
@@ -88,7 +89,8 @@ class Assembly(Solution[N]):
                 "platform error": f"at most {largest(self.platform_screw[solved])}",
             }
         forces = np.linalg.norm(without_rounding(self.tip_wrenches)[:, 3:], axis=1)
-        most = largest_row(forces)  # first of equal forces: links in series
+        # the first of several equal forces, as in links in series
+        most = largest_row(forces)
         return {
             **forced_lines(self),
             "largest force": f"{forces[most]:.4g} N, in "
@@ -132,12 +134,12 @@ class Assembly(Solution[N]):
 
     @property
     def stored(self) -> N:
-        """(...) [J] energy in the springs of the numerical solution."""
+        """(...) [J] elastic energy of the springs in the numerical solution."""
         return plain(np.vecdot(self.elastic, self.elastic) / 2)
 
     @cached_property
     def potential(self) -> N:
-        """(...) [J] energy minus the work of the loads."""
+        """(...) [J] potential: elastic energy minus the work of the loads."""
         on_errors = np.vecdot(self.frame_loads.body, _flat(self._errors))
         return plain(self.stored - self.work - on_errors)
 
@@ -234,7 +236,7 @@ class Assembly(Solution[N]):
 
     @cached_property
     def _closing(self) -> NDArray:
-        """(..., n, 6) [N m, N] wrench through each frame due to the closures only."""
+        """(..., n, 6) [N m, N] part of each frame's wrench due to the closures only."""
         at_platform = closure_signs(self.posture.robot).T @ self.closure_wrenches
         return np.einsum("...nji,...nj->...ni", self.posture.paths, at_platform)
 
@@ -245,7 +247,7 @@ class Assembly(Solution[N]):
         The bound is the complementary energy of the computed wrenches.  For any
         wrenches w in equilibrium, the energy of every assembly is at least
         -w.dl - w.C w/2 - (largest work of w on the clearances).  The bound therefore
-        does not depend on the solution method.  It assumes that no free motion exceeds
+        does not depend on the solution method.  It is valid if no free motion exceeds
         its value in this solution.
         """
         joint, springs = _flat(self.joint_wrenches), self._balancing
@@ -343,7 +345,7 @@ class Assembly(Solution[N]):
 
         The divisor is at least 1e-4 of the energy without clearance.
         """
-        # the least energy is zero inside an assembly zone: the divisor has a lower
+        # inside an assembly zone the least energy is zero, so the divisor has a lower
         # limit
         least = np.maximum(1e-4 * np.asarray(self.energy_without_clearance), 1e-300)
         return plain(self.duality_gap() / np.maximum(self.stored, least))
@@ -360,12 +362,12 @@ class Assembly(Solution[N]):
 
 
 def _flat(screws: NDArray) -> NDArray:
-    """Reshape screws (..., n, 6) to (..., 6n)."""
+    """Return screws (..., n, 6) in the shape (..., 6n)."""
     return screws.reshape(*screws.shape[:-2], -1)
 
 
 def _by_frames(screws: NDArray) -> NDArray:
-    """Reshape screws (..., 6n) to (..., n, 6)."""
+    """Return screws (..., 6n) in the shape (..., n, 6)."""
     return screws.reshape(*screws.shape[:-1], -1, 6)
 
 
@@ -381,8 +383,8 @@ def without_rounding(wrenches: NDArray) -> NDArray:
         wrenches: (..., n, 6) [N m, N] wrenches of the n bodies of a robot.
 
     Returns:
-        (..., n, 6) [N m, N]; a component is 0 if its size was below 1e-9 of the robot's
-        largest component, or below 1e-12.
+        (..., n, 6) [N m, N] wrenches.  A component is 0 if its absolute value was below
+        1e-9 of the largest component of the robot, or below 1e-12 N m or N.
     """
     sizes = np.abs(wrenches)
     largest = sizes.max(axis=(-2, -1), keepdims=True, initial=0.0)

@@ -1,4 +1,4 @@
-"""Errors of energy, closures and platform screw that the certificate excludes.
+"""Bounds of the errors of energy, closures and platform screw, from a certificate.
 
 A certificate of least energy is a lower bound of the energy.  The distance of the
 computed platform screw from all platform screws of least energy is bounded as well.
@@ -34,12 +34,17 @@ from forcefit.assembly.linear.rounding import SPREAD, stiffness_spread
 from forcefit.assembly.solvers.cones import cone_sizes
 from forcefit.assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE, SolverFailed
 
-LARGEST_RESIDUAL = 1e-9  # [rad, reference lengths] accepted residual of a closure
-LARGEST_EXCESS = 1e-9  # [-] accepted excess of a clearance over its cone
-_SCREW, _SCREW_SHARE = 1e-5, 1e-3  # accepted error of the screw: [rad, m] and relative
+# [rad, reference lengths] largest accepted residual of a closure
+LARGEST_RESIDUAL = 1e-9
+# [-] largest accepted relative excess of a clearance over its bound
+LARGEST_EXCESS = 1e-9
+# largest accepted error of the screw: absolute [rad, m], and relative to the screw
+_SCREW, _SCREW_SHARE = 1e-5, 1e-3
 _AMPLIFIED = 10.0  # assumed upper limit of frame motion divided by spring deformation
-_WIDTH = 3e-5  # required difference of upper and lower bound, relative to the distance
-_HELD = 0.1  # [-] largest free share of its cone with which a clearance is fixed
+# [-] required difference of upper and lower bound of a distance, relative to it
+_WIDTH = 3e-5
+# [-] a clearance whose range is a smaller share of its cone counts as fixed
+_HELD = 0.1
 
 
 @dataclass(frozen=True)
@@ -49,8 +54,9 @@ class ScrewBound:
     Attributes:
         rotation: [rad] upper bound; infinite if the platform turns freely.
         translation: [m] upper bound, at the platform's origin.
-        rotation_open: [rad] part of ``rotation`` due to clearances without load.  These
-            make the screw non-unique, and the farthest screw is at most this far away.
+        rotation_open: [rad] part of ``rotation`` due to clearances without load.  Such
+            clearances make the screw non-unique.  The farthest possible screw is at
+            most this far from the computed screw.
         translation_open: [m] part of ``translation`` due to clearances without load.
         rotation_error: [rad] part of ``rotation`` that is numerical error.
         translation_error: [m] part of ``translation`` that is numerical error.
@@ -65,7 +71,7 @@ class ScrewBound:
 
 
 def unproved(assembly: Assembly) -> str:
-    """Return sentences on the properties that the certificate does not prove.
+    """Return sentences that state which properties the certificate does not prove.
 
     An assembly is proved if three conditions are satisfied.  The closure residuals are
     at most 1e-9 (rad, or m per reference length).  The clearances exceed their bounds
@@ -103,7 +109,7 @@ def unproved(assembly: Assembly) -> str:
 
 
 def unproved_screw(assembly: Assembly, bound: ScrewBound) -> list[str]:
-    """Return messages on the rotation or translation that the gap does not determine.
+    """Return messages if the duality gap leaves rotation or translation uncertain.
 
     The test covers only the parts of the platform screw that are unique.
 
@@ -134,7 +140,7 @@ def unproved_screw(assembly: Assembly, bound: ScrewBound) -> list[str]:
 
 
 def _allowed(assembly: Assembly) -> NDArray:
-    """Return the (2,) [rad, m] largest accepted error of the platform screw."""
+    """Return the largest accepted rotation [rad] and translation [m] error."""
     halves = assembly.platform_screw.reshape(2, 3)
     return _SCREW + _SCREW_SHARE * np.linalg.norm(halves, axis=1)
 
@@ -215,14 +221,15 @@ def _room(
 
     Returns:
         Columns of the clearances; their values in this assembly; the cone of each
-        column; and (nu,) ranges relative to the size of the cone.  A range of 1 means
-        the complete cone.  A smaller range is the largest distance between this
+        column; and (nu,) [-] ranges relative to the sizes of the cones.  A range of 1
+        means the complete cone.  A smaller range is the largest distance between this
         assembly and any assembly of least energy.
     """
     group = joints.group
     load = cone_sizes(joints.cones.T @ assembly.joint_wrenches.ravel(), group)
     share = np.divide(gap, load, out=np.full(len(load), np.inf), where=load > 0.0)
-    # the range is measured from the end of an interval; in a disc it is a cap's width
+    # in an interval, the range is measured from its end; in a disc, it is the width of
+    # a segment
     room = np.where(np.bincount(group) > 1, 2.0 * np.sqrt(2.0 * share), share)
     room = np.where(room < _HELD, room, 1.0)
     return joints.cones, clearances_in(assembly, joints), group, room[group]

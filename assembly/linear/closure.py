@@ -46,7 +46,7 @@ from forcefit.results.display import html_table, short_repr
 
 @dataclass(frozen=True, eq=False)
 class VirtualJoints:
-    """Columns of small screws of all parts that can move in a robot, except its drives.
+    """Columns of the small screws of all links, clearances, springs and free joints.
 
     Attributes:
         robot: robot of n frames.
@@ -54,9 +54,11 @@ class VirtualJoints:
         links: (ny,) bool, True for columns of links and False for columns of joints.
         cones: (6n, nu) columns of bounded clearances; the length of each is its bound.
         group: (nu,) cone of each column: two columns for a disc, three for a ball.
-        scaled: (nu,) bool, whether the margin's factor scales the column's cone.
+        scaled: (nu,) bool, True if the factor of the margin, problem (21), scales the
+            cone of the column.
         free: (6n, nq) unit columns of unbounded motions.
-        bounded_motion: frames whose passive joint's bound of motion is a cone.
+        bounded_motion: frames with a passive joint whose motion limit is included as a
+            cone.
     """
 
     robot: Robot
@@ -83,9 +85,9 @@ def virtual_joints(
         own_axes_free: whether passive joints with stiffness move freely about (or
             along) their z axis.  If not, the z axis is elastic, or rigid without
             springs.  The two cases give the two margins of problem (21).
-        bounded_motion: whether the motion of passive joints is bounded: for all joints,
-            or for a set of frames.  These bounds are large and rarely active.  They are
-            therefore omitted first and tested afterwards.
+        bounded_motion: whether the motion limits of passive joints are included, for
+            all joints or for a set of frames.  These limits are large and rarely
+            active.  They are therefore omitted first and checked afterwards.
 
     Returns:
         The columns.
@@ -105,7 +107,7 @@ class _JointsKey:
 
 
 def _parts(robot: Robot) -> tuple:
-    """Return the data for the cache key; links are compared by identity."""
+    """Return the parts of the cache key; links are compared by object identity."""
     return tuple(
         (
             f.parent, f.joint, f.pitch, f.actuated, f.clearance, id(f.link),
@@ -153,7 +155,7 @@ def _virtual_joints(
 def _elastic(
     links: NDArray, joints: NDArray, robot: Robot
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the spring columns of links and joints, and (ny,) bool, True for links."""
+    """Return the columns of all springs, and (ny,) bool, True for springs of links."""
     count = len(robot.frames)
     columns, is_link = [np.zeros((6 * count, 0))], []
     for compliances, link in ((links, True), (joints, False)):
@@ -238,7 +240,7 @@ class Linearisation:
 
     @cached_property
     def platform(self) -> NDArray:
-        """(6, 6 n) map, not scaled, from frame screws to the platform screw, (8)."""
+        """(6, 6 n) unscaled map from frame screws to the platform screw, eq. (8)."""
         robot = self.posture.robot
         on_path = robot.on_path[robot.index(robot.platform)]
         platform = np.swapaxes(self.posture.paths * on_path[:, None, None], 0, 1)

@@ -48,8 +48,9 @@ from forcefit.assembly.solvers.method import Method, check_method, log_reference
 
 __all__ = ["Assembly", "CannotAssemble", "solve_assembly"]
 
-# outcomes of assembly/kernels/linear/energies.h: from _LEFT on, the kernel has no
-# result; _AT_BOUNDS can be caused by an omitted bound of a passive joint's motion
+# outcome codes of assembly/kernels/linear/energies.h. From _LEFT on, the kernel has no
+# result. The codes _AT_BOUNDS can be caused by an omitted motion limit of a passive
+# joint
 _LEFT, _AT_BOUNDS = 2, (5, 6)
 _STATUS: dict[type[Exception], str] = {
     CannotAssemble: CANNOT_ASSEMBLE,
@@ -58,7 +59,7 @@ _STATUS: dict[type[Exception], str] = {
 }
 _NUMBERS = ("energy", "bound", "tight", "work", "residual", "excess")
 _VECTORS = ("clearances", "motions", "multipliers", "elastic")
-# name -> array over k points; "tight" is the energy without clearance
+# arrays of k points by name; "tight" is the energy without clearance
 _Rows = dict[str, NDArray]
 
 
@@ -120,8 +121,8 @@ def solve_assembly(
         The assembled manipulator.  The function
         :func:`forcefit.assembly.linear.certificate.unproved` lists the properties that
         remain unproved.  For many postures or sets of errors, one object contains all
-        points.  A point without a solution then raises no exception; ``reason``
-        contains its message.
+        points.  A point without a solution then raises no exception; the field
+        ``reason`` contains the message.
 
     Raises:
         CannotAssemble: no clearance and no spring can close an open closure.
@@ -198,7 +199,7 @@ def failure_status(error: Exception) -> str:
 def _solve_one(
     posture: Posture, load: NDArray, loads: FrameLoads, method: Method
 ) -> Assembly:
-    """Solve one posture compiled, or by the reference if requested or not proved."""
+    """Solve one posture by the compiled method, or by the reference where necessary."""
     robot = posture.robot
     if method == "reference":
         return least_energy(posture, load, loads)
@@ -227,7 +228,7 @@ def _solve_one(
     return with_known(assembly, known)
 
 
-@lru_cache(maxsize=32)  # called for one robot at many postures
+@lru_cache(maxsize=32)  # cached, because it is called for one robot at many postures
 def _rounding_of(robot: Robot) -> float:
     """Return the largest closure error [rad, lengths] that rounding can cause."""
     joints, _ = structure_of(robot)
@@ -238,12 +239,13 @@ def _solve_many(
     posture: Posture, errors: NDArray | None, load: NDArray, loads: FrameLoads,
     own_axes_free: bool, method: Method,
 ) -> Assembly:  # fmt: skip
-    """Solve all points compiled, then unproved points by the reference method."""
+    """Solve all points by the compiled method, then unproved ones by the reference."""
     robot = posture.robot
     T, sets, off = _checked(posture, errors)
     joints, structure = structure_of(robot, True, own_axes_free)
     acting = loads.rows() if loads else None
-    if acting is not None and len(T) == len(sets) == 1:  # loads alone differ
+    # the points differ only in their loads
+    if acting is not None and len(T) == len(sets) == 1:
         sets = np.repeat(sets, len(acting), axis=0)
     count = len(sets) if len(T) == 1 else len(T)
     rows = _compiled(joints, structure, T, sets, off, acting, method)
@@ -262,7 +264,7 @@ def _solve_many(
     if left and method == "compiled":
         log_reference(robot.name, "least energy", len(left), count)
     for i in left:
-        one = points[i]  # this object contains posture and loads of the point
+        one = points[i]  # this object contains the posture and the loads of point i
         _record(rows, points.apart, i, _by_reference(one, own_axes_free))
     residual = rows["residual"] + closure_rounding(sets, joints, structure.size)
     _drop_rounding(rows, residual, points.loaded)
@@ -271,7 +273,7 @@ def _solve_many(
 
 
 def _bounds_matter(structure: Structure, outcome: NDArray) -> NDArray:
-    """Return (k,) bool, whether an omitted bound of motion can be active."""
+    """Return (k,) bool, True where an omitted motion limit could be active."""
     return np.isin(outcome, _AT_BOUNDS) & bool(np.isfinite(structure.free_bound).any())
 
 
@@ -279,12 +281,12 @@ def _within_bounds(
     joints: VirtualJoints, structure: Structure, matter: NDArray,
     given: tuple[NDArray, NDArray, NDArray, NDArray | None], rows: _Rows,
 ) -> tuple[NDArray, VirtualJoints, _Rows]:  # fmt: skip
-    """Solve points again at which bounds of passive joints' motions can be active.
+    """Solve again the points at which motion limits of passive joints can be active.
 
     Returns:
-        Numbers of the points solved here, with all bounds as cones; their virtual
-        joints; and their rows for these joints.  Results whose shape does not depend on
-        the virtual joints are also written into ``rows``.
+        Indices of the points that are solved here, with all motion limits as cones;
+        their virtual joints; and their results for these joints.  Results whose shape
+        does not depend on the virtual joints are also written into ``rows``.
     """
     held = np.flatnonzero(matter)
     T, sets, off, acting = (
@@ -306,7 +308,7 @@ def _within_bounds(
 def _checked(
     posture: Posture, errors: NDArray | None
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Return the transforms, sets of errors and closure errors, per point or common."""
+    """Return checked transforms, errors and closure errors, per point or common."""
     n = len(posture.robot.frames)
     given = posture.robot.errors if errors is None else errors
     T = posture.transforms.reshape(-1, *posture.transforms.shape[-3:])
@@ -336,7 +338,7 @@ def _compiled(
     joints: VirtualJoints, structure: Structure, T: NDArray, errors: NDArray,
     mismatch: NDArray, loads: NDArray | None, method: Method = "compiled",
 ) -> _Rows:  # fmt: skip
-    """Return the compiled rows of k points; mark the points left to the reference."""
+    """Return compiled results of k points; mark the points left to the reference."""
     count = len(errors) if len(T) == 1 else len(T)
     rows = _empty(joints, count)
     given = structure, T, errors, mismatch
@@ -344,7 +346,9 @@ def _compiled(
         rows["outcome"][:] = _LEFT
     elif loads is None:
         _fill(given, rows, None)
-    else:  # points without load: results bit-identical to a call without loads
+    # without loads, the results are bit-identical to those of a call without this
+    # argument
+    else:
         loaded = np.any(loads, axis=(1, 2, 3))
         for some, acting in ((loaded, loads), (~loaded, None)):
             if some.all():
@@ -355,7 +359,7 @@ def _compiled(
 
 
 def _empty(joints: VirtualJoints, count: int) -> _Rows:
-    """Return empty rows of k points, in the kernel's order."""
+    """Return empty result arrays of k points, in the order that the kernel requires."""
     return {
         "outcome": np.zeros(count, dtype=np.int64),
         "energy": np.zeros(count),
@@ -372,14 +376,14 @@ def _empty(joints: VirtualJoints, count: int) -> _Rows:
 
 
 def _unsaid(count: int) -> _Rows:
-    """Return the rows of k points that the kernel does not fill."""
+    """Return the result arrays of k points that the kernel does not fill."""
     texts = {"method": "compiled", "status": OK, "reason": ""}
     rows = {name: np.full(count, text, dtype=object) for name, text in texts.items()}
     return rows | {name: np.zeros(count) for name in ("gap", "potential", "least")}
 
 
 def _certify(rows: _Rows, points: Assembly) -> None:
-    """Compute the gap, the potential and its lower bound of each point in ``rows``."""
+    """Add the gap, the potential and its lower bound of each point to ``rows``."""
     energy, bound, loads = rows["energy"], rows["bound"], points.frame_loads
     rows["gap"][:] = np.maximum(0.0, energy - bound)
     on_errors = loads.body @ points.posture.robot.errors.ravel()
@@ -390,7 +394,7 @@ def _certify(rows: _Rows, points: Assembly) -> None:
 
 
 def _fill(given: tuple[Any, ...], rows: _Rows, loads: NDArray | None) -> None:
-    """Solve all points with errors or loads; the rows of the other points stay zero."""
+    """Solve the points with errors or loads; the results of other points stay zero."""
     if loads is not None or np.count_nonzero(given[2][:1]) or given[2].any():
         structure, T, errors, mismatch = given
         assemble_side_by_side(structure, T, errors, mismatch, loads, rows)
@@ -399,7 +403,7 @@ def _fill(given: tuple[Any, ...], rows: _Rows, loads: NDArray | None) -> None:
 def _fill_some(
     some: NDArray, given: tuple[Any, ...], rows: _Rows, loads: NDArray | None
 ) -> None:
-    """Solve the selected points and fill in their rows."""
+    """Solve the selected points and store their results."""
     structure, *points = given
     part = {name: values[some] for name, values in rows.items()}
     own = (array[some] if len(array) > 1 else array for array in points)
@@ -412,7 +416,7 @@ def _of_rows(
     posture: Posture, joints: VirtualJoints, rows: _Rows, load: NDArray,
     loads: FrameLoads, errors: NDArray | None,
 ) -> Assembly:  # fmt: skip
-    """Return many assemblies as views of ``rows``, which can be filled in later."""
+    """Return many assemblies as views of ``rows``, whose values can be set later."""
     known = {"_gap": "gap", "_residual": "residual", "_excess": "excess"}
     known |= {"bound": "least"}
     known |= {k: k for k in ("energy", "work", "platform_screw", "potential")}
@@ -466,7 +470,7 @@ def _record(
 
 
 def _drop_rounding(rows: _Rows, residual: NDArray, loaded: NDArray) -> None:
-    """Set energies, wrenches and springs to zero, in place, if they are rounding."""
+    """Set energies, wrenches and springs that are rounding errors to zero, in place."""
     multipliers = rows["multipliers"]
     drop_zeros(rows["energy"], rows["bound"], multipliers, residual, loaded)
     # without loads and wrenches, all deformations are rounding errors

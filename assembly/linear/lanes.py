@@ -1,4 +1,4 @@
-"""Problems (22), (21), (27) and the stiffness K_C of several postures, compiled.
+"""Compiled solution of problems (22), (21), (27) and of K_C at several postures.
 
 Each lane of the processor's vector registers computes one posture, or one search of
 (27), from the poses of the frames to the certificate.  Lanes do not depend on each
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from forcefit.assembly.kernels.choice import kernels
 from forcefit.assembly.linear.robot_structure import Structure
 
-# outcomes of (21), (27) and K_C: proved by the kernel, or left to the reference method
+# outcome codes of (21), (27) and K_C: proved by the kernel, or left to the reference
 COMPILED, REFERENCE = range(2)
 _KEPT = 64  # number of robots whose C++ objects are cached
 _known: dict[int, tuple[Structure, Any]] = {}

@@ -1,4 +1,4 @@
-"""Arguments and call of the compiled search of problem (27)."""
+"""Arguments and call of the compiled search for the largest pose error, (27)."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -78,8 +78,8 @@ def compiled_bounds(assembly: Assembly, asked: Asked) -> tuple[dict[str, Any], N
         return rows, np.ones(count, dtype=bool)
     solution = assembly
     if asked.assumption == "free":
-        # the own axes turn without energy here: a clearance is fixed only if it remains
-        # loaded without the soft springs of these axes
+        # here, joints rotate about their own axes without energy. A clearance is fixed
+        # only if it remains loaded without the soft springs of these axes
         solution = with_free_own_axes(assembly)
         outcome[~np.isfinite(solution.clearances).all(axis=1)] = REFERENCE
     places = _places_of(robot, asked.assumption)
@@ -108,7 +108,7 @@ def compiled_bounds(assembly: Assembly, asked: Asked) -> tuple[dict[str, Any], N
 
 
 class _Places(NamedTuple):
-    """Columns that can move under an assumption, and their indices in problem (22).
+    """Clearances and motions that can change under an assumption of (27).
 
     Attributes:
         moving: structure of the robot whose columns can move.
@@ -151,10 +151,10 @@ def _places_of(robot: Robot, assumption: str) -> _Places:
 
 
 def _columns(frames: NDArray, axes: NDArray) -> list[tuple[int, int]]:
-    """Return the pairs of frame and axis of all columns."""
+    """Return the pair of frame and axis of each column."""
     return list(zip(frames.tolist(), axes.tolist(), strict=True))
 
 
 def _indices(some: list[tuple[int, int]], among: list[tuple[int, int]]) -> NDArray:
-    """Return the indices of pairs of frame and axis in another list of pairs."""
+    """Return the index of each pair of frame and axis in another list of pairs."""
     return np.array([among.index(one) for one in some], dtype=np.int64)

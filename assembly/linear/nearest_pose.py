@@ -41,7 +41,7 @@ from forcefit.assembly.solvers.conic import minimise_energy
 from forcefit.assembly.solvers.method import Method
 from forcefit.stiffness.screws import skew
 
-_STILL = 1e-11  # [rad, m] a pose with a smaller range counts as fixed
+_STILL = 1e-11  # [rad, m] a platform pose whose range is smaller counts as unique
 
 
 def nearest_pose(
@@ -77,7 +77,8 @@ def nearest_pose(
         moved = _with_clearances(assembly, free, least.clearances)
     exceeded = moved.clearance_excess() > LARGEST_EXCESS
     if exceeded and not assembly.joints.bounded_motion:
-        # the omitted bound of a passive joint's motion is active: solve with the bound
+        # an omitted motion limit of a passive joint is active: solve again with all
+        # limits
         robot = assembly.posture.robot
         if has_bounded_motion(robot):
             bounded = solve_with(
@@ -113,7 +114,7 @@ class _FreeClearances:
 
 
 def _free_clearances(assembly: Assembly, offset: ArrayLike) -> _FreeClearances | None:
-    """Return the clearances that can move at least energy; None if there are none."""
+    """Return the clearances that can change at least energy; None if there are none."""
     joints, lin = assembly.joints, assembly.linearisation
     unloaded = ~loaded_cones(assembly, joints)
     columns = joints.cones[:, unloaded]

@@ -67,7 +67,8 @@ class PoseError(PointResults):
         supports: (...) number of support functions computed.
         method: (...) method of the search: ``"compiled"``, or ``"reference"`` for numpy
             and Clarabel.
-        one_by_one: (...) bool, True if the set of screws was constructed in numpy.
+        one_by_one: (...) bool, True if the set of screws was constructed in numpy for
+            this point alone.
         status: (...) ``"ok"``; for many points also ``"cannot assemble"``, or
             ``"solver failed"`` if there is no solution or its certificate is too weak.
         reason: (...) message if the status is not ok.
@@ -244,7 +245,7 @@ def _bounds_of_one(assembly: Assembly, asked: Asked) -> PoseError:
 def _too_wide(
     part: str, bounds: tuple[float, float], tolerance: float, unit: str
 ) -> str:
-    """Return a message if the bounds are farther apart than required, else ``""``."""
+    """Return a message if lower and upper bound differ too much, else ``""``."""
     low, high = bounds
     # both bounds are infinite if the platform can move without bound
     if high - low <= tolerance or low == high:

@@ -1,4 +1,4 @@
-"""Arrays of a robot's virtual joints for the compiled methods."""
+"""Arrays that describe a robot's virtual joints to the compiled methods."""
 
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -45,7 +45,8 @@ class Structure(NamedTuple):
         free_frame: (nq,) frame of each free motion.
         free_axis: (nq,) component of each free motion in its screw.
         free_lead: (nq,) [m/rad] translation along z per angle, of a helical joint.
-        free_bound: (nq,) [rad or m] bound that is not a cone; inf without a bound.
+        free_bound: (nq,) [rad or m] motion limit that is not included as a cone; inf
+            without a limit.
     """
 
     size: float
@@ -94,7 +95,7 @@ def structure_of(
 
 @dataclass(frozen=True)
 class _Tree:
-    """Data on which a structure depends in addition to the virtual joints."""
+    """Data of the robot that a structure contains in addition to virtual joints."""
 
     platform: int
     closures: tuple[tuple[int, int], ...]
@@ -108,7 +109,8 @@ def _structure(joints: VirtualJoints, tree: _Tree, own_axes_free: bool) -> Struc
     on_path = robot.on_path[tree.platform]
     signs = closure_signs(robot).T.astype(float)
     patterns, pattern_of = np.unique(signs, axis=0, return_inverse=True)
-    # springs with equal signs in all closures and on the platform's path form a group
+    # springs form a group if they have equal signs in all closures and on the path to
+    # the platform
     spring_frame, springs = _by_frame(joints.elastic)
     acting = np.any(signs[spring_frame] != 0.0, axis=1)
     key = 2 * pattern_of[spring_frame] + on_path[spring_frame]

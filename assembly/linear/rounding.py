@@ -1,4 +1,4 @@
-"""Rounding errors: energies indistinguishable from zero, ill-conditioned stiffnesses.
+"""Rounding errors: energies that could be zero, and ill-conditioned stiffnesses.
 
 Closures are sums of screws that cancel.  In floating point, a residual of some units in
 the last place of the summed terms remains.  The work of the wrenches on this residual
@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from forcefit.assembly.linear.closure import VirtualJoints, in_reference_lengths
 
-ROUNDING = 8 * float(np.finfo(float).eps)  # relative error of a sum of tens of terms
+# [-] relative rounding error of a sum of some tens of terms
+ROUNDING = 8 * float(np.finfo(float).eps)
 # stiffness ratio at which the stiffest spring's rounding error is 1e-3 of the softest
 SPREAD = 1e13
 
@@ -34,7 +35,7 @@ def closure_rounding(errors: NDArray, joints: VirtualJoints, size: float) -> NDA
 
 @lru_cache(maxsize=64)
 def _clearance_sum(joints: VirtualJoints, size: float) -> float:
-    """Return the sum [rad, lengths] of all clearances."""
+    """Return the sum [rad, reference lengths] of the bounds of all clearances."""
     clearances = np.abs(joints.cones[:, joints.scaled]).sum(axis=1).reshape(-1, 6)
     return float((clearances @ in_reference_lengths(size)).sum())
 
@@ -51,7 +52,7 @@ def differs_from_zero(
         energy: (...,) [J] least energies.
         gap: (...,) [J] energy minus its certified bound.
         multipliers: (..., 6 closures) multipliers of the scaled closures.
-        residual: (...,) [rad, lengths] residual of the closures, rounding included.
+        residual: (...,) [rad, reference lengths] closure residual, rounding included.
 
     Returns:
         (...,) bool; True also if the energy is NaN.
@@ -75,7 +76,8 @@ def drop_zeros(
         loaded: (k,) bool, points under loads.
     """
     zero = ~differs_from_zero(energy, energy - bound, multipliers, residual)
-    if not np.count_nonzero(zero):  # then no multiplier is a rounding error either
+    # if no energy is zero, no multiplier is a rounding error
+    if not np.count_nonzero(zero):
         return
     rounding = ~differs_from_zero(energy, 0.0, multipliers, residual) & ~np.array(
         loaded

@@ -18,7 +18,7 @@ from forcefit.assembly.model.point_results import N, PointResults, plain
 from forcefit.assembly.model.statuses import OK
 
 _VECTORS = ("elastic", "clearances", "motions", "multipliers")
-# further values that can be given: properties, parts of a certificate
+# names of values that can be stored in addition: properties, parts of a certificate
 KNOWN = (
     "energy", "platform_screw", "work", "potential", "bound", "_gap", "_residual",
     "_excess",
@@ -50,10 +50,10 @@ class Solution(PointResults, Generic[N]):
             ``"no equilibrium"``, or ``"solver failed"``.  The last status also marks a
             certificate that is too weak.
         reason: (...) message if the status is not ok.
-        apart: by point number, points whose columns differ from ``joints``, or the
-            exception of a point without a solution.
-        held: sorted numbers of the points at which bounds of passive joints' motions
-            are active, and an assembly of these points with all such bounds as cones.
+        apart: by point number, an assembly if the columns of the point differ from
+            ``joints``, or an exception if the point has no solution.
+        held: sorted numbers of the points at which motion limits of passive joints are
+            active, and an assembly of these points with all motion limits as cones.
     """
 
     linearisation: Linearisation
@@ -94,7 +94,7 @@ class Solution(PointResults, Generic[N]):
         return self.linearisation.posture
 
     def __getitem__(self, rows: Any) -> Self:
-        """Return one point or a selection; raise the exception of a failed point."""
+        """Return one or several points; raise the exception of a failed point."""
         if not isinstance(rows, (int, np.integer)):
             return self._taken(np.arange(len(self))[rows])
         i = range(len(self))[rows]
@@ -109,7 +109,8 @@ class Solution(PointResults, Generic[N]):
         lin, robot = self.linearisation, self.posture.robot
         if self.posture.transforms.ndim > 3:
             lin = replace(lin, posture=self.posture[i])
-        # with the robot's own errors, keep the robot object: its columns are cached
+        # if the errors are those of the robot, keep the robot object, whose columns are
+        # cached
         if one.errors is not None and not np.array_equal(one.errors, robot.errors):
             robot = robot.with_errors(one.errors)
             lin = replace(lin, posture=replace(lin.posture, robot=robot))
@@ -121,7 +122,7 @@ class Solution(PointResults, Generic[N]):
         return with_known(alone, known)
 
     def _taken(self, rows: NDArray) -> Self:
-        """Return a selection of points, perhaps with repetitions."""
+        """Return a selection of points, in which a point can occur repeatedly."""
         lin, held = self.linearisation, self.held
         if self.posture.transforms.ndim > 3:
             lin = replace(lin, posture=self.posture[rows])
@@ -190,7 +191,7 @@ class Solution(PointResults, Generic[N]):
 
     @property
     def as_many(self) -> Self:
-        """The same point with a leading axis of length 1."""
+        """The solution of one point as a solution of many points, with k = 1."""
         lin = self.linearisation
         rows: dict[str, Any] = {
             name: np.asarray(getattr(self, name))[None]
@@ -213,7 +214,8 @@ def with_known(solution: One, known: Mapping[str, Any]) -> One:
 
     Args:
         solution: solution of one point or of many points.
-        known: values by the names in :data:`KNOWN`; other names are ignored.
+        known: known values by name.  Only the names in :data:`KNOWN` are used; others
+            are ignored.
 
     Returns:
         The given object.

@@ -26,9 +26,10 @@ from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.assembly.solvers.method import Method, check_method, log_reference
 from forcefit.results.display import Figures
 
-MARGIN_GAP = 1e-8  # accepted difference of margin and lower bound, share of the margin
+# accepted difference of margin and lower bound, relative to the margin
+MARGIN_GAP = 1e-8
 _GAP_ABSOLUTE = 1e-12  # [-] absolute part of that difference
-# name of each margin -> behaviour of compliant joints about their own axis
+# for each name of a margin: behaviour of compliant joints about their own axis
 Compliant = Literal["rigid", "free"]
 MARGINS: dict[str, Compliant] = {"margin": "rigid", "margin_free": "free"}
 ASSEMBLABLE = 1.0 + 1e-6  # largest margin that counts as assemblable: 1 plus rounding
@@ -46,9 +47,10 @@ class Zone(PointResults, Generic[N]):
             within 1e-8 of the margin.
         method: (...) method that solved the point: ``"compiled"``, or ``"reference"``
             for numpy and Clarabel.
-        forces: (..., nu) forces on the clearances, times the cones' sizes, that prove
-            the bound; their sizes on all cones add up to 1.  Zero if no clearance is
-            needed, NaN if the reference method solved the point.
+        forces: (..., nu) [-] forces on the clearances that prove the bound, multiplied
+            by the sizes of the cones.  They are scaled so that their magnitudes on all
+            cones add up to 1.  Zero if no clearance is needed; NaN if the reference
+            method solved the point.
         reason: (...) message if the solver failed; else empty.
     """
 
@@ -86,7 +88,7 @@ class Zone(PointResults, Generic[N]):
 
     @property
     def assemblable(self) -> Any:
-        """(...) whether the rigid manipulator can be assembled."""
+        """(...) bool, True if the manipulator can be assembled without deformation."""
         return self.margin <= ASSEMBLABLE
 
     @property
@@ -192,7 +194,7 @@ def _erring(posture: Posture, errors: NDArray, i: int) -> Posture:
 def _compiled(
     posture: Posture, compliant: Compliant, own: NDArray, method: Method
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Return margins, bounds, forces, and a mask of points left to the reference."""
+    """Return margins, bounds, forces, and a mask of points for the reference method."""
     if compliant not in {"rigid", "free"}:
         raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
     joints, structure = structure_of(posture.robot, False, compliant == "free")

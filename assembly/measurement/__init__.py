@@ -1,4 +1,4 @@
-"""Predicted readings of a measuring device on a robot with effects.
+"""Predicted readings of a device that measures the pose of a robot.
 
 Start with ``conditions.py``, the conditions of each measurement, then ``predict.py``.
 """

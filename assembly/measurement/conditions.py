@@ -1,9 +1,10 @@
 """Conditions of past or planned measurements of a robot.
 
-An *effect* (:mod:`forcefit.assembly.effects`) is a property that the model of a robot
-lacks.  An effect changes one or more of the fields below and nothing else.  Any number
-of effects can therefore be combined, and
-:func:`forcefit.assembly.measurement.predict.predict` does not depend on the effects.
+An *effect* (:mod:`forcefit.assembly.effects`) is a property that the declared model of
+a robot lacks, such as friction or thermal expansion.  An effect changes one or more of
+the fields below and nothing else.  Any number of effects can therefore be combined.
+The function :func:`forcefit.assembly.measurement.predict.predict` need not know the
+effects.
 
 ======  ====================  =========  =============================================
 symbol  code                  shape      meaning
@@ -31,7 +32,7 @@ COVARIATES = ("temperature", "time", "approach")
 
 @dataclass(frozen=True)
 class ContactLaw:
-    """Spring in series with a joint, with the law load = coefficient |deflection|^n.
+    """Contact spring in series with a joint: load = coefficient |deflection|^n.
 
     The spring acts along or about the joint's z axis, equally in both directions.
 
@@ -48,17 +49,17 @@ class ContactLaw:
 
 @dataclass(frozen=True, eq=False)
 class Yield:
-    """Compliant place, at which a law determines the deflection from wrenches.
+    """Compliant place of a robot: a law determines its deflection from wrenches.
 
     Attributes:
         frame: name of the frame.
-        component: row of the screw at the frame that it changes, in the frame's axes; 6
-            for the motion along the thread of a helical joint.
-        through: frames and rows of the wrenches on which the law depends.
-        inputs: (R, k) other inputs of the law in each row.
+        component: index of the screw component that changes, in the frame's axes; 6 for
+            the motion along the thread of a helical joint.
+        through: frames and component indices of the wrenches on which the law depends.
+        inputs: (R, k) other inputs of the law in each of R rows.
         law: smooth function [rad or m] of the inputs (R, k) and wrenches (R, s).
-        linear: whether it is a spring, that is a compliance times one wrench at its
-            place.
+        linear: whether the law is that of a linear spring: a compliance times one
+            wrench component at this place.
     """
 
     frame: str
@@ -71,22 +72,24 @@ class Yield:
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """R rows of conditions of one robot, as declared or changed by effects.
+    """Conditions of R measurements (rows) of one robot, perhaps changed by effects.
 
     Attributes:
         robot: robot of n frames; its links, springs and clearances are the same in all
             rows.
         coordinates: (R, n) [rad or m] commanded coordinates of all joints.
         transforms: (R, n, 4, 4) frames in the base frame, without imperfections.
-        mismatch: (R,) [rad, m] remaining nominal closure error.
-        errors: (R, n, 6) [rad, m] stress-free screws.
+        mismatch: (R,) [rad, m] largest nominal closure error, which is neglected.
+        errors: (R, n, 6) [rad, m] stress-free screws of the frames: geometric errors
+            and changes by effects.
         point: (3,) [m] reference point at which the load acts, platform axes.
         load: (R, 6) [N m, N] wrenches on the platform at the reference point, base
             axes.
         gravity: (R, 3) [m/s^2] gravity vectors in base axes.
         temperature: (R,) [K] temperature above calibration; NaN if unknown.
         time: (R,) [s] time since the first measurement; NaN if unknown.
-        approach: (R,) side of approach, -1 or 1; NaN if unknown.
+        approach: (R,) side from which the position was approached, -1 or 1; NaN if
+            unknown.
         covariates: (R,) values of further covariates by name.
         session: (R,) names of the sessions; None if unknown.
         history: rows of a campaign in the order of measurement, including these rows;
@@ -95,13 +98,14 @@ class Conditions:
         target: (R, 3) [m] measured point, platform axes; None for the reference point.
         laws: contact springs in series with joints.
         yields: compliant places with laws.
-        exact: whether finite motions are used instead of the linear model.
+        exact: whether the model with finite motions is used instead of the linear
+            model.
         second_order: (R, 6) [rad, m] exact minus linear platform screw without load;
             see :func:`forcefit.assembly.measurement.predict.with_second_order`.
         rest: (R, n, 6) rest positions of the clearances relative to their bounds; None
             if they follow from the least energy.
-        base: (6,) or (R, 6) [rad, m] rotation and translation of the measuring frame,
-            which act on the left.
+        base: (6,) or (R, 6) [rad, m] rotation and translation of the measuring frame.
+            They multiply the measured pose from the left.
         tool: (3,) or (R, 3) [m] vector from the reference point to the measured point,
             platform axes.
         reading: (R, 6) [rad, m] values that are added to the reading.
@@ -139,7 +143,7 @@ class Conditions:
 
     @property
     def reads_otherwise(self) -> bool:
-        """Whether a reading differs from the pose error of the reference point."""
+        """Whether readings can differ from the pose error of the reference point."""
         return bool(self.base.any() or self.tool.any() or np.any(self.reading))
 
     @property
@@ -156,7 +160,7 @@ class Conditions:
 
     @property
     def measured_points(self) -> NDArray:
-        """(R, 3) [m] nominal positions of the measured points, base axes."""
+        """(R, 3) [m] nominal position of the measured point in each row, base axes."""
         T = self.postures.platform
         return T[:, :3, 3] + self.measured_arms
 

@@ -12,13 +12,13 @@ from forcefit.assembly.measurement.conditions import Conditions, ContactLaw
 from forcefit.assembly.model.links import in_series, own_screw
 
 ITERATIONS = 100  # largest number of iterations
-CONVERGED = 1e-11  # relative change of a contact's deflection at convergence
+CONVERGED = 1e-11  # largest relative change of a contact's deflection at convergence
 
 
 def softened(
     posture: Posture, laws: tuple[ContactLaw, ...], compliances: NDArray
 ) -> Posture:
-    """Return the posture with the laws' secant compliances as springs in series."""
+    """Return the posture with each contact replaced by a spring in series (secant)."""
     if not compliances.any():
         return posture
     frames = list(posture.robot.frames)
@@ -54,7 +54,7 @@ def wrenches_through(assembly: Assembly | ExactAssembly) -> NDArray:
 
 
 def contact_columns(conditions: Conditions) -> NDArray:
-    """Return the (6n, s) unit screws of the joints with a contact law."""
+    """Return the (6n, s) unit screws of the motions at s contact springs."""
     columns = np.zeros((6 * len(conditions.robot.frames), len(conditions.laws)))
     for k, law in enumerate(conditions.laws):
         i = conditions.robot.index(law.frame)

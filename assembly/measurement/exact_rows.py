@@ -1,4 +1,4 @@
-r"""Exact equilibrium of a robot without clearances, for many rows together.
+r"""Exact equilibrium of a robot without clearances, for many measurements together.
 
 The equations are those of :mod:`forcefit.assembly.exact.exact`: closures hold on SE(3),
 every body and spring deforms by its compliance times its wrench, and free motions carry
@@ -31,12 +31,13 @@ _MOST_ITERATIONS = 60  # largest number of iterations; usually 5 to 12
 # [rad, reference lengths] largest change of a screw in the last iteration
 _CONVERGED = 1e-12
 _CLOSURE_TOLERANCE = 1e-11  # [rad, reference lengths] largest closure residual
-_FREE_FORCE = 1e-5  # relative to the largest wrench: largest force along a free motion
+# largest accepted force along a free motion, relative to the largest wrench
+_FREE_FORCE = 1e-5
 # [rad, reference lengths] deformation below which a wrench counts as zero
 _ZERO_LOAD = 1e-9
-# largest ratio of two successive changes, after the first iterations
+# largest accepted ratio of two successive changes, after the initial iterations
 _CONTRACTION = 0.8
-_TRANSIENT = 3  # number of first iterations in which changes may increase
+_TRANSIENT = 3  # number of initial iterations in which the changes can increase
 _BATCH = 100  # number of rows solved together, which limits the memory
 
 
@@ -72,7 +73,7 @@ def solve_rows(
 
 
 def _of_passive_joints(free: NDArray, robot: Robot) -> bool:
-    """Return whether all free motions (6n, q) are motions of passive joints."""
+    """Return whether all q free motions (6n, q) are motions of passive joints."""
     passive = np.array([frame.passive for frame in robot.frames])
     own = own_screws(robot) * passive[:, None]
     for column in free.T.reshape(-1, len(robot.frames), 6):
@@ -114,7 +115,7 @@ def _solve(rows: Rows) -> tuple[NDArray, NDArray]:
     converged &= np.abs(state.residual).max(axis=1, initial=0.0) <= _CLOSURE_TOLERANCE
     converged &= np.all(np.abs(state.motions) <= flexible.limit, axis=1)
     _, free_forces, _ = state.imbalance()
-    # without load, wrenches are due to rounding
+    # without loads, wrenches are only rounding errors
     zero_load = _ZERO_LOAD / flexible.softness
     largest = np.abs(state.total_wrenches / rows.scale).max(
         axis=(0, 2, 3), initial=zero_load
@@ -161,7 +162,7 @@ def _correction(state: RowState, first: bool) -> tuple[NDArray, NDArray, NDArray
 
 
 def _in_pieces(conditions: Conditions) -> Conditions:
-    """Return the conditions with a frame for every piece of a beam."""
+    """Return the conditions of the robot in which every piece of a beam is a frame."""
     cut = cut_beams(conditions.robot)
     if cut.robot is conditions.robot:
         return conditions

@@ -1,9 +1,9 @@
-"""History of a machine: the rows of a campaign in the order of measurement.
+"""History of a robot: the measurements (rows) of a campaign in order of time.
 
-Some effects have memory: slow warming lags behind the temperature, and a clearance is
-closed on the side from which a joint came.  Such effects depend on earlier rows,
-including rows that a fit omits.  The value of a row is assumed to apply since the
-previous row, or since time 0.
+Some effects have memory.  For example, the temperature of a body lags behind that of
+the air, and the side on which a clearance is closed depends on the direction of the
+last motion.  Such effects depend on earlier rows, including rows that a fit omits.  The
+value of a row is assumed to apply since the previous row, or since time 0.
 
 Sources:
     Ljung, System Identification, section 2 (sampling of a first-order lag).
@@ -21,10 +21,10 @@ STILL = 1e-9  # [rad, m] smaller changes of a command count as no motion
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """H rows in the order of measurement, one session after another.
+    """Variables of H measurements in order of time, one session after another.
 
     Attributes:
-        values: (H,) values by public name of the variable; NaN if unknown.
+        values: for each variable, by public name, its (H,) values; NaN if unknown.
         first: (H,) bool, True for the first row of a session.
     """
 
@@ -32,7 +32,7 @@ class History:
     first: NDArray
 
     def direction(self, name: str) -> NDArray:
-        """Return the side from which a variable reached its value: -1, 1 or 0.
+        """Return the direction in which a variable last changed: -1, 1 or 0 (unknown).
 
         Args:
             name: name of the variable; ``"approach"`` is the column of this name.
@@ -54,7 +54,7 @@ class History:
         return np.where(known, np.sign(step[last]), given)
 
     def slip(self, name: str, depth: float) -> NDArray:
-        """Return the position of a friction element that slips after a variable.
+        """Return the position of a friction element that a variable drags along.
 
         Args:
             name: name of the variable.
@@ -94,7 +94,7 @@ class History:
         u, state = self.values[name], 0.0
         past = self._elapsed / time_constant
         decay = np.exp(-past)
-        # lagging share of the change: (1 - e^-r) / r, or 1 if no time passed
+        # share of the change that lags: (1 - e^-r) / r, or 1 if no time passed
         share = np.where(
             past > 0, -np.expm1(-past) / np.where(past > 0, past, 1.0), 1.0
         )
@@ -104,7 +104,7 @@ class History:
             if self.first[i]:
                 state = 0.0
             before = float(u[i - 1]) if even[i] else value
-            # exact if u is linear from ``before`` to ``value``
+            # this step is exact if u changes linearly from ``before`` to ``value``
             late = (value - before) * share[i]
             state = value - late + (state - before) * decay[i]
             response[i] = state
@@ -124,12 +124,12 @@ class History:
 def in_order(
     values: Mapping[str, NDArray], session: NDArray | None
 ) -> tuple[History, NDArray]:
-    """Return the rows of a table in the order of measurement.
+    """Return the rows of a table sorted in the order of measurement.
 
     Args:
         values: (H,) values by public name of the variable, including ``time``; rows
             without a time keep their order.
-        session: (H,) names; None if there is one session.
+        session: (H,) name of each row's session; None if there is one session.
 
     Returns:
         The history, and (H,) the index of each given row in the history.

@@ -48,9 +48,10 @@ from forcefit.assembly.measurement.yields import Yields, settle_yields, with_spr
 from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.stiffness.screws import rotation_matrix, rotation_vector
 
-# largest number of configurations that are corrected to second order one by one
+# largest number of configurations that are corrected to second order individually
 _MOST_ONE_BY_ONE = 40
-# convergence criterion that replaces CONVERGED if the start is the linear solution
+# convergence criterion in place of CONVERGED, if the iteration starts from the linear
+# solution
 _CONVERGED_FINITE = 1e-5
 
 
@@ -75,7 +76,7 @@ def predict(conditions: Conditions) -> Prediction:
     """Return the platform's deviation from its nominal pose at the reference point.
 
     Args:
-        conditions: R rows.
+        conditions: R rows: the conditions of R measurements.
 
     Returns:
         The predicted readings.
@@ -85,8 +86,8 @@ def predict(conditions: Conditions) -> Prediction:
     one_by_one = None
     if has_clearance and conditions.rest is not None:
         conditions = with_clearances_at_rest(conditions)
-        # if finite motions cannot close the robot with clearances at rest, neither
-        # model has a solution
+        # if the exact model cannot close the robot with clearances in rest position,
+        # neither model has a solution
         one_by_one = 0 if conditions.exact else None
     elif has_clearance and not conditions.robot.closures and not conditions.exact:
         conditions, undetermined = with_clearances_taken_up(conditions)
@@ -106,7 +107,7 @@ def predict(conditions: Conditions) -> Prediction:
 def _platform_screws(
     conditions: Conditions, one_by_one: int | None = None
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Return the platform screws; some rows are solved one by one.
+    """Return the platform screws of all rows; solve rows one by one where necessary.
 
     Returns:
         (R, 6) screws, (R,) reasons why there is no solution, and (R,) bool, True if
@@ -177,7 +178,8 @@ def with_second_order(conditions: Conditions) -> Conditions:
         The conditions, with ``second_order``.
     """
     if virtual_joints(conditions.robot).cones.shape[1]:
-        return conditions  # the rest position without a load is undetermined
+        # without a load, the rest position of clearances is undetermined
+        return conditions
     zero = np.zeros_like(conditions.load)
     _, which = conditions.postures.distinct
     _, first = np.unique(which, return_index=True)
@@ -219,7 +221,7 @@ def _finite_part(conditions: Conditions, one_by_one: int | None = None) -> NDArr
 def with_rest_positions(conditions: Conditions) -> Conditions:
     """Return the conditions with the rest positions of clearances at least energy.
 
-    Trying an effect then requires only the time of a robot without clearances.  The
+    An effect can then be evaluated as fast as for a robot without clearances.  The
     result is correct to first order as long as the contact points do not change.
 
     Args:
@@ -248,7 +250,7 @@ def read(conditions: Conditions, screws: NDArray) -> NDArray:
             platform's origin, base axes.
 
     Returns:
-        (R, 6) [rad, m] deviation that is read at the measured points.
+        (R, 6) [rad, m] deviation that the device reads at the measured points.
     """
     platform = conditions.postures.platform
     R, p = platform[:, :3, :3], platform[:, :3, 3]
@@ -268,14 +270,14 @@ def read(conditions: Conditions, screws: NDArray) -> NDArray:
 
 
 def _turned(R: NDArray, vectors: NDArray) -> NDArray:
-    """Return the (R, 3) vectors rotated by one matrix, or by one matrix each."""
+    """Return (R, 3) vectors, rotated by a common matrix or by one matrix for each."""
     if R.ndim == 2:
         return vectors @ R.T
     return np.einsum("rij,...j->ri" if vectors.ndim == 1 else "rij,rj->ri", R, vectors)
 
 
 def assemble_row(conditions: Conditions, row: int) -> Assembly | ExactAssembly:
-    """Solve one row completely, with every screw and wrench of the robot.
+    """Solve one row and return all screws and wrenches of the robot.
 
     Args:
         conditions: conditions of all rows.
@@ -295,7 +297,7 @@ def assemble_row(conditions: Conditions, row: int) -> Assembly | ExactAssembly:
     load = conditions.load_at_origin()[row]
     gravity = conditions.gravity[row] if conditions.gravity[row].any() else None
     compliances = np.zeros(len(conditions.laws))
-    # the contacts of the linear model are nearly converged
+    # the contacts start from the linear model and are nearly converged
     if conditions.exact and conditions.laws:
         linear = assemble_row(replace(conditions, exact=False), row)
         compliances = secants(linear, conditions.laws)
@@ -339,7 +341,8 @@ def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
         np.zeros(len(conditions), dtype=bool),
     )
     if conditions.exact:
-        return unsolved  # these rows are solved one by one, with finite motions
+        # all rows unsolved: they are solved one by one, with finite motions
+        return unsolved
     distinct, which = conditions.postures.distinct
 
     def solve(held: Conditions) -> tuple[tuple[NDArray, NDArray], NDArray]:
@@ -381,7 +384,8 @@ def _linear(conditions: Conditions) -> tuple[NDArray, NDArray, NDArray]:
         )
         deflections, settled = contact_deflections(conditions.laws, w, own[which])
         screws = screws + times(platform, deflections)
-        if flexible.system.size:  # wrenches of open chains depend on loads only
+        # not for open chains, whose wrenches depend only on the loads
+        if flexible.system.size:
             wrenches = wrenches + times(everywhere, deflections)
         solved = solved & settled
     if conditions.exact:

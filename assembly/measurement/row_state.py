@@ -1,4 +1,4 @@
-r"""Exact equilibrium equations of many rows, evaluated at an iterate.
+r"""Exact equilibrium equations of many measurements (rows), evaluated at an iterate.
 
 ======  =============  ===========  ==================================================
 symbol  code           shape        meaning
@@ -47,12 +47,12 @@ _LINEAR_BELOW = 1e-9  # [rad or m] deflection below which the law of a contact i
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Rows to be solved, and the quantities that remain constant during the iteration.
+    """Rows to be solved, with the quantities that do not change in the iteration.
 
     Attributes:
         conditions: R rows.
         flexible: linear model at the distinct postures.
-        posture_of_row: (R,) index of each row's posture among the distinct ones.
+        posture_of_row: (R,) index of each row's posture among the distinct postures.
         linear_deflections: (R, s) [rad or m] deflections of contacts in the linear
             model.
     """
@@ -64,13 +64,13 @@ class Rows:
 
     @cached_property
     def loads(self) -> DeadLoads:
-        """Loads and weights as dead loads."""
+        """All loads, including weights, as dead loads."""
         c = self.conditions
         return dead_loads_of_rows(c.postures, c.errors, c.load, c.gravity, c.point)
 
     @cached_property
     def elastic_frames(self) -> tuple[NDArray, NDArray]:
-        """Frames with elastic bodies, and frames with elastic joints."""
+        """Indices of frames with elastic bodies, and of frames with elastic joints."""
         with_contact = [
             self.conditions.robot.index(law.frame) for law in self.conditions.laws
         ]
@@ -80,7 +80,7 @@ class Rows:
 
     @cached_property
     def free_frames(self) -> NDArray:
-        """Frames whose joints have free motions."""
+        """Indices of the frames whose joints have free motions."""
         moved = self.flexible.free.any(axis=1).reshape(-1, 6)
         return np.flatnonzero(moved.any(axis=1))
 
@@ -135,7 +135,7 @@ class Rows:
 
     @cached_property
     def times(self) -> Callable[[NDArray, NDArray], NDArray]:
-        """Function that multiplies matrices per posture with vectors per row."""
+        """Function that multiplies each row's vector by its posture's matrix."""
         return at_postures(self.posture_of_row)
 
     def corrected(self, right_side: NDArray) -> NDArray:
@@ -168,7 +168,7 @@ class Rows:
 
     @cached_property
     def commanded(self) -> NDArray:
-        """(R, n, 4, 4) commanded motions of the joints."""
+        """(R, n, 4, 4) motions of the joints by their commanded coordinates."""
         return along_own(self.conditions.robot, self.conditions.coordinates)
 
     @cached_property

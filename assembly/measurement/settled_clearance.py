@@ -1,4 +1,4 @@
-"""Clearances closed by the load: each joint is in contact at its bound.
+"""Clearances closed by the loads: each joint is in contact, at its bound.
 
 A joint that transmits the wrench w rests at the point of its clearance cones that is
 farthest along w.  In a robot without closures, the wrenches depend only on the loads,
@@ -25,7 +25,7 @@ from forcefit.assembly.model.clearance import (
 from forcefit.assembly.model.contact_closures import loops
 from forcefit.assembly.model.robot import Clearance, Frame, Robot
 
-# relative to the largest wrench of the same kind; smaller wrenches count as zero
+# relative to the largest moment or force: smaller moments or forces count as zero
 _UNLOADED = 1e-9
 
 
@@ -58,7 +58,7 @@ def with_clearances_taken_up(conditions: Conditions) -> tuple[Conditions, NDArra
         size = np.linalg.norm(parts, axis=2)
         rests = size > _UNLOADED * size.max(initial=0.0)
         unit = parts / np.where(rests, size, 1.0)[:, :, None]
-        # a joint with a ball has neither radial nor axial clearance, and conversely
+        # a joint has either the clearance ``ball``, or ``radial`` and ``axial``
         bound = np.where(np.isnan(bounds[:, cone]), 0.0, bounds[:, cone])
         clearance_screws[:, :, list(rows)] += unit * (rests * bound)[:, :, None]
         undetermined |= np.any(~rests & (bound > 0.0), axis=1)
@@ -112,7 +112,7 @@ def fractions(robot: Robot, clearance_screws: NDArray) -> NDArray:
 
 
 def without_joint_clearances(robot: Robot) -> Robot:
-    """Return the robot without clearances; bounds of passive joints' motions remain.
+    """Return the robot without clearances; motion limits of passive joints remain.
 
     Args:
         robot: robot with or without clearances.

@@ -1,4 +1,4 @@
-"""Variables of effects, by public name: ``q.drive``, ``load.fz``, ``time`` ..
+"""Values of the variables of effects, such as ``q.drive``, ``load.fz``, ``time``.
 
 Wrenches (``wrench.drive.mz``) are not included, because they are known only after the
 equilibrium has been computed.

@@ -42,12 +42,12 @@ from forcefit.assembly.model.links import (
     own_screws,
 )
 
-# relative size below which an eigenvalue is a rounding error; between this size and
-# RANK, the rank is ambiguous
+# relative size below which an eigenvalue counts as a rounding error. If an eigenvalue
+# is between this size and RANK, the numerical rank is ambiguous
 _ROUNDING = 1e-13
 # largest padding relative to the number of rows; beyond it, rows are solved one by one
 _PADDING = 4
-_CLOSED = 1e-9  # relative residual of a solved system
+_CLOSED = 1e-9  # largest relative residual of a solved system
 _CLOSED_ABSOLUTE = 1e-12  # [rad, reference lengths] residual that counts as rounding
 
 
@@ -64,8 +64,9 @@ class Flexibility:
         limit: (q,) [rad, m] bounds of the free motions, inf without a bound.
         inverse: (c, m, m) inverse of the scaled system, m = 6K + q.
         system: (c, m, m) the scaled system.
-        softness: number by which compliances are divided to scale the system to 1.
-        ambiguous: (c,) bool, True if the numerical rank is ambiguous.
+        softness: number by which compliances are divided, so that the entries of the
+            scaled system are about 1.
+        ambiguous: (c,) bool, True if the numerical rank at the posture is ambiguous.
     """
 
     rows: NDArray
@@ -81,7 +82,7 @@ class Flexibility:
 
     @cached_property
     def compliance(self) -> NDArray:
-        """(n, 6, 6) compliances of body and joint together."""
+        """(n, 6, 6) sums of the compliances of each body and its joint."""
         return self.body_compliances + self.joint_compliances
 
     def solve(
@@ -205,8 +206,8 @@ class FlexibleAssembly:
 
 @lru_cache(maxsize=4)
 def _under_load(flexible: Flexibility, loads: FrameLoads) -> NDArray | None:
-    """Return (R, 6n) screws of bodies and joints that loads cause in open chains."""
-    # the result is the same for all conditions that differ only in errors
+    """Return the (R, 6n) deformations that loads cause in an open chain."""
+    # cached: conditions that differ only in errors have the same result
     if not loads:
         return None
     screws = _each(flexible.body_compliances, loads.body)
@@ -215,7 +216,7 @@ def _under_load(flexible: Flexibility, loads: FrameLoads) -> NDArray | None:
 
 
 def at_postures(posture: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
-    """Return a function that multiplies matrices per posture with vectors per row.
+    """Return a function that multiplies each row's vector by its posture's matrix.
 
     Rows at the same posture are multiplied together, so matrices are not copied.
 
@@ -318,7 +319,8 @@ def pseudo_inverse(M: NDArray) -> tuple[NDArray, NDArray]:
         return M, np.zeros(len(M), dtype=bool)
     values, vectors = np.linalg.eigh(M)
     size = np.abs(values)
-    largest = size.max(axis=1, keepdims=True)  # zero if there is only a free motion
+    # the largest value is zero if there is only a free motion
+    largest = size.max(axis=1, keepdims=True)
     kept = size > RANK * largest
     ambiguous = np.any((size > _ROUNDING * largest) & ~kept, axis=1)
     inverted = np.divide(1.0, values, out=np.zeros_like(values), where=kept)

@@ -1,4 +1,4 @@
-"""Compliant places, whose deflections follow from wrenches by given laws.
+"""Compliant places of a robot, whose deflections follow from wrenches by laws.
 
 Their deflections e are stress-free screws that depend on the wrenches w, which in turn
 depend on e: e = g(w), w = w0 + A e, where A is the self-stress.  Newton's method solves
@@ -27,14 +27,14 @@ from forcefit.assembly.model.links import in_series, own_screw
 from forcefit.assembly.solvers.conic import SolverFailed
 
 T = TypeVar("T")
-_STEP = 1e-6  # relative to a wrench: step for the derivative of a law
-_SETTLED = 1e-10  # relative to the largest deflection: accepted residual
+_STEP = 1e-6  # step of the numerical derivative of a law, relative to the wrench
+_SETTLED = 1e-10  # largest accepted residual, relative to the largest deflection
 _STEPS = 40
 
 
 @dataclass(frozen=True, eq=False)
 class Yields:
-    """Compliant places of conditions, described by columns of small screws.
+    """Compliant places of a robot, described by columns of small screws.
 
     Attributes:
         conditions: R rows of a robot of n frames.
@@ -162,14 +162,15 @@ def settle_yields(
 
 
 def with_springs(conditions: Conditions, row: int) -> Conditions:
-    """Return one row with its linear compliant places as springs in series with joints.
+    """Return one row whose linear compliant places are springs in series with joints.
 
     Args:
         conditions: conditions of all rows.
         row: index of the row.
 
     Returns:
-        The row.  Places that are not springs, or have no positive compliance, remain.
+        Conditions of the row.  Compliant places with a nonlinear law or without
+        positive compliance remain.
     """
     one, left = conditions.take([row]), []
     frames = list(conditions.robot.frames)

@@ -7,12 +7,11 @@ c-bar   ``clearance_bounds``  (n, 5)   [RXY RZ TXY TZ TXYZ], 0 rigid, inf free
 ======  ====================  =======  ==========================================
 
 The first four bounds are those of the paper.  The last bound, for (TX, TY, TZ), is a
-ball joint's clearance in its socket and replaces TXY and TZ.  A bound that a joint does
-not have is NaN.
+ball joint's clearance in its socket and replaces TXY and TZ.  The value is NaN for a
+bound that the joint does not use.
 
-The free motion of a passive joint is one of these directions without a bound, or with
-the bound given in the file.  The motion of a joint therefore needs no special
-treatment.
+The free motion of a passive joint is treated as a clearance in one of these directions.
+This clearance is unbounded, or has the bound given in the file.
 """
 
 import numpy as np
@@ -20,11 +19,13 @@ from numpy.typing import NDArray
 
 from forcefit.assembly.model.robot import Clearance, Frame, Robot
 
-# components of the screw that each bound limits
+# components of the screw [RX RY RZ TX TY TZ] that each bound limits
 CONES = ((0, 1), (2,), (3, 4), (5,), (3, 4, 5))
-BOUNDS = ("tilt", "spin", "radial", "axial", "ball")  # keys of the bounds, by cone
+# keys of the five bounds in robot files
+BOUNDS = ("tilt", "spin", "radial", "axial", "ball")
 _BALL = BOUNDS.index("ball")
-_BOUND_OF_COMPONENT = (0, 0, 1, 2, 2, 3)  # for joints without ball
+# index of the bound of each screw component, for joints without the bound ``ball``
+_BOUND_OF_COMPONENT = (0, 0, 1, 2, 2, 3)
 
 
 def clearance_bounds(robot: Robot, own_axes_free: bool = False) -> NDArray:
@@ -55,7 +56,7 @@ def clearance_bounds(robot: Robot, own_axes_free: bool = False) -> NDArray:
 
 
 def component_bounds(bounds: NDArray) -> NDArray:
-    """Return the (n, 6) bound of each component of a screw, from bounds (n, 5)."""
+    """Return the (n, 6) bounds of the screw components, from the bounds (n, 5)."""
     components = bounds[:, list(_BOUND_OF_COMPONENT)]
     return np.where(np.isnan(components), bounds[:, [_BALL]], components)
 
@@ -82,7 +83,7 @@ def own_cone(frame: Frame) -> int | None:
 
 
 def scales_with_margin(robot: Robot) -> NDArray:
-    """Return (n, 5) bool, True for clearances, False for ranges of passive joints."""
+    """Return (n, 5) bool: True for clearances, False for limits of free motions."""
     scaled = np.ones((len(robot.frames), len(BOUNDS)), dtype=bool)
     for i, frame in enumerate(robot.frames):
         own = own_cone(frame)

@@ -1,8 +1,8 @@
-"""Closures between parallel contacts of one joint, which are no loops of a mechanism.
+"""Closures between parallel contacts of one joint; they are not loops of the mechanism.
 
-A guide and a pad are two chains of fixed frames with clearances between the same two
-bodies (:mod:`forcefit.assembly.drawing.contacts`).  A closure joins the ends of the
-chains.
+A guide or a pad is modelled by two chains between the same two bodies
+(:mod:`forcefit.assembly.drawing.contacts`).  Each chain consists of fixed frames with
+clearances, and a closure joins the ends of the chains.
 """
 
 from functools import lru_cache
@@ -33,26 +33,26 @@ def contact_closures(robot: Robot) -> NDArray:
 
 @lru_cache(maxsize=64)
 def contact_frames(robot: Robot) -> frozenset[str]:
-    """Return the names of the frames in the two chains of every such closure."""
+    """Return the names of the frames in the two chains of every contact closure."""
     pairs = zip(robot.closures, contact_closures(robot), strict=True)
     chains = [_apart(robot, *pair) for pair, of_contacts in pairs if of_contacts]
     return frozenset(frame.name for chain in chains for frame in chain)
 
 
 def _apart(robot: Robot, first: str, second: str) -> list[Frame]:
-    """Return the frames on the path to exactly one of two frames."""
+    """Return the frames on the path from the base to only one of two frames."""
     paths = robot.on_path[[robot.index(first), robot.index(second)]]
     return [robot.frames[i] for i in np.flatnonzero(paths[0] != paths[1])]
 
 
 def _joins_contacts(robot: Robot, first: str, second: str) -> bool:
-    """Return whether the chains to two frames are clearances, one of them unbounded."""
+    """Return whether two chains move only by clearances, one of which is unbounded."""
     apart = _apart(robot, first, second)
     return all(map(_moves_by_clearance, apart)) and any(map(_is_unbounded, apart))
 
 
 def _is_unbounded(frame: Frame) -> bool:
-    """Return whether a clearance of a frame is unbounded."""
+    """Return whether a bound of the frame's clearance is infinite."""
     return frame.clearance is not None and np.inf in vars(frame.clearance).values()
 
 
@@ -63,6 +63,6 @@ def _moves_by_clearance(frame: Frame) -> bool:
 
 
 def loops(robot: Robot) -> tuple[tuple[str, str], ...]:
-    """Return the closures of the mechanism, without the closures of contacts."""
+    """Return the closures of the mechanism, without those between contacts."""
     pairs = zip(robot.closures, contact_closures(robot), strict=True)
     return tuple(closure for closure, of_contacts in pairs if not of_contacts)

@@ -1,8 +1,8 @@
-"""Equality of objects by their data, by a hash that each object computes once.
+"""Equality of objects by their data; each object computes a hash of its data once.
 
 Numbers are compared bit by bit, so that equal objects have equal results and can share
-them.  For example, 0.0 and -0.0 differ, because an angle can be pi for one and -pi for
-the other.  An integer equals the float of the same value.
+them.  For example, 0.0 and -0.0 count as different numbers, because an angle computed
+from them can be pi or -pi.  An integer equals the float of the same value.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -47,7 +47,8 @@ class EqualData:
         return hash(self._digest)  # subclasses can compute a faster hash
 
     def __getstate__(self) -> dict[str, Any]:
-        # hashes differ from process to process; pickled links lack their solutions
+        # the digest is not pickled: hashes differ from process to process, and pickled
+        # links lack their solutions
         return {key: value for key, value in vars(self).items() if key not in _CACHED}
 
 
@@ -76,7 +77,7 @@ def _feed(update: Callable[[bytes], None], value: Any) -> None:
 
 
 def _feed_parts(update: Callable[[bytes], None], value: Any) -> None:
-    """Add a value that consists of parts, or its text, to a digest."""
+    """Add the parts of a value to a digest, or the text of a value without parts."""
     if is_dataclass(value):
         update(type(value).__name__.encode())
         parts = _fields_of(value)

@@ -1,4 +1,4 @@
-"""Distributions of the geometric errors, and draws that any process can repeat.
+"""Probability distributions of geometric errors, and reproducible random draws.
 
 Each source is one component of one frame's delta l, equal to ``centre + scale s``:
 
@@ -32,12 +32,12 @@ from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 from forcefit.results.display import html_table, short_repr
 
 KINDS = ("uniform", "normal", "truncated")
-_LARGEST = 1e3  # [rad, m] larger than any error
+_LARGEST = 1e3  # [rad, m] upper limit of the numbers in a file of errors
 # names of the columns in the result of _rows
 _COLUMNS = (
     "frame", "component", "kind", "centre", "scale", "least", "limit", "signed",
 )  # fmt: skip
-_WORDS = 4  # random numbers per step of Philox
+_WORDS = 4  # number of random numbers that one step of the Philox generator produces
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,10 +50,10 @@ class ErrorSources:
         component: (m,) component of the frame's screw.
         kind: (m,) index into :data:`KINDS`.
         centre: (m,) [rad or m] value at s = 0.
-        scale: (m,) [rad or m] factor of s, >= 0.
-        least: (m,) smallest size of s, below 1; only for uniform sources.
-        limit: (m,) largest size of s; only for truncated sources.
-        signed: (m,) bool, whether s can have both signs.
+        scale: (m,) [rad or m] factor by which s is multiplied, >= 0.
+        least: (m,) [-] smallest absolute value of s, below 1; only for uniform sources.
+        limit: (m,) [-] largest absolute value of s; only for truncated sources.
+        signed: (m,) bool, True if s can be positive or negative.
         fixed: (n, 6) [rad, m] errors that are added to every draw, such as the
             mismatch of the closures; None for zero.
     """
@@ -83,13 +83,13 @@ class ErrorSources:
         return len(self.frame)
 
     def standard(self, uniform: NDArray) -> NDArray:
-        """Return the (..., m) values s for numbers that are uniform between 0 and 1."""
+        """Return the (..., m) values s for uniform random numbers between 0 and 1."""
         v = 2.0 * uniform - 1.0
         size = self.least + (1.0 - self.least) * np.where(self.signed, abs(v), uniform)
         uniform_values = np.where(self.signed, np.copysign(size, v), size)
         if not (self.kind > 0).any():
             return uniform_values
-        # only the part of the normal distribution within the limits is used
+        # only the part of the normal distribution between the limits is used
         tail = np.where(self.kind == 2, ndtr(-self.limit), 0.0)
         normal_values = ndtri(tail + np.maximum(uniform, 2.0**-54) * (1.0 - 2.0 * tail))
         return np.where(self.kind == 0, uniform_values, normal_values)
@@ -108,8 +108,8 @@ class ErrorSources:
             stream: number of the stream; streams are independent.
 
         Returns:
-            The random numbers; the numbers of a draw do not depend on ``first`` or
-            ``count``.
+            The random numbers, one row for each draw.  The numbers of one draw do not
+            depend on ``first`` or ``count``.
         """
         steps = -(-max(1, len(self)) // _WORDS)
         philox = np.random.Philox(key=np.array([seed, stream], dtype=np.uint64))
@@ -129,7 +129,7 @@ class ErrorSources:
 
     @property
     def mean(self) -> NDArray:
-        """(m,) [rad or m] expected errors."""
+        """(m,) [rad or m] expected value of every error."""
         one_sided = (self.kind == 0) & ~self.signed
         return self.centre + self.scale * np.where(one_sided, (1 + self.least) / 2, 0.0)
 
@@ -145,7 +145,7 @@ class ErrorSources:
         return self.scale**2 * np.where(self.kind == 0, uniform, normal)
 
     def of_numbers(self, slopes: NDArray) -> NDArray:
-        """Return the columns (..., m) of these sources from slopes (..., n, 6)."""
+        """Return derivatives by source (..., m), given those by error (..., n, 6)."""
         return np.asarray(slopes[..., self.frame, self.component])
 
     @property
@@ -155,7 +155,7 @@ class ErrorSources:
 
     @property
     def identity(self) -> list[NDArray]:
-        """Arrays that are equal if and only if the draws are equal."""
+        """Arrays that identify the draws: equal arrays mean equal draws."""
         return [
             self.frame, self.component, self.kind, self.centre, self.scale,
             self.least, self.limit, self.signed,
@@ -163,7 +163,7 @@ class ErrorSources:
         ]  # fmt: skip
 
     def scaled(self, scale: NDArray) -> "ErrorSources":
-        """Return the same sources with other scales (m,) [rad or m]."""
+        """Return the same sources with new scales (m,) [rad or m]."""
         return replace(self, scale=np.asarray(scale, dtype=float))
 
 
@@ -193,12 +193,13 @@ def tolerance_sources(
 
     Args:
         robot: robot of n frames.
-        tolerances: (6,) [rad, m] half widths by component, 0 for none.
-        frames: names of the frames and joints; if None, all frames at whose body the
-            robot has errors or a link.
+        tolerances: (6,) [rad, m] half widths of the tolerance intervals by component; 0
+            for a component without error.
+        frames: names of the frames and joints with errors.  If None, all frames whose
+            bodies have a geometric error or an elastic link.
         distribution: ``"uniform"`` over the tolerance, or ``"truncated"``: normal, cut
             at the tolerance.
-        deviations: number of standard deviations in the tolerance.
+        deviations: half width of the tolerance interval in standard deviations.
 
     Returns:
         The sources, frame by frame.

@@ -1,4 +1,4 @@
-"""Drives that apply a force and do not control their coordinate."""
+"""Drives that apply a prescribed force and do not control the joint coordinate."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -11,7 +11,7 @@ from forcefit.inputs.table import BadInput, nearest, quoted
 
 
 def with_drive_forces(robot: Robot, forces: Mapping[str, float]) -> Robot:
-    """Return a robot in which some drives apply a force and move freely.
+    """Return a robot in which the named drives apply a given force and move freely.
 
     The joint of such a drive becomes passive.  Stiffness and clearance of the drive do
     not act along its motion.  The force acts between its body and the part that its

@@ -2,8 +2,8 @@
 
 The body connects the parent to the frame (``docs/robot_files.md``).  Small screws act
 at the frame, in its axes and in the paper's order: geometric error, link deformation,
-joint clearance, joint deformation.  The motion of the joint about or along its z axis
-follows and moves the child frames.
+joint clearance, joint deformation.  The motion of the joint comes last.  It is about or
+along the z axis of the frame, and it moves the child frames.
 """
 
 import math
@@ -41,8 +41,9 @@ FORCE_CONTROL = (
 class Clearance:
     """Bounds of a joint's clearance, the paper's c-bar of eqs. (1)-(5).
 
-    ``None`` means that a bound is not given: there is no clearance in this direction,
-    except along the free motion of a passive joint, which is then unbounded.
+    ``None`` means that the bound is not given.  The joint then has no clearance in this
+    direction.  Along the free motion of a passive joint, ``None`` means an unbounded
+    motion.
 
     Attributes:
         radial: [m] radius of the disc for (TX, TY), eq. (2).
@@ -65,7 +66,8 @@ class Clearance:
             raise BadInput(f"clearance.{key}: {ONE_OF_BALL}")
 
 
-LEFT = ("least", "uniform", "worst")  # rules for the position of a bolted joint
+# rules for the position in which a joint is bolted
+LEFT = ("least", "uniform", "worst")
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,13 +75,14 @@ class LockedAt:
     """A fixed joint with clearance that is bolted at one pose and rigid afterwards.
 
     Attributes:
-        clearance: before it is bolted.
+        clearance: clearance of the joint before it is bolted.
         pose: components ``tx .. rz`` [m, rad] of the platform at that pose.
-        joints: or coordinates [rad or m] of drives; home if both are empty.
-        left: where the fitter leaves drawn machines: ``"least"``, the least sum of
-            squares among the positions of least energy; ``"uniform"``, any of them; or
-            ``"worst"``, the one with the largest pose error, which ``assembly error``
-            bounds.
+        joints: coordinates [rad or m] of drives at that pose, in place of ``pose``.  If
+            both are empty, the joint is bolted in the home pose.
+        left: position of the joint in its clearance when it is bolted, used for random
+            draws.  All three rules select among the positions of least energy:
+            ``"least"``, the least sum of squares; ``"uniform"``, a random position;
+            ``"worst"``, the largest pose error, which ``assembly error`` bounds.
         screw: (6,) [rad, m] clearance that is locked in; it is part of the geometric
             error.  Computed by :func:`forcefit.assembly.steps.bolted.bolt_joints`.
     """
@@ -104,34 +107,40 @@ class Frame(EqualData):
     """One body and the joint at its far end; see the head of this module.
 
     Attributes:
-        name: unique; dots group by leg.
+        name: unique name of the frame; the part before a dot is the leg's name.
         parent: name of the parent frame, or ``"base"``.
-        translation: (3,) [m] origin seen from the parent's frame after its joint.
-        rotation: (3,) [rad] rotation vector of the axes, seen from there too.
-        joint: ``"fixed"``, ``"revolute"`` or ``"prismatic"``, about or along own z, or
-            ``"helical"``, both together; its coordinate is the angle.
-        actuated: whether the joint is locked at a command; otherwise its motion is
-            free.
+        translation: (3,) [m] origin of the frame in the axes of the parent's frame
+            after the motion of the parent's joint.
+        rotation: (3,) [rad] rotation vector of the frame's axes relative to the same
+            axes of the parent's frame.
+        joint: type of the joint.  ``"revolute"`` rotates about the frame's z axis,
+            ``"prismatic"`` translates along it, ``"helical"`` does both, and
+            ``"fixed"`` does not move.  The coordinate of a helical joint is the angle.
+        actuated: whether a drive holds the joint at its commanded coordinate; otherwise
+            its motion is free.
         position: [rad or m] joint coordinate in the home pose.
-        limits: [rad or m] least and largest coordinate that may be commanded, or None.
-        geometric_error: (6,) [rad, m] delta l.
-        tolerance: (6,) [rad, m] standard deviations of delta l about the given value, 0
-            where it is exact; None if unknown.
+        limits: [rad or m] least and largest coordinate that can be commanded; None
+            without limits.
+        geometric_error: (6,) [rad, m] geometric error delta l of the body.
+        tolerance: (6,) [rad, m] standard deviations of delta l about the given value. 0
+            means an exact component; None means that they are unknown.
         clearance: clearance of the joint; None if it has none.
-        locked_at: where the joint is bolted, with its clearance before; None if it is
-            not.
-        joint_stiffness: (6, 6) K_B with ``inf`` on the diagonal where rigid, or None;
-            (6,) its diagonal, as in robot files, becomes a matrix; 0 along a passive
-            joint's own motion (its row and column) leaves it free.
-        drive_force: [N m or N] with which a drive pushes a passive joint along its
-            motion, independent of its coordinate; positive where the coordinate grows.
+        locked_at: pose at which a fixed joint is bolted, with its clearance before
+            bolting; None if it is not bolted.
+        joint_stiffness: (6, 6) stiffness K_B of the joint, or None.  ``inf`` on the
+            diagonal means a rigid direction.  Zeros in the row and column of a passive
+            joint's own motion leave this motion free.  If (6,) numbers are given, as in
+            robot files, they become the diagonal of the matrix.
+        drive_force: [N m or N] constant force of a drive on a passive joint, along the
+            motion of the joint; positive in the direction of increasing coordinate.
         link: elasticity of the body, None if rigid.
-        mass: [kg] of the body in addition to its link's own.
-        centre_of_mass: (3,) [m] of that mass, in the frame's axes.
-        inertia: (3, 3) [kg m^2] of that mass about its centre, in the frame's axes;
-            symmetric, its principal moments those of a body.
-        pitch: [m] translation of a helical joint in a turn, positive for a right-hand
-            thread; 0 of other joints.
+        mass: [kg] mass of the body in addition to the mass of its link.
+        centre_of_mass: (3,) [m] centre of this additional mass, in the frame's axes.
+        inertia: (3, 3) [kg m^2] moments of inertia of this additional mass about its
+            centre, in the frame's axes.  The matrix must be symmetric, and a rigid body
+            with its principal moments must exist.
+        pitch: [m] translation of a helical joint per turn, positive for a right-hand
+            thread; 0 for other joints.
     """
 
     name: str
@@ -205,7 +214,7 @@ class Frame(EqualData):
         return hash((self.name, numbers))
 
     def _figures(self) -> Figures:
-        """Return the fields in short form; rarely used ones only if not zero."""
+        """Return the fields in short form; rarely used fields only if not zero."""
         shown = {f.name: brief(getattr(self, f.name)) for f in fields(self)[1:]}
         for name in ("drive_force", "pitch"):
             if not getattr(self, name):
@@ -217,12 +226,12 @@ class Frame(EqualData):
 
     @property
     def passive(self) -> bool:
-        """Whether the joint moves and is not driven."""
+        """Whether the joint can move and has no position-controlled drive."""
         return self.joint != "fixed" and not self.actuated
 
     @property
     def compliant(self) -> bool:
-        """Whether the joint is passive and its motion has a spring."""
+        """Whether the joint is passive and a spring resists its motion."""
         return self.passive and bool(self.own_stiffness)
 
     @property
@@ -326,7 +335,8 @@ def beam_axis(frame: Frame) -> tuple[float, NDArray]:
     if frame.link.length is not None and frame.link.axis is not None:
         axis = np.array(frame.link.axis)
         return frame.link.length, axis / np.linalg.norm(axis)
-    # a revolute parent rotates the beam about its start: length and direction remain
+    # a revolute parent joint rotates the beam about its start: its length and direction
+    # in the frame's axes remain
     along = between_origins(frame)
     length = math.sqrt(along @ along)
     if length == 0.0:

@@ -1,7 +1,8 @@
-"""Series of frames that are one joint of several freedoms, by their names.
+"""Series of frames that together form one joint with several freedoms.
 
-They are found by the names, the kinds and the common point of the frames, so that a
-robot file of frames that was converted from a drawing has the same joints.
+A series is recognised by the names of its frames, the types of their joints and their
+common point.  A robot file of bodies that was converted to a file of frames therefore
+keeps its joints.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,8 +13,9 @@ import numpy as np
 from forcefit.assembly.model.frame import Frame
 from forcefit.stiffness.screws import rotation_matrix, transform
 
-_SAME = 1e-9  # [m] distance below which the frames of one joint are at one point
-# ends of the frames' names with their joints, from the first body to the second
+_SAME = 1e-9  # [m] largest distance of two frames that count as one point
+# kind of joint by the ends of its frames' names and the types of their joints, in order
+# from the first body to the second
 _SERIES: dict[tuple[tuple[str, str], ...], str] = {
     (("first", "revolute"), ("second", "revolute")): "universal",
     (
@@ -32,15 +34,15 @@ _SERIES: dict[tuple[tuple[str, str], ...], str] = {
 
 @dataclass(frozen=True)
 class NamedJoint:
-    """A joint of several frames.
+    """A joint that consists of several frames.
 
     Attributes:
-        name: of the joint.
+        name: name of the joint.
         kind: ``"universal"``, ``"spherical"``, ``"cylindrical"`` or ``"planar"``.
-        frames: names of its frames with a freedom, parents first.
+        frames: names of its frames that can move, parents first.
         main: name of the frame at the joint's point and in its axes.
-        carriers: names of the frames with its geometric errors: two of a universal
-            joint, one of others.
+        carriers: names of the frames with its geometric error: two frames for a
+            universal joint, one for every other joint.
     """
 
     name: str
@@ -54,7 +56,7 @@ def joints_of(frames: Sequence[Frame]) -> dict[str, NamedJoint]:
     """Return the joints of several frames by name, in the order of the frames.
 
     Args:
-        frames: of a robot, parents first.
+        frames: frames of a robot, parents first.
     """
     known = {frame.name: frame for frame in frames}
     stems: dict[str, list[Frame]] = {}
@@ -69,7 +71,7 @@ def joints_of(frames: Sequence[Frame]) -> dict[str, NamedJoint]:
 def _joint(
     known: Mapping[str, Frame], stem: str, parts: list[Frame]
 ) -> NamedJoint | None:
-    """The joint of the frames whose names begin alike, None if they are not one."""
+    """Return the joint that frames with a common name form; None if they form none."""
     ends = tuple((part.name[len(stem) + 1 :], part.joint) for part in parts)
     kind = _SERIES.get(ends) or _SERIES.get(ends[::-1])
     if kind is None or not _at_one_point(known, stem, parts):
@@ -82,7 +84,7 @@ def _joint(
 
 
 def _at_one_point(known: Mapping[str, Frame], stem: str, parts: list[Frame]) -> bool:
-    """Whether frames follow each other at one point, only contacts between them."""
+    """Return whether frames are at one point, in series, with only contacts between."""
     frame, T = parts[-1], np.eye(4)
     while frame is not parts[0]:
         T = transform(frame.translation, rotation_matrix(frame.rotation)) @ T

@@ -24,13 +24,15 @@ class Function:
             ``cov.temperature``.
         form: a name of :data:`forcefit.assembly.effects.forms.FORMS`, or ``"formula"``.
         parameters: numbers by name, in the units that follow from the variables and
-            the kind; with several components a name can begin with a component.
+            the kind; if the effect has several components, a name can begin with a
+            component.
         kind: ``"screw"`` [rad, m], or ``"compliance"`` [rad/(N m), m/N], which is
             multiplied by the wrench component at the same place.
         label: text for reports.
         formula: the formula if ``form`` is ``"formula"``.
         session: name of the only session in which the effect acts; None for all.
-        std: standard deviations of some parameters, in the parameters' units.
+        std: standard deviations of the parameters for which they are known, in the
+            units of the parameters.
     """
 
     where: str
@@ -46,6 +48,6 @@ class Function:
 
     @property
     def title(self) -> str:
-        """The label; without a label, the place and the variables."""
+        """Text for reports: the label, or else the place and the variables."""
         acts = f"{self.where} {', '.join(self.components)}"
         return self.label or f"{acts} of {', '.join(self.variables)}"

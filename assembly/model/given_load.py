@@ -19,9 +19,10 @@ def given_load(load: Load, whose: str = "load") -> NDArray:
     """Return a load as an array.
 
     Args:
-        load: (..., 6) [N m, N] ``[mx my mz fx fy fz]``; or a mapping of some of these
-            components, the others zero, to one number or one for each of k points.
-        whose: name of the argument, for messages.
+        load: (..., 6) [N m, N] ``[mx my mz fx fy fz]``; or a mapping from the names of
+            these components to numbers.  Each value is one number, or one number for
+            each of k points.  Components that are not given are zero.
+        whose: name of the argument, with which error messages begin.
 
     Returns:
         (..., 6) [N m, N]; (6,) or (k, 6) for a mapping.

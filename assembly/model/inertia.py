@@ -1,4 +1,4 @@
-"""Moments of inertia of rigid bodies: checks, conversion, and joined bodies."""
+"""Moments of inertia of rigid bodies: checks, conversion, and sums over bodies."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 # mass [kg], centre (3,) [m] and moments of inertia (3, 3) [kg m^2] about that centre
 MassProperties = tuple[float, NDArray, NDArray]
 
-_ROUNDING = 1e-6  # [-] share of the largest moment: files have few digits
+# [-] accepted rounding of moments in files, relative to the largest moment
+_ROUNDING = 1e-6
 _SIX = (np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2]))
 
 
@@ -32,7 +33,7 @@ def inertia_fault(J: NDArray) -> str:
         J: (3, 3) [kg m^2] moments of inertia.
 
     Returns:
-        The found and the expected values, for a message.
+        Text for a message, with the found and the expected values.
     """
     if not np.abs(J - J.T).max() <= _ROUNDING * np.abs(J).max():
         return "found a matrix that is not symmetric, expected a symmetric one"
@@ -55,7 +56,7 @@ def joined_bodies(parts: Sequence[MassProperties]) -> MassProperties:
     """Return mass, centre and moments of inertia of bodies that form one rigid body.
 
     Args:
-        parts: mass properties of each body, in common axes.
+        parts: mass, centre and moments of inertia of each body, in common axes.
 
     Returns:
         Mass properties of the rigid body, by the parallel axis theorem.  The centre is

@@ -1,10 +1,10 @@
-"""Names of drawn joints that became several frames, such as ``ball`` of ``ball.first``.
+"""Names of joints that consist of several frames, such as ``ball`` of ``ball.first``.
 
 A joint of several freedoms is a series of passive frames at one point, each with one
-freedom (:mod:`forcefit.assembly.drawing.parts`).  Its errors, clearance and springs are
-on one of them, those of a universal joint on both.  A user names the joint; these
-functions return the frames that are meant.  :mod:`forcefit.assembly.model.frame_series`
-finds the joints.
+freedom (:mod:`forcefit.assembly.drawing.parts`).  One of these frames has the geometric
+error, the clearance and the springs of the joint.  In a universal joint, both frames
+have them.  A user names the joint; the functions of this module return the frames of
+that joint.  :mod:`forcefit.assembly.model.frame_series` finds the joints.
 """
 
 import re
@@ -14,12 +14,13 @@ from forcefit.assembly.model.frame_series import NamedJoint
 from forcefit.assembly.model.robot import BASE, Robot
 from forcefit.stiffness.screws import SCREW
 
-# ends of the names of a joint's contacts (assembly/drawing/contacts.py)
+# ends of the names of the frames that model contacts (assembly/drawing/contacts.py)
 _CONTACT = re.compile(
     r"(bore|bearing)_(start|end)|guide(_far)?_(roll|(yaw|pitch)_(start|end))|pad_[1-4]"
     r"|contacts_(start|end|far_end)"
 )
-# component of the frame slide_x, whose z is the joint's x, for each of a planar joint
+# for each component of a planar joint, the component of its frame slide_x, whose z axis
+# is the joint's x axis
 _OF_PLANE = (2, 0, 1, 5, 3, 4)
 
 
@@ -28,11 +29,11 @@ def row_of(robot: Robot, name: str) -> int:
 
     Args:
         robot: any robot.
-        name: of a frame, or of a joint of several frames.
+        name: name of a frame, or of a joint that consists of several frames.
 
     Returns:
-        For a joint, the row of ``first`` of a universal or a spherical joint, and of
-        ``turn`` of a cylindrical or a planar one.
+        The index of the frame.  For a universal or a spherical joint, this is its frame
+        ``first``; for a cylindrical or a planar joint, its frame ``turn``.
 
     Raises:
         BadInput: neither a frame nor a joint has this name.
@@ -42,16 +43,16 @@ def row_of(robot: Robot, name: str) -> int:
 
 
 def error_rows(robot: Robot, name: str) -> list[tuple[int, list[int]]]:
-    """Return where the geometric error of a joint is.
+    """Return the frames and components that contain the geometric error of a joint.
 
     Args:
         robot: any robot.
-        name: of a frame, or of a joint of several frames.
+        name: name of a frame, or of a joint that consists of several frames.
 
     Returns:
-        For each frame, two of a universal joint, whose bearings each have the error,
-        and one otherwise: its row, and its component for each of RX .. TZ in the
-        joint's axes.
+        For each frame with an error, its index, and its component for each of RX .. TZ
+        in the joint's axes.  A universal joint has two such frames, because each of its
+        bearings has the error.  Every other joint has one.
 
     Raises:
         BadInput: neither a frame nor a joint has this name.
@@ -68,12 +69,12 @@ def error_label(robot: Robot, row: int, component: int) -> str:
 
     Args:
         robot: any robot.
-        row: of a frame.
-        component: of the frame, 0 to 5 for RX .. TZ.
+        row: index of the frame.
+        component: component of the frame's error, 0 to 5 for RX .. TZ.
 
     Returns:
-        Name and component of the joint of several frames if no other frame has its
-        errors, and of the frame otherwise.
+        Name and component of the joint to which the frame belongs, if no other frame
+        has errors of that joint.  Otherwise the name and component of the frame.
     """
     name = robot.frames[row].name
     for joint in robot.joints.values():
@@ -89,11 +90,11 @@ def shown_name(robot: Robot, row: int) -> str:
 
     Args:
         robot: any robot.
-        row: of a frame.
+        row: index of the frame.
 
     Returns:
-        The name of the joint of several frames if no other frame has its clearance and
-        springs, and of the frame otherwise.
+        The name of the joint to which the frame belongs, if no other frame has
+        clearance or springs of that joint.  Otherwise the name of the frame.
     """
     name = robot.frames[row].name
     for joint in robot.joints.values():
@@ -107,12 +108,13 @@ def clearance_name(robot: Robot, row: int, bound: str) -> str:
 
     Args:
         robot: any robot.
-        row: of the frame with the clearance.
-        bound: ``radial``, ``axial``, ``tilt``, ``spin`` or ``ball``.
+        row: index of the frame that has the clearance.
+        bound: key of the bound: ``radial``, ``axial``, ``tilt``, ``spin`` or ``ball``.
 
     Returns:
-        ``"rail.clearance"`` of a contact of the joint ``rail``, because the bounds of
-        its contacts follow from the joint's gaps; otherwise ``"hinge.tilt"``.
+        For a contact of the joint ``rail``, ``"rail.clearance"``, because the bounds of
+        the contacts follow from the gaps of the joint.  Otherwise a name such as
+        ``"hinge.tilt"``.
     """
     if owner_of_contact(robot.frames[row].name, names_of(robot)):
         return f"{joint_of(robot, row)}.clearance"
@@ -124,11 +126,12 @@ def joint_of(robot: Robot, row: int) -> str:
 
     Args:
         robot: any robot.
-        row: of a frame.
+        row: index of the frame.
 
     Returns:
-        The name of the joint of several frames, or of the joint whose contact the frame
-        is (``"foot"`` of ``foot.bore_start``); otherwise the name of the frame.
+        The name of the joint to which the frame belongs.  For a contact such as
+        ``foot.bore_start``, this is the joint ``foot``.  A frame of no such joint has
+        its own name.
     """
     frame = robot.frames[row]
     fixed = frame.joint == "fixed"
@@ -141,14 +144,15 @@ def joint_of(robot: Robot, row: int) -> str:
 
 
 def owner_of_contact(name: str, names: Container[str]) -> str:
-    """Return the joint or frame whose contact a frame is, or an empty text.
+    """Return the joint or frame to which a contact belongs, or an empty text.
 
     Args:
-        name: of a frame, such as ``"foot.bore_start"``.
-        names: of frames and joints.
+        name: name of a frame, such as ``"foot.bore_start"``.
+        names: names of frames and joints.
 
     Returns:
-        ``"foot"`` if it is one of the names.
+        ``"foot"`` for this example, if ``"foot"`` is one of ``names``.  Empty for a
+        frame that is not a contact.
     """
     stem, _, end = name.rpartition(".")
     return stem if stem in names and _CONTACT.fullmatch(end) else ""
@@ -180,7 +184,7 @@ def closing_names(
 
 
 def moves(robot: Robot, name: str) -> bool:
-    """Return whether a frame, or a joint of several frames, has a motion."""
+    """Return whether a frame, or a joint of several frames, can move."""
     return name in robot.joints or robot.frame(name).joint != "fixed"
 
 
@@ -190,16 +194,16 @@ def names_of(robot: Robot) -> list[str]:
 
 
 def joint_paths(joint: NamedJoint, path: str) -> list[str]:
-    """Return the paths of frames that a path of a joint's number means.
+    """Return the paths of the frames' numbers that one path of a joint's number means.
 
     Args:
-        joint: of several frames.
-        path: such as ``"ball.clearance.ball"`` or ``"cross.geometric_error.rx"``, also
-            without the leg of the joint.
+        joint: joint that consists of several frames.
+        path: path such as ``"ball.clearance.ball"`` or ``"cross.geometric_error.rx"``.
+            The name of the leg at its beginning can be omitted.
 
     Returns:
-        The same with the frame that has the number: two of a universal joint, none if
-        the path is not of this joint.
+        Paths in which the joint is replaced by the frame that has the number: two paths
+        for a universal joint, and none if the path does not belong to this joint.
     """
     for name in (joint.name, joint.name.partition(".")[2]):
         if name and path.startswith(f"{name}."):

@@ -1,4 +1,5 @@
 """Upper limits of numbers in files and options; larger numbers are mistakes."""
 
-LARGEST_LENGTH = 1e6  # [m] larger than any machine; also limits angles and directions
-LARGEST = 1e40  # in SI units: larger than any property; lower limits are its inverse
+# [m] upper limit of lengths; also used for angles [rad] and components of directions
+LARGEST_LENGTH = 1e6
+LARGEST = 1e40  # [SI] upper limit of other numbers; its inverse is the lower limit

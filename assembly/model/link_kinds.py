@@ -1,4 +1,4 @@
-"""Models of a body's elasticity: a beam, a matrix, a mesh or a library entry."""
+"""Elasticity models of a body: beam, stiffness matrix, mesh or library entry."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -23,10 +23,11 @@ class BeamLink:
         poisson: [-] Poisson's ratio.
         density: [kg/m^3] density; None if the link has no declared mass.
         theory: ``"timoshenko"`` or ``"euler"``.
-        length: [m] length of the beam; None for the distance of the origins.
+        length: [m] length of the beam; None for the distance between the two origins.
         axis: unit vector from base to tip in the frame's axes, given together with
             ``length``.
-        up: direction of the section's height in the frame's axes, or None.
+        up: direction of the section's height in the frame's axes; None if it is not
+            given.
         pieces: number of springs in series for finite motions; it has no effect on
             small motions.
     """
@@ -75,7 +76,7 @@ class MeshSolution(EqualData):
     mass: NDArray
 
     def _data(self) -> tuple[Any, ...]:
-        # all fields of the finite elements depend only on these data
+        # the finite-element solution depends only on these data
         return self.solved.link.compliance, self.young, self.digest, self.mass
 
 
@@ -119,7 +120,8 @@ class MeshLink:
     solution: MeshSolution | None = field(default=None, compare=False, repr=False)
 
     def __getstate__(self) -> dict[str, Any]:
-        # the solution has tens of megabytes; worker processes compute it again
+        # a solution of tens of megabytes is not pickled; worker processes compute it
+        # again
         return {**vars(self), "solution": None}
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "MeshLink":

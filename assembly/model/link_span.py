@@ -11,7 +11,7 @@ from forcefit.inputs.table import BadInput, quoted
 from forcefit.stiffness.beam.beam import section_axes
 from forcefit.stiffness.screws import rotation_matrix
 
-_SAME_POINT = 1e-9  # [m] origins that are nearer to each other coincide
+_SAME_POINT = 1e-9  # [m] largest distance of two origins that count as coincident
 
 
 def with_spans(robot: Robot, home: NDArray) -> Robot:
@@ -26,7 +26,8 @@ def with_spans(robot: Robot, home: NDArray) -> Robot:
         home: (n,) [rad or m] joint coordinates in the home pose.
 
     Returns:
-        The robot, in which some beams have ``length`` and ``axis``.
+        The robot.  Beams whose length differs from the frame's translation have
+        ``length`` and ``axis``.
 
     Raises:
         BadInput: two origins coincide, or a direction is parallel to its beam.
@@ -46,7 +47,7 @@ def with_spans(robot: Robot, home: NDArray) -> Robot:
 
 
 def _with_span(frame: Frame, link: BeamLink, shift: float) -> BeamLink:
-    """Return a beam with a known length, after a check of its ``up``."""
+    """Return a beam with its length computed, after a check of its direction ``up``."""
     if link.length is None or link.axis is None:
         axis = _span(frame, shift)
         length = float(np.linalg.norm(axis))
@@ -63,7 +64,7 @@ def _with_span(frame: Frame, link: BeamLink, shift: float) -> BeamLink:
 
 
 def _check_mesh(frame: Frame, link: MeshLink, shift: float) -> None:
-    """Raise BadInput if a mesh has no direction, or no rotation about it."""
+    """Raise BadInput if the direction or the rotation of a mesh is undefined."""
     if link.axis is None and shift:
         raise BadInput(
             f"frame {quoted(frame.name)}.link.mesh: found a mesh on a frame "

@@ -4,8 +4,9 @@ A link is clamped at its base and loaded by its frame's wrench at the tip; a bea
 density is also loaded by its weight.  The formulas for beams are in
 :mod:`forcefit.stiffness.beam.beam_stress`.  For links given by a surface, finite
 elements compute the stress of unit wrenches (:mod:`forcefit.stiffness.fem.stress`).
-Points nearer than an interface's radius to a clamped, singular edge are omitted.  The
-stress of a link given only by its stiffness is unknown.
+The stress is singular at the edge of a clamped interface.  Points nearer to this edge
+than the radius of the interface are therefore omitted.  The stress of a link given only
+by its stiffness is unknown.
 """
 
 from collections.abc import Callable
@@ -67,7 +68,7 @@ def stressed_links(robot: Robot) -> tuple[LinkStress, ...]:
 
 
 def stressed_names(robot: Robot) -> tuple[str, ...]:
-    """Return the frames of :func:`stressed_links`, without solving any link."""
+    """Return the frame names of :func:`stressed_links` without solving a link."""
     return tuple(
         frame.name for frame in robot.frames
         if isinstance(frame.link, MeshLink)
@@ -111,7 +112,7 @@ def peak_stresses(
 
 
 def _of_beam(frame: Frame) -> Callable[..., NDArray]:
-    """Return the function that computes the peak stress of a beam."""
+    """Return the peak stress of a beam as a function of its wrench."""
     assert isinstance(frame.link, BeamLink)
     length, axis = beam_axis(frame)
     section, R = frame.link.section, section_axes(axis, frame.link.up)
@@ -119,14 +120,15 @@ def _of_beam(frame: Frame) -> Callable[..., NDArray]:
     def peak(wrench: NDArray, at_tip: NDArray = WEIGHTLESS) -> NDArray:
         tip = wrench - at_tip
         in_section_axes = np.hstack([tip[:, :3] @ R, tip[:, 3:] @ R])
-        weight = 2 * at_tip[..., 3:] @ R  # half of the weight acts at the tip
+        # weight of the beam, half of which acts at the tip
+        weight = 2 * at_tip[..., 3:] @ R
         return peak_beam_stress(section, length, in_section_axes, weight)[0]
 
     return peak
 
 
 def _of_mesh(frame: Frame, row: int) -> LinkStress:
-    """Return the peak stress of a link given by its surface."""
+    """Return the peak stress of a mesh link as a function of its wrench."""
     from forcefit.stiffness.fem.stress import stress_influence, von_mises
 
     solved = mesh_solution(frame).solved

@@ -38,7 +38,8 @@ def link_compliances(robot: Robot) -> NDArray:
     return C
 
 
-@lru_cache(maxsize=4096)  # if one frame of a robot changes, the others stay cached
+# results of the other frames stay cached if one frame of a robot changes
+@lru_cache(maxsize=4096)
 def link_compliance(frame: Frame) -> NDArray:
     """Return the (6, 6) compliance of a frame's body in its axes, a read-only array."""
     C = _compliance(frame)
@@ -103,7 +104,7 @@ def spring_compliances(robot: Robot) -> NDArray:
 
 
 def compliance_factor(C: NDArray) -> NDArray:
-    """Return a factor L of a compliance, C = L L^T: the screw L y has energy y^2/2.
+    """Return a factor L of a compliance C = L L^T; a screw L y has energy y.y/2.
 
     Args:
         C: (6, 6) symmetric positive semidefinite compliance in mixed units.
@@ -113,7 +114,8 @@ def compliance_factor(C: NDArray) -> NDArray:
     """
     size = np.sqrt(np.diag(C))
     soft = np.flatnonzero(size > 0)
-    # scale to a unit diagonal first: rad and m differ by many orders of magnitude
+    # scale C to a unit diagonal first: entries in rad and m differ by many orders of
+    # magnitude
     scaled = C[np.ix_(soft, soft)] / np.outer(size[soft], size[soft])
     L = np.zeros((6, len(soft)))
     L[soft] = size[soft, None] * np.linalg.cholesky(scaled)
@@ -154,7 +156,7 @@ def motion_map(frame: Frame) -> NDArray:
 
 
 def in_series(stiffness: NDArray | None, row: int, compliance: float) -> NDArray:
-    """Return K_B with a spring in series in one direction of its own axes.
+    """Return K_B of a joint with an additional spring in series in one direction.
 
     Args:
         stiffness: (6, 6) declared stiffness, None if rigid.
@@ -165,7 +167,7 @@ def in_series(stiffness: NDArray | None, row: int, compliance: float) -> NDArray
         (6, 6) stiffness with ``inf`` on the diagonal for rigid directions.
     """
     K = np.diag(np.full(6, np.inf)) if stiffness is None else np.array(stiffness)
-    free = np.diag(K) == 0.0  # a spring in series with a free motion leaves it free
+    free = np.diag(K) == 0.0  # a spring in series leaves a free motion free
     K[free, free] = np.inf
     soft = np.isfinite(np.diag(K))
     C = np.zeros((6, 6))

@@ -134,14 +134,15 @@ def mesh_rotation(
     if sine < 1e-15:
         if cosine > 0:
             return np.eye(3)
-        # half a turn about the perpendicular axis nearest to a coordinate axis
+        # the spans are opposite: rotate by pi about the perpendicular nearest to an
+        # axis
         axis = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
         return rotation_matrix(np.pi * axis / np.linalg.norm(axis))
     return rotation_matrix(np.arctan2(sine, cosine) * axis / sine)
 
 
 def _triad(along: NDArray, up: NDArray) -> NDArray:
-    """Return right-handed axes: first along, third as near to up as possible."""
+    """Return right-handed axes: the first along a span, the third near ``up``."""
     side = np.cross(up, along)
     side = side / np.linalg.norm(side)
     return np.column_stack([along, side, np.cross(along, side)])

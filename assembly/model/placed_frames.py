@@ -1,4 +1,4 @@
-"""Frames defined by their home poses in base axes."""
+"""Conversion of frames from home poses in base axes to poses relative to parents."""
 
 from collections.abc import Iterable
 from dataclasses import replace

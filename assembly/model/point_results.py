@@ -1,4 +1,4 @@
-"""Results of one point, or of many with a leading axis in every array."""
+"""Results of one point, or of many points with a leading point axis in every array."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-Numbers = Any  # a number for one point, or an array (k,) for many points
-N = TypeVar("N", float, NDArray)  # the same, if the type is known
+Numbers = Any  # a number for one point, or an array (k,) for k points
+N = TypeVar("N", float, NDArray)  # type variable: number for one point, array for many
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -22,10 +22,10 @@ class PointResults:
     """A result of one point, or of many points with a leading axis in its arrays.
 
     Attributes:
-        AXES: the fields that can have the leading axis, with their number of axes for
-            one point; an array with no more axes applies to all points.
-        VARIABLES: the array of each variable in the table of many points, by the names
-            of :mod:`forcefit.assembly.model.tables`.
+        AXES: for each field that can have a leading point axis, its number of axes for
+            one point.  An array with only this number of axes applies to all points.
+        VARIABLES: name of the array that each column of the table of many points
+            contains; columns are named as in :mod:`forcefit.assembly.model.tables`.
     """
 
     AXES: ClassVar[Mapping[str, int]]
@@ -35,7 +35,7 @@ class PointResults:
 
     @property
     def of_many(self) -> bool:
-        """Whether the result is one of many points."""
+        """Whether the object contains the results of many points."""
         name, axes = next(iter(self.AXES.items()))
         return np.ndim(getattr(self, name)) > axes
 
@@ -60,7 +60,7 @@ class PointResults:
         return (self[i] for i in range(len(self)))
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return a data set over ``point``, see ``assembly.model.tables``."""
+        """Return a data set with dimension ``point``; see ``assembly.model.tables``."""
         from forcefit.assembly.model.tables import points_dataset
 
         arrays = {name: getattr(self, own) for name, own in self.VARIABLES.items()}
@@ -76,7 +76,7 @@ class PointResults:
 
 
 def plain(values: Any) -> Any:
-    """Return arrays unchanged; convert an array without axes to a number."""
+    """Return an array unchanged, or as a number if it has no axes."""
     if isinstance(values, np.ndarray):
         return values if values.ndim else values.item()
     return values.item() if isinstance(values, np.generic) else values

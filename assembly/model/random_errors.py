@@ -1,4 +1,4 @@
-"""Random geometric errors as in the paper's section IV, from a seed."""
+"""Random geometric errors as in the paper's section IV, reproducible by a seed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,14 +18,15 @@ class ErrorDraw:
     """Parameters of a draw of geometric errors delta l.
 
     Attributes:
-        frames: names of the frames and joints that get an error, in the order of
-            drawing.
-        least: (6,) [rad, m] smallest size of each component.
-        most: (6,) [rad, m] largest size.
+        frames: names of the frames and joints with an error, in the order in which
+            random numbers are drawn.
+        least: (6,) [rad, m] smallest absolute value of each component.
+        most: (6,) [rad, m] largest absolute value of each component.
         seed: seed of the random numbers.
-        signs: ``"literal"``, all positive as the paper's interval reads, or
-            ``"signed"``, the same sizes with random signs.  The paper does not state
-            which; the median energy differs five-fold.
+        signs: ``"literal"`` for positive errors only, as the paper's interval is
+            printed; or ``"signed"`` for the same absolute values with random signs.
+            The paper does not state which of them it used.  The median energies of the
+            two differ by a factor of five.
     """
 
     frames: tuple[str, ...]
@@ -38,8 +39,9 @@ class ErrorDraw:
 def draw_errors(robot: Robot, draw: ErrorDraw) -> NDArray:
     """Return the errors of one draw.
 
-    Sizes are uniform between ``least`` and ``most``, frame by frame.  The signs are
-    drawn afterwards from the same generator, so both conventions have equal sizes.
+    Absolute values are uniform between ``least`` and ``most``, drawn frame by frame.
+    The signs are drawn afterwards from the same generator.  Both values of ``signs``
+    therefore lead to equal absolute values.
 
     Args:
         robot: robot of n frames.
@@ -82,7 +84,8 @@ def frames_named(robot: Robot, names: Sequence[str]) -> tuple[str, ...]:
     frames = known[: len(robot.frames)]
     chosen = set()
     for name in names:
-        among = frames if name in frames else known  # a frame's name means no joint
+        # a name that matches a frame does not select a joint
+        among = frames if name in frames else known
         fits = {k for k in among if k == name or k.split(".", 1)[-1] == name}
         if not fits:
             hint = nearest(name, known)

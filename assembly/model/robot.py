@@ -64,17 +64,18 @@ class Robot(EqualData):
             :mod:`forcefit.assembly.effects`.
         session_effects: for each session, the effects that act only in this session.
         functions: known general effects of the machine.
-        learned_range: least and largest value of each variable in the data from which
-            the effects were identified, by public name.
+        learned_range: for each variable, by public name, its least and largest value in
+            the data from which the effects were identified.
         reference_point: (3,) [m] point at which the robot was identified, in platform
             axes; None if it was not identified.
-        diagnosis: information from the file about the robot's diagnosis: verdict,
+        diagnosis: data in the file on the diagnosis that identified the robot: verdict,
             fitted rows, hold-out error, hash of the campaign, path of the covariance.
-        remarks: default values of the file that are easily overlooked.
-        callouts: tolerances of features, as stated in the drawing.
+        remarks: sentences on default values of the file that are easily overlooked.
+        callouts: tolerance callouts of features, as stated in the drawing.
         fits: ISO 286 fits such as ``"12 H7/g6"`` by frame; ``radial`` of the frame's
             clearance is the mean clearance of the fit.
-        fitted_ends: frames with a fit that determines ``tilt`` instead of ``radial``.
+        fitted_ends: by frame, data of fits that determine ``tilt`` instead of
+            ``radial``.
     """
 
     name: str
@@ -229,7 +230,7 @@ class Robot(EqualData):
         return replace(self, frames=tuple(_with_error(f, e) for f, e in frames))
 
     def with_links(self, links: dict[str, Link]) -> "Robot":
-        """Return the same robot with new links at the named frames."""
+        """Return the same robot with new link models at the named frames."""
         for name in links:
             self.index(name)
         frames = (replace(f, link=links.get(f.name, f.link)) for f in self.frames)
@@ -237,7 +238,7 @@ class Robot(EqualData):
 
 
 def _with_error(frame: Frame, error: NDArray) -> Frame:
-    """Return a frame with another geometric error and no locked-in clearance."""
+    """Return a frame with a new geometric error, without locked-in clearance."""
     bolt = frame.locked_at
     if bolt is not None:
         bolt = replace(bolt, screw=np.zeros(6))
@@ -301,7 +302,7 @@ def parents_first(frames: Iterable[Frame]) -> tuple[Frame, ...]:
 
 
 def _stable(frames: tuple[Frame, ...], depth: dict[str, int]) -> tuple[Frame, ...]:
-    """Return the given order if parents already come first, else sort by depth."""
+    """Return frames unchanged if parents come first; otherwise sorted by depth."""
     seen = {BASE}
     for frame in frames:
         if frame.parent not in seen:

@@ -33,7 +33,7 @@ MEANINGS = {
     UNSTABLE: "the equilibrium has a direction of negative stiffness",
     NOT_PROVED: "the certificate of the solution is not sufficient",
 }
-# statuses of the points of a sweep; a file stores the index in this list
+# statuses of the points of a sweep; a file stores the index of the status in this list
 OF_POINTS = (
     OK, OUT_OF_REACH, CANNOT_ASSEMBLE, SOLVER_FAILED, INVALID_ROBOT, NO_EQUILIBRIUM,
     SINGULAR, BEYOND_LIMITS, BEYOND_SINGULARITY,

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# variables whose quantity has another name in forcefit/results/quantities.py
+# variables that have another name in the table forcefit/results/quantities.py
 _RENAMED = {
     "clearance_screw": "clearance", "link_screw": "link", "joint_screw": "joint",
     "stiffness": "axis_stiffness", "stiffness_matrix": "stiffness", "read_at": "point",
@@ -32,7 +32,7 @@ class PlacedRobot(Protocol):
 
     @property
     def robot(self) -> Robot:
-        """The manipulator."""
+        """The robot that is placed."""
 
     def pose(self) -> dict[str, float]:
         """Return the nominal platform pose by component."""
@@ -71,7 +71,7 @@ class ForcedAssembly(Protocol):
 
 
 def assembly_dataset(assembly: ForcedAssembly) -> "xarray.Dataset":
-    """Return an assembly over its frames and closures, with the platform's error.
+    """Return the results of an assembly as a data set, by frame and by closure.
 
     Args:
         assembly: assembly by the linear model or with finite motions.
@@ -108,7 +108,7 @@ def assembly_dataset(assembly: ForcedAssembly) -> "xarray.Dataset":
 
 
 def points_dataset(values: Mapping[str, NDArray]) -> "xarray.Dataset":
-    """Return the results of many points as a data set over ``point``.
+    """Return the results of many points as a data set with the dimension ``point``.
 
     Args:
         values: (k, ...) arrays by the names of a sweep's variables.
@@ -128,9 +128,10 @@ def frame_table(data: "xarray.Dataset", *rows: str) -> "pandas.DataFrame":
         rows: the dimensions that become the index; each row is one of their points.
 
     Returns:
-        Table whose columns are (variable, component).  The component is empty for plain
-        numbers; for several further dimensions, it joins their labels by dots.  Units
-        by variable and dimension are in ``attrs["units"]``.
+        Table whose columns are pairs (variable, component).  The component is empty for
+        a variable without further dimensions.  For several further dimensions, it
+        consists of their labels, joined by dots.  ``attrs["units"]`` contains the unit
+        of every variable and dimension.
     """
     import pandas
 
@@ -194,11 +195,13 @@ def labelled(
     """Return arrays as a data set with units and meaning.
 
     Args:
-        values: by variable the array of the quantity of this name; or the pair of
-            another :class:`~forcefit.results.quantities.Quantity` and its array.
+        values: for each variable the array of the quantity with this name; or a pair of
+            a :class:`~forcefit.results.quantities.Quantity` with another name and its
+            array.
         axis: name of the first dimension of every array; empty if there is none.
         points: labels of that dimension.
-        labels: labels of dimensions of which the table of quantities has none.
+        labels: labels of the dimensions for which the table of quantities has no
+            labels.
 
     Returns:
         The data set.

@@ -1,4 +1,4 @@
-"""Stiffness K_C of the platform by direction, and contributions of the parts.
+"""Stiffness K_C of the platform, and contributions of the parts to its compliance.
 
 Start with ``platform_stiffness.py``; ``matrices.py`` defines its result.
 """

@@ -1,4 +1,4 @@
-r"""Newton's method for an equilibrium whose loaded clearances are known.
+r"""Newton's method for an equilibrium at which the loaded clearances are known.
 
 A clearance is called pressed here if it is at its bound and carries a force.  Cone
 programmes are solved up to a certified gap: pressed clearances are within 1e-6 of their
@@ -28,15 +28,16 @@ from forcefit.assembly.linear.closure import Linearisation, VirtualJoints
 from forcefit.assembly.linear.load import FrameLoads
 from forcefit.assembly.solvers.cones import cone_sizes
 
-AT_BOUND = 1e-6  # [-] distance within which a clearance counts as at its bound
-_NEAR_BOUND = 1e-3  # [-] distance from its bound within which it can be pressed
+AT_BOUND = 1e-6  # [-] relative distance within which a clearance counts as at its bound
+# [-] relative distance from its bound within which a clearance can be pressed
+_NEAR_BOUND = 1e-3
 _PRESSED = 1e-8  # relative to the largest force: a smaller force counts as zero
 # relative to the energy without clearance: a force below this counts as zero
 _ROUNDING = 1e-12
 _RANK = 1e-10  # relative size below which a singular value counts as zero
 _FLAT = 1e-12  # relative to the largest curvature: smaller curvatures count as zero
 _STEPS = 4  # largest number of Newton steps; two are usual
-_SETTLED = 1e-14  # [-] accepted excess over the bounds
+_SETTLED = 1e-14  # [-] largest accepted relative excess of a clearance over its bound
 _GUESSES = 3  # largest number of guesses of the pressed clearances
 
 
@@ -51,7 +52,8 @@ def contacts(assembly: Assembly) -> tuple[NDArray, NDArray]:
         assembly: the manipulator with least energy.
 
     Returns:
-        Two masks, each (cones,) bool.
+        Two masks (cones,) bool: clearances that carry a force, and clearances at their
+        bound without a force.
     """
     force = bound_forces(assembly)
     gap = 1.0 - cone_sizes(assembly.clearances, assembly.joints.group)
@@ -88,7 +90,7 @@ def settle(assembly: Assembly) -> Assembly:
         size = cone_sizes(settled.clearances, settled.joints.group)
         if np.array_equal(contacts(settled)[0], pressed) and np.all(size <= 1 + 1e-9):
             return settled
-        # a small force was wrongly set to zero: its clearance exceeds its bound
+        # a clearance exceeds its bound, because its small force was wrongly set to zero
         beyond = size > 1.0 + 1e-9
         if not (beyond & ~pressed).any():
             break
@@ -97,7 +99,7 @@ def settle(assembly: Assembly) -> Assembly:
 
 
 def _settled(assembly: Assembly, pressed: NDArray) -> Assembly:
-    """Return the equilibrium with these clearances at their bounds."""
+    """Return the equilibrium with the given clearances at their bounds."""
     joints, group = assembly.joints, assembly.joints.group
     x, multipliers = unknowns(assembly), assembly.multipliers
     bounded = bounded_unknowns(joints)

@@ -1,9 +1,10 @@
-r"""Load-deflection path beyond limit points by arc length, without clearance.
+r"""Load-deflection path beyond limit points, followed by arc length, without clearance.
 
-At a maximum of the load, the path of equilibria turns back, and there is no equilibrium
-nearby for larger loads.  The load is therefore treated as an unknown.  The path
-(x, lambda) is followed in steps of given length.  Each step is a prediction along the
-tangent, followed by corrections by Newton's method perpendicular to it,
+At a maximum of the load (a limit point), the path of equilibria turns back.  No
+equilibrium nearby exists for larger loads.  The load is therefore treated as an
+unknown.  The path (x, lambda) is followed in steps of given length.  Each step is a
+prediction along the tangent, followed by corrections by Newton's method perpendicular
+to it,
 
         [ Z'HZ   -Z'q ] [ t       ]     [ unbalanced force       ]
         [ tau_x   tau ] [ dlambda ] = - [ error of step's length ].
@@ -58,7 +59,7 @@ _HALVINGS = 20  # number of bisections that bracket a critical load within a ste
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """An equilibrium of the path.
+    """An equilibrium on the load-deflection path.
 
     Attributes:
         load: [N or N m] load at the equilibrium.
@@ -85,18 +86,19 @@ class _Place:
 
 @dataclass(frozen=True, eq=False)
 class _Path:
-    """A path to be followed, and the definition of its arc length.
+    """A load-deflection path to be followed, and the definition of its arc length.
 
     Attributes:
         posture: posture of the robot without clearance, with beams cut into pieces.
         component: component of the load that changes.
         rest: (6,) [N m, N] the other components of the load.
         gravity: (3,) [m/s^2] gravity vector, or None.
-        weight: weight of squared motions, relative to squared loads divided by the
-            squared largest load.
+        weight: factor of squared motions in the squared arc length.  The other term of
+            the squared arc length is the squared load divided by the squared largest
+            load.
         range: [N or N m] the largest load.
         parts: owner of each spring.
-        idle: number of motions without stiffness and load.
+        idle: number of motions that have no stiffness and on which no load acts.
     """
 
     posture: Posture
@@ -206,7 +208,7 @@ def follow_load(
 def _begin(
     path: _Path, start: ExactAssembly, first: float, last: float
 ) -> tuple[_Place, _Path]:
-    """Return the first equilibrium with its tangent, and the path with its weight."""
+    """Return the first equilibrium with its tangent, and the path to be followed."""
     local = start.expansion
     values, _ = path.modes(local)
     flat = np.abs(values) <= FLAT * np.abs(values).max(initial=0.0)
@@ -214,15 +216,15 @@ def _begin(
     values, Z = path.modes(local)
     motion = Z @ ((Z.T @ path.reference_load(local)) / values)
     size = np.linalg.norm(motion / local.placement.model.units) * path.range
-    weight = 1.0 / (size or 1.0) ** 2  # the size is zero if the robot is rigid
-    # the load contributes half of the arc length
+    weight = 1.0 / (size or 1.0) ** 2  # if the robot is rigid, the size is zero
+    # the weight is chosen so that the load contributes half of the arc length
     rise = path.range / np.sqrt(2.0) * np.sign(last - first)
     place = _Place(first, local, motion * rise, float(rise), values, Z)
     return place, replace(path, weight=float(weight))
 
 
 def _advance(path: _Path, place: _Place, step: float) -> tuple[_Place | None, int]:
-    """Return the next equilibrium, None if not converged, and the correction count."""
+    """Return the next equilibrium or None, and the number of Newton corrections."""
     x0, load = place.local.placement.x, place.load
     x = x0 + step * place.motion
     load = load + step * place.rise
@@ -256,7 +258,7 @@ def _solve(
     path: _Path, local: Expansion, modes: tuple[NDArray, NDArray], tangent: NDArray,
     left: NDArray,
 ) -> NDArray | None:  # fmt: skip
-    """Return the motion along the modes and the load change that remove a residual."""
+    """Return the motion and the change of the load that remove a residual."""
     values, Z = modes
     M = np.zeros((len(left), len(left)))
     M[:-1, :-1] = np.diag(values)
@@ -271,7 +273,7 @@ def _solve(
 def _oriented(
     path: _Path, local: Expansion, load: float, normal_to: NDArray, rise: float
 ) -> _Place | None:
-    """Return an equilibrium with its unit tangent in the direction of travel."""
+    """Return an equilibrium with its unit tangent, in the direction of the path."""
     values, Z = path.modes(local)
     left = np.zeros(len(values) + 1)
     left[-1] = -1.0
@@ -292,7 +294,7 @@ def _critical(path: _Path, low: _Place, high: _Place, step: float) -> Event:
     for _ in range(_HALVINGS):
         middle, _ = _advance(path, start, (short + long_) / 2)
         if middle is None:
-            break  # for example at a branch, where the equations are singular
+            break  # the equations are singular, for example at a branch
         if middle.unstable == start.unstable:
             low, short = middle, (short + long_) / 2
         else:

@@ -1,4 +1,4 @@
-"""Load against deflection: clearances, contacts, elasticity, and buckling.
+"""Deflection of the platform as a function of a load: contacts, elasticity, buckling.
 
 One component of the load is changed through a list of values while the others are
 constant.  At each value, the equilibrium is computed by problem (22) or with finite
@@ -50,21 +50,25 @@ if TYPE_CHECKING:
     import xarray
 
 _HALVINGS = 14  # bisections that locate an event to 6e-5 of a load step
-_CARRIES = 1e-6  # force times bound, relative to the largest, that counts as zero
+# product of force and bound, relative to the largest product, that counts as zero
+_CARRIES = 1e-6
 # largest number of contact changes that are followed within a load step: in symmetric
 # robots, rounding errors can cause forces in some contacts
 _CHANGES = 8
-# relative to the largest motion in a mode: the platform counts as fixed below this
+# platform motion, relative to the largest motion in a mode, below which the platform
+# counts as fixed
 _STAYS = 1e-6
-_STILL = 1e-12  # [characteristic lengths] smaller motions count as rounding errors
-_JUMP = 5.0  # factor on the motion that the tangents on both sides predict
-# relative to the largest load: for smaller loads, clearances can leave the pose open
+_STILL = 1e-12  # smaller motions, in characteristic lengths, count as rounding errors
+# a motion is a jump if it exceeds the motion predicted by both tangents by this factor
+_JUMP = 5.0
+# relative to the largest load: under smaller loads, clearances can leave the pose
+# undetermined
 _NO_LOAD = 1e-9
 
 
 @dataclass(frozen=True)
 class Event:
-    """An event on the curve.
+    """An event on the load-deflection curve, such as a change of contact.
 
     Attributes:
         load: [N or N m] load at the event, or directly after it.
@@ -90,7 +94,8 @@ class DeflectionCurve:
         loads: (k,) [N m or N] values of that component, in the order of application.
         screws: (k, 6) [rad, m] screws of the platform at its origin, base axes.
         energies: (k,) [J] elastic energies.
-        stiffness: (k,) tangent stiffness along the component, with the others free.
+        stiffness: (k,) [N m/rad or N/m] tangent stiffness along the component, with the
+            other components of the motion free.
         pressed: (k,) names of the clearances that carry a force.
         open_: (k,) bool, True if clearances leave the pose undetermined.
         events: events in the order of the curve.
@@ -111,13 +116,13 @@ class DeflectionCurve:
     __repr__, _repr_html_ = short_repr, html_table
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return a data set over ``point``; see :mod:`.tables`."""
+        """Return a data set with the dimension ``point``; see :mod:`.tables`."""
         from forcefit.assembly.platform_stiffness.tables import curve_dataset
 
         return curve_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a row for each load, columns (variable, component)."""
+        """Return a table with one row per load and columns (variable, component)."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "point")
@@ -130,7 +135,7 @@ class DeflectionCurve:
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """An equilibrium on the curve."""
+    """An equilibrium on the load-deflection curve."""
 
     load: float
     equilibrium: Assembly | ExactAssembly
@@ -180,11 +185,13 @@ def deflection_curve(
     """
     check_method(method)
     if state not in {"contact", "exact"}:
-        raise ValueError(f"deflection_curve: no state {state!r}")
+        raise ValueError(
+            f"deflection_curve: no state {state!r}; expected 'contact' or 'exact'"
+        )
     if component not in range(6) or not len(loads):
         raise BadInput(
             f"deflection_curve: found component {component} and {len(loads)} loads, "
-            "expected one of 0 to 5 and at least one load"
+            "expected a component from 0 to 5 and at least one load"
         )
     rest = np.zeros(6) if load is None else one_load(load)
     loads = numbers_of("loads", loads, len(loads), "N m or N").tolist()
@@ -253,7 +260,7 @@ def _solve(
             posture, wrench, gravity=gravity, progress=progress, method=method
         )
     active, force = active_clearances(equilibrium.expansion)
-    # omit contacts with forces due to rounding errors only
+    # omit contacts whose forces are only rounding errors
     active &= force > _CARRIES * force.max(initial=0.0)
     names = clearance_names(equilibrium.expansion.placement.model.joints, active)
     return _Point(value, equilibrium, exact_tangent(equilibrium, "letting go"), names)
@@ -321,7 +328,7 @@ def _events(
         low, high = _bracket(
             before, after, at, lambda p: _apart(before, p) < _apart(p, after)
         )
-        if _jumps(low, high, component):  # otherwise the robot is only compliant here
+        if _jumps(low, high, component):  # otherwise the motion is large but continuous
             way = numbers(
                 high.equilibrium.platform_screw - low.equilibrium.platform_screw
             )
@@ -338,7 +345,7 @@ def _event(point: _Point, kind: str, what: str, component: int) -> Event:
 def _bracket(
     low: _Point, high: _Point, at: _Solver, same: Callable[[_Point], bool]
 ) -> tuple[_Point, _Point]:
-    """Return two close loads between which a property changes for the first time."""
+    """Bracket the first change of a property between two close loads."""
     for _ in range(_HALVINGS):
         try:
             middle = at((low.load + high.load) / 2, low)
@@ -349,7 +356,7 @@ def _bracket(
 
 
 def _apart(one: _Point, other: _Point) -> float:
-    """Return the distance [m] of two platforms, with rotations times a length."""
+    """Return the distance [m] of two platform poses, with rotations times a length."""
     change = other.equilibrium.platform_screw - one.equilibrium.platform_screw
     return float(np.linalg.norm(change * np.repeat([one.tangent.length, 1.0], 3)))
 
@@ -368,7 +375,7 @@ def _jumps(before: _Point, after: _Point, component: int) -> bool:
 
 
 def _mode(point: _Point) -> str:
-    """Describe the mode of negative stiffness: the platform's motion, the bent part."""
+    """Describe the mode of negative stiffness by platform motion and bent part."""
     tangent = point.tangent
     soft = int(np.flatnonzero(tangent.signs < 0)[0])
     return "buckles: " + mode_text(
@@ -382,15 +389,16 @@ def mode_text(
     """Return a description of a mode: the platform's motion, and the part that bends.
 
     Args:
-        screws: (6, k) [rad, m] screws of the platform in all modes, of any common size.
+        screws: (6, k) [rad, m] screws of the platform in all modes, with a common
+            factor.
         mode: index of the mode.
         springs: (m,) [sqrt(2 J)] deformations of the springs in this mode.
         parts: (m,) owner of each spring.
         length: [m] factor that makes rotations comparable with translations.
 
     Returns:
-        Text with the unit screw, or the statement that the platform does not move, and
-        the part that bends most.
+        Text with the unit screw of the platform, or the statement that it does not
+        move; and the name of the part that bends most.
     """
     part = parts[largest_row(np.square(springs))]
     scale, screw = np.repeat([length, 1.0], 3), screws[:, mode]

@@ -34,7 +34,8 @@ from forcefit.assembly.platform_stiffness.matrices import (
     unit_screws,
 )
 
-FLAT = 1e-12  # relative to the largest curvature: smaller curvatures count as zero
+# relative to the largest curvature of the potential: smaller ones count as zero
+FLAT = 1e-12
 
 
 def exact_tangent(

@@ -6,8 +6,8 @@ Without loads, the small motions of springs y and free joints q satisfy the clos
 
 Multiplication by rows orthogonal to A_q eliminates q and gives Z'A_y y = 0.  The
 solutions y = W t, with W orthonormal, are the modes.  Their energy is t.t / 2, and
-C = L L', where L contains the platform's screws.  Compliances are not added, so stiff
-and soft ones keep their accuracy.
+C = L L', where L contains the platform's screws.  The method does not add compliances,
+so stiff and soft springs keep their relative accuracy.
 
 A clearance is either fixed at zero (the classical model), or has the state of problem
 (22): free within its bound, or pressed against it.  A pressed clearance is rigid in the
@@ -49,11 +49,11 @@ from forcefit.assembly.solvers.method import Method
 
 Side = Literal["holding", "letting go"]
 _RANK = 1e-10  # relative size below which a singular value counts as zero
-_NOISE = 1e-12  # rounding error of a column that a projection removes, relative to it
+_NOISE = 1e-12  # relative rounding error of a column that a projection removes
 
 
 def without_clearance(posture: Posture) -> PlatformStiffness:
-    """Return the classical virtual-joint model, with every clearance fixed at zero.
+    """Return the stiffness by the classical model, with clearances fixed at zero.
 
     Args:
         posture: the robot's configuration.
@@ -82,7 +82,7 @@ def in_contact(assembly: Assembly, side: Side = "holding") -> PlatformStiffness:
 
 
 def active_tangent(assembly: Assembly, side: Side = "holding") -> PlatformStiffness:
-    """Return the tangent of an assembly that may be slightly out of equilibrium.
+    """Return the tangent stiffness of an assembly that is nearly in equilibrium.
 
     Args:
         assembly: assembly with clearances that are accurate to rounding.
@@ -174,7 +174,7 @@ def _sizes(columns: NDArray, length: float) -> NDArray:
 
 
 def _svd(A: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Return all singular vectors, also of a matrix without rows or columns."""
+    """Return all singular vectors of a matrix, which may have no rows or columns."""
     if A.size:
         return np.linalg.svd(A)
     return np.eye(A.shape[0]), np.zeros(0), np.eye(A.shape[1])

@@ -1,4 +1,4 @@
-"""Stiffness of the platform at many postures, with contributions of the parts."""
+"""Stiffness of the platform at many postures, with the parts' contributions."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_RANK = 1e-10  # relative size below which a square root of compliance counts as rigid
+# relative size below which a singular value of the compliance root counts as rigid
+_RANK = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,13 +86,13 @@ class Stiffnesses:
         )
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return a data set over ``point``, as of a sweep."""
+        """Return a data set with the dimension ``point``, as in the file of a sweep."""
         from forcefit.assembly.platform_stiffness.tables import stiffnesses_dataset
 
         return stiffnesses_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a row for each point, columns (variable, component)."""
+        """Return a table with one row per point and columns (variable, component)."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "point")
@@ -121,7 +122,7 @@ class Stiffnesses:
     def _roots(self) -> tuple[NDArray, NDArray]:
         """Singular values (k, 6), vectors (k, 6, 6) of the scaled compliance roots."""
         scale = np.repeat([self.length, 1.0], 3)
-        # reduce to six rows by a triangular factor, because there can be many springs
+        # a triangular factor reduces the many rows of springs to six
         known = np.isfinite(self.springs).all(axis=(1, 2))
         values = np.full((len(self.springs), 6), np.nan)
         vectors = np.full((len(self.springs), 6, 6), np.nan)
@@ -162,7 +163,7 @@ class Stiffnesses:
             return self.eigen_stiffnesses[:, -1] / self.eigen_stiffnesses[:, 0]
 
     def along(self, direction: ArrayLike) -> NDArray:
-        """Return (k,) [N m/rad or N/m] stiffness along a direction, the others free.
+        """Return (k,) [N m/rad or N/m] stiffness along a direction, other motions free.
 
         Args:
             direction: (6,) unit direction of a wrench.
@@ -173,7 +174,7 @@ class Stiffnesses:
         d, scale = np.asarray(direction), np.repeat([self.length, 1.0], 3)
         compliance = np.sum((self.springs @ d) ** 2, axis=1)
         largest = np.sum((self.springs * scale) ** 2, axis=(1, 2))
-        # a motion that no part makes has only rounding errors as compliance
+        # along a motion that no part allows, the compliance consists of rounding errors
         still = compliance <= _RANK**2 * largest * np.sum((d / scale) ** 2)
         with np.errstate(divide="ignore"):
             K = 1.0 / np.where(still, 0.0, compliance)
@@ -205,7 +206,7 @@ class Stiffnesses:
 
 
 def many_without_clearance(posture: Posture, method: Method) -> Stiffnesses:
-    """Return the classical virtual-joint model, with every clearance fixed at zero.
+    """Return stiffnesses by the classical model, with clearances fixed at zero.
 
     Args:
         posture: k postures.

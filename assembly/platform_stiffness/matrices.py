@@ -46,12 +46,12 @@ if TYPE_CHECKING:
     import xarray
 
 _RANK = 1e-10  # relative size below which a motion counts as zero
-_ROUNDING = 1e-12  # relative size of rounding of motions of the platform
+_ROUNDING = 1e-12  # relative rounding error of platform motions
 _UNTOUCHED = 1e-9  # component of a unit screw below which it counts as zero
 
 
 class Part(NamedTuple):
-    """Owner of a deformation: ``link``, ``joint`` or ``clearance`` of a frame.
+    """Part that deforms: the ``link``, ``joint`` or ``clearance`` of a frame.
 
     ``frame`` may be the name of a joint of several frames
     (:func:`forcefit.assembly.model.joint_names.shown_name`).
@@ -72,7 +72,8 @@ class EigenStiffnesses:
     """Principal stiffnesses, the stiffest last; rotations are angle times length.
 
     Attributes:
-        values: (6,) [N/m], 0 along free motions, inf along rigid directions.
+        values: (6,) [N/m] principal stiffnesses: 0 along free motions, inf along rigid
+            directions.
         screws: (6, 6) [rad, m] screws in columns, of unit size with rotations times
             length.
         length: [m] the characteristic length.
@@ -151,7 +152,7 @@ class PlatformStiffness:
         return stiffness_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a row for each part: its shares in the compliance along each axis."""
+        """Return a table: the share of each part in the compliance along each axis."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "part")
@@ -187,7 +188,7 @@ class PlatformStiffness:
 
     @property
     def free_text(self) -> str:
-        """Text on motions without resistance; empty if there are none."""
+        """Text on platform motions without resistance; empty if there are none."""
         screws = ", ".join(numbers(screw) for screw in self.free.T)
         return f"the platform moves freely along {screws} [rad, m]" * bool(screws)
 
@@ -208,12 +209,13 @@ class PlatformStiffness:
 
     @cached_property
     def _resisted(self) -> tuple[NDArray, NDArray, NDArray]:
-        """Basis of resisted wrenches (6, r), stiffness in it, and rigid wrenches."""
+        """Basis (6, r) of resisted wrenches, stiffness in it, and rigid wrenches."""
         scale = self._scale[:, None]
         basis = null_space((scale * self.free).T) if self.free.size else np.eye(6)
         whole = scale * self.root
         U, S, Vt = np.linalg.svd(basis.T @ whole)
-        # what springs add along free motions leaves its rounding in other directions
+        # the contribution of springs along free motions causes rounding errors in other
+        # directions
         rounding = _ROUNDING * np.abs(whole).max(initial=0.0)
         rank = int(np.sum(S > max(_RANK * S.max(initial=0.0), rounding)))
         inverse = np.diag(1.0 / S[:rank])
@@ -230,7 +232,7 @@ class PlatformStiffness:
         way, core, rigid = self._resisted
         values, vectors = np.linalg.eigh(core)
         scale = self._scale[:, None]
-        # screws that are orthonormal if rotations are multiplied by the length
+        # these screws are orthonormal after multiplication of rotations by the length
         screws = np.hstack([
             np.linalg.qr(scale * self.free)[0],
             way @ vectors / scale,
@@ -243,7 +245,7 @@ class PlatformStiffness:
         return EigenStiffnesses(values[order], screws[:, order] / scale, self.length)
 
     def along(self, direction: ArrayLike) -> tuple[float, float]:
-        """Return the stiffness along one direction, with the others free or blocked.
+        """Return the stiffness along a direction, with other motions free, or blocked.
 
         Args:
             direction: (6,) direction of a wrench and of a screw, such as
@@ -263,17 +265,17 @@ class PlatformStiffness:
         return free, blocked
 
     def _compliance_along(self, d: NDArray) -> float:
-        """Return d . C d, infinite along free motions."""
+        """Return d . C d for a unit direction d; infinite along free motions."""
         if _touches(self.free, d):
             return np.inf
         screws = self.root.T @ d
         largest = np.linalg.norm(self._scale[:, None] * self.root)
         if np.linalg.norm(screws) <= _RANK * largest * np.linalg.norm(d / self._scale):
-            return 0.0  # the value is a rounding error of a motion that no part makes
+            return 0.0  # no part allows this motion, so the value is a rounding error
         return float(self.signs @ screws**2)
 
     def _held(self, d: NDArray) -> float:
-        """Return d . K d."""
+        """Return d . K d for a unit direction d."""
         way, core, _ = self._resisted
         return float(d @ way @ core @ way.T @ d)
 
@@ -397,7 +399,7 @@ def _direction(direction: ArrayLike) -> NDArray:
 
 
 def _touches(vectors: NDArray, d: NDArray) -> bool:
-    """Return whether a direction has a component along any of the vectors."""
+    """Return whether a direction has a component along at least one of the vectors."""
     return bool(np.abs(vectors.T @ d).max(initial=0.0) > _UNTOUCHED)
 
 

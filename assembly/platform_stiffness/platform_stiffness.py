@@ -55,7 +55,7 @@ def platform_stiffness(
     side: Side = "holding",
     method: Method = "compiled",
 ) -> PlatformStiffness | Stiffnesses:
-    """Return the platform's stiffness: the tangent of its motion under a small wrench.
+    """Return the platform's tangent stiffness: small wrench per small motion.
 
     Args:
         posture: the robot's configuration; or many postures of one robot.
@@ -97,10 +97,15 @@ def platform_stiffness(
     if load is not None:
         load = one_load(load)
     if side not in get_args(Side):
-        raise ValueError(f"platform_stiffness: no side {side!r}")
+        raise ValueError(
+            f"platform_stiffness: no side {side!r}; expected 'holding' or 'letting go'"
+        )
     state = cast(State, current_value("state", state, _OLD_STATES))
     if state not in get_args(State):
-        raise ValueError(f"platform_stiffness: no state {state!r}")
+        raise ValueError(
+            f"platform_stiffness: no state {state!r}; expected 'nominal', 'contact' "
+            "or 'exact'"
+        )
     if not isinstance(posture, Posture):
         posture = together(posture)
     if posture.transforms.ndim == 3:

@@ -1,4 +1,4 @@
-"""Stiffness, curves and modes as labelled arrays, with the names of a sweep's file.
+"""Labelled arrays of stiffness, curves and modes, named as in the file of a sweep.
 
 ========================  ======================================================
 ``compliance``            matrix C
@@ -57,7 +57,7 @@ def tangent_quantities(
 
 
 def many_quantities(many: "Stiffnesses") -> dict[str, NDArray]:
-    """Return the quantities of :func:`tangent_quantities`, with k rows each."""
+    """Return the quantities of :func:`tangent_quantities` for k postures."""
     by_axis = [list(many.shares(axis).values()) for axis in np.eye(6)]
     return {
         "compliance": many.compliance,
@@ -90,7 +90,7 @@ def stiffnesses_dataset(many: "Stiffnesses") -> "xarray.Dataset":
 
 
 def modes_dataset(modes: "NaturalModes") -> "xarray.Dataset":
-    """Return natural modes over ``mode``: frequency, platform's motion, shares."""
+    """Return a data set of natural modes: frequency, platform motion, energy shares."""
     parts = sorted({part for shares in modes.shares for part in shares})
     shares = [[one.get(part, 0.0) for part in parts] for one in modes.shares]
     count = len(modes.frequencies)
@@ -111,7 +111,7 @@ def modes_dataset(modes: "NaturalModes") -> "xarray.Dataset":
 
 
 def curve_dataset(curve: "DeflectionCurve") -> "xarray.Dataset":
-    """Return a load-deflection curve over ``point``, in the order of the loads."""
+    """Return a data set of a load-deflection curve, in the order of the loads."""
     turns = curve.component < 3
     load, deflection = ("N m", "rad") if turns else ("N", "m")
     pressed = [", ".join(sorted(names)) for names in curve.pressed]

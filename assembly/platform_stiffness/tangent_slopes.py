@@ -1,4 +1,4 @@
-r"""Derivatives of the platform's stiffness with respect to a number of the robot.
+r"""Derivatives of the platform's compliance with respect to one number of the robot.
 
 The stiffness at an equilibrium depends on a number p directly, and through the
 equilibrium (x, lambda, f): unknowns, multipliers of the closures and forces of the
@@ -93,7 +93,7 @@ _Moved = Callable[[Posture, float], tuple[PlatformStiffness, NDArray]]
 def compliance_slope(
     posture: Posture, ahead: Posture, back: Posture, step: float, asked: TangentState
 ) -> NDArray:
-    """Return the derivative of the platform's compliance with respect to a number.
+    """Return the compliance's derivative with respect to one number of the robot.
 
     Args:
         posture: the robot's configuration.
@@ -168,7 +168,7 @@ def _linear(
 
 
 def _like(joints: VirtualJoints, there: Posture) -> VirtualJoints:
-    """Return the virtual joints of a neighbouring robot."""
+    """Return the virtual joints of a robot that differs in one number."""
     return virtual_joints(there.robot, bounded_motion=joints.bounded_motion)
 
 
@@ -223,11 +223,11 @@ def _difference(
     conditions: Callable[[Posture], tuple[NDArray, NDArray]],
     ahead: Posture, back: Posture, step: float,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the derivatives of closures and gradient for fixed unknowns."""
+    """Return the derivatives of closures and gradient with the unknowns fixed."""
     there, behind = conditions(ahead), conditions(back)
     return (there[0] - behind[0]) / (2 * step), (there[1] - behind[1]) / (2 * step)
 
 
 def _unknown(tangent: PlatformStiffness) -> PlatformStiffness:
-    """Return the tangent with NaN, because it has no derivative at a contact change."""
+    """Return NaN for the derivative, which does not exist at a change of contact."""
     return replace(tangent, root=np.full_like(tangent.root, np.nan))

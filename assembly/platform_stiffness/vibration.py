@@ -48,17 +48,18 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_NULL = 1e-12  # eigenvalues below this share of the largest are zero
-_ROUNDING = 1e-14  # rounding of the mass matrix relative to its largest entry
+_NULL = 1e-12  # eigenvalues below this share of the largest count as zero
+_ROUNDING = 1e-14  # rounding error of the mass matrix, relative to its largest entry
 
 
 @dataclass(frozen=True, eq=False)
 class NaturalModes:
-    """The lowest natural modes, slowest first.
+    """Lowest natural modes of a robot, in order of increasing frequency.
 
     Attributes:
         posture: the robot's nominal configuration.
-        frequencies: (k,) [Hz]; 0 for motions without resistance, NaN if unstable.
+        frequencies: (k,) [Hz] natural frequencies; 0 for motions without resistance,
+            NaN for unstable modes.
         platform_screws: (6, k) [rad, m] motions of the platform for a modal mass of
             1 kg.
         shares: for each mode the share of every part in its elastic energy, largest
@@ -78,13 +79,13 @@ class NaturalModes:
     __repr__, _repr_html_ = short_repr, html_table
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return a data set over ``mode``; see :mod:`.tables`."""
+        """Return a data set with the dimension ``mode``; see :mod:`.tables`."""
         from forcefit.assembly.platform_stiffness.tables import modes_dataset
 
         return modes_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a row for each mode, columns (variable, component)."""
+        """Return a table with one row per mode and columns (variable, component)."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "mode")
@@ -122,7 +123,9 @@ def natural_modes(
         ValueError: ``state`` or ``method`` is unknown.
     """
     if state not in {"nominal", "exact"}:
-        raise ValueError(f"natural_modes: no state {state!r}")
+        raise ValueError(
+            f"natural_modes: no state {state!r}; expected 'nominal' or 'exact'"
+        )
     if state == "nominal":
         # drive forces are loads, which the nominal state excludes
         frames = (
@@ -138,7 +141,7 @@ def natural_modes(
     if not np.trace(M) > 0.0:
         raise BadInput(_no_mass(posture.robot))
     squares, modes = _modes(H, M, rounding)
-    if not squares.size:  # the mass of the moving parts is only a rounding error
+    if not squares.size:  # the moving parts have no mass except for rounding errors
         raise BadInput(_no_mass(posture.robot))
     squares, modes, idle = _without_idle(
         squares, modes, platform_moves(equilibrium.expansion) @ D
@@ -200,10 +203,11 @@ def _modes(K: NDArray, M: NDArray, rounding: NDArray) -> tuple[NDArray, NDArray]
     Returns:
         (m,) squared frequencies and (k, m) modes.
     """
-    shift = np.trace(K) / np.trace(M) or 1.0  # 1 for a robot without elastic parts
+    # the shift is 1 for a robot without elastic parts
+    shift = np.trace(K) / np.trace(M) or 1.0
     values, vectors = np.linalg.eigh(K + shift * M)
     least = shift * np.sum(vectors * (rounding @ vectors), axis=0)
-    # omit motions without mass and spring
+    # omit motions on which neither a mass nor a spring acts
     kept = values > np.maximum(_NULL * values.max(), least)
     if not kept.any():
         return np.zeros(0), np.zeros((len(K), 0))
@@ -317,7 +321,7 @@ def _beam_mass(frame: Frame) -> NDArray:
     e, f, g = 3 * length, 4 * length**2, length**2
     bends = ((4, 2, 10, 8), 1, section.I_z), ((5, 1, 11, 7), -1, section.I_y)
     for plane, sign, second in bends:
-        # a rotation about y lowers points that are ahead along x
+        # a positive rotation about y moves points at positive x in the direction -z
         s = np.array([1, sign, 1, sign])
         shift = np.array([
             [156, a, 54, -b], [a, c, b, -d], [54, b, 156, -a], [-b, -d, -a, c]

@@ -1,4 +1,4 @@
-"""Built-in robots; each module contains one robot with its parameters.
+"""Built-in robots: each module defines one robot and its parameters.
 
 Start with ``five_bar.py``, a short one.  ``placing.py`` creates frames from home poses.
 """

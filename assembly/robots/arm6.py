@@ -1,8 +1,8 @@
 """A serial arm of six axes: the PUMA 560.
 
 The arm has no closure, and therefore no internal forces: errors and clearances add up
-along the arm.  Under a load, the flange moves by J K^-1 J^T due to the drives, and by
-the bending of the two long bodies.
+along the arm.  Under a load on the flange, two parts deform: the drives, whose
+compliance at the flange is J K^-1 J^T, and the two long bodies, which bend.
 
 Sources:
     Corke, Armstrong-Helouvry (1994), A search for consensus among model parameters
@@ -79,5 +79,5 @@ def arm6(parameters: Arm6Parameters | None = None) -> Robot:
 
 
 def after_joint(d: float, a: float, alpha: float) -> NDArray:
-    """Return (4, 4) transform from one joint to the next at joint angle zero."""
+    """Return the (4, 4) transform from a joint to the next at joint angle zero."""
     return transform([a, 0.0, d], rotation_matrix([alpha, 0.0, 0.0]))

@@ -28,11 +28,12 @@ AZIMUTHS = (-math.pi / 2, math.pi / 6, 5 * math.pi / 6)  # [rad] directions of t
 
 @dataclass(frozen=True)
 class DeltaParameters:
-    """Parameters of the robot [m, N m/rad]; the rods are carbon fibre tubes."""
+    """Parameters of the Delta robot [m, N m/rad]; the rods are carbon fibre tubes."""
 
-    # side of the triangle whose sides have the drives at their middles
+    # side of the base's triangle; the drives are in the middle of its sides
     base_side: float = 0.567
-    platform_side: float = 0.076  # side of the triangle with the rods at its corners
+    # side of the platform's triangle, with the rods at its corners
+    platform_side: float = 0.076
     arm: float = 0.524
     rod: float = 1.244
     rod_distance: float = 0.131  # distance of the two rods of a leg
@@ -114,7 +115,7 @@ def drive_angle(
 
 
 def _radial(azimuth: float) -> tuple[NDArray, NDArray]:
-    """Return the unit vectors outward and across, in the base's plane."""
+    """Return the unit vectors outward and tangential, in the plane of the base."""
     c, s = math.cos(azimuth), math.sin(azimuth)
     return np.array([c, s, 0.0]), np.array([-s, c, 0.0])
 

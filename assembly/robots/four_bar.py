@@ -48,7 +48,7 @@ def four_bar(parameters: FourBarParameters | None = None) -> Robot:
 
     Returns:
         The linkage with 8 frames and 1 closure; the platform ``point`` is the tracing
-        point. ``crank`` is driven; its coordinate is the angle to the ground link.
+        point.  ``crank`` is driven; its coordinate is the angle to the ground link.
     """
     P = parameters or FourBarParameters()
     foot, tip, middle, point = (P.crank * p for p in corners(P.home))
@@ -82,7 +82,8 @@ def corners(angle: float) -> tuple[NDArray, ...]:
     """
     foot, tip = np.array([2.0, 0.0]), direction(angle)
     to_pin = tip - foot
-    # Thales: perpendicular to it, at a distance of 5 from the crank pin
+    # by Thales' theorem: perpendicular to that line, at a distance of 5 from the crank
+    # pin
     across = np.array([to_pin[1], -to_pin[0]]) / np.linalg.norm(to_pin)
     point = foot + np.sqrt(25.0 - to_pin @ to_pin) * across
     return foot, tip, (tip + point) / 2, point

@@ -13,7 +13,7 @@ counted from 1.  Errors act at the frames :data:`ERROR_FRAMES` of the paper.
 ======  ===========================================================================
 symbol  meaning [m, rad]
 ======  ===========================================================================
-b       from the base's origin to the parallelogram's first joint
+b       distance from the base's origin to the parallelogram's first joint
 d       fixed side of the parallelogram, alpha its angle to the platform's plane
 f g e   from the parallelogram's end to the universal joints, base axes
 p a     from the far universal joints to the platform, base axes
@@ -109,7 +109,8 @@ def irsbot2(
         placed = _leg(parameters, sign * x, z)
         if sign < 0:
             placed = {name: turned @ T for name, T in placed.items()}
-            placed["tip"] = placed["tip"] @ turned  # both tips are parallel to the base
+            # rotated so that the tips of both legs are parallel to the base
+            placed["tip"] = placed["tip"] @ turned
         frames += _frames(leg, placed, parameters)
     loops = [
         (f"{leg}.{a}", f"{leg}.{b}")
@@ -149,7 +150,7 @@ def drive_angle(parameters: IRSBot2Parameters, x: float, z: float) -> float:
 
 
 def _planar_length(P: IRSBot2Parameters) -> float:
-    """Return [m] length of the distal links projected along y."""
+    """Return the length [m] of the distal links projected along y."""
     return math.sqrt(P.L2**2 - (P.g - P.a) ** 2)
 
 

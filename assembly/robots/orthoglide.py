@@ -15,8 +15,8 @@ Sources:
     mechanism for machining applications, the Orthoglide, IEEE Trans. Robotics and
     Automation 19: the architecture and its isotropic point.  Pashkevich, Chablat,
     Wenger (2009), Stiffness analysis of overconstrained parallel manipulators,
-    Mechanism and Machine Theory 44: which parts bend.  Dimensions are round numbers, of
-    the size of their prototype; sections, clearances and drives are typical.
+    Mechanism and Machine Theory 44: which parts deform.  Dimensions are round numbers,
+    of the size of their prototype; sections, clearances and drives are typical.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Frames defined by their home poses in base axes.
+"""Frames of built-in robots, defined by their home poses in base axes.
 
 The data of a robot are easiest to check in base axes.  A tree of frames, however,
 requires each frame relative to its parent, after the parent's joint.  Joints with

@@ -32,7 +32,7 @@ class PlanarLeg:
 
 
 def in_plane(point: ArrayLike, angle: float = 0.0) -> NDArray:
-    """Return (4, 4) frame at a point (x, y) [m], with its x axis at an angle [rad]."""
+    """Return the (4, 4) frame at (x, y) [m] whose x axis is at an angle [rad]."""
     x, y = np.asarray(point, dtype=float)
     return at([x, y, 0.0], x=[math.cos(angle), math.sin(angle), 0.0])
 

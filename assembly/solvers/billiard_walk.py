@@ -1,4 +1,4 @@
-"""Compiled billiard walk through the set of clearance positions.
+"""Compiled billiard walk (random sampling) through the set of clearance positions.
 
 Sources:
     Gryazina, Polyak (2014), Random sampling: billiard walk algorithm.
@@ -49,11 +49,11 @@ class Positions:
     def walk(
         self, u: NDArray, every: int, rng: np.random.Generator, trace: NDArray
     ) -> None:
-        """Continue a chain and record its platform screw at regular intervals.
+        """Continue a random chain and record its platform screw at regular intervals.
 
         Args:
             u: (nu,) current point of the chain, overwritten.
-            every: number of trajectories between two recorded screws.
+            every: number of trajectories of the walk between two recorded screws.
             rng: generator of random numbers.
             trace: (kept, 6) [rad, m] overwritten with the recorded screws.
         """

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 
 def cone_starts(group: NDArray) -> NDArray:
-    """Return (cones + 1,) the index of the first column of each cone, then nu."""
+    """Return (cones + 1,) indices: the first column of each cone, then nu."""
     return np.append(0, np.cumsum(np.bincount(group)))
 
 
@@ -22,5 +22,5 @@ def cone_sizes(values: NDArray, group: NDArray) -> NDArray:
 
 
 def into_cones(u: NDArray, group: NDArray) -> NDArray:
-    """Return the vectors with components in each cone scaled to length 1 at most."""
+    """Return vectors whose part in each cone is shortened to length 1 if longer."""
     return u / np.maximum(1.0, cone_sizes(u, group))[group]

@@ -32,13 +32,13 @@ _TOLERANCE = 1e-13
 # Clarabel's default static regularisation, 1e-8, stops 3 of 12 points of the paper's
 # robot at a relative gap of 1e-6; without it the gap is 1e-13 for all of them
 _REGULARISATIONS = (0.0, 1e-10, 1e-8)
-# gap that counts as proved: relative to the energy, and to the energy without clearance
+# largest gap at which a solution counts as proved: relative to the energy, and to the
+# energy without clearance
 GAP, GAP_WITHOUT_CLEARANCE = 1e-8, 1e-12
 _GAP_WITHIN = 1e-12  # required relative gap of the interior-point method
-# share of the proved gap that is required here, because the full problem increases the
-# gap
+# share of that gap that is required here, because the full problem increases the gap
 _SHARE = 0.1
-_STOP = 1e-2  # share of this gap at which Newton's method stops
+_STOP = 1e-2  # share of the required gap at which Newton's method stops
 # largest number of Newton steps, and first sigma of the method
 _STEPS, _FIRST_SIGMA = 150, 1e6
 _RESIDUAL = 1e-11  # accepted residual of rows without springs
@@ -48,7 +48,7 @@ _UNPROVED = "PrimalInfeasible, but its multipliers do not prove it"
 
 
 class SolverFailed(RuntimeError):
-    """Error: the solver found no solution of a problem.
+    """Raised if a solver finds no solution of a problem.
 
     Attributes:
         problem: name of the problem.
@@ -88,7 +88,7 @@ class ConicSolution:
 
 
 class ConeProgramme(NamedTuple):
-    """Arguments of :func:`minimise_energy`, scaled to size 1."""
+    """Arguments of :func:`minimise_energy`, scaled so that their size is about 1."""
 
     G: NDArray
     h: NDArray
@@ -190,7 +190,8 @@ def _by_clarabel(
     r, nu = G.shape
     cones, radii = _unit_cones(group, np.ones(nu))
     rows = np.vstack([G, H, cones.toarray()])
-    # dense, because assembling a small sparse matrix takes longer than its solution
+    # the matrix is dense, because assembling a small sparse matrix takes longer than
+    # solving
     A = csc_matrix(np.hstack([rows, np.eye(len(rows), r)]))
     b = np.concatenate([-h, k, radii])
     P = csc_matrix(np.diag(np.repeat([0.0, 1.0], [nu, r])))
@@ -251,7 +252,7 @@ def _certify(
     value = float(strain @ strain) / 2 - float(problem.d @ u)
     bound = _energy_bound(problem, springs, rigid)
     if not problem.d.any():
-        # a multiple f of the multipliers is a valid proof: f gain - f^2 cost / 2
+        # every multiple f of the multipliers proves a bound: f gain - f^2 cost / 2
         cost = float(springs @ springs)
         factor = max(0.0, bound + cost / 2) / cost if cost > 0.0 else 0.0
         better = _energy_bound(problem, factor * springs, factor * rigid)
@@ -300,7 +301,8 @@ def least_factor(
     """
     m, nu = B.shape
     rows = np.linalg.norm(B, axis=1)
-    # if every cone is scaled, t is proportional to ``right``; it is scaled to length 1
+    # if every cone is scaled, t is proportional to ``right``, which is scaled to length
+    # 1
     size = np.linalg.norm(right / rows) if scaled.all() else 1.0
     unit_cones, radii = _unit_cones(group, np.where(scaled, 0.0, 1.0))
     _, factors = _unit_cones(group, np.where(scaled, -1.0, 0.0))
@@ -368,7 +370,7 @@ def _clarabel(
     solution = clarabel.DefaultSolver(P, q, A, b, sets, settings).solve()
     status = str(solution.status)
     x, z = np.array(solution.x), np.array(solution.z)
-    # an inaccurate solution can be good enough, because its certificate decides
+    # an inaccurate solution is accepted here; its certificate decides later
     usable = {"Solved", "AlmostSolved", "InsufficientProgress", "MaxIterations"}
     if status not in usable or not (np.isfinite(x).all() and np.isfinite(z).all()):
         return None, z, status

@@ -1,8 +1,8 @@
-"""Cone programmes with the same matrices and many right sides, compiled.
+"""Compiled solution of cone programmes with equal matrices and many right sides.
 
-A programme is that of :func:`forcefit.assembly.solvers.conic.minimise_energy`.  Each
-lane of the processor's vector registers solves one of them; those that are not proved
-are solved again one at a time.
+Each programme has the form of :func:`forcefit.assembly.solvers.conic.minimise_energy`.
+Each lane of the processor's vector registers solves one programme.  Programmes whose
+solution is not proved are solved again, one at a time.
 """
 
 from typing import NamedTuple
@@ -19,16 +19,18 @@ from forcefit.assembly.solvers.conic import (
     minimise_energy,
 )
 
-_SHARE = 0.1  # of the proved gap that is required, because callers add to the gap
+# share of the proved gap that is required here, because callers increase the gap
+_SHARE = 0.1
 _RESIDUAL = 1e-11  # accepted residual of a row without springs
-_LOADED = 1e-9  # share of the forces without clearance above which a cone is loaded
+# a cone counts as loaded if its force exceeds this share of the force without clearance
+_LOADED = 1e-9
 
 
 class Minima(NamedTuple):
     """Solutions of :func:`minimise_energies`.
 
     Attributes:
-        clearances: (n, nu) relative to their bounds.
+        clearances: (n, nu) clearances relative to their bounds.
         rigid_multipliers: (n, p) [J] multipliers of the rows without springs.
         feasible: (n,) bool, whether clearances satisfy the rows without springs.
     """
@@ -73,12 +75,12 @@ def minimise_energies(
 
 
 def into_cones_of_each(u: NDArray, group: NDArray) -> NDArray:
-    """Return (n, nu) vectors whose part in each cone is shortened to 1 if longer."""
+    """Return (n, nu) vectors; parts in a cone longer than 1 are shortened to 1."""
     return u / np.maximum(1.0, cone_sizes(u, group))[:, group]
 
 
 def _proved(problem: tuple[NDArray, ...], u: NDArray, n: NDArray) -> NDArray:
-    """Return (n,) bool: solutions with a small gap that satisfy the rows of H.
+    """Return (n,) bool, True for solutions with a small gap that satisfy H u = k.
 
     For every y and n the energy is at least the bound of
     :func:`forcefit.assembly.solvers.conic.minimise_energy`, here at y = G u + h, or at
@@ -101,7 +103,7 @@ def _proved(problem: tuple[NDArray, ...], u: NDArray, n: NDArray) -> NDArray:
 def closest_of_same_energy(
     minima: Minima, last: NDArray, rows: NDArray, problem: tuple[NDArray, ...]
 ) -> NDArray:
-    """Return the points of the cones closest to given ones, with the same energy.
+    """Return the points of equal energy that are closest to given points.
 
     Args:
         minima: n solutions of :func:`minimise_energies`.
@@ -117,8 +119,9 @@ def closest_of_same_energy(
     forces = (u @ G.T + h) @ G - d - minima.rigid_multipliers @ H
     size, slack = cone_sizes(forces, group), 1.0 - cone_sizes(u, group)
     scale = (np.abs(h) @ np.abs(G) + np.abs(d)).max(axis=1, initial=0.0)[:, None]
-    # a loaded cone is at its bound, where the rows determine its position; force times
-    # slack is about the gap, so one of them is nearly zero
+    # a loaded clearance is at its bound, where the rows determine its position. Its
+    # force times its distance from the bound is about the gap, so one of the two is
+    # nearly zero
     kept = (size > scale * slack) & (size > _LOADED * scale) & (scale > 0.0)
     closest, solved = np.array(u, order="C"), np.zeros(len(u), dtype=np.int64)
     starts = cone_starts(group)

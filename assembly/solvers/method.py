@@ -1,4 +1,4 @@
-"""Names of the two methods that every public solver offers."""
+"""Names of the two solution methods that every public solver offers."""
 
 import logging
 from typing import Literal, get_args
@@ -28,8 +28,8 @@ def log_reference(robot: str, what: str, left: int, count: int) -> None:
 
     Args:
         robot: name of the robot.
-        what: quantity that is computed.
-        left: number of these points.
+        what: name of the quantity that is computed.
+        left: number of points that the reference method solves.
         count: number of all points.
     """
     _LOG.info(

@@ -18,7 +18,7 @@ Support = Callable[[NDArray], tuple[float, NDArray, NDArray]]
 
 
 class SolverLimits(NamedTuple):
-    """Limits of an iterative method.
+    """Convergence criteria and largest number of steps of an iterative method.
 
     Attributes:
         relative: required gap relative to |G u + h|^2 / 2.

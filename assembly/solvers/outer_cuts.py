@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from forcefit.assembly.solvers.one_problem import Support
 
 _MOST = 400  # largest number of support functions
-# distance of every cut from the set, so that a flat set has corners too: relative to
-# the tolerance, and at least relative to the size of the set
+# distance of every cut from the set, so that the polytope around a flat set has corners
+# too: relative to the tolerance, and at least relative to the size of the set
 _SLACK, _LEAST_SLACK = 0.25, 1e-7
 
 
@@ -40,7 +40,7 @@ def farthest(
     part = slice(half, half + 3)
     best, low = centre, float(np.linalg.norm(centre[part]))
     cuts: list[NDArray] = []
-    room: list[float] = []  # distance from the centre to each cut
+    room: list[float] = []  # distance [rad or m] from the centre of the set to each cut
     directions = [*np.eye(3), *-np.eye(3)]
     while True:
         for direction in directions:
@@ -59,7 +59,7 @@ def farthest(
 
 
 def _farthest_corner(cuts: NDArray, room: NDArray, centre: NDArray) -> NDArray:
-    """Return the (3,) corner of {cuts (x - centre) <= room} with the largest size."""
+    """Return the corner (3,) of {cuts (x - centre) <= room} with the largest norm."""
     from scipy.spatial import HalfspaceIntersection
 
     unit = room.max()

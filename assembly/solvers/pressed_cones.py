@@ -20,7 +20,8 @@ from forcefit.assembly.solvers.cones import cone_sizes
 _STEPS = 4  # largest number of Newton steps; two are usual
 _SETTLED = 1e-12  # [-] size of the clearances' last step at convergence
 _GUESSES = 6  # largest number of guesses of the cones in contact; usually one suffices
-_NEAR = 1e-2, 0.0  # [-] slacks below which a cone with a force counts as in contact
+# [-] distances from the bound below which a cone with a force counts as in contact
+_NEAR = 1e-2, 0.0
 _BEYOND = 1e-9  # [-] accepted excess over the bound of a cone that is not in contact
 
 _Problem = tuple[NDArray, NDArray, NDArray, NDArray, NDArray, NDArray]
@@ -43,8 +44,8 @@ def refine(problem: _Problem, u: NDArray, n: NDArray) -> Iterator[_Point]:
     G, h, d, H, _, group = problem
     y = G @ u + h
     force, slack = cone_sizes(G.T @ y - d - H.T @ n, group), 1.0 - cone_sizes(u, group)
-    # the product of force and slack is about the solver's gap: one of them is nearly
-    # zero
+    # the product of force and distance from the bound is about the solver's gap: one of
+    # them is nearly zero
     scale = max(float(y @ y) / 2, float(force.max()), 1e-300)
     for near in _NEAR:
         pressed = (slack < near) | (force > scale * slack)

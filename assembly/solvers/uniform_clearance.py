@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 # number of chains, and number of points of each chain that are compared
 CHAINS, KEPT = 4, 64
-# largest accepted R-hat, smallest accepted effective sample size
+# largest accepted split R-hat, and smallest accepted effective sample size
 R_HAT, EFFECTIVE = 1.05, 100.0
 # largest number of doublings of the chains: 4 x 65 472 trajectories for a draw
 DOUBLINGS = 10
@@ -99,7 +99,7 @@ def _ellipsoid(
                 # M M^T = Z H^-1 Z^T
                 M = np.linalg.solve(np.linalg.cholesky(H), Z.T).T
                 return u, np.ascontiguousarray(M)
-        except np.linalg.LinAlgError:  # the interior is numerically empty
+        except np.linalg.LinAlgError:  # the interior of the set is numerically empty
             return None
         u += Z @ (step / (1.0 + decrement))
         if rho > 1.0 and decrement < 0.5:
@@ -114,7 +114,7 @@ def _ellipsoid(
 
 
 def _largest(heads: NDArray, u: NDArray) -> float:
-    """Return the largest norm of u over the cones; 1 on the boundary."""
+    """Return the largest norm of u over all cones, which is 1 on the set's boundary."""
     return float(np.sqrt(np.add.reduceat(u * u, heads).max()))
 
 
@@ -122,7 +122,7 @@ def is_mixed(trace: NDArray) -> bool:
     """Return whether the chains of all varying components have mixed."""
     moving = trace[:, :, trace.std(axis=(0, 1)) > _CONSTANT]
     return all(
-        # written so that NaN counts as not mixed
+        # the condition is written so that NaN counts as not mixed
         r_hat <= R_HAT and effective >= EFFECTIVE
         for r_hat, effective in map(diagnose, np.moveaxis(moving, 2, 0))
     )

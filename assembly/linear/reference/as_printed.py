@@ -72,8 +72,8 @@ def margin_as_printed(posture: Posture, own_axes_free: bool = False) -> float | 
 
     Args:
         posture: the robot's configuration.
-        own_axes_free: whether compliant joints turn freely about their own axis; in the
-            printed problem they are rigid.
+        own_axes_free: whether compliant joints rotate freely about their own axis.  In
+            the printed problem, they are rigid.
 
     Returns:
         The factor; None if the problem is infeasible for every factor.
@@ -94,7 +94,7 @@ def margin_as_printed(posture: Posture, own_axes_free: bool = False) -> float | 
 
 
 def _root_of_stiffness(C: NDArray) -> NDArray:
-    """Return (6, 6) R; R^T R is the stiffness, with zeros in rigid directions."""
+    """Return a (6, 6) root R of the stiffness R^T R, zero in rigid directions."""
     soft = np.flatnonzero(np.diag(C) > 0)
     root = np.zeros_like(C)
     root[np.ix_(soft, soft)] = np.linalg.cholesky(
@@ -146,12 +146,13 @@ def _assembly_constraints(
 
 
 def _solve(problem: Any, allowed: set[str]) -> None:
-    """Solve with tight tolerances; raise if the status is not allowed."""
+    """Solve with tight tolerances; raise RuntimeError unless the status is allowed."""
     import cvxpy as cp
 
     tight = {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
     try:
-        with warnings.catch_warnings():  # the status also reports inaccurate solutions
+        # the warning is redundant: the status also reports inaccurate solutions
+        with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             problem.solve(solver=cp.CLARABEL, **tight)
     except cp.error.SolverError as error:

@@ -23,14 +23,15 @@ from forcefit.assembly.linear.rounding import differs_from_zero, stiffness_sprea
 from forcefit.assembly.model.clearance import has_bounded_motion
 from forcefit.assembly.solvers.conic import ConicSolution, minimise_energy
 
-_RIGID_BESIDE = 1e19  # stiffness relative to the softest spring that counts as rigid
+# stiffness, relative to the softest spring, above which a spring counts as rigid
+_RIGID_BESIDE = 1e19
 
 
 class CannotAssemble(Exception):
-    """The closures cannot be closed by clearances and elasticity of the model.
+    """Raised if clearances and elasticity of the model cannot close the closures.
 
-    The exception reports a result and not a mistake of the caller: some closure is
-    rigid in a direction.
+    The exception reports a result, not a mistake of the caller: a closure is open in a
+    direction in which all parts are rigid.
     """
 
 
@@ -66,7 +67,7 @@ def least_energy(
     else:
         if assembly.clearance_excess(own_axes_free) <= 1e-9:
             return assembly
-    # the omitted bound of a passive joint's motion is active: solve with the bound
+    # an omitted motion limit of a passive joint is active: solve again with the limit
     joints = virtual_joints(robot, True, own_axes_free, bounded_motion=True)
     return solve_with(lin, joints, load, frame_loads)
 
@@ -110,7 +111,7 @@ def solve_with(
     residual = assembly.closure_residual() + assembly.rounding
     if frame_loads or differs_from_zero(assembly.stored, 0.0, multipliers, residual):
         return assembly
-    # no energy is needed: deformations and wrenches are rounding errors
+    # the closures need no energy, so deformations and wrenches are rounding errors
     return replace(
         assembly, elastic=np.zeros_like(y), multipliers=np.zeros_like(multipliers)
     )

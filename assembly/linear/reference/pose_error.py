@@ -48,8 +48,9 @@ from forcefit.results.display import html_table, short_repr
 from forcefit.stiffness.screws import skew
 
 ASSUMPTIONS = ("frozen", "free", "budget")
-# accepted excess of squared sizes over cones: a smaller value hardly improves
-# solutions, and a cone at its bound would then stop the step of all other cones
+# accepted excess of squared clearances over their cones. A smaller value hardly
+# improves solutions, and a cone at its bound would then stop the step of all other
+# cones
 _EXCESS = 1e-8
 
 
@@ -112,7 +113,7 @@ class ReachableSet:
     __repr__, _repr_html_ = short_repr, html_table
 
     def unbounded(self, part: int) -> bool:
-        """Return whether a part is unbounded: rotation (0) or translation (3)."""
+        """Return whether the rotation (part 0) or translation (part 3) is unbounded."""
         free = self.free[part : part + 3]
         return bool(np.abs(free).max(initial=0.0) > UNBOUNDED)
 
@@ -170,7 +171,7 @@ class ReachableSet:
         start, group = self.start, self.group
         step = v - start
         step = step - self.rows.T @ (self.rows @ step)
-        # from a start inside all cones, the longest part of the step that stays inside
+        # starting inside all cones: longest part of the step that remains inside
         aa, ab, bb = (
             np.bincount(group, one * other)
             for one, other in ((step, step), (start, step), (start, start))
@@ -244,8 +245,8 @@ def reachable_screws(
     free = assumption == "free"
     loaded = assembly
     if free:
-        # the own axes turn without energy here: a clearance is fixed only if it remains
-        # loaded without the soft springs of these axes
+        # here, joints rotate about their own axes without energy. A clearance is fixed
+        # only if it remains loaded without the soft springs of these axes
         loaded = least_energy(
             assembly.posture, assembly.load, assembly.frame_loads, own_axes_free=True
         )
@@ -277,7 +278,7 @@ def within_bounds(
 
     Args:
         assembly: assembly at the start.
-        kept: frames whose bound of the joint's motion is included from the beginning.
+        kept: frames whose motion limits are included from the beginning.
         moving: function of virtual joints that returns the moving cones.
         own_axes_free: see :func:`forcefit.assembly.linear.closure.virtual_joints`; if
             True, no spring acts.
@@ -322,10 +323,11 @@ class _Motion:
 
     @cached_property
     def passed(self) -> frozenset[int]:
-        """Frames whose motion can exceed a bound that is omitted here."""
+        """Frames whose joint motion can exceed a motion limit that is omitted here."""
         inverse, free = self._follow
         row = self.joints.free.argmax(axis=0)
-        # the bound of a joint without a spring is included under every assumption
+        # under every assumption, the motion limit of a joint without a spring is
+        # included
         robot, group = self.joints.robot, self.cones.group
         limit = component_bounds(clearance_bounds(robot)).ravel()[row]
         clearance = component_bounds(scales_with_margin(robot)).ravel()[row]
@@ -337,7 +339,7 @@ class _Motion:
         most = np.abs(middle)
         for c in np.unique(group):
             most = most + np.linalg.norm(step[:, group == c], axis=1)
-        # a motion that is resisted only by its bound reaches that bound
+        # a motion that only its limit resists reaches that limit
         passing = limited & ((most > limit) | free.any(axis=0))
         return frozenset((row[passing] // 6).tolist())
 
@@ -366,7 +368,7 @@ def clearances_in(assembly: Assembly, joints: VirtualJoints) -> NDArray:
 
 
 def _rows(A: NDArray, noise: float) -> NDArray:
-    """Return an orthonormal basis of the rows of A, up to rounding."""
+    """Return an orthonormal basis of the span of the rows of A, up to rounding."""
     _, S, Vt = svd(A, full_matrices=False)
     return Vt[: rank_of(S, ROWS_RANK, noise)]
 
@@ -386,7 +388,7 @@ def loaded_cones(assembly: Assembly, joints: VirtualJoints) -> NDArray:
     screws = clearance_components(joints.robot, assembly.clearance_screws).ravel()
     u = joints.cones.T @ screws / (joints.cones**2).sum(axis=0)
     slack = np.maximum(0.0, 1.0 - cone_sizes(u, joints.group))
-    # the product of load and slack is about the solver's gap: one of them is nearly
-    # zero
+    # the product of a clearance's force and its distance from the bound is about the
+    # solver's gap, so one of them is nearly zero
     scale = max(assembly.energy, 1e-9 * assembly.energy_without_clearance, 1e-300)
     return ((load > scale * slack) & (load > 1e-9 * scale))[joints.group]

@@ -44,13 +44,15 @@ from forcefit.assembly.linear.load import FrameLoads, loads_on_frames
 from forcefit.results.display import html_table, numbers, short_repr
 from forcefit.stiffness.screws import SCREW
 
-_STILL = 1e-6  # relative to the largest motion: smaller motions count as rounding
-_NAMED = 4  # largest number of joints that a message names
-_LOAD_ROUNDING = 1e-13  # relative to the largest load: smaller ones count as rounding
+# relative to the largest joint motion: smaller motions count as rounding errors
+_STILL = 1e-6
+_NAMED = 4  # largest number of joints that a message lists
+# relative to the largest load: smaller loads count as rounding errors
+_LOAD_ROUNDING = 1e-13
 
 
 class FreeMotion(ValueError):
-    """The load drives a motion that nothing resists: there is no equilibrium."""
+    """Raised if a load drives a motion that nothing resists: no equilibrium exists."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,7 +235,7 @@ def _load_multipliers(
     """Return the multipliers that balance the loads along every free motion."""
     A_q, drive = lin.rows @ joints.free, joints.free.T @ frame_loads.joint
     multipliers = np.linalg.lstsq(A_q.T, -drive, rcond=RANK)[0]
-    # the residual, orthogonal to the rows of A_q, is a free motion that the load drives
+    # the part orthogonal to the rows of A_q is a free motion that the load drives
     left = A_q.T @ multipliers + drive
     most = np.maximum(
         1e-8 * np.abs(drive).max(initial=1e-300),
@@ -250,15 +252,16 @@ def _load_multipliers(
 def _load_rounding(
     lin: Linearisation, joints: VirtualJoints, frame_loads: FrameLoads
 ) -> NDArray:
-    """Return (nq,) the rounding errors of the loads' work on the free motions."""
-    lengths = in_reference_lengths(lin.size)  # factors for screws; wrenches: inverse
+    """Return the (nq,) rounding errors of the work of the loads on free motions."""
+    # factors for screws; those for wrenches are the inverse
+    lengths = in_reference_lengths(lin.size)
     largest = np.abs(frame_loads.joint.reshape(-1, 6) / lengths).max(initial=0.0)
     sizes = np.tile(lengths, len(joints.free) // 6) @ np.abs(joints.free)
     return np.asarray(_LOAD_ROUNDING * largest * sizes)
 
 
 def _motion_text(lin: Linearisation, screws: NDArray) -> str:
-    """Return a text on a free motion: its joints and the platform's unit screw."""
+    """Describe a free motion by its joints and the unit screw of the platform."""
     robot = lin.posture.robot
     sizes = np.abs(screws.reshape(-1, 6) * in_reference_lengths(lin.size))
     moved = sizes.max(axis=1)
@@ -289,7 +292,7 @@ def _rigid_rows(
     """Return independent rows that only clearances can satisfy, and their residual."""
     rows, wanted = rigid_rows.T @ A_u, rigid_rows.T @ right
     U, S, _ = svd(rows, full_matrices=True)
-    # the clearances are small: the rank is determined relative to their size
+    # clearances are small, so the rank is determined relative to their size
     rank = rank_of(S, ROWS_RANK, noise)
     errors = np.abs(lin.rows * lin.posture.robot.errors.ravel()).max(initial=0.0)
     unclosed = np.abs(U[:, rank:].T @ wanted).max(initial=0.0)

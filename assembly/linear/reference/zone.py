@@ -41,7 +41,8 @@ def least_margin(posture: Posture, own_axes_free: bool) -> tuple[float, float]:
     bounds = clearance_bounds(robot, own_axes_free)
     ranges = np.where(scales_with_margin(robot), np.inf, bounds)
     if clearance_excess(clearance_components(robot, screws), ranges) > 1e-9:
-        # the omitted bound of a passive joint's motion is active: solve with the bound
+        # an omitted motion limit of a passive joint is active: solve again with the
+        # limit
         joints = virtual_joints(robot, False, own_axes_free, bounded_motion=True)
         margin, bound, _ = margin_with(lin, joints)
     return margin, bound

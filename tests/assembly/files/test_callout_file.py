@@ -139,7 +139,7 @@ def test_normal_of_a_face_is_the_normal_of_its_planar_joint(tmp_path, without_ci
         ('perpendicularity = "0.02 mm"', 'perpendicularity = "0.2 mm"',
          "found 0.2 mm, expected less than that of the location, 0.1 mm"),
         ('profile = "0.04 mm"', 'coaxiality = "0.04 mm"',
-         "found for a feature that is a plane"),
+         "found this zone at a feature that is a plane"),
         ('hole = "12 H7"', "", 'found (M), expected only for the position of a bore'),
         ('hole = "12 H7"', 'hole = "12 H4"', '"H4", expected a grade from 5 to 11'),
         ('position = "0.1 mm"\nextent = "10 mm"', "",

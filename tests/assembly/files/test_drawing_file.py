@@ -496,7 +496,7 @@ REFUSED = {
         'leg "leg".joint "upper".axis2: missing; expected 3 finite numbers'),
     "no direction": (
         "axis = [-16, 0, 45]", "axis = [0, 0, 0]",
-        'leg "leg".joint "slide".axis: found no direction, expected 3 numbers, '),
+        'leg "leg".joint "slide".axis: found only zeros, expected a direction: 3 '),
     "a body without joints": (
         '[[leg]]', '[[body]]\nname = "lost"\n[[leg]]',
         'body "lost": found no joint that connects it with "base", expected one'),

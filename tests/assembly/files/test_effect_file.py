@@ -67,7 +67,7 @@ REFUSED = {
         '"self_weight".parameters: found "g.w", which is not a parameter of '
         'self_weight; did you mean "g.z"?',
     'name = "self_weight"\n[[effect]]\nname = "self_weight"':
-        '"self_weight".name: found twice; expected one [[effect]] per name',
+        '"self_weight".name: found this name twice; expected one [[effect]] per name',
     'name = "encoder_offset"\nparameters = { tool = 1e-4 }':
         '"encoder_offset".parameters: found "tool", which is not a parameter of '
         "encoder_offset; valid: drive",

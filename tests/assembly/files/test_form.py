@@ -103,7 +103,7 @@ def test_flatness_widens_the_gap_of_a_pad(tmp_path):
     [
         ('"0.006 mm"', '"0.006"', 'tolerance of "pin".cylindricity: found \'0.006\''),
         ('"0.006 mm"', '"-0.006 mm"', "found '-0.006 mm', expected a width > 0"),
-        ('"0.006 mm"', '"0.006 mm (M)"', "found (M), expected a width alone"),
+        ('"0.006 mm"', '"0.006 mm (M)"', "found a width with (M), expected a width"),
         ("cylindricity", "flatness", "found no gap that the flatness of its features"),
         ('{ fit = "12 H7/g6", length = "40 mm" }', '{ axial = "5 um" }',
          'joint "pin".clearance: found no gap that the cylindricity of its features '
@@ -111,7 +111,8 @@ def test_flatness_widens_the_gap_of_a_pad(tmp_path):
         ('{ fit = "12 H7/g6", length = "40 mm" }', '{ fit = "25 H7/p6" }',
          'clearance.fit: found "25 H7/p6", an interference fit'),
         ('cylindricity = "0.006 mm"', 'cylindricity = "0.006 mm"\ndatums = ["pin"]',
-         "datums: found one of a feature whose form alone is stated, expected none"),
+         "datums: found this key at a feature that has only a form tolerance, expected "
+         "none"),
         ('[[body.tolerance]]\nfeature = "pin"', '[[body.tolerance]]\nfeature = "pn"',
          'found "pn", expected a joint of "rod"; did you mean "pin"'),
     ],
