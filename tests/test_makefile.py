@@ -34,7 +34,7 @@ def test_environment_of_another_python_is_created_again(tmp_path, stamp):
     assert f"{sys.executable} -m venv --clear .venv" in commands(tmp_path, stamp)
 
 
-def test_environment_of_the_same_python_is_kept(tmp_path):
+def test_environment_is_reused_if_the_python_version_is_unchanged(tmp_path):
     found = commands(tmp_path, f"empty-{OWN}", f"ready-{OWN}")
     assert "venv --clear" not in found
     assert "pip install" not in found

@@ -303,7 +303,7 @@ def _children(
     search: _Search, state: State, peak: float, done: tuple[Step, ...],
     left: tuple[Step, ...],
 ) -> list[_Partial]:  # fmt: skip
-    """Return a partial order, extended by each step that may come next."""
+    """Return the partial orders made by appending each step that may come next."""
     children = []
     for step, others in choices(left):
         found = search.carry_out(state, step)

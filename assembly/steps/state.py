@@ -113,8 +113,9 @@ def settle(machine: Machine, state: State) -> State:
     """Return the equilibrium of a state, closest to the preceding equilibrium.
 
     Args:
-        machine: columns and rows of the robot.
-        state: new holds, loads and errors, with the unknowns of the preceding state.
+        machine: Jacobian columns and constraint rows of the robot.
+        state: new supports, loads and errors; the unknowns are those of the preceding
+            state.
 
     Returns:
         The state with its unknowns at equilibrium.

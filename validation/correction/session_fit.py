@@ -70,7 +70,7 @@ class SetUp:
 
     @cached_property
     def own(self) -> Campaign:
-        """Campaign of the set-up rows only."""
+        """Campaign that contains only the rows measured in this set-up."""
         return self.campaign.take(self.rows)
 
     @property

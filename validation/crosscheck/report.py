@@ -24,7 +24,7 @@ from forcefit.validation.crosscheck.verdict import NOT_CHECKED, verdict, verdict
 
 # Colour of the verdict for each outcome.
 GOOD = {PASSED: True, NOT_DECIDED: None, NO_SIGNAL: None, FAILED: False}
-_LISTED = 30  # largest number of parameters in the table of smallest changes
+_LISTED = 30  # parameters in the table of smallest detectable changes
 ASSUMED = (
     "The simulation (Exudyn) has geometrically exact motions; the virtual-joint model "
     "is linear in errors and loads.",

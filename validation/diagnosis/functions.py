@@ -45,7 +45,7 @@ Variables = tuple[str, ...]
 Request = tuple[Variables, tuple[CandidateShape, ...]]
 # Largest number of columns of a function: six columns for each of six components.
 _WIDEST = 36
-# Number of best functions from which the best functions of each request are selected.
+# Number of functions with the highest scores that are kept; requests select from these.
 _LISTED = 2000
 _BATCH = 2_000_000  # number of values in a batch, 16 MB
 

@@ -32,12 +32,12 @@ class OutOfTime(SimulationFailed):
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """A point and axes fixed to a body of the model.
+    """A coordinate frame fixed to a body of the model.
 
     Attributes:
-        body: Exudyn's number of the body.
+        body: number of the body in Exudyn.
         start: (4, 4) initial pose of the body in the base frame.
-        local: (4, 4) pose of the place in the body's frame.
+        local: (4, 4) pose of this frame in the body's frame.
     """
 
     body: int

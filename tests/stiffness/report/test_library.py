@@ -364,7 +364,7 @@ def test_build_file_of_each_shape_is_distributed_with_its_entries(shape):
 
 
 @pytest.mark.parametrize(("shape", "length"), BETWEEN)
-def test_estimated_error_between_shipped_entries_covers_an_independent_stiffness(
+def test_interpolation_error_estimate_bounds_the_error_against_another_stiffness(
     shape, length
 ):
     K, error = look_up(read_library(SHIPPED / shape), {"length": length})

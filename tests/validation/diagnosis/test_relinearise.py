@@ -76,7 +76,7 @@ def test_relinearised_model_finds_values_that_a_linear_one_misses(columns):
         assert abs(e.values(mean) - x) < 4 * spread
 
 
-def test_spring_of_a_drive_is_an_effect_instead_of_a_nuisance_parameter(columns):
+def test_drive_stiffness_is_estimated_as_an_effect_not_as_a_nuisance_parameter(columns):
     loaded = replace(CAMPAIGN, loads=np.tile([0, 0, 5.0, 0, 9.0, 0], (20, 1)))
     loose = columns_of(loaded)
     small, robot = loose.nuisance, CAMPAIGN.robot
