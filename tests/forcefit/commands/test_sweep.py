@@ -86,7 +86,7 @@ def test_plot_draws_a_saved_sweep_without_solving(run, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["sweep", "five_bar", "-o", "x.nc"], "expected --grid or --poses"),
+        (["sweep", "five_bar", "-o", "x.nc"], "expected exactly one of --grid"),
         (["sweep", "five_bar", "--grid", "tx=0", "-o", "x.nc", "--workers", "2",
           "--scheduler", "tcp://h:1"], "found both --workers and --scheduler"),
         (["sweep", "five_bar", "--poses", "no.csv", "-o", "x.nc"],

@@ -161,7 +161,7 @@ def test_one_of_several_solids_is_read_by_its_name(tmp_path, run):
     script = [sys.executable, "-c", TWO_SOLIDS, str(path)]
     subprocess.run(script, check=True, capture_output=True)
     with pytest.raises(
-        BadInput, match=r"found 2 solids \(.*\), expected which"
+        BadInput, match=r"found 2 solids \(.*\), expected the name"
     ) as error:
         read_surface(path)
     names = str(error.value).partition("(")[2].partition(")")[0].split(", ")
