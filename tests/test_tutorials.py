@@ -90,7 +90,7 @@ def test_page_runs_with_the_printed_output(tmp_path, name):
 def test_files_of_the_measuring_protocol_are_a_valid_campaign(tmp_path):
     """The last block of the page names a campaign that is still to be measured."""
     page = (DOCS / "measuring_protocol.md").read_text(encoding="utf-8")
-    own, mark, _ = page.partition("After the whole session")
+    own, mark, _ = page.partition("When the session is complete")
     assert mark
     (tmp_path / "page.md").write_text(own, encoding="utf-8")
     (tmp_path / "lab").mkdir()
