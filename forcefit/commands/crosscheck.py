@@ -84,8 +84,7 @@ def crosscheck(
         str,
         typer.Option(
             help="Scales: factors on errors and load. Smaller ones are added if a "
-            "check is "
-            "undecided."
+            "check is undecided."
         ),
     ] = "1,0.5,0.25,0.125",
     links: Annotated[
@@ -158,8 +157,7 @@ def crosscheck(
     source = provenance(robot, errors)
 
     def compare(posture: "Posture") -> Crosscheck | StiffnessCheck:
-        fixed = None if own else posture.robot.declared_errors
-        drawn = with_errors(posture, errors, seed, fixed)
+        drawn = with_errors(posture, errors, seed, own)
         applied = apply_robot_effects(drawn, wrench, g, covariates)
         if state is not None:
             return check_stiffness(

@@ -97,8 +97,7 @@ def validity(
     wrench, g = parse_load(load), parse_gravity(gravity)
     own = errors is None or rest is mismatch is None
     posture = posture_of(robot, pose, joint, rest, mismatch, own)
-    fixed = None if own else posture.robot.declared_errors
-    posture = with_errors(posture, errors, seed, fixed)
+    posture = with_errors(posture, errors, seed, own)
     if grid is None and poses is None:
         costs = costs_at(posture, wrench, g, solids)
         table, text = costs_table(costs), costs_text(costs)
