@@ -157,7 +157,6 @@ def statistics(
     With OUTPUT, finished draws are stored in OUTPUT.journal.  After an interruption,
     the same command continues from this journal and produces the same file.
     """
-    from forcefit.assembly.model.error_distributions import read_sources
     from forcefit.assembly.report.first_order import posture_status
     from forcefit.assembly.report.results import status_line
     from forcefit.assembly.statistics.callout_sources import sources_of
@@ -193,10 +192,7 @@ def statistics(
         drive_force=drive_force,
     )  # fmt: skip
     fixed = posture.robot.declared_errors if closing else None
-    independent = None
-    if errors is not None:
-        independent = read_sources(errors, posture.robot, fixed)
-    sources = sources_of(posture.robot, independent, fixed)
+    sources = sources_of(posture.robot, errors, fixed)
     wrench, g = parse_load(load), parse_gravity(gravity)
     note_closing(posture.robot, rest, mismatch)
     note_massless(posture.robot, g)

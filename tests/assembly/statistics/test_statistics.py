@@ -1,0 +1,107 @@
+"""Statistics in one call, against distributions that are known in closed form."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import forcefit as ff
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import Frame, Robot
+
+pytest.importorskip("xarray")
+NORMAL = """
+[[errors]]
+frames = ["tip"]
+distribution = "normal"
+deviation = [0, 0, 0, 0, 0, 1e-4]
+"""
+UNIFORM = """
+[[errors]]
+frames = ["tip"]
+most = [0, 0, 0, 3e-5, 0, 4e-5]
+"""
+
+
+@pytest.fixture
+def tip():
+    """A rigid frame at the base: its error is the pose error."""
+    return home_posture(Robot("block", "tip", (Frame("tip"),)))
+
+
+@pytest.fixture
+def normal(tmp_path):
+    file = tmp_path / "normal.toml"
+    file.write_text(NORMAL)
+    return file
+
+
+def test_yield_of_a_normal_error_is_that_of_the_normal_distribution(tip, normal):
+    """P(|x| <= sigma) = 0.6827, and the median of |x| is 0.6745 sigma."""
+    found = ff.statistics(tip, normal, draws=4000, limits={"translation": 1e-4})
+    share = found.summary["within_limits"]
+    assert share["lower"] < 0.68269 < share["upper"]
+    median = found.summary["quantities"]["translation"]["quantiles"]["0.5"]
+    assert median["lower"] < 0.67449e-4 < median["upper"]
+
+
+def test_draws_are_a_table_and_a_figure(tip, normal):
+    found = ff.statistics(tip, normal, draws=50)
+    table = found.to_pandas()
+    assert len(table) == 50
+    np.testing.assert_array_equal(table["translation", ""], found.data["translation"])
+    drawn = [ff.show(found), ff.show(found.data, kind="histogram"), found.plot()]
+    titles = {tuple(axes.get_title() for axes in one.axes) for one in drawn}
+    assert len(titles) == 1
+    assert "translation [clearance worst]" in repr(found)
+
+
+def test_statistics_in_python_equal_those_of_the_command(run):
+    robot = Path(__file__).parents[3] / "examples" / "drawn" / "four_bar.toml"
+    limits = {"translation": 1e-4}
+    found = ff.statistics(
+        ff.place_robot(ff.load_robot(robot)), draws=40, seed=3, limits=limits,
+        load={"fx": 2.0}, capability=True,
+    )  # fmt: skip
+    status, out, _ = run(
+        "assembly", "statistics", robot, "--draws", 40, "--seed", 3, "--capability",
+        "--limit", "translation=1e-4", "--load", "fx=2", "--json", "-",
+    )  # fmt: skip
+    assert status == 0
+    expected = json.loads(out)
+    for key in ("exceeds", "within_limits", "capability", "platform_screw"):
+        ours = json.loads(json.dumps(found.summary[key], default=np.ndarray.tolist))
+        assert ours == expected[key], key
+
+
+def test_worst_pose_of_two_uniform_errors_is_the_diagonal_of_their_box(tip, tmp_path):
+    file = tmp_path / "uniform.toml"
+    file.write_text(UNIFORM)
+    worst = ff.worst_pose(tip, file)
+    assert worst.attained == pytest.approx(5e-5, rel=1e-9)
+    assert worst.bound == pytest.approx(5e-5, rel=1e-3)
+
+
+def test_statistics_without_errors_name_what_is_missing(tip):
+    with pytest.raises(ff.BadInput, match="no --errors"):
+        ff.statistics(tip)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"errors": "translation"}, "found errors or interactive=True for a data set"),
+        ({"kind": "tornado"}, "show: "),
+        ({"quantities": ["enrgy"]}, "enrgy"),
+    ],
+)
+def test_show_refuses_options_that_do_not_fit_draws(tip, normal, options, message):
+    found = ff.statistics(tip, normal, draws=4)
+    with pytest.raises(ff.BadInput, match=message):
+        ff.show(found, **options)
+
+
+def test_show_refuses_options_of_data_sets_for_a_robot():
+    with pytest.raises(ff.BadInput, match="expected them for a data set"):
+        ff.show(ff.load_robot("five_bar"), quantities=["energy"])
