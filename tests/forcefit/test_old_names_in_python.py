@@ -184,3 +184,14 @@ def test_worst_pose_by_a_linear_response_equals_that_of_the_posture(posture, tmp
             prepared=linear_response(posture), sources=sources, quantity="translation"
         )
     assert ff.worst_pose(posture, file).bound == old.bound
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [("holding", "loading"), ("letting go", "unloading")]
+)
+def test_old_side_has_the_results_of_the_new_one(posture, old, new):
+    with pytest.warns(FutureWarning, match=f"side='{old}' is now side='{new}'") as c:
+        found = ff.platform_stiffness(posture, "contact", LOAD, side=old)
+    assert c[0].filename == __file__
+    expected = ff.platform_stiffness(posture, "contact", LOAD, side=new)
+    np.testing.assert_array_equal(found.compliance, expected.compliance)
