@@ -1,12 +1,14 @@
 """Pictures of all results: of robots, of results at one point, and of data sets."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from forcefit.assembly.report.show import Shown
 from forcefit.assembly.report.show import show as show_point
 from forcefit.assembly.statistics.plot import figure_of_draws
 from forcefit.assembly.statistics.statistics import Statistics
+from forcefit.assembly.sweeps.dataset import open_dataset
 from forcefit.assembly.sweeps.maps import figure_of
 from forcefit.inputs.errors import BadInput
 from forcefit.page.picture import Picture, show_figures_of_cells
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def show(
-    thing: "Shown | Statistics | xarray.Dataset",
+    thing: "Shown | Statistics | xarray.Dataset | Path | str",
     *,
     errors: str | None = None,
     assumption: str = "frozen",
@@ -35,6 +37,7 @@ def show(
             forced, but large displacements are to scale. For a platform stiffness, the
             shares of its parts are drawn.  For a data set, maps over two axes or lines
             along one axis of a sweep are drawn, or histograms of draws, or tolerances.
+            The path of its NetCDF file is accepted too.
         errors: for an assembly: ``"translation"`` or ``"rotation"`` to add the possible
             platform errors within the clearances.
         assumption: assumption of problem (27) for these errors: ``"frozen"``,
@@ -55,7 +58,8 @@ def show(
         cell.
 
     Raises:
-        BadInput: the object has another type or many points; an axis or a quantity is
+        BadInput: the object has another type or many points; a file cannot be read; an
+            axis or a quantity is
             unknown; more than two axes of a sweep remain; errors are requested for
             something else than an assembly, or for one with a free motion; or
             matplotlib is not installed.
@@ -63,6 +67,9 @@ def show(
     """
     if isinstance(thing, Statistics):
         thing = thing.data
+    whose = "show"
+    if isinstance(thing, Path | str):
+        whose, thing = str(thing), open_dataset(thing)
     if isinstance(thing, Shown):
         if quantities or at or kind:
             raise BadInput(
@@ -85,7 +92,7 @@ def show(
     try:
         drawn = figure_of_draws(thing, kind, quantities)
     except ValueError as error:
-        raise BadInput(f"show: {error}") from None
+        raise BadInput(f"{whose}: {error}") from None
     if drawn is None:
         return figure_of(thing, at, quantities)
     show_figures_of_cells()

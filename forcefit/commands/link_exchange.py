@@ -106,7 +106,7 @@ def _saved(
                 "because it belongs to the matrix of another program"
             )
     if to is None:
-        raise BadInput(f"--to: missing; expected the format into which {file} goes")
+        raise BadInput("--to: missing; expected the format of the file to write")
     return read_link_results(file)
 
 

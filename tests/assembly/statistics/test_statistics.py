@@ -47,12 +47,14 @@ def test_yield_of_a_normal_error_is_that_of_the_normal_distribution(tip, normal)
 
 
 def test_draws_are_a_table_and_a_figure(tip, normal):
-    found = ff.statistics(tip, normal, draws=50)
+    file = normal.with_suffix(".nc")
+    found = ff.statistics(tip, normal, draws=50, output=file)
     table = found.to_pandas()
     assert len(table) == 50
     np.testing.assert_array_equal(table["translation", ""], found.data["translation"])
-    drawn = [ff.show(found), ff.show(found.data, kind="histogram"), found.plot()]
+    drawn = [ff.show(found), ff.show(found.data, kind="histogram"), ff.show(file)]
     titles = {tuple(axes.get_title() for axes in one.axes) for one in drawn}
+    titles.add(tuple(axes.get_title() for axes in found.plot().axes))
     assert len(titles) == 1
     assert "translation [clearance worst]" in repr(found)
 
@@ -100,6 +102,11 @@ def test_show_refuses_options_that_do_not_fit_draws(tip, normal, options, messag
     found = ff.statistics(tip, normal, draws=4)
     with pytest.raises(ff.BadInput, match=message):
         ff.show(found, **options)
+
+
+def test_show_refuses_a_file_that_is_not_a_data_set(normal):
+    with pytest.raises(ff.BadInput, match="normal.toml"):
+        ff.show(normal)
 
 
 def test_show_refuses_options_of_data_sets_for_a_robot():
