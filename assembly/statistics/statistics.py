@@ -15,17 +15,24 @@ from numpy.typing import ArrayLike
 from forcefit.assembly.kinematics.posture import Posture
 from forcefit.assembly.model.given_load import Load
 from forcefit.assembly.statistics.callout_sources import Sources, sources_of
+from forcefit.assembly.statistics.clearance_positions import CLEARANCE_MODELS
 from forcefit.assembly.statistics.experiment import Experiment, precision_for
 from forcefit.assembly.statistics.importance_table import ImportanceOptions
 from forcefit.assembly.statistics.monte_carlo import run_draws
 from forcefit.assembly.statistics.plot import histogram_figure
 from forcefit.assembly.statistics.summary import summarise, summary_text
 from forcefit.assembly.sweeps.point_table import point_table
+from forcefit.inputs.errors import BadInput, describe, nearest
 
 if TYPE_CHECKING:
     import pandas
     import xarray
     from matplotlib.figure import Figure
+
+_WORDS: dict[str, tuple[str | None, ...]] = {
+    "clearance": tuple(CLEARANCE_MODELS), "by": ("source", "frame", "kind"),
+    "state": (None, "contact", "exact"),
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,9 +125,10 @@ def statistics(
         The draws and their summary.
 
     Raises:
-        BadInput: a file violates a rule; the robot has neither tolerances nor
-            ``errors``; a limited quantity is not computed; the load acts along a motion
-            without stiffness; or the journal belongs to another run.
+        BadInput: an argument is out of its range; a file violates a rule; the robot has
+            neither tolerances nor ``errors``; a limited quantity is not computed; the
+            load acts along a motion without stiffness; or the journal belongs to
+            another run.
         ModuleNotFoundError: xarray is missing.
 
     Example:
@@ -131,6 +139,14 @@ def statistics(
         100
     """
     limits = dict(limits or {})
+    _check_words(clearance=clearance, by=by, state=state)
+    _check_numbers(draws, workers, confidence, yield_strength)
+    if capability and not limits:
+        raise BadInput("capability: found no limits, expected one or more")
+    if contact_length is not None and clearance != "contact":
+        raise BadInput(
+            f'contact_length: found with clearance "{clearance}", expected "contact"'
+        )
     g = None if gravity is None else tuple(np.array(gravity, dtype=float).tolist())
     experiment = Experiment(
         posture, sources_of(posture.robot, errors), seed, clearance, margins, load=load,
@@ -148,3 +164,26 @@ def statistics(
         **summarise(data, limits, yield_strength, confidence, capability),
     }  # fmt: skip
     return Statistics(data, summary)
+
+
+def _check_words(**words: str | None) -> None:
+    """Raise an error for a word that is not among those of its argument."""
+    for name, word in words.items():
+        if word not in _WORDS[name]:
+            valid = [one for one in _WORDS[name] if one is not None]
+            raise BadInput(f"{name}: found {describe(word)}{nearest(str(word), valid)}")
+
+
+def _check_numbers(
+    draws: int, workers: int, confidence: float, yield_strength: float | None
+) -> None:
+    """Raise an error for a number that is out of its range."""
+    for name, count, least in (("draws", draws, 2), ("workers", workers, 1)):
+        if count < least:
+            raise BadInput(f"{name}: found {count}, expected at least {least}")
+    if not 0 < confidence < 1:
+        raise BadInput(
+            f"confidence: found {confidence}, expected a number between 0 and 1"
+        )
+    if yield_strength is not None and not 0 < yield_strength < np.inf:
+        raise BadInput(f"yield_strength: found {yield_strength}, expected > 0 Pa")

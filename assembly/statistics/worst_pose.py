@@ -47,7 +47,7 @@ from forcefit.assembly.statistics.quantities import POSE_ERRORS
 from forcefit.assembly.statistics.responses import respond
 from forcefit.assembly.steps.bolted import refuse_bolted
 from forcefit.inputs.renamed import renamed_keywords
-from forcefit.inputs.table import BadInput
+from forcefit.inputs.table import BadInput, describe, nearest
 from forcefit.results.display import Figures, html_table, short_repr
 from forcefit.results.text import in_unit
 
@@ -124,9 +124,13 @@ def worst_pose(
         The worst case, with the definition that applies.
 
     Raises:
-        BadInput: a joint is bolted at a pose, the posture is loaded, or an independent
-            error is unbounded or not symmetric about zero.
+        BadInput: the quantity is unknown, a joint is bolted at a pose, the posture is
+            loaded, or an independent error is unbounded or not symmetric about zero.
     """
+    if quantity not in POSE_ERRORS:
+        raise BadInput(
+            f"quantity: found {describe(quantity)}{nearest(quantity, POSE_ERRORS)}"
+        )
     one = posture.posture if isinstance(posture, LinearResponse) else posture
     prepared = linear_response(posture) if isinstance(posture, Posture) else posture
     prepared, sources = _at_largest_clearances(prepared, sources_of(one.robot, errors))

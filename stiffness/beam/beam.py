@@ -82,6 +82,11 @@ def beam_compliance(
             f"beam_compliance: theory = {describe(theory)}{nearest(theory, THEORIES)}"
         )
     if not isinstance(section, Section):
+        if not isinstance(section, Mapping):
+            found = describe(section)
+            raise BadInput(
+                f'beam_compliance: section: found {found}, expected {{"radius": 0.02}}'
+            )
         check_section("beam_compliance: section", section)
         section = declared_section(section, nu)
     C = _compliance_in_section_axes(length, section, E, nu, theory == "timoshenko")

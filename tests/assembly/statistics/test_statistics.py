@@ -85,6 +85,31 @@ def test_worst_pose_of_two_uniform_errors_is_the_diagonal_of_their_box(tip, tmp_
     assert worst.bound == pytest.approx(5e-5, rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"clearance": "wrost"}, "clearance: found 'wrost'; did you mean \"worst\""),
+        ({"by": "x"}, "by: found 'x'"),
+        ({"state": "nominal"}, "state: found 'nominal'"),
+        ({"draws": 1}, "draws: found 1, expected at least 2"),
+        ({"workers": 0}, "workers: found 0, expected at least 1"),
+        ({"confidence": 2.0}, "confidence: found 2.0, expected a number between"),
+        ({"yield_strength": -1.0}, "yield_strength: found -1.0, expected > 0 Pa"),
+        ({"capability": True}, "capability: found no limits"),
+        ({"contact_length": 0.1}, "contact_length: found with clearance"),
+        ({"limits": {"enrgy": 1.0}}, "limit enrgy: found a quantity"),
+    ],
+)
+def test_statistics_refuse_an_argument_out_of_its_range(tip, normal, options, message):
+    with pytest.raises(ff.BadInput, match=message):
+        ff.statistics(tip, normal, **{"draws": 10, **options})
+
+
+def test_worst_pose_refuses_an_unknown_quantity(tip, normal):
+    with pytest.raises(ff.BadInput, match="quantity: found 'translaton'"):
+        ff.worst_pose(tip, normal, "translaton")
+
+
 def test_statistics_without_errors_name_what_is_missing(tip):
     with pytest.raises(ff.BadInput, match="no --errors"):
         ff.statistics(tip)

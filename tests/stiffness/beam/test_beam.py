@@ -1,6 +1,7 @@
 """Compliance and stiffness of beams against tables, textbooks and hand calculation."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -217,6 +218,13 @@ def test_section_given_by_its_lengths_bends_as_in_the_textbook(section, moment):
     assert C[4, 4] == pytest.approx(0.5**3 / (3 * 7e10 * moment), rel=1e-12)
 
 
-def test_section_with_an_unknown_length_is_refused():
-    with pytest.raises(BadInput, match='section: unknown "radus"; did you mean'):
-        beam_compliance(0.5, {"radus": 0.02}, E=7e10, nu=0.33)
+@pytest.mark.parametrize(
+    ("section", "message"),
+    [
+        ({"radus": 0.02}, 'section: unknown "radus"; did you mean'),
+        (0.02, 'section: found 0.02, expected {"radius": 0.02}'),
+    ],
+)
+def test_section_that_is_none_is_refused(section, message):
+    with pytest.raises(BadInput, match=re.escape(message)):
+        beam_compliance(0.5, section, E=7e10, nu=0.33)
