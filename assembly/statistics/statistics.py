@@ -93,7 +93,9 @@ def statistics(
         posture: posture of the robot; drawn errors replace the robot file's errors.
         errors: file with the distributions of errors (TOML, see docs/statistics.md), in
             addition to the tolerances and fits in the robot file; None for these alone.
-            Sources that were read before are also accepted.
+            Sources of errors are accepted too; those of
+            :func:`forcefit.assembly.statistics.callout_sources.sources_of` may include
+            errors that are the same in every draw.
         draws: number of draws, at least 2.
         seed: seed of the draws.
         clearance: positions within the clearances: ``"worst"``, ``"uniform"``,
