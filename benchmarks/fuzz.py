@@ -102,7 +102,7 @@ def command_name(words: list[str]) -> str:
     """Return the words that name a command."""
     if words[0] in {"study", "convert"}:
         return words[0]
-    return " ".join(words[:3] if words[1] == "library" else words[:2])
+    return " ".join(words[:2])
 
 
 def prepare(folder: Path, commands: list[str]) -> None:

@@ -109,15 +109,15 @@ FOREIGN = [
     (8, "convert tied.xml -o new.toml"),
     (6, "convert tied.urdf -o new.toml"),
     (3, "assembly solve tied.urdf --quantities margin --json -"),
-    (4, "stiffness import long.dmig --json -"),
+    (4, "stiffness convert long.dmig --json -"),
     (2, "convert five.toml -o new.urdf"),
     (2, "convert five.toml -o new.xml"),
-    (4, "stiffness import rod.mtx --json new.json"),
-    (3, "stiffness import rod.mtx --nodes nodes.csv --base 1 --tip 2 --json -"),
-    (4, "stiffness import element.mtx --unit mm --json -"),
-    (4, "stiffness import rod.pch --json new.json"),
-    (4, "stiffness import rod.npy --json -"),
-    (4, "stiffness export rod.json --to nastran -o new.pch"),
+    (4, "stiffness convert rod.mtx --json new.json"),
+    (3, "stiffness convert rod.mtx --nodes nodes.csv --base 1 --tip 2 --json -"),
+    (4, "stiffness convert element.mtx --unit mm --json -"),
+    (4, "stiffness convert rod.pch --json new.json"),
+    (4, "stiffness convert rod.npy --json -"),
+    (4, "stiffness convert rod.json --to nastran -o new.pch"),
     (6, "validation import named.txt --targets smr.toml --commands commands.csv "
         "-o newfolder"),
     (4, "validation import timed.csv --targets smr.toml --commands commands.csv "
@@ -132,10 +132,10 @@ MADE_FOREIGN = [
     "--json rod.json",
     "stiffness beam --length 0.3 --young 7e10 --poisson 0.3 --radius 0.03 "
     "--json other.json",
-    "stiffness export rod.json --to matrix-market -o rod.mtx",
-    "stiffness export rod.json --to abaqus --unit mm -o element.mtx",
-    "stiffness export rod.json --to nastran -o rod.pch",
-    "stiffness export rod.json --to numpy -o rod.npy",
+    "stiffness convert rod.json --to matrix-market -o rod.mtx",
+    "stiffness convert rod.json --to abaqus --unit mm -o element.mtx",
+    "stiffness convert rod.json --to nastran -o rod.pch",
+    "stiffness convert rod.json --to numpy -o rod.npy",
 ]  # fmt: skip
 
 

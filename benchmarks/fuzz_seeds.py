@@ -167,7 +167,7 @@ COMMANDS = [
     (6, "assembly statistics bar.toml --errors errors.toml --draws 40 --seed 2 --limit "
         "energy=5 --confidence 0.9 -o new.nc --json new.json"),
     (2, "assembly statistics bar.toml --errors errors.toml --draws 40 -o drawn.nc"),
-    (3, "assembly tolerances bar.toml --grid tx=0.65 --plan plan.toml --fresh 20 "
+    (3, "assembly tolerances bar.toml --grid tx=0.65 --plan plan.toml --draws 20 "
         "-o new.nc --json -"),
     (2, "assembly tolerances bar.toml --grid tx=0.65:0.66:0.01 --quantities margin"),
     (5, "assembly path bar.toml --path way.csv --gravity y=-9.81 --points 9 -o new.nc "
@@ -189,13 +189,13 @@ COMMANDS = [
     (2, "stiffness compare solid.obj --base z=0 --tip z=7 --young 7e10 --poisson 0.3 "
         "--radius 0.02 --figure new.pdf"),
     (2, "stiffness stress solid.obj --base z=0 --tip z=7 --young 7e10 --poisson 0.3 "
-        "--wrench fx=10,mz=1 --away 0.01"),
+        "--load fx=10,mz=1 --away 0.01"),
     (1, "stiffness compare --young 7e10 --poisson 0.3 --radius 0.02 --ratios 5,x"),
-    (6, "stiffness library build spec.toml --workers 1"),
-    (5, "stiffness library read links"),
-    (4, "stiffness library read links --at length=0.3 --json -"),
-    (4, "stiffness library read links --to csv"),
-    (3, "stiffness library read links --to mapdl --key "
+    (6, "stiffness library spec.toml --workers 1"),
+    (5, "stiffness library links"),
+    (4, "stiffness library links --at length=0.3 --json -"),
+    (4, "stiffness library links --to csv"),
+    (3, "stiffness library links --to mapdl --key "
         "round-beam-length0.3-radius0.02-young7e+10-poisson0.3"),
     (6, "validation inspect campaign --json -"),
     (1, "validation diagnose campaign --json new.json --save new.toml --report "
@@ -252,7 +252,7 @@ def _stl() -> bytes:
 
 # commands that write the files that other commands read
 MADE = [
-    "stiffness library build links.toml",
+    "stiffness library links.toml",
     "assembly sweep bar.toml --grid q.crank=1:1.2:0.1 -o swept.nc --near 0.1",
     "assembly statistics bar.toml --errors errors.toml --draws 40 -o draws.nc",
 ]

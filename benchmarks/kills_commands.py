@@ -24,7 +24,7 @@ COMMANDS = {
     "statistics": "assembly statistics five_bar --errors errors.toml --draws 4000 "
     "--pose ty=0.13 --no-margins -o out.nc --json out.json",
     "tolerances": "assembly tolerances five_bar --grid tx=0:0.01:0.01,ty=0.13 "
-    "--plan plan.toml --fresh 50 -o out.nc --figure out.png --json out.json",
+    "--plan plan.toml --draws 50 -o out.nc --figure out.png --json out.json",
     "diagnose": "validation diagnose campaign --json out.json --report out.html "
     "--save out.toml",
 }

@@ -54,7 +54,7 @@ def main():
         f"{k} {float(near.sel(kind=k)):.2f}" for k in near.kind.values
     )
     print(f"least distances to singularities in the square: {distances}")
-    figure = ff.figure_of(data, {CLEARANCE: 8e-6})
+    figure = ff.show(data, at={CLEARANCE: 8e-6})
     figure.savefig(options.output.with_suffix(".png"), dpi=150)
 
 

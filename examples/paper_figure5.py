@@ -67,7 +67,7 @@ def main():
             ],
             output=base.with_suffix(".nc"),
         )  # fmt: skip
-        ff.figure_of(data).savefig(base.with_suffix(".png"), dpi=150)
+        ff.show(data).savefig(base.with_suffix(".png"), dpi=150)
         print_table(signs, data, column)
 
 

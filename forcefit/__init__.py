@@ -25,10 +25,7 @@ if TYPE_CHECKING:
 _OWNERS = {
     "forcefit.inputs.errors": ("BadInput",),
     "forcefit.stiffness.beam.beam": ("beam_compliance",),
-    "forcefit.stiffness.beam.sections": ("rectangular_section", "round_section"),
     "forcefit.stiffness.fem.fea": ("mesh_link",),
-    "forcefit.stiffness.fem.material": ("Material",),
-    "forcefit.stiffness.surface.interface": ("parse_interface",),
     "forcefit.assembly.exact.exact": ("solve_exact",),
     "forcefit.assembly.exchange.convert": ("convert",),
     "forcefit.assembly.exchange.robot_files": ("load_robot", "write_robot"),
@@ -37,48 +34,64 @@ _OWNERS = {
     "forcefit.assembly.kinematics.mobility": ("mobility",),
     "forcefit.assembly.linear.pose_error": ("bound_pose_error",),
     "forcefit.assembly.linear.zone": ("zone_margin",),
-    "forcefit.assembly.model.error_distributions": ("read_sources",),
-    "forcefit.assembly.path.request": ("PathTimes", "errors_along_path"),
+    "forcefit.assembly.path.request": ("errors_along_path",),
     "forcefit.assembly.platform_stiffness.deflection": ("deflection_curve",),
     "forcefit.assembly.platform_stiffness.platform_stiffness": ("platform_stiffness",),
     "forcefit.assembly.platform_stiffness.vibration": ("natural_modes",),
     "forcefit.assembly.model.robot": (
         "BeamLink", "Clearance", "Frame", "LockedAt", "MatrixLink", "Robot",
     ),
-    "forcefit.assembly.report.show": ("show",),
-    "forcefit.assembly.files.step_file": ("read_steps",),
+    "forcefit.assembly.files.step_file": ("assemble_in_steps",),
     "forcefit.assembly.steps.bolted": ("bolt_joints",),
-    "forcefit.assembly.steps.run": ("assemble_in_steps",),
-    "forcefit.assembly.statistics.callout_sources": ("sources_of",),
-    "forcefit.assembly.statistics.experiment": ("Experiment",),
-    "forcefit.assembly.statistics.monte_carlo": ("run_draws",),
-    "forcefit.assembly.statistics.summary": ("summarise",),
+    "forcefit.assembly.statistics.show": ("show",),
+    "forcefit.assembly.statistics.statistics": ("statistics",),
     "forcefit.assembly.statistics.worst_pose": ("worst_pose",),
     "forcefit.assembly.sweeps.dataset": ("open_dataset",),
-    "forcefit.assembly.sweeps.maps": ("figure_of",),
     "forcefit.assembly.sweeps.point_table": ("point_table",),
     "forcefit.assembly.sweeps.robot_sweep": ("sweep",),
     "forcefit.validation.assumptions.assumptions": ("assumption_costs",),
-    "forcefit.validation.campaign.campaign_file": ("read_campaign", "read_commands"),
+    "forcefit.validation.campaign.campaign_file": ("read_campaign",),
     "forcefit.validation.correction.compensation": ("compensate",),
     "forcefit.validation.correction.prediction": ("predict",),
     "forcefit.validation.crosscheck.crosscheck": ("crosscheck",),
     "forcefit.validation.diagnosis.diagnose": ("diagnose",),
     "forcefit.validation.inspection.inspection": ("inspect_campaign",),
-    "forcefit.validation.study.report": ("write_study",),
-    "forcefit.validation.study.study": ("run_study",),
-    "forcefit.validation.study.study_file": ("read_study",),
+    "forcefit.validation.study.run": ("run_study",),
 }  # fmt: skip
-# Old public names, which still work for one release.  Each entry gives the new public
-# name, or the module and the name of the object in that module.
-_RENAMED = {
+# Old public names by the module that still defines them, each with the public name that
+# replaces it.  They work for one release.
+_REPLACED = {
+    "forcefit.stiffness.beam.sections": {
+        "rectangular_section": "beam_compliance", "round_section": "beam_compliance",
+    },
+    "forcefit.stiffness.fem.material": {"Material": "mesh_link"},
+    "forcefit.stiffness.surface.interface": {"parse_interface": "mesh_link"},
+    "forcefit.assembly.files.step_file": {"read_steps": "assemble_in_steps"},
+    "forcefit.assembly.kinematics.posture": {"home_posture": "place_robot"},
+    "forcefit.assembly.model.error_distributions": {"read_sources": "statistics"},
+    "forcefit.assembly.path.request": {"PathTimes": "errors_along_path"},
+    "forcefit.assembly.statistics.callout_sources": {"sources_of": "statistics"},
+    "forcefit.assembly.statistics.experiment": {"Experiment": "statistics"},
+    "forcefit.assembly.statistics.monte_carlo": {"run_draws": "statistics"},
+    "forcefit.assembly.statistics.summary": {"summarise": "statistics"},
+    "forcefit.assembly.sweeps.maps": {"figure_of": "show"},
+    "forcefit.assembly.sweeps.request": {"ask_sweep": "sweep"},
+    "forcefit.assembly.sweeps.sweep": {
+        "run_sweep": "sweep", "sweep_in_memory": "sweep",
+    },
+    "forcefit.validation.campaign.campaign_file": {"read_commands": "read_campaign"},
+    "forcefit.validation.study.report": {"write_study": "run_study"},
+    "forcefit.validation.study.study_file": {"read_study": "run_study"},
+}  # fmt: skip
+# Old public names that work for one release.  Each entry gives the new public name, and
+# the module and the name of the object if they are not those of the new name.
+_RENAMED: dict[str, tuple[str, ...]] = {
     "foretell": ("predict",), "load_deflection": ("deflection_curve",),
     "read_robot": ("load_robot",),
-    "home_posture": ("place_robot", "forcefit.assembly.kinematics.posture",
-    "home_posture"), "SweepOptions": ("sweep", "forcefit.assembly.sweeps.robot_sweep",
-    "options_by_old_names"), "ask_sweep": ("sweep", "forcefit.assembly.sweeps.request",
-    "ask_sweep"), "run_sweep": ("sweep", "forcefit.assembly.sweeps.sweep", "run_sweep"),
-    "sweep_in_memory": ("sweep", "forcefit.assembly.sweeps.sweep", "sweep_in_memory"),
+    "SweepOptions": ("sweep", "forcefit.assembly.sweeps.robot_sweep",
+                     "options_by_old_names"),
+    **{old: (new, owner, old)
+       for owner, names in _REPLACED.items() for old, new in names.items()},
 }  # fmt: skip
 # public names of the last release that must now be imported from their module
 _MOVED = {

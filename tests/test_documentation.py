@@ -195,9 +195,9 @@ def links(folder, run):
 
     run("stiffness", "beam", "--length", 0.4, "--radius", 0.02, "--young", 6e10,
         "--poisson", 0.3, "--json", folder / "rod.json")  # fmt: skip
-    run("stiffness", "export", folder / "rod.json", "--to", "matrix-market", "--unit",
+    run("stiffness", "convert", folder / "rod.json", "--to", "matrix-market", "--unit",
         "mm", "-o", folder / "rod.mtx")  # fmt: skip
-    run("stiffness", "export", folder / "rod.json", "--to", "matrix-market", "-o",
+    run("stiffness", "convert", folder / "rod.json", "--to", "matrix-market", "-o",
         folder / "full.mtx")  # fmt: skip
     mmwrite(folder / "m.mtx", np.eye(12))
     (folder / "nodes.csv").write_text("1,0,0,0\n2,0.4,0,0\n")

@@ -17,7 +17,7 @@ from benchmarks.fuzz_seeds import COMMANDS, write_seeds
 # quick ones, that read no file which another command makes
 QUICK = (
     "assembly solve bar.toml --quantities", "assembly solve rounded", "convert bar.sdf",
-    "convert tied", "stiffness beam", "stiffness import long",
+    "convert tied", "stiffness beam", "stiffness convert long",
     "validation import", "validation inspect campaign",
 )  # fmt: skip
 

@@ -7,6 +7,7 @@ from math import pi
 import numpy as np
 import pytest
 
+from forcefit.assembly.statistics.joint_fits import fits_of
 from tests.test_tutorials import ROOT
 
 NOTEBOOKS = {path.stem: path for path in (ROOT / "examples/notebooks").glob("*.ipynb")}
@@ -62,7 +63,7 @@ def test_notebook_for_a_custom_robot_ends_with_a_report(tmp_path, monkeypatch):
     assert (found["mobility"].freedoms, found["mobility"].overconstraint) == (2, 3)
     assert not found["zone"].assemblable
     assert found["results"].passed  # checked by a multibody simulation
-    assert (tmp_path / "study_study" / "report.html").is_file()
+    assert (tmp_path / "study" / "report.html").is_file()
 
 
 @pytest.mark.slow
@@ -141,7 +142,7 @@ def test_bounds_in_the_notebook_of_drawing_tolerances_contain_all_draws(
     share = float(np.mean(found["translation"] <= 150))
     assert found["share"]["probability"] == pytest.approx(share)
     assert found["share"]["lower"] < share < found["share"]["upper"]
-    fits = [fit.fit for fit in found["experiment"].sources.fits]
+    fits = [fit.fit for fit in fits_of(found["robot"])]
     assert [fit.text for fit in fits] == ["12 H7/g6", "12 H7/g6"]
     assert len(found["robot"].callouts) == 4
     assert worst.attained <= sum(x for _, x in worst.shares) <= worst.bound

@@ -6,11 +6,14 @@ from math import inf
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from forcefit.assembly.files.written_units import without_units
+from forcefit.assembly.kinematics.posture import Posture
 from forcefit.assembly.model.joint_names import names_of, row_of
 from forcefit.assembly.model.largest import LARGEST, LARGEST_LENGTH
 from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.steps import run
 from forcefit.assembly.steps.plan import (
     Adjust,
     Fix,
@@ -22,6 +25,7 @@ from forcefit.assembly.steps.plan import (
     Step,
     check_plan,
 )
+from forcefit.assembly.steps.run import StepResult
 from forcefit.inputs.table import BadInput, Table, describe, nearest, quoted, read_toml
 from forcefit.results.quantities import flag, number, text
 from forcefit.results.records import (
@@ -57,6 +61,35 @@ PLAN_FILE = record(
         reading_=_PART, of_=_NAMES, increment_=number("increment", "rad or m"),
     ))),
 )  # fmt: skip
+
+
+def assemble_in_steps(
+    plan: Plan | Path | str,
+    posture: Posture,
+    errors: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+) -> list[StepResult]:
+    """Carry out a plan, or the plan of a file, and return the result of each step.
+
+    Args:
+        plan: the steps, or a TOML file with ``[[step]]`` tables.
+        posture: pose at which the robot of n frames is assembled.
+        errors: (k, n, 6) [rad, m] geometric errors of k machines; None for the errors
+            of the robot file.
+        gravity: (3,) [m/s^2] gravity in base axes, which acts from the beginning.  It
+            does not move parts that nothing holds yet.
+
+    Returns:
+        The results, one per step.
+
+    Raises:
+        BadInput: the file violates a rule, or the plan does not fit the robot.
+        CannotAssemble: the conditions of rigid parts contradict each other.
+        FreeMotion: a load acts along a motion that nothing resists.
+        SolverFailed: the solver for the clearances did not converge.
+    """
+    steps = plan if isinstance(plan, Plan) else read_steps(plan, posture.robot)
+    return run.assemble_in_steps(steps, posture, errors, gravity)
 
 
 def read_steps(path: Path | str, robot: Robot) -> Plan:

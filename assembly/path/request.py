@@ -1,11 +1,12 @@
 """The errors along a path from the options of ``forcefit assembly path``."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import wraps
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,8 +25,11 @@ from forcefit.assembly.statistics.replay import journalled
 from forcefit.assembly.sweeps.dataset import save_dataset
 from forcefit.assembly.sweeps.identity import program_hash, robot_hash
 from forcefit.inputs.errors import checked
+from forcefit.inputs.renamed import warn_renamed
 from forcefit.inputs.table import BadInput, nearest
 
+P = ParamSpec("P")
+R = TypeVar("R")
 ENDS = ("rest", "moving")
 POINTS = 201
 
@@ -55,11 +59,32 @@ class PathTimes:
     points: int = POINTS
 
 
+def _accepting_times(function: Callable[P, R]) -> Callable[P, R]:
+    """Return the function, which also accepts ``times`` as in the last release."""
+
+    @wraps(function)
+    def call(*args: P.args, **kwargs: P.kwargs) -> R:
+        times = kwargs.pop("times", None)
+        if isinstance(times, PathTimes):
+            warn_renamed("errors_along_path(times)", "errors_along_path(profile, ..)")
+            kwargs.update(vars(times))
+        return function(*args, **kwargs)
+
+    return call
+
+
+@_accepting_times
 def errors_along_path(
     robot: Robot | str | Path,
     path: PathTable | str | Path,
     *,
-    times: PathTimes | None = None,
+    profile: str | None = None,
+    duration: float | None = None,
+    speed: float | None = None,
+    acceleration: float | None = None,
+    interval: float | None = None,
+    ends: str = "rest",
+    points: int = POINTS,
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
     assumption: str = "none",
@@ -75,7 +100,15 @@ def errors_along_path(
         robot: a robot with masses, a robot file, or a built-in name.
         path: rows of poses or joint coordinates, or a CSV file of them, with or without
             a column ``time``; see :func:`forcefit.assembly.path.path_file.read_path`.
-        times: how the path is traversed in time; None to use the times of the path.
+        profile: name of a profile from rest to rest in
+            :data:`forcefit.assembly.path.profiles.PROFILES`; None if times are given.
+        duration: [s] duration of the profile.
+        speed: [m/s, or rad/s or m/s of drives] largest speed of the profile.
+        acceleration: [m/s^2, or rad/s^2 or m/s^2 of drives] largest acceleration of the
+            profile.
+        interval: [s] time between the rows of a table without times.
+        ends: ``"rest"`` or ``"moving"``, for a path with times.
+        points: number of equally spaced instants.
         load: (6,) [N m, N] constant load on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
         assumption: assumption of the pose error bounds, problem (27): ``"frozen"`` or
@@ -101,7 +134,8 @@ def errors_along_path(
     if drive_force:
         machine = with_drive_forces(machine, drive_force)
     check_state(machine, state)
-    trajectory = trajectory_of(machine, path, times or PathTimes())
+    times = PathTimes(profile, duration, speed, acceleration, interval, ends, points)
+    trajectory = trajectory_of(machine, path, times)
     asked = {"load": load, "gravity": gravity, "assumption": assumption, "state": state}
     file = None if output is None else Path(output)
     with journalled(file, _identity(machine, trajectory, asked)) as replay:

@@ -85,7 +85,7 @@ def _compliance(
     """Return the platform's compliance (6, 6) under loads on bodies and platform."""
     if state == "contact":
         assembly = solve_assembly(posture, load, bodies, carried=carried)
-        return in_contact(assembly, "letting go").compliance
+        return in_contact(assembly, "unloading").compliance
     exact = solve_exact(posture, load, bodies=bodies)
-    tangent = exact_tangent(exact, "letting go")
+    tangent = exact_tangent(exact, "unloading")
     return tangent.at(exact.placement.platform[:3, 3]).compliance

@@ -242,7 +242,7 @@ def _solve(
     if not exact:
         linear = solve_assembly(posture, wrench, gravity=gravity, method=method)
         names = clearance_names(linear.joints, contacts(linear)[0])
-        return _Point(value, linear, in_contact(linear, "letting go"), names)
+        return _Point(value, linear, in_contact(linear, "unloading"), names)
     start = (
         near.equilibrium
         if near and isinstance(near.equilibrium, ExactAssembly)
@@ -263,7 +263,7 @@ def _solve(
     # omit contacts whose forces are only rounding errors
     active &= force > _CARRIES * force.max(initial=0.0)
     names = clearance_names(equilibrium.expansion.placement.model.joints, active)
-    return _Point(value, equilibrium, exact_tangent(equilibrium, "letting go"), names)
+    return _Point(value, equilibrium, exact_tangent(equilibrium, "unloading"), names)
 
 
 def _settled(

@@ -39,14 +39,14 @@ FLAT = 1e-12
 
 
 def exact_tangent(
-    equilibrium: ExactAssembly, side: Side = "holding"
+    equilibrium: ExactAssembly, side: Side = "loading"
 ) -> PlatformStiffness:
     """Return the stiffness of the platform at an exact equilibrium.
 
     Args:
         equilibrium: the manipulator assembled with finite motions, under its loads.
-        side: state of clearances at their bound without a force: ``"holding"`` keeps
-            them at the bound, ``"letting go"`` releases them.
+        side: state of clearances at their bound without a force: ``"loading"``, in
+            which they stay at the bound, or ``"unloading"``, in which they leave it.
 
     Returns:
         The stiffness at the platform's displaced origin, base axes; modes of negative
@@ -54,7 +54,7 @@ def exact_tangent(
     """
     local = equilibrium.expansion
     model, at = local.placement.model, local.placement
-    D, H = tangent_space(local, hold_touching=side == "holding")
+    D, H = tangent_space(local, hold_touching=side == "loading")
     curvature, modes = curvature_modes(D, H, model.units)
     flat = np.abs(curvature) <= FLAT * np.abs(curvature).max(initial=0.0)
     bent = modes[:, ~flat] / np.sqrt(np.abs(curvature[~flat]))

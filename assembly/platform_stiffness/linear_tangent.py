@@ -47,7 +47,7 @@ from forcefit.assembly.platform_stiffness.matrices import (
 )
 from forcefit.assembly.solvers.method import Method
 
-Side = Literal["holding", "letting go"]
+Side = Literal["loading", "unloading"]
 _RANK = 1e-10  # relative size below which a singular value counts as zero
 _NOISE = 1e-12  # relative rounding error of a column that a projection removes
 
@@ -66,13 +66,13 @@ def without_clearance(posture: Posture) -> PlatformStiffness:
                       joints.free, "reference")  # fmt: skip
 
 
-def in_contact(assembly: Assembly, side: Side = "holding") -> PlatformStiffness:
+def in_contact(assembly: Assembly, side: Side = "loading") -> PlatformStiffness:
     """Return the tangent of problem (22), with each clearance free or pressed.
 
     Args:
         assembly: the manipulator with least energy under its loads.
-        side: state of clearances at their bound without a force: ``"holding"`` keeps
-            them at the bound, ``"letting go"`` releases them.
+        side: state of clearances at their bound without a force: ``"loading"``, in
+            which they stay at the bound, or ``"unloading"``, in which they leave it.
 
     Returns:
         The stiffness at the platform's origin, from the second derivative of the least
@@ -81,7 +81,7 @@ def in_contact(assembly: Assembly, side: Side = "holding") -> PlatformStiffness:
     return active_tangent(settle(assembly), side)
 
 
-def active_tangent(assembly: Assembly, side: Side = "holding") -> PlatformStiffness:
+def active_tangent(assembly: Assembly, side: Side = "loading") -> PlatformStiffness:
     """Return the tangent stiffness of an assembly that is nearly in equilibrium.
 
     Args:
@@ -94,7 +94,7 @@ def active_tangent(assembly: Assembly, side: Side = "holding") -> PlatformStiffn
     """
     joints, u = assembly.joints, assembly.clearances
     pressed, touching = contacts(assembly)
-    held = pressed | (touching & (side == "holding"))
+    held = pressed | (touching & (side == "loading"))
     force = bound_forces(assembly)
     springs, names, free = [joints.elastic], owners(joints), [joints.free]
     for k, is_held in enumerate(held):

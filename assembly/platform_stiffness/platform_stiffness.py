@@ -25,6 +25,7 @@ from forcefit.assembly.solvers.method import Method, check_method
 from forcefit.inputs.renamed import current_value
 
 State = Literal["nominal", "contact", "exact"]
+_OLD_SIDES = {"holding": "loading", "letting go": "unloading"}
 _OLD_STATES = {"without clearance": "nominal", "in contact": "contact"}
 
 
@@ -32,7 +33,7 @@ _OLD_STATES = {"without clearance": "nominal", "in contact": "contact"}
 def platform_stiffness(
     posture: Posture, state: State = "nominal",
     load: Load | None = None, gravity: ArrayLike | None = None,
-    at: ArrayLike = (0.0, 0.0, 0.0), side: Side = "holding",
+    at: ArrayLike = (0.0, 0.0, 0.0), side: Side = "loading",
     method: Method = "compiled",
 ) -> PlatformStiffness: ...  # fmt: skip
 
@@ -41,7 +42,7 @@ def platform_stiffness(
 def platform_stiffness(
     posture: Sequence[Posture], state: State = "nominal",
     load: Load | None = None, gravity: ArrayLike | None = None,
-    at: ArrayLike = (0.0, 0.0, 0.0), side: Side = "holding",
+    at: ArrayLike = (0.0, 0.0, 0.0), side: Side = "loading",
     method: Method = "compiled",
 ) -> Stiffnesses: ...  # fmt: skip
 
@@ -52,7 +53,7 @@ def platform_stiffness(
     load: Load | None = None,
     gravity: ArrayLike | None = None,
     at: ArrayLike = (0.0, 0.0, 0.0),
-    side: Side = "holding",
+    side: Side = "loading",
     method: Method = "compiled",
 ) -> PlatformStiffness | Stiffnesses:
     """Return the platform's tangent stiffness: small wrench per small motion.
@@ -70,8 +71,9 @@ def platform_stiffness(
         gravity: (3,) [m/s^2] gravity vector in base axes.  It has no effect on the
             classical model.
         at: (3,) [m] reference point of screws and wrenches, in platform axes.
-        side: state of clearances that touch their bound without a force: ``"holding"``
-            keeps them at the bound, ``"letting go"`` releases them.
+        side: state of clearances that touch their bound without a force:
+            ``"loading"``, in which they stay at the bound, or ``"unloading"``, in which
+            they leave it.
         method: ``"compiled"``, with the reference method where necessary; or
             ``"reference"``, with numpy and Clarabel only.  In the state ``"contact"``,
             the method is passed to
@@ -96,9 +98,10 @@ def platform_stiffness(
     offset = numbers_of("at", at, 3, "m")
     if load is not None:
         load = one_load(load)
+    side = cast(Side, current_value("side", side, _OLD_SIDES))
     if side not in get_args(Side):
         raise ValueError(
-            f"platform_stiffness: no side {side!r}; expected 'holding' or 'letting go'"
+            f"platform_stiffness: no side {side!r}; expected 'loading' or 'unloading'"
         )
     state = cast(State, current_value("state", state, _OLD_STATES))
     if state not in get_args(State):

@@ -84,7 +84,7 @@ class TangentState:
     load: ArrayLike | None = None
     gravity: ArrayLike | None = None
     at: ArrayLike = (0.0, 0.0, 0.0)
-    side: Side = "holding"
+    side: Side = "loading"
 
 
 _Moved = Callable[[Posture, float], tuple[PlatformStiffness, NDArray]]

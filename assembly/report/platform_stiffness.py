@@ -30,8 +30,8 @@ from forcefit.results.text import lines_of, table_lines, value_text
 from forcefit.stiffness.screws import SCREW, WRENCH
 
 DIRECTIONS = tuple(name.lower() for name in SCREW)
-# texts for the tangent stiffness on both sides of a contact change
-_SIDES = {"holding": "loading", "letting go": "unloading"}
+# words of results, which stay, for the two sides of a contact change
+_SIDES: dict[Side, str] = {"loading": "holding", "unloading": "letting go"}
 _KINDS = {"link": "links", "joint": "joints", "clearance": "clearances"}
 _SHOWN = 12  # number of parts in table and chart; the sum of other parts is one row
 
@@ -98,11 +98,11 @@ def _tangents(
         linear = solve_assembly(posture, load, gravity=gravity)
         sides = [in_contact(linear)]
         if contacts(linear)[1].any():
-            sides.append(in_contact(linear, "letting go"))
+            sides.append(in_contact(linear, "unloading"))
         return posture.platform, sides, None
     equilibrium = solve_exact(posture, load, gravity=gravity)
     sides = [exact_tangent(equilibrium)]
-    away = exact_tangent(equilibrium, "letting go")
+    away = exact_tangent(equilibrium, "unloading")
     if away.free.shape[1] > sides[0].free.shape[1]:
         sides.append(away)
     return equilibrium.placement.platform, sides, far_from_linear(equilibrium)
@@ -129,11 +129,15 @@ def _in_contact(
     """Return the tangent of problem (22); two if a clearance just touches a bound."""
     assembly = solve_assembly(posture, load, gravity=gravity)
     pressed, touching = contacts(assembly)
-    sides: list[Side] = ["holding"]
+    sides: list[Side] = ["loading"]
     if touching.any():
-        sides.append("letting go")
+        sides.append("unloading")
     return [
-        {"side": side, "contacts": int(pressed.sum()), "touching": int(touching.sum())}
+        {
+            "side": _SIDES[side],
+            "contacts": int(pressed.sum()),
+            "touching": int(touching.sum()),
+        }
         | stiffness_values(in_contact(assembly, side), point, length)
         for side in sides
     ]
@@ -232,7 +236,8 @@ def stiffness_text(results: dict[str, Any]) -> str:
     if "direction" in results:
         lines += _direction_lines(results["direction"])
     for side in results.get("contact", ()):
-        closed = f"{side['contacts']} closed clearances, {_SIDES[side['side']]}:"
+        word = next(name for name, old in _SIDES.items() if old == side["side"])
+        closed = f"{side['contacts']} closed clearances, {word}:"
         lines += ["", closed, *_state_lines(side)]
     if results.get("letting_go"):
         lines += ["", "unloading of clearances that touch their bound without a force:"]

@@ -8,6 +8,7 @@ the seed, as in :mod:`forcefit.assembly.model.error_distributions`.
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from forcefit.assembly.callouts.zone import DISTRIBUTIONS
 from forcefit.assembly.kinematics.callout_maps import place_callouts
 from forcefit.assembly.kinematics.placed_callout import PlacedCallout
 from forcefit.assembly.kinematics.posture import home_posture
-from forcefit.assembly.model.error_distributions import ErrorSources
+from forcefit.assembly.model.error_distributions import ErrorSources, read_sources
 from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.statistics.joint_fits import (
     JointFit,
@@ -255,21 +256,30 @@ def _uniforms(
 
 
 def sources_of(
-    robot: Robot, independent: ErrorSources | None = None, fixed: NDArray | None = None
+    robot: Robot,
+    independent: Sources | Path | str | None = None,
+    fixed: NDArray | None = None,
 ) -> Sources:
     """Return the random errors of a robot from its callouts and independent errors.
 
     Args:
         robot: any robot.
-        independent: independent errors from an errors file, or None.
+        independent: independent errors, or a file of them (TOML, see
+            docs/statistics.md); or None.  The sources that this function returned are
+            returned unchanged.
         fixed: (n, 6) [rad, m] errors that are added to every draw.
 
     Returns:
         The sources of errors; only the independent ones if the robot has no callouts.
 
     Raises:
-        BadInput: the robot has no callouts, and there are no independent errors.
+        BadInput: the file violates a rule; or the robot has no callouts, and there are
+            no independent errors.
     """
+    if isinstance(independent, Path | str):
+        independent = read_sources(independent, robot, fixed)
+    if isinstance(independent, CalloutSources):
+        return independent
     fits = fits_of(robot)
     if robot.callouts or fits:
         placed = place_callouts(home_posture(robot))

@@ -54,10 +54,10 @@ def draw_stiffnesses(
         try:
             if state == "exact":
                 answer = solve_exact(forced, load, gravity=gravity)
-                tangent = exact_tangent(answer, "letting go")
+                tangent = exact_tangent(answer, "unloading")
             else:
                 linear = solve_assembly(forced, load, gravity=gravity)
-                tangent = in_contact(linear, "letting go")
+                tangent = in_contact(linear, "unloading")
         except (CannotAssemble, FreeMotion, SolverFailed):
             continue
         out[:] = [tangent.along(axis)[0] for axis in np.eye(6)]

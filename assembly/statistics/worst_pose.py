@@ -21,13 +21,19 @@ Sources:
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.assembly.callouts.largest_product import largest_product
+from forcefit.assembly.kinematics.posture import Posture
 from forcefit.assembly.solvers.outer_cuts import farthest
-from forcefit.assembly.statistics.callout_sources import CalloutSources, Sources
+from forcefit.assembly.statistics.callout_sources import (
+    CalloutSources,
+    Sources,
+    sources_of,
+)
 from forcefit.assembly.statistics.error_sets import (
     ErrorSets,
     bounds_where_closed,
@@ -40,7 +46,8 @@ from forcefit.assembly.statistics.linear_response import LinearResponse, linear_
 from forcefit.assembly.statistics.quantities import POSE_ERRORS
 from forcefit.assembly.statistics.responses import respond
 from forcefit.assembly.steps.bolted import refuse_bolted
-from forcefit.inputs.table import BadInput
+from forcefit.inputs.renamed import renamed_keywords
+from forcefit.inputs.table import BadInput, describe, nearest
 from forcefit.results.display import Figures, html_table, short_repr
 from forcefit.results.text import in_unit
 
@@ -96,15 +103,20 @@ class WorstPose:
         }
 
 
+@renamed_keywords(prepared="posture", sources="errors")
 def worst_pose(
-    prepared: LinearResponse, sources: Sources, quantity: str, seed: int = 1
+    posture: Posture | LinearResponse,
+    errors: Sources | Path | str | None = None,
+    quantity: str = "translation",
+    seed: int = 1,
 ) -> WorstPose:
     """Return the worst pose error over all errors within tolerance and clearances.
 
     Args:
-        prepared: a posture without loads.
-        sources: callouts, independent errors that are bounded and symmetric, and
-            fits, each at its largest clearance.
+        posture: a posture without loads, or its linear response.
+        errors: file of independent errors that are bounded and symmetric (TOML), in
+            addition to the callouts and fits of the robot, each fit at its largest
+            clearance; None for the callouts and fits alone; or sources of errors.
         quantity: ``"rotation"`` or ``"translation"``.
         seed: seed of the random corners from which the search starts.
 
@@ -112,10 +124,16 @@ def worst_pose(
         The worst case, with the definition that applies.
 
     Raises:
-        BadInput: a joint is bolted at a pose, the posture is loaded, or an independent
-            error is unbounded or not symmetric about zero.
+        BadInput: the quantity is unknown, a joint is bolted at a pose, the posture is
+            loaded, or an independent error is unbounded or not symmetric about zero.
     """
-    prepared, sources = _at_largest_clearances(prepared, sources)
+    if quantity not in POSE_ERRORS:
+        raise BadInput(
+            f"quantity: found {describe(quantity)}{nearest(quantity, POSE_ERRORS)}"
+        )
+    one = posture.posture if isinstance(posture, LinearResponse) else posture
+    prepared = linear_response(posture) if isinstance(posture, Posture) else posture
+    prepared, sources = _at_largest_clearances(prepared, sources_of(one.robot, errors))
     sets, half = error_sets(prepared, sources), 3 * POSE_ERRORS.index(quantity)
     reading = _reading(sets)
     (low, high), screw = _farthest(sets, sets.rigid_rows, half)
@@ -124,8 +142,8 @@ def worst_pose(
         rows = np.vstack([sets.rigid_rows, sets.spring_rows])
         (rigid, _), inner = _farthest(sets, rows, half)
         toward = inner[half : half + 3] / max(rigid, 1e-300)
-        errors = _support(sets, rows, half)(toward)[2][: -sets.clearances]
-        low, direction = _climb(prepared, sources, quantity, seed, errors)
+        start = _support(sets, rows, half)(toward)[2][: -sets.clearances]
+        low, direction = _climb(prepared, sources, quantity, seed, start)
         if rigid > low:
             low, direction = rigid, inner[half : half + 3]
     else:

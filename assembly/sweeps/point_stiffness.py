@@ -118,8 +118,8 @@ def _tangent(conditions: Conditions, i: int, state: str) -> PlatformStiffness:
         )
     assembly = assemble_row(replace(conditions, exact=state == "exact"), i)
     if isinstance(assembly, ExactAssembly):
-        return exact_tangent(assembly, "letting go")
-    return in_contact(assembly, "letting go")
+        return exact_tangent(assembly, "unloading")
+    return in_contact(assembly, "unloading")
 
 
 def _unknown(parts: int) -> dict[str, NDArray]:

@@ -24,7 +24,7 @@ from forcefit.commands.options import JsonOption
 from forcefit.commands.progress import progress_bars, report_loading
 from forcefit.commands.schema import schema
 from forcefit.inputs.errors import BadInput, one_line, quoted
-from forcefit.inputs.packages import naming_packages, need
+from forcefit.inputs.packages import naming_packages
 from forcefit.inputs.writing import write_json
 
 app = Commands(
@@ -94,17 +94,14 @@ def study(
     is given, the study file names the folder.  The exit status is 1 if a check fails.
     """
     from forcefit.validation.study.headline import verdict
-    from forcefit.validation.study.report import results_table, write_study
-    from forcefit.validation.study.study import run_study
+    from forcefit.validation.study.report import results_table
+    from forcefit.validation.study.run import run_study
     from forcefit.validation.study.study_file import read_study
 
     requested = read_study(file, output)
-    need("jinja2")
+    folder = requested.folder
     with progress_bars() as update:
-        results = run_study(requested, update)
-        update("report", 0, 1)
-        folder = write_study(results)
-        update("report", 1, 1)
+        results = run_study(requested, update, output=folder)
     write_json(results_table(results), json)
     if json != "-":
         print(verdict(results))

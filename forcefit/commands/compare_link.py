@@ -132,7 +132,6 @@ def _compare_surface(
 ) -> None:  # fmt: skip
     """Compare the stiffness of a meshed surface with that of a beam."""
     from forcefit.stiffness.fem.fea import FemOptions, mesh_link
-    from forcefit.stiffness.fem.material import Material
     from forcefit.stiffness.report.compare import compare_link
     from forcefit.stiffness.report.results import comparison_results, comparison_text
 
@@ -148,7 +147,7 @@ def _compare_surface(
         check_writable(figure, PICTURE)
     tell_progress()
     meshed = mesh_link(
-        surface, held, moved, Material(E, nu), unit=unit,
+        surface, held, moved, E=E, nu=nu, unit=unit,
         options=FemOptions(accuracy, interface),
     )  # fmt: skip
     if bent is None:

@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from forcefit.commands.errors_options import ErrorsOption, SeedOption, with_errors
+from forcefit.commands.errors_options import ErrorsOption, with_errors
 from forcefit.commands.options import (
     DriveForceOption,
     FigureOption,
     GravityOption,
+    GridOption,
     JointOption,
     JsonOption,
     LoadOption,
@@ -18,6 +19,7 @@ from forcefit.commands.options import (
     PoseOption,
     RestOption,
     RobotArgument,
+    SeedOption,
     UnderOption,
     declared_posture,
     parse_covariates,
@@ -103,10 +105,7 @@ def crosscheck(
             "exact (around the equilibrium with errors and loads).",
         ),
     ] = None,
-    grid: Annotated[
-        str | None,
-        typer.Option(help="Grid of poses, such as tx=-0.2:0.2:0.1,tz=-0.5."),
-    ] = None,
+    grid: GridOption = None,
     json: JsonOption = None,
     figure: FigureOption = None,
     report: ReportOption = None,

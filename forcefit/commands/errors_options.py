@@ -1,4 +1,4 @@
-"""The options --errors and --seed, which replace the errors of a robot by one draw."""
+"""The option --errors, which replaces the errors of a robot by one draw."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -15,9 +15,6 @@ ErrorsOption = Annotated[
         help="Distributions of errors (TOML); one draw from them replaces the robot's "
         "declared errors."
     ),
-]
-SeedOption = Annotated[
-    int, typer.Option(help="Seed of the draw from --errors.", min=0, max=2**63 - 1)
 ]
 
 

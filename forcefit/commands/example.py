@@ -80,18 +80,17 @@ EXAMPLES = {
     "link_library": _Example(
         "stiffness of links for a grid of dimensions",
         ("examples/link_library.toml",),
-        "forcefit stiffness library build examples/link_library.toml",
+        "forcefit stiffness library examples/link_library.toml",
     ),
     "part_library": _Example(
         "stiffness of parts given by their surfaces",
         ("examples/part_library.toml", _MESH, "meshes/l_bracket.stl"),
-        "forcefit stiffness library build examples/part_library.toml",
+        "forcefit stiffness library examples/part_library.toml",
     ),
     "stiffness_library": _Example(
         "bars, tubes, boxes and cones by finite elements",
         ("examples/stiffness_library",),
-        "forcefit stiffness library read examples/stiffness_library/tube "
-        "--at length=0.37",
+        "forcefit stiffness library examples/stiffness_library/tube --at length=0.37",
     ),
     "surfaces": _Example(
         "surfaces of parts for finite elements",

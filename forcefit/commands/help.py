@@ -13,7 +13,7 @@ GROUPS = {
     ),
     "How sure": (
         "accuracy tolerance-rotation tolerance-translation energy-budget draws seed "
-        "confidence fresh calibrate importance scale rotation position diagnosed"
+        "confidence calibrate importance scale rotation position diagnosed"
     ),
     "Output": "output figure report csv json save offsets truth exaggeration to",
     "Run": "workers scheduler time-limit help",

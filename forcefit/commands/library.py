@@ -1,4 +1,4 @@
-"""The commands ``forcefit stiffness library ...``, for stored link stiffnesses."""
+"""The command ``forcefit stiffness library``, for stored link stiffnesses."""
 
 from functools import partial
 from pathlib import Path
@@ -6,40 +6,25 @@ from typing import Annotated
 
 import typer
 
-from forcefit.commands.help import Commands
 from forcefit.commands.options import JsonOption
 from forcefit.commands.progress import progress_bars
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.writing import write_json
 
-library = Commands(no_args_is_help=True)
-Folder = Annotated[
-    Path, typer.Argument(metavar="LIBRARY", help="Folder of the library.")
-]
 
-
-@library.command()
-def build(
-    spec: Annotated[Path, typer.Argument(metavar="SPEC", help="Build file (TOML).")],
+def library(
+    path: Annotated[
+        Path,
+        typer.Argument(
+            metavar="SPEC|LIBRARY",
+            help="Build file (TOML), whose missing entries are computed; or the folder "
+            "of a library.",
+        ),
+    ],
     workers: Annotated[
-        int, typer.Option(help="Number of processes.", min=1, max=1024)
-    ] = 1,
-    json: JsonOption = None,
-) -> None:
-    """Compute the missing entries of a build file."""
-    from forcefit.stiffness.report.library_build import build_library, read_spec
-
-    wanted = read_spec(spec)
-    with progress_bars() as update:
-        files = build_library(wanted, workers, partial(update, "entries"))
-    write_json({"library": str(wanted.folder), "keys": [f.stem for f in files]}, json)
-    if json != "-":
-        print(f"{len(files)} entries in {wanted.folder}")
-
-
-@library.command()
-def read(
-    folder: Folder,
+        int | None,
+        typer.Option(help="Number of processes for a build file.", min=1, max=1024),
+    ] = None,
     at: Annotated[
         list[str] | None,
         typer.Option(
@@ -65,11 +50,23 @@ def read(
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """List, interpolate or export the entries of a library."""
+    """Build a library of link stiffnesses, or read one.
+
+    A build file computes the entries that are missing.  A library lists its entries;
+    --at interpolates between them, and --to exports them.
+    """
+    named = path.suffix.lower() == ".toml" and not path.is_dir()
+    is_spec = path.is_file() or named
+    given = {"--at": at, "--family": family, "--to": to, "--key": key}
+    for name, value in (given if is_spec else {"--workers": workers}).items():
+        if value:
+            kind = "the folder of a library" if is_spec else "a build file (.toml)"
+            raise BadInput(f"{name}: found with {path}, expected {kind}")
+    if is_spec:
+        _build(path, workers or 1, json)
+        return
     if at and to:
-        raise BadInput(
-            "library read: found both --at and --to, expected only one of them"
-        )
+        raise BadInput("library: found both --at and --to, expected only one of them")
     for name, value, other in (("--family", family, at), ("--key", key, to)):
         if value and not other:
             needed = "--at" if name == "--family" else "--to"
@@ -77,11 +74,23 @@ def read(
                 f"{name}: found without {needed}; add {needed} or remove {name}"
             )
     if at:
-        _look_up(folder, at, family, json)
+        _look_up(path, at, family, json)
     elif to is not None:
-        _export(folder, to, key, json)
+        _export(path, to, key, json)
     else:
-        _list(folder, json)
+        _list(path, json)
+
+
+def _build(spec: Path, workers: int, json: str | None) -> None:
+    """Compute the missing entries of a build file."""
+    from forcefit.stiffness.report.library_build import build_library, read_spec
+
+    wanted = read_spec(spec)
+    with progress_bars() as update:
+        files = build_library(wanted, workers, partial(update, "entries"))
+    write_json({"library": str(wanted.folder), "keys": [f.stem for f in files]}, json)
+    if json != "-":
+        print(f"{len(files)} entries in {wanted.folder}")
 
 
 def _list(folder: Path, json: str | None) -> None:

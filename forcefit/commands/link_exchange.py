@@ -1,7 +1,7 @@
-"""The commands ``forcefit stiffness import`` and ``forcefit stiffness export``."""
+"""The command ``forcefit stiffness convert``, between K_E and other programs' files."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -9,32 +9,44 @@ from forcefit.commands.options import JsonOption
 from forcefit.inputs.errors import BadInput, quoted
 from forcefit.inputs.writing import Kind, check_writable, write_bytes, write_json
 
-Length = Annotated[
-    str,
-    typer.Option(
-        help="Unit of lengths: m, cm, mm, um, inch; forces are in N, angles in rad."
-    ),
-]
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from forcefit.stiffness.link import LinkStiffness
 
 
-def import_(
+def convert(
     file: Annotated[
         Path,
         typer.Argument(
             metavar="FILE",
-            help="K_E or a full stiffness matrix: .mtx, .pch, .dmig, .npy, .npz.",
+            help="K_E or a full stiffness matrix (.mtx, .pch, .dmig, .npy, .npz), or "
+            "results of a link that were written with --json (.json).",
         ),
     ],
-    base: Annotated[
-        str, typer.Option(help='Held interface: a node, or "z=0" [m] with --nodes.')
-    ] = "1",
-    tip: Annotated[
-        str,
+    to: Annotated[
+        str | None,
         typer.Option(
-            help='Interface at which the screw is read: a node, or "z=0.4" [m] with '
-            "--nodes."
+            help="Format of --output: matrix-market, abaqus, calculix, nastran, numpy, "
+            "exudyn, adams, mapdl."
         ),
-    ] = "2",
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="File to write, see --to.")
+    ] = None,
+    base: Annotated[
+        str | None,
+        typer.Option(
+            help='Held interface: a node (default: 1), or "z=0" [m] with --nodes.'
+        ),
+    ] = None,
+    tip: Annotated[
+        str | None,
+        typer.Option(
+            help="Interface at which the screw is read: a node (default: 2), or "
+            '"z=0.4" [m] with --nodes.'
+        ),
+    ] = None,
     nodes: Annotated[
         Path | None,
         typer.Option(
@@ -45,55 +57,90 @@ def import_(
     mass: Annotated[
         Path | None, typer.Option(help="Mass matrix of the same degrees of freedom.")
     ] = None,
-    unit: Length = "m",
-    order: Annotated[
+    unit: Annotated[
         str,
         typer.Option(
-            help="Order of a node's degrees of freedom if the file does not name them: "
-            "translations-first, rotations-first."
+            help="Unit of lengths in the matrices: m, cm, mm, um, inch; forces are in "
+            "N, angles in rad."
         ),
-    ] = "translations-first",
+    ] = "m",
+    order: Annotated[
+        str | None,
+        typer.Option(
+            help="Order of a node's degrees of freedom if the file does not name them: "
+            "translations-first (default), rotations-first."
+        ),
+    ] = None,
     json: JsonOption = None,
 ) -> None:
-    """Import K_E from a stiffness matrix of another program.
+    """Read and write K_E in the formats of other programs.
 
-    The matrix is condensed onto the base and tip interfaces.
+    A matrix is condensed onto the base and tip interfaces, and K_E is printed.  With
+    --to and --output, K_E is also written as a stiffness matrix of two nodes, at the
+    base and at the tip.
     """
+    if (to is None) != (output is None):
+        raise BadInput(
+            "stiffness convert: found only one of --to and --output, expected both"
+        )
+    if file.suffix.lower() == ".json":
+        options = {"--base": base, "--tip": tip, "--nodes": nodes, "--mass": mass,
+                   "--order": order, "--json": json}  # fmt: skip
+        _write(*_saved(file, to, options), to, unit, output)
+        return
+    link = _imported(file, mass, nodes, base or "1", tip or "2", unit, order)
+    _write(link.stiffness, link.base - link.tip, to, unit, output)
+    _report(link, json)
+
+
+def _saved(
+    file: Path, to: str | None, options: dict[str, Any]
+) -> "tuple[NDArray, NDArray]":
+    """Return K_E and the vector from tip to base of a file of results."""
+    from forcefit.stiffness.exchange.export_link import read_link_results
+
+    for name, value in options.items():
+        if value is not None:
+            raise BadInput(
+                f"{name}: found together with the results {file}; remove the option, "
+                "because it belongs to the matrix of another program"
+            )
+    if to is None:
+        raise BadInput("--to: missing; expected the format of the file to write")
+    return read_link_results(file)
+
+
+def _imported(
+    file: Path, mass: Path | None, nodes: Path | None, base: str, tip: str, unit: str,
+    order: str | None,
+) -> "LinkStiffness":  # fmt: skip
+    """Return the link of a matrix of another program."""
     from forcefit.stiffness.exchange.import_link import import_link
+
+    return import_link(
+        file, mass=mass, nodes=nodes, base=base, tip=tip, unit=unit,
+        order=order or "translations-first",
+    )  # fmt: skip
+
+
+def _report(link: "LinkStiffness", json: str | None) -> None:
+    """Print K_E of a link, or write it as JSON."""
     from forcefit.stiffness.report.results import link_results, link_text
 
-    link = import_link(
-        file, mass=mass, nodes=nodes, base=base, tip=tip, unit=unit, order=order
-    )
     write_json(link_results(link), json)
     if json != "-":
         print(link_text(link))
 
 
-def export(
-    file: Annotated[
-        Path,
-        typer.Argument(
-            metavar="LINK.json", help="Results of a link, written with --json."
-        ),
-    ],
-    to: Annotated[
-        str,
-        typer.Option(
-            help="Format: matrix-market, abaqus, calculix, nastran, numpy, exudyn, "
-            "adams, mapdl."
-        ),
-    ],
-    output: Annotated[Path, typer.Option("-o", "--output", help="File to write.")],
-    unit: Length = "m",
-) -> None:
-    """Write K_E of a link as a stiffness matrix for another program.
+def _write(
+    stiffness: "NDArray", offset: "NDArray", to: str | None, unit: str,
+    output: Path | None,
+) -> None:  # fmt: skip
+    """Write K_E as a matrix for another program, if a file is named."""
+    from forcefit.stiffness.exchange.export_link import link_file
 
-    The matrix contains the degrees of freedom of two nodes, at the base and at the tip.
-    """
-    from forcefit.stiffness.exchange.export_link import link_file, read_link_results
-
-    stiffness, offset = read_link_results(file)
+    if to is None or output is None:
+        return
     content = link_file(stiffness, offset, to, unit)
     if (to == "numpy") != (output.suffix.lower() == ".npy"):
         expected = ".npy" if to == "numpy" else "another than .npy"

@@ -17,9 +17,13 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "stiffness curve": ("stiffness", "beam"),
     "stiffness solids": ("stiffness", "fea", "--part", "list"),
     "stiffness slenderness": ("stiffness", "compare", "--ratios", "5,10,20,40"),
-    "stiffness library list": ("stiffness", "library", "read"),
-    "stiffness library look-up": ("stiffness", "library", "read"),
-    "stiffness library export": ("stiffness", "library", "read", "--to", "csv"),
+    "stiffness import": ("stiffness", "convert"),
+    "stiffness export": ("stiffness", "convert"),
+    "stiffness library build": ("stiffness", "library"),
+    "stiffness library read": ("stiffness", "library"),
+    "stiffness library list": ("stiffness", "library"),
+    "stiffness library look-up": ("stiffness", "library"),
+    "stiffness library export": ("stiffness", "library", "--to", "csv"),
     "validation iso": ("validation", "inspect", "--iso"),
 }
 _PICTURE: dict[str, tuple[str, ...]] = {"-o": ("--figure",), "--output": ("--figure",)}
@@ -56,6 +60,7 @@ OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
     "assembly tolerances": {
         "--play": ("--clearance",),
         "--compliant": ("--quantities",),
+        "--fresh": ("--draws",),
     },
     "assembly deflection": _PICTURE | {"--exact": ("--state", "exact")},
     "assembly table": {"-o": ("--csv",), "--output": ("--csv",)},
@@ -68,6 +73,7 @@ OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
     "validation generate": {"--point": ("--at",)},
     "validation plan": {"--point": ("--at",)},
     "stiffness beam": {"--axis": ("--along",)},
+    "stiffness stress": {"--wrench": ("--load",)},
 }
 
 # for each option, its old values and the new values that replace them

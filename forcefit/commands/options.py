@@ -123,6 +123,17 @@ MismatchOption = Annotated[
 ]
 
 
+SeedOption = Annotated[
+    int, typer.Option("--seed", help="Seed of the random errors.", min=0, max=2**63 - 1)
+]
+
+
+GridOption = Annotated[
+    str | None,
+    typer.Option("--grid", help="Grid of poses, such as tx=-0.2:0.2:0.1,tz=-0.5."),
+]
+
+
 FigureOption = Annotated[
     Path | None,
     typer.Option("--figure", help="Also write a figure: PNG, SVG or PDF."),

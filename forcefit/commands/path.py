@@ -113,7 +113,7 @@ def path(
     With -o, an interrupted computation resumes when the command is run again.
     """
     from forcefit.assembly.model.largest import LARGEST
-    from forcefit.assembly.path.request import PathTimes, errors_along_path
+    from forcefit.assembly.path.request import errors_along_path
     from forcefit.assembly.path.summary import path_summary, path_text
     from forcefit.assembly.sweeps.dataset import check_dataset
 
@@ -122,14 +122,13 @@ def path(
     if figure is not None:
         check_writable(figure, PICTURE)
     wrench, g = parse_load(load), parse_gravity(gravity)
-    times = PathTimes(
-        profile, duration, speed, acceleration, interval, ends, points
-    )  # fmt: skip
     forces = drive_force and parse_assignments(drive_force, "--drive-force", LARGEST)
     machine, source = _closed(robot, rest, mismatch), provenance(robot, path)
     with one_thread(), progress_lines() as update, _resumable(output) as note:
         errors = errors_along_path(
-            machine, path, times=times, load=wrench, gravity=g, assumption=assumption,
+            machine, path, profile=profile, duration=duration, speed=speed,
+            acceleration=acceleration, interval=interval, ends=ends, points=points,
+            load=wrench, gravity=g, assumption=assumption,
             state=parse_state(state), drive_force=forces or None, output=output,
             command=source.command,
             progress=lambda done, total: update("points", note(done), total),

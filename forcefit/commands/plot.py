@@ -100,9 +100,8 @@ def _plot_file(
     file: Path, picture: Path, at: list[str], kind: str | None, quantities: list[str]
 ) -> None:
     """Plot the data in a saved file."""
-    from forcefit.assembly.statistics.plot import KINDS, figure_of_draws
-    from forcefit.assembly.sweeps.dataset import open_dataset
-    from forcefit.assembly.sweeps.maps import figure_of
+    from forcefit.assembly.statistics.plot import KINDS
+    from forcefit.assembly.statistics.show import show
 
     if kind is not None and kind not in KINDS:
         raise BadInput(f'--kind: found "{kind[:60]}"{nearest(kind, KINDS)}')
@@ -114,9 +113,4 @@ def _plot_file(
             raise BadInput(f'--at: found "{text[:60]}", expected AXIS=VALUE')
         places[name] = value
     names = [part.strip() for text in quantities for part in text.split(",")]
-    data = open_dataset(file)
-    try:
-        figure = figure_of_draws(data, kind, names)
-    except ValueError as error:
-        raise BadInput(f"{file}: {error}") from None
-    save_figure(figure or figure_of(data, places, names), picture)
+    save_figure(show(file, quantities=names, at=places, kind=kind), picture)

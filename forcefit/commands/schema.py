@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from forcefit.commands.old_names import with_new_names
 from forcefit.inputs.errors import BadInput, nearest, quoted
 
 
@@ -34,7 +35,7 @@ def schema(
     if not name:
         print("\n".join(known))
         return
-    wanted = " ".join(name)
+    wanted = " ".join(with_new_names(name)).partition(" --")[0]
     if wanted not in known:
         raise BadInput(f"schema: found {quoted(wanted)}{nearest(wanted, known)}")
     is_file = wanted in {*files, "steps"}

@@ -19,6 +19,7 @@ from forcefit.commands.options import (
     PoseOption,
     RestOption,
     RobotArgument,
+    SeedOption,
     note_closing,
     note_loose,
     note_massless,
@@ -79,9 +80,7 @@ def statistics(
     draws: Annotated[
         int, typer.Option(help="Number of draws of the errors.", min=2, max=10**9)
     ] = 10_000,
-    seed: Annotated[
-        int, typer.Option(help="Seed of the random draws.", min=0, max=2**63 - 1)
-    ] = 1,
+    seed: SeedOption = 1,
     clearance: ClearanceOption = "worst",
     contact_length: ContactLengthOption = None,
     limit: Annotated[
@@ -157,7 +156,6 @@ def statistics(
     With OUTPUT, finished draws are stored in OUTPUT.journal.  After an interruption,
     the same command continues from this journal and produces the same file.
     """
-    from forcefit.assembly.model.error_distributions import read_sources
     from forcefit.assembly.report.first_order import posture_status
     from forcefit.assembly.report.results import status_line
     from forcefit.assembly.statistics.callout_sources import sources_of
@@ -193,10 +191,7 @@ def statistics(
         drive_force=drive_force,
     )  # fmt: skip
     fixed = posture.robot.declared_errors if closing else None
-    independent = None
-    if errors is not None:
-        independent = read_sources(errors, posture.robot, fixed)
-    sources = sources_of(posture.robot, independent, fixed)
+    sources = sources_of(posture.robot, errors, fixed)
     wrench, g = parse_load(load), parse_gravity(gravity)
     note_closing(posture.robot, rest, mismatch)
     note_massless(posture.robot, g)
@@ -305,10 +300,10 @@ def tolerances(
     contact_length: ContactLengthOption = None,
     rest: RestOption = None,
     mismatch: MismatchOption = None,
-    fresh: Annotated[
+    draws: Annotated[
         int,
         typer.Option(
-            help="Number of new draws that verify the tolerances.", min=0, max=10**9
+            help="Number of draws that verify the tolerances.", min=0, max=10**9
         ),
     ] = 2000,
     output: Annotated[
@@ -399,9 +394,9 @@ def tolerances(
                 "to be compared with the zone margin, or a --plan of tolerances"
             )
         if asked_plan is not None:
-            whose = identity_of(postures, asked_plan, fresh)
+            whose = identity_of(postures, asked_plan, draws)
             replay = held.enter_context(journalled(output, whose))
-            allocation = allocate(postures, asked_plan, fresh, update, replay)
+            allocation = allocate(postures, asked_plan, draws, update, replay)
             results["allocation"] = allocation_of(allocation)
             texts.append(allocation_text(results["allocation"]))
             _save_allocation(allocation, output, figure, csv)

@@ -14,6 +14,7 @@ from forcefit.commands.options import (
     PoseOption,
     RestOption,
     RobotArgument,
+    SeedOption,
     parse_gravity,
     posture_of,
 )
@@ -50,9 +51,7 @@ def steps(
         int | None,
         typer.Option(help="Number of machines with random errors.", min=1, max=10**7),
     ] = None,
-    seed: Annotated[
-        int, typer.Option(help="Seed of the random errors.", min=0, max=2**63 - 1)
-    ] = 1,
+    seed: SeedOption = 1,
     report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:

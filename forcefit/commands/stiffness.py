@@ -8,7 +8,7 @@ import typer
 from forcefit.commands.compare_link import compare
 from forcefit.commands.help import Commands
 from forcefit.commands.library import library
-from forcefit.commands.link_exchange import export, import_
+from forcefit.commands.link_exchange import convert
 from forcefit.commands.options import FigureOption, JsonOption
 from forcefit.commands.report import ReportOption, provenance
 from forcefit.commands.stiffness_options import (
@@ -56,9 +56,8 @@ if TYPE_CHECKING:
     from forcefit.stiffness.link import LinkStiffness
 
 app = Commands(no_args_is_help=True)
-app.add_typer(library, name="library", help="Libraries of link stiffnesses.")
-app.command("import")(import_)
-app.command()(export)
+app.command()(convert)
+app.command()(library)
 
 
 @app.command()
@@ -212,9 +211,9 @@ def stress(
     surface: Surface,
     base: Base,
     tip: Tip,
-    wrench: Annotated[
+    load: Annotated[
         list[str] | None,
-        typer.Option(help="Wrench at the tip [N, N m], such as fx=10,mz=1."),
+        typer.Option(help="Load at the tip [N, N m], such as fx=10,mz=1."),
     ] = None,
     young: YoungOfRest = None,
     poisson: PoissonOfRest = None,
@@ -263,9 +262,9 @@ def stress(
     options = BeamOptions(
         materials[0].E, materials[0].nu, radius, inner_radius, width, height, section
     )
-    if not wrench and not gravity:
+    if not load and not gravity:
         raise BadInput(
-            "--wrench: missing; expected a wrench [N, N m] such as fx=10, or --gravity"
+            "--load: missing; expected a load [N, N m] such as fx=10, or --gravity"
         )
     if part and options.has_section():
         raise BadInput(
@@ -276,7 +275,7 @@ def stress(
         raise BadInput(
             "--figure: found together with --gravity, expected only one of the two"
         )
-    load = np.array(parse_load(wrench or ["fx=0"], "--wrench"))
+    wrench = np.array(parse_load(load or ["fx=0"]))
     g = parse_gravity(gravity)
     declared = options.declared() if options.has_section() else None
     held, moved = parse_interfaces(base, tip)
@@ -290,7 +289,7 @@ def stress(
         read_surface(surface, unit), held, moved, materials,
         options=FemOptions(accuracy, interface),
     )  # fmt: skip
-    peak = peak_stress(solved, load, section=declared, up=roll, away=away, gravity=g)
+    peak = peak_stress(solved, wrench, section=declared, up=roll, away=away, gravity=g)
     if figure is not None:
         from forcefit.stiffness.report.plot import plot_stress
 

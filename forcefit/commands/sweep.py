@@ -15,6 +15,7 @@ from forcefit.commands.options import (
     MismatchOption,
     RestOption,
     RobotArgument,
+    SeedOption,
     UnderOption,
     note_closing,
     note_loose,
@@ -80,9 +81,7 @@ def sweep(
         int | None,
         typer.Option(help="Number of draws of errors at each point.", min=1, max=10**9),
     ] = None,
-    seed: Annotated[
-        int, typer.Option(help="Seed of the random draws.", min=0, max=2**63 - 1)
-    ] = 1,
+    seed: SeedOption = 1,
     assumption: Annotated[
         str,
         typer.Option(

@@ -5,10 +5,11 @@ from typing import Annotated
 
 import typer
 
-from forcefit.commands.errors_options import ErrorsOption, SeedOption, with_errors
+from forcefit.commands.errors_options import ErrorsOption, with_errors
 from forcefit.commands.options import (
     FigureOption,
     GravityOption,
+    GridOption,
     JointOption,
     JsonOption,
     LoadOption,
@@ -16,6 +17,7 @@ from forcefit.commands.options import (
     PoseOption,
     RestOption,
     RobotArgument,
+    SeedOption,
     parse_gravity,
     parse_load,
     posture_of,
@@ -49,10 +51,7 @@ def validity(
             help="Also mesh links as solids, which takes seconds for each shape.",
         ),
     ] = False,
-    grid: Annotated[
-        str | None,
-        typer.Option(help="Grid of poses, such as tx=-0.2:0.2:0.1,tz=-0.5."),
-    ] = None,
+    grid: GridOption = None,
     poses: Annotated[
         Path | None,
         typer.Option(help="CSV table of poses: pose.tx .. or q.*."),

@@ -68,7 +68,7 @@ _LOOKED_UP = record(
 STIFFNESS: Mapping[str, Content] = {
     "stiffness beam": LINK,
     "stiffness fea": Either((LINK, _SOLIDS)),
-    "stiffness import": LINK,
+    "stiffness convert": LINK,
     "stiffness compare": Either((_COMPARISON, _OVER_SLENDERNESS)),
     "stiffness stress": record(
         "", _STRESS, wrench=number("wrench at the tip", "N m, N", "wrench_component"),
@@ -79,8 +79,9 @@ STIFFNESS: Mapping[str, Content] = {
             von_mises_whole_length=number("largest in the whole length", "Pa"),
         ),
     ),
-    "stiffness library build": record(
-        library=text("folder"), keys=text("keys of the entries", "entry")
-    ),
-    "stiffness library read": Either((record(entries=Listed(_ENTRY)), _LOOKED_UP)),
+    "stiffness library": Either((
+        record(library=text("folder"), keys=text("keys of the entries", "entry")),
+        record(entries=Listed(_ENTRY)),
+        _LOOKED_UP,
+    )),
 }  # fmt: skip

@@ -11,11 +11,19 @@ C         tip compliance, ``screw = C @ wrench``                  SI
 ========  ======================================================  =====
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from forcefit.inputs.errors import BadInput, describe, nearest
-from forcefit.stiffness.beam.sections import Section, check_material, check_positive
+from forcefit.stiffness.beam.sections import (
+    Section,
+    check_material,
+    check_positive,
+    check_section,
+    declared_section,
+)
 from forcefit.stiffness.screws import UNIT_VECTORS
 
 THEORIES = ("timoshenko", "euler")
@@ -23,7 +31,7 @@ THEORIES = ("timoshenko", "euler")
 
 def beam_compliance(
     length: float,
-    section: Section,
+    section: Section | Mapping[str, float],
     E: float,
     nu: float,
     *,
@@ -40,7 +48,10 @@ def beam_compliance(
 
     Args:
         length: [m] distance from the clamped section to the tip, > 0.
-        section: constants of the cross-section.
+        section: lengths of the cross-section [m], as for a link of a robot:
+            ``{"radius": 0.02}`` and optionally ``inner_radius``; ``width`` and
+            ``height``, and optionally ``wall`` of a box or ``web`` and ``flange`` of an
+            I; or constants of another section.
         E: [Pa] Young's modulus, > 0.
         nu: [-] Poisson's ratio, in (-1, 0.5).
         theory: ``"timoshenko"``, or ``"euler"`` for bending without shear.
@@ -60,9 +71,7 @@ def beam_compliance(
     Example:
         A downward force of 100 N rotates the tip about y:
 
-        >>> from forcefit.stiffness.beam.sections import round_section
-        >>> section = round_section(0.04, nu=0.3)
-        >>> C = beam_compliance(0.452, section, E=60e9, nu=0.3)
+        >>> C = beam_compliance(0.452, {"radius": 0.04}, E=60e9, nu=0.3)
         >>> print(f"{C[1] @ [0, 0, 0, 0, 0, -100.0] * 1e6:.1f} urad")
         84.7 urad
     """
@@ -72,6 +81,14 @@ def beam_compliance(
         raise BadInput(
             f"beam_compliance: theory = {describe(theory)}{nearest(theory, THEORIES)}"
         )
+    if not isinstance(section, Section):
+        if not isinstance(section, Mapping):
+            found = describe(section)
+            raise BadInput(
+                f'beam_compliance: section: found {found}, expected {{"radius": 0.02}}'
+            )
+        check_section("beam_compliance: section", section)
+        section = declared_section(section, nu)
     C = _compliance_in_section_axes(length, section, E, nu, theory == "timoshenko")
     R = np.kron(np.eye(2), section_axes(axis, up))
     return R @ C @ R.T

@@ -1,4 +1,4 @@
-"""``forcefit stiffness export``: a link as a matrix of two nodes, base and tip."""
+"""``forcefit stiffness convert``: a link as a matrix of two nodes, base and tip."""
 
 import io
 import json
@@ -38,7 +38,7 @@ def read_link_results(path: Path | str) -> tuple[NDArray, NDArray]:
         reason = one_line(str(error), 80)
         raise BadInput(
             f"{path}: found no stiffness, base and tip of a link ({reason}); "
-            "expected a file that stiffness beam, fea or import writes with "
+            "expected a file that stiffness beam, fea or convert writes with "
             "--json"
         ) from None
     if K.shape != (6, 6) or offset.shape != (3,) or not np.isfinite(K).all():

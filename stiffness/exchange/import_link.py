@@ -1,4 +1,4 @@
-"""``forcefit stiffness import``: K_E of a link from matrices of another program."""
+"""``forcefit stiffness convert``: K_E of a link from matrices of another program."""
 
 from collections.abc import Mapping
 from dataclasses import replace

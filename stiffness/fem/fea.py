@@ -10,14 +10,16 @@ import logging
 import math
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from forcefit.inputs.renamed import warn_renamed
 from forcefit.inputs.table import BadInput, describe, nearest
 from forcefit.results.display import html_table, short_repr
 from forcefit.stiffness.fem.adaptive_step import (
@@ -48,6 +50,8 @@ from forcefit.stiffness.surface.patches import (
 )
 from forcefit.stiffness.surface.surface import Surface, read_surface
 
+P = ParamSpec("P")
+R = TypeVar("R")
 _LOG = logging.getLogger("forcefit.finite_elements")
 _SETUP = 2.0  # [s] part of the solution time that does not depend on the mesh
 # share of the time budget for the mesher; the remaining time is for the solver
@@ -117,12 +121,31 @@ class MeshedLink:
     __repr__, _repr_html_ = short_repr, html_table
 
 
+def _accepting_material(function: Callable[P, R]) -> Callable[P, R]:
+    """Return the function, which also accepts a material as in the last release."""
+
+    @wraps(function)
+    def call(*args: P.args, **kwargs: P.kwargs) -> R:
+        material = args[3] if len(args) > 3 else kwargs.pop("material", None)
+        if isinstance(material, Material):
+            warn_renamed("mesh_link(material)", "mesh_link(E, nu, density)")
+            for name in ("E", "nu", "density"):
+                kwargs[name] = getattr(material, name)
+            args = args[:3]  # type: ignore[assignment]
+        return function(*args, **kwargs)
+
+    return call
+
+
+@_accepting_material
 def mesh_link(
     surface: Path | str,
     base: Interface | str,
     tip: Interface | str,
-    material: Material,
     *,
+    E: float,
+    nu: float,
+    density: float = 0.0,
     unit: str = "m",
     options: FemOptions = _STANDARD,
 ) -> LinkStiffness:
@@ -134,7 +157,9 @@ def mesh_link(
             as ``"z=0"``, see
             :func:`forcefit.stiffness.surface.interface.parse_interface`.
         tip: interface that moves, in the same form.
-        material: material of the link; if its density is 0, the link has no mass.
+        E: [Pa] Young's modulus, > 0.
+        nu: [-] Poisson's ratio, in (-1, 0.5).
+        density: [kg/m^3] density; 0 for a link without mass.
         unit: unit of length of the surface file.
         options: options of the solution.
 
@@ -143,12 +168,13 @@ def mesh_link(
         ``reached`` of its ``mesh`` states whether the required accuracy was reached.
 
     Raises:
-        BadInput: the file or an interface is invalid.
+        BadInput: the file, an interface or a material constant is invalid.
 
     Sources:
         Rivara (1984) for the bisection; :mod:`forcefit.stiffness.fem.error_indicator`
         for the error.
     """
+    material = Material(E, nu, density)
     shape = read_surface(Path(surface), unit)
     held, moved = (
         parse_interface(side, name) if isinstance(side, str) else side

@@ -1,12 +1,23 @@
 """Public names, arguments and values of the last release: they work, with a warning."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray
 
 import forcefit as ff
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.assembly.path.path_file import PathTable
+from forcefit.assembly.path.request import PathTimes
+from forcefit.assembly.statistics.callout_sources import sources_of
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.linear_response import linear_response
 from forcefit.assembly.sweeps.selection import BY_CLEARANCE, FINITE
+from forcefit.stiffness.fem.fea import FemOptions
+from forcefit.stiffness.fem.material import Material
 
+ROOT = Path(__file__).parents[2]
 ERRORS = """
 [[errors]]
 frames = ["leg1.link_a"]
@@ -123,10 +134,64 @@ def test_old_argument_clearance_model_of_an_experiment_works_as_clearance(
 ):
     file = tmp_path / "errors.toml"
     file.write_text(ERRORS)
-    sources = ff.read_sources(file, posture.robot)
+    sources = sources_of(posture.robot, file)
     with pytest.warns(FutureWarning, match=r"is now Experiment.clearance='least'") as c:
-        found = ff.Experiment(posture, sources, clearance_model="least")
+        found = Experiment(posture, sources, clearance_model="least")
     assert c[0].filename == __file__
     assert found.clearance == "least"
     with pytest.warns(FutureWarning, match=r"is now Experiment\.clearance"):
         assert found.clearance_model == "least"
+
+
+def test_path_with_the_times_of_the_last_release_has_the_results_of_the_keywords():
+    """Rest to rest over d in a time T: a quintic reaches 10 d / (sqrt(3) T^2)."""
+    robot = Robot("cart", "tool", (
+        Frame("rail", joint="prismatic", actuated=True),
+        Frame("tool", "rail", mass=2.0),
+    ))  # fmt: skip
+    table = PathTable(("tz",), np.array([[0.0], [0.1]]))
+    with pytest.warns(FutureWarning, match="errors_along_path.times. is now") as caught:
+        old = ff.errors_along_path(robot, table, times=PathTimes("quintic", 0.2))
+    assert caught[0].filename == __file__
+    new = ff.errors_along_path(robot, table, profile="quintic", duration=0.2)
+    for name, values in new.arrays.items():
+        np.testing.assert_array_equal(old.arrays[name], values)
+    peak = np.abs(new.arrays["platform_acceleration"][:, 5]).max()
+    assert peak == pytest.approx(10 * 0.1 / (np.sqrt(3) * 0.2**2), rel=1e-3)
+
+
+def test_link_of_a_material_has_the_stiffness_of_the_constants(tmp_path):
+    surface = ROOT / "meshes" / "distal_plain.stl"
+    quick = FemOptions(accuracy=0.05)
+    with pytest.warns(FutureWarning, match="mesh_link.material. is now") as caught:
+        old = ff.mesh_link(
+            surface, "z=0", "z=0.452", Material(6e10, 0.3), options=quick
+        )
+    assert caught[0].filename == __file__
+    new = ff.mesh_link(surface, "z=0", "z=0.452", E=6e10, nu=0.3, options=quick)
+    np.testing.assert_array_equal(old.stiffness, new.stiffness)
+    # E A / L of the full round bar of 40 mm radius
+    stretch = 6e10 * np.pi * 0.04**2 / 0.452
+    assert new.stiffness[5, 5] == pytest.approx(stretch, rel=0.06)
+
+
+def test_worst_pose_by_a_linear_response_equals_that_of_the_posture(posture, tmp_path):
+    file = tmp_path / "errors.toml"
+    file.write_text(ERRORS)
+    sources = sources_of(posture.robot, file)
+    with pytest.warns(FutureWarning, match="worst_pose"):
+        old = ff.worst_pose(
+            prepared=linear_response(posture), sources=sources, quantity="translation"
+        )
+    assert ff.worst_pose(posture, file).bound == old.bound
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [("holding", "loading"), ("letting go", "unloading")]
+)
+def test_old_side_has_the_results_of_the_new_one(posture, old, new):
+    with pytest.warns(FutureWarning, match=f"side='{old}' is now side='{new}'") as c:
+        found = ff.platform_stiffness(posture, "contact", LOAD, side=old)
+    assert c[0].filename == __file__
+    expected = ff.platform_stiffness(posture, "contact", LOAD, side=new)
+    np.testing.assert_array_equal(found.compliance, expected.compliance)

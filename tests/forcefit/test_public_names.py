@@ -1,14 +1,18 @@
 """Public names as editors and type checkers see them."""
 
 import os
+import re
 import subprocess
 import sys
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+import typer
 
 import forcefit as ff
+from forcefit.commands.app import app
 from tests.test_readme import python_example
 
 ROOT = Path(__file__).parents[2]
@@ -37,6 +41,32 @@ def stub_of(owners):
 def test_stub_file_equals_the_table_of_public_names():
     """To write it again: python -m tests.forcefit.test_public_names."""
     assert STUB.read_text(encoding="utf-8") == stub_of(ff._OWNERS)
+
+
+def commands_of(group, before=()):
+    """Names of all commands of the command line."""
+    for name, one in group.commands.items():
+        if hasattr(one, "commands"):
+            yield from commands_of(one, (*before, name))
+        else:
+            yield " ".join((*before, name))
+
+
+def test_reference_names_the_functions_of_every_command():
+    """Public ones without a module, others importable from the stated module."""
+    page = (ROOT / "docs/api.md").read_text(encoding="utf-8")
+    table = page.partition("## Commands and their functions")[2]
+    rows = re.findall(r"^\| `([\w ]+)` \| (.*) \|$", table, flags=re.MULTILINE)
+    others = re.findall(r"`([\w ]+)`", table.rpartition("|\n")[2])
+    commands = sorted(commands_of(typer.main.get_command(app)))
+    assert sorted([name for name, _ in rows] + others) == commands
+    for _, cell in rows:
+        functions = re.findall(r"`(\w+)`(?: in `([\w.]+)`)?", cell)
+        assert functions
+        for name, module in functions:
+            assert name in ff.__all__ or callable(
+                getattr(import_module(module), name)
+            ), name
 
 
 def checked(checker, folder, code):

@@ -62,11 +62,17 @@ class _Declared:
     per_session: tuple[str, ...]
 
 
-def read_campaign(folder: Path | str, *, links: bool = True) -> Campaign:
-    """Return the campaign of a folder.
+def read_campaign(
+    folder: Path | str, robot: Robot | None = None, *, links: bool = True
+) -> Campaign:
+    """Return the campaign of a folder, or commands for another robot.
 
     Args:
-        folder: folder with a file ``campaign.toml``, or that file.
+        folder: folder with a file ``campaign.toml``, or that file; if a robot is given,
+            also a single table with the same columns in SI units.
+        robot: robot that replaces the robot of the campaign, such as the identified
+            one.  Measurements may then be missing; they are NaN.  None for the robot
+            that the campaign declares.
         links: whether the stiffness of meshed links is computed, which diagnoses
             require.
 
@@ -78,6 +84,8 @@ def read_campaign(folder: Path | str, *, links: bool = True) -> Campaign:
             a configuration is unreachable.  The message names the file, the place, the
             value found and the expected value.
     """
+    if robot is not None:
+        return read_commands(folder, robot)
     root = read_toml(_declaration(folder))
     robot_name = root.text("robot", expected="a built-in robot or a robot file")
     declared = _declared(root)

@@ -48,8 +48,8 @@ class Curve:
         function: the function.
         component: component of the screw or compliance that the function returns.
         variable: variable on the horizontal axis.
-        beside: (name, value) of the second variable, which is constant along the curve;
-            None for a function of one variable.
+        constant: (name, value) of the second variable, which is constant along the
+            curve; None for a function of one variable.
         x: (k,) values of the variable, in its unit.
         values: (k,) values of the component [rad, m, N m, N]; divided by N or N m for a
             compliance.
@@ -60,7 +60,7 @@ class Curve:
     function: Function
     component: str
     variable: str
-    beside: tuple[str, float] | None
+    constant: tuple[str, float] | None
     x: NDArray
     values: NDArray
     std: NDArray
@@ -88,12 +88,12 @@ def curves_of(
         along, others = _variables(function)
         least, most = (over or {}).get(along) or _range(robot, function, along)
         x = np.linspace(least, most, _POINTS)
-        beside: list[tuple[str, float] | None] = [None]
+        constants: list[tuple[str, float] | None] = [None]
         if others:
             ends = (over or {}).get(others) or _range(robot, function, others)
-            beside = [(others, v) for v in np.linspace(*ends, 3).tolist()]
+            constants = [(others, v) for v in np.linspace(*ends, 3).tolist()]
         for component in function.components:
-            for fixed in beside:
+            for fixed in constants:
                 curves.append(_curve(robot, function, component, along, fixed, x))
     return curves
 
@@ -130,7 +130,7 @@ def _curve(
         function=function,
         component=component,
         variable=along,
-        beside=fixed,
+        constant=fixed,
         x=x,
         values=values,
         std=np.sqrt(variance),
@@ -213,7 +213,7 @@ def table(robot: Robot, curves: list[Curve]) -> list[dict[str, Any]]:
                 )
             ],
             "variable": c.variable,
-            "beside": None if c.beside is None else dict([c.beside]),
+            "beside": None if c.constant is None else dict([c.constant]),
             "units": {"variable": c.units[0], "value": c.units[1]},
             "x": c.x, "value": c.values, "std": c.std,
         }
@@ -225,12 +225,12 @@ def text(curves: list[Curve]) -> str:
     """Return the curves as text, with :data:`_SHOWN` points of each."""
     lines: list[str] = []
     for c in curves:
-        beside = f", {c.beside[0]} = {c.beside[1]:.4g}" if c.beside else ""
+        second = f", {c.constant[0]} = {c.constant[1]:.4g}" if c.constant else ""
         form = FORMS[c.function.form].summary if c.function.form in FORMS else "formula"
         lines += [
             "",
             f"{c.function.title}: {c.function.kind} {c.component} at "
-            f"{c.function.where}, {form}{beside}",
+            f"{c.function.where}, {form}{second}",
             f"{c.variable} [{c.units[0]}]    {c.component} [{c.units[1]}]    1 sigma",
         ]
         for i in np.linspace(0, _POINTS - 1, _SHOWN).astype(int).tolist():
@@ -260,8 +260,8 @@ def figure_of(curves: list[Curve]) -> "Figure":
             lw=0,
         )  # fmt: skip
         panel.plot(c.x, c.values, color="C0")
-        beside = f", {c.beside[0]} = {c.beside[1]:.3g}" if c.beside else ""
-        panel.set_title(plot_label(f"{c.function.title}{beside}"), fontsize=9)
+        second = f", {c.constant[0]} = {c.constant[1]:.3g}" if c.constant else ""
+        panel.set_title(plot_label(f"{c.function.title}{second}"), fontsize=9)
         panel.set_xlabel(plot_label(f"{c.variable} [{c.units[0]}]"))
         panel.set_ylabel(plot_label(f"{c.component} [{c.units[1]}]"))
         panel.grid(visible=True, alpha=0.3)

@@ -30,12 +30,13 @@ class CandidatePart:
     where: str
     components: tuple[str, ...]
     variable: str
-    beside: str = ""
+    second_variable: str = ""
 
     @property
     def variables(self) -> tuple[str, ...]:
         """One or two public names."""
-        return (self.variable, self.beside) if self.beside else (self.variable,)
+        second = (self.second_variable,) if self.second_variable else ()
+        return (self.variable, *second)
 
 
 @dataclass(frozen=True)

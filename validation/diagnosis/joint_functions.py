@@ -113,5 +113,5 @@ def _at_drives(
         yield "screw", turns, forms.of_direction(conditions, turns[0].variable)
         both = forms.of_two(conditions, turns[0].variable, "approach")
         if sided and both is not None:
-            sides = tuple(replace(part, beside="approach") for part in turns)
+            sides = tuple(replace(part, second_variable="approach") for part in turns)
             yield "screw", sides, both[1]

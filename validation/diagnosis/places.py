@@ -40,8 +40,8 @@ class Weighted:
         rows: (R,) rows that contain a selected cell.
         answers: (S, R, 6) responses, zero in cells that are not selected.
         squares: (S, R) sums of squares over the cells of a row.
-        beside: (pairs, R) sums of products of two components that act at the same
-            place.
+        pair_products: (pairs, R) sums of products of two components that act at the
+            same place.
         cells: row and component of the selected cells.
         known: cache of inner products of each form.
     """
@@ -49,7 +49,7 @@ class Weighted:
     rows: NDArray
     answers: NDArray
     squares: NDArray
-    beside: NDArray
+    pair_products: NDArray
     cells: tuple[NDArray, NDArray]
     known: dict[object, tuple[NDArray, NDArray]] = field(default_factory=dict)
 
@@ -60,7 +60,7 @@ class Weighted:
         m = columns.shape[1]
         outer = (columns[:, :, None] * columns[:, None, :]).reshape(-1, m * m)
         whole = (self.squares @ outer).reshape(-1, m, m)
-        cross = (self.beside @ outer).reshape(-1, m, m)
+        cross = (self.pair_products @ outer).reshape(-1, m, m)
         if m <= _REMEMBERED:
             self.known[key] = whole, cross
         return whole, cross
@@ -183,10 +183,10 @@ class Places:
         each = self._answers[:, rows[row], component]
         answers[:, row, component] = whiten(each.T).T
         squares = np.einsum("src,src->sr", answers, answers)
-        beside = np.zeros((len(self._pairs), len(rows)))
+        pair_products = np.zeros((len(self._pairs), len(rows)))
         for (i, j), k in self._pairs.items():
-            beside[k] = np.einsum("rc,rc->r", answers[i], answers[j])
-        return Weighted(rows, answers, squares, beside, (row, component))
+            pair_products[k] = np.einsum("rc,rc->r", answers[i], answers[j])
+        return Weighted(rows, answers, squares, pair_products, (row, component))
 
     def joined(self, members: NDArray, whole: NDArray, cross: NDArray) -> NDArray:
         """Return (f, c, s m, s m) inner products of combinations of s components."""

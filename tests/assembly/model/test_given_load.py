@@ -9,6 +9,7 @@ import forcefit as ff
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.model.given_load import given_load
 from forcefit.assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.assembly.statistics.callout_sources import sources_of
 from forcefit.assembly.statistics.experiment import Experiment
 from forcefit.commands.options import parse_load
 from forcefit.inputs.table import BadInput
@@ -17,7 +18,7 @@ FORCE, LENGTH = 50.0, 0.4
 STIFFNESS = 2e11 * np.pi * 0.01**4 / 4  # [N m^2] of a round bar of 10 mm radius
 ROOT = Path(__file__).parents[3]
 HEXAPOD = ff.load_robot("hexapod")
-SOURCES = ff.read_sources(ROOT / "examples" / "hexapod_errors.toml", HEXAPOD)
+SOURCES = sources_of(HEXAPOD, ROOT / "examples" / "hexapod_errors.toml")
 TIP = -FORCE * LENGTH**3 / (3 * STIFFNESS)  # [m]
 
 

@@ -10,7 +10,7 @@ from forcefit.assembly.model.frame import Clearance
 from forcefit.assembly.model.robot import BeamLink, Frame, Robot
 from forcefit.assembly.path.path_errors import path_errors
 from forcefit.assembly.path.path_file import PathTable
-from forcefit.assembly.path.request import PathTimes, errors_along_path
+from forcefit.assembly.path.request import errors_along_path
 from forcefit.inputs.table import BadInput
 from tests.assembly.path.moving_robots_for_tests import hinge, instants
 
@@ -88,8 +88,10 @@ def two_drives():
 def test_drive_with_a_force_unloads_the_other_drive():
     """m a = F_a + F_b at each instant."""
     table = PathTable(("tx",), np.array([[0.0], [0.1]]))
-    times = PathTimes(profile="quintic", duration=0.2, points=21)
-    found = errors_along_path(two_drives(), table, times=times, drive_force={"b": 70.0})
+    found = errors_along_path(
+        two_drives(), table, profile="quintic", duration=0.2, points=21,
+        drive_force={"b": 70.0},
+    )  # fmt: skip
     assert found.drives == ("a",)
     expected = MASS * found.arrays["platform_acceleration"][:, 3] - 70.0
     np.testing.assert_allclose(found.arrays["drive_force"][:, 0], expected, atol=1e-9)
@@ -100,13 +102,13 @@ def test_drive_with_a_force_unloads_the_other_drive():
 def test_an_interrupted_path_resumes_with_the_same_results(tmp_path):
     """Ctrl-C after the first block: the file is that of an uninterrupted path."""
     table = PathTable(("tx",), np.array([[0.0], [0.1]]))
-    times = PathTimes(profile="quintic", duration=0.2, points=4100)
 
     def compute(file, progress=lambda done, total: None):
         robot = two_drives()
         return errors_along_path(
-            robot, table, times=times, output=file, progress=progress
-        )
+            robot, table, profile="quintic", duration=0.2, points=4100,
+            output=file, progress=progress,
+        )  # fmt: skip
 
     def stop(done, total):
         if done:
@@ -135,5 +137,5 @@ def test_an_interrupted_path_resumes_with_the_same_results(tmp_path):
     with pytest.raises(BadInput, match="journal of another sweep: found path_sha256"):
         errors_along_path(
             two_drives(), table, output=file,
-            times=PathTimes(profile="quintic", duration=0.3, points=4100),
+            profile="quintic", duration=0.3, points=4100,
         )  # fmt: skip

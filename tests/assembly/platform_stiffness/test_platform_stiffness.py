@@ -302,8 +302,8 @@ def test_stiffness_at_a_change_of_contact_depends_on_the_side(state):
         Frame("other", "spring"),
     )
     posture = home_posture(Robot("pair", "tip", frames, (("tip", "other"),)))
-    stop = platform_stiffness(posture, state, side="holding")
-    away = platform_stiffness(posture, state, side="letting go")
+    stop = platform_stiffness(posture, state, side="loading")
+    away = platform_stiffness(posture, state, side="unloading")
     assert stop.along(UNIT[5])[0] == np.inf
     assert away.along(UNIT[5])[0] == pytest.approx(1e5)
 

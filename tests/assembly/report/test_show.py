@@ -183,7 +183,7 @@ def maps(monkeypatch, known):
     module = SimpleNamespace(get_ipython=lambda: shell)
     monkeypatch.setitem(sys.modules, "IPython", module)
     data = ff.sweep("hexapod", grid="tx=0:0.02:0.01,tz=0.53", quantities=["energy"])
-    return ff.figure_of(data.squeeze(), quantities=["energy"]), formats["image/png"]
+    return ff.show(data.squeeze(), quantities=["energy"]), formats["image/png"]
 
 
 def test_notebook_shows_the_maps_of_a_sweep_as_the_result_of_a_cell(monkeypatch):

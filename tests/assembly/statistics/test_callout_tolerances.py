@@ -130,7 +130,7 @@ def test_command_allocates_widths_of_callouts(tmp_path):
     write_robot(ARM, tmp_path / "arm.toml")
     (tmp_path / "plan.toml").write_text(PLAN.format(**OF_CALLOUTS))
     words = ["assembly", "tolerances", str(tmp_path / "arm.toml"), "--plan",
-             str(tmp_path / "plan.toml"), "--grid", "tx=0.43", "--fresh", "200",
+             str(tmp_path / "plan.toml"), "--grid", "tx=0.43", "--draws", "200",
              "--clearance", "least", "--json", str(tmp_path / "answer.json"),
              "-o", str(tmp_path / "out.nc"),
              "--report", str(tmp_path / "page.html")]  # fmt: skip

@@ -80,7 +80,7 @@ def test_repeatedly_killed_command_resumes_and_writes_the_same_file(tmp_path):
     plan = "yield = 0.9\ndraws = 200\n" + PLAN.replace("margin_free = 1.0", limits)
     (tmp_path / "plan.toml").write_text(plan)
     base = [sys.executable, "-m", "forcefit", "assembly", "tolerances", "irsbot2",
-            "--grid", "tx=0:0.1:0.1,tz=-0.5", "--plan", "plan.toml", "--fresh",
+            "--grid", "tx=0:0.1:0.1,tz=-0.5", "--plan", "plan.toml", "--draws",
             "100"]  # fmt: skip
     subprocess.run([*base, "-o", "whole.nc"], cwd=tmp_path, capture_output=True,
                    check=True)  # fmt: skip
@@ -124,7 +124,7 @@ def test_statistics_and_tolerances_commands_write_results_and_figures(
     assert "link_a.TX" in said["importance"]["platform"]
     status, _, _ = run(
         "assembly", "tolerances", "irsbot2", "--grid", "tx=-0.1:0.1:0.2,tz=-0.5",
-        "--plan", "plan.toml", "--fresh", 50, "-o", "t.nc", "--json", "t.json",
+        "--plan", "plan.toml", "--draws", 50, "-o", "t.nc", "--json", "t.json",
     )  # fmt: skip
     assert status == 0
     found = json.loads((tmp_path / "t.json").read_text())["allocation"]

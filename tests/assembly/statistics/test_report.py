@@ -74,7 +74,7 @@ def test_tolerance_report_shows_the_numbers_of_the_json(tmp_path, run):
     (tmp_path / "plan.toml").write_text(PLAN)
     page, written = tmp_path / "t.html", tmp_path / "t.json"
     status, _, err = run(
-        "assembly", "tolerances", "irsbot2", "--grid", "tx=0.1,tz=-0.5", "--fresh", 20,
+        "assembly", "tolerances", "irsbot2", "--grid", "tx=0.1,tz=-0.5", "--draws", 20,
         "--plan", tmp_path / "plan.toml", "--report", page, "--json", written,
     )  # fmt: skip
     assert status == 0, err

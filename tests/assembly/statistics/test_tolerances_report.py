@@ -93,7 +93,7 @@ def test_report_states_requirements_and_the_share_of_clearances(tmp_path, run):
     page, written = tmp_path / "t.html", tmp_path / "t.json"
     status, text, err = run(
         "assembly", "tolerances", tmp_path / "arm.toml", "--grid", "tx=0.4", "--plan",
-        tmp_path / "plan.toml", "--fresh", 50, "--report", page, "--json", written,
+        tmp_path / "plan.toml", "--draws", 50, "--report", page, "--json", written,
     )  # fmt: skip
     assert status == 0, err
     allocation = json.loads(written.read_text())["allocation"]

@@ -172,7 +172,7 @@ def test_command_allocates_callouts_for_the_worst_case(tmp_path):
     write_robot(arm(), tmp_path / "arm.toml")
     (tmp_path / "plan.toml").write_text(OF_ARM)
     words = ["assembly", "tolerances", str(tmp_path / "arm.toml"), "--plan",
-             str(tmp_path / "plan.toml"), "--grid", "tx=0.43", "--fresh", "100",
+             str(tmp_path / "plan.toml"), "--grid", "tx=0.43", "--draws", "100",
              "--json", str(tmp_path / "answer.json"),
              "--report", str(tmp_path / "page.html")]  # fmt: skip
     done = CliRunner().invoke(app, words)

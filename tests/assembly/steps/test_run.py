@@ -10,6 +10,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
+import forcefit as ff
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.linear.energy import solve_assembly
 from forcefit.assembly.linear.reference.reduction import FreeMotion
@@ -58,6 +59,15 @@ def test_two_bars_and_a_gap_store_and_dissipate_the_energy_of_the_springs():
     assert released.energy == pytest.approx(0.0, abs=1e-15)
     assert released.lost == pytest.approx(15e-3)
     assert abs(released.spring_back[0, 5]) == pytest.approx(2e-4)
+
+
+def test_plan_of_a_file_stores_the_energy_of_the_springs(tmp_path):
+    """As above: 150 N, and half of it times the gap of 0.2 mm."""
+    file = tmp_path / "steps.toml"
+    file.write_text('[[step]]\njoin = ["wall", "bar2"]\n')
+    (closed,) = ff.assemble_in_steps(file, two_bars(2e-4))
+    assert closed.closing_force == pytest.approx(150.0)
+    assert closed.energy == pytest.approx(15e-3)
 
 
 def test_joint_closed_by_limited_force_stays_open_as_computed_with_springs():

@@ -36,21 +36,21 @@ def shown(panel):
     ],
 )  # fmt: skip
 def test_map_shows_the_named_component(data, name, at, scale, title):
-    (panel, *_) = ff.figure_of(data, quantities=[name]).axes
+    (panel, *_) = ff.show(data, quantities=[name]).axes
     expected = data[name.partition(".")[0]].sel(at).transpose("ty", "tx").values
     np.testing.assert_allclose(shown(panel), scale * expected, rtol=1e-12)
     assert panel.get_title().startswith(title)
 
 
 def test_translation_panel_shows_the_norm_of_the_platform_translation(data):
-    (panel, *_) = ff.figure_of(data, quantities=["translation"]).axes
+    (panel, *_) = ff.show(data, quantities=["translation"]).axes
     parts = data["platform_screw"].sel(screw=["TX", "TY", "TZ"])
     expected = np.linalg.norm(parts.transpose("ty", "tx", "screw").values, axis=2)
     np.testing.assert_allclose(shown(panel), 1e3 * expected, rtol=1e-12)
 
 
 def test_variable_without_a_component_plots_all_its_components(data):
-    figure = ff.figure_of(data.isel(ty=[0]), quantities=["stiffness", "energy"])
+    figure = ff.show(data.isel(ty=[0]), quantities=["stiffness", "energy"])
     lines = [panel for panel in figure.axes if panel.lines]
     titles = [panel.get_title() for panel in lines]
     assert [t.partition(" ")[0] for t in titles] == [
@@ -66,7 +66,7 @@ def test_single_natural_frequency_is_plotted(data):
         frequency=(("tx", "ty", "mode"), np.ones((3, 2, 1)))
     ).assign_coords(mode=["1"])
     for quantities in ([], ["frequency.1"], ["frequency"]):
-        titles = [p.get_title() for p in ff.figure_of(one, None, quantities).axes]
+        titles = [p.get_title() for p in ff.show(one, quantities=quantities).axes]
         assert any("frequency" in title for title in titles)
 
 

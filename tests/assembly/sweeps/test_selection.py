@@ -89,4 +89,4 @@ def test_sweep_command_lists_and_selects_quantities(run, tmp_path):
 def test_figure_without_usual_quantities_is_refused(tmp_path):
     data = ff.sweep("five_bar", grid=GRID, quantities=["condition"])
     with pytest.raises(ff.BadInput, match="found none of the usual quantities"):
-        ff.figure_of(data)
+        ff.show(data)

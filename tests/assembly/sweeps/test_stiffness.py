@@ -56,7 +56,7 @@ def test_swept_tangent_includes_errors_load_and_clearances(state):
     errors = np.zeros((len(robot.frames), 6))
     errors[robot.index("leg1.link_a"), 0] = 0.02
     posture = place_robot(robot.with_errors(errors), {"tx": 0.1, "tz": -0.5})
-    expected = platform_stiffness(posture, state, LOAD, side="letting go")
+    expected = platform_stiffness(posture, state, LOAD, side="unloading")
     size = np.sqrt(np.diag(expected.compliance))
     np.testing.assert_allclose(
         data.compliance.values[1] / np.outer(size, size),

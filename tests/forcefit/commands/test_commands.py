@@ -339,7 +339,7 @@ def test_module_command_refuses_an_unknown_robot_without_a_traceback():
         ["validation", "plan", "arm6", "-o", "x", "--rows", "0"],
         ["assembly", "statistics", "bar.toml", "-o", "x.nc", "--workers", "9" * 40],
         ["assembly", "statistics", "bar.toml", "-o", "x.nc", "--importance", "1" * 9],
-        ["stiffness", "library", "build", "spec.toml", "--workers", "1025"],
+        ["stiffness", "library", "spec.toml", "--workers", "1025"],
     ],
 )  # fmt: skip
 def test_absurdly_large_counts_are_refused(run, tmp_path, monkeypatch, words):

@@ -27,7 +27,7 @@ def test_old_command_is_translated_to_an_existing_command(old, new, capsys):
     words = ["file", "--at", "radius=1", "--json", "-"]  # looking up needs a place
     assert with_new_names([*old.split(), *words]) == [*new, *words]
     assert capsys.readouterr().err == f"forcefit: {old} is now {' '.join(new)}\n"
-    with pytest.raises(KeyError):
+    with pytest.raises((KeyError, AttributeError)):
         options_of(old)
     command = " ".join(new).partition(" --")[0]
     assert {one for one in new if one.startswith("--")} <= set(options_of(command))
@@ -100,3 +100,13 @@ def test_library_look_up_without_parameters_is_refused(run):
     status, out, err = run("stiffness", "library", "look-up", "folder")
     assert (status, out) == (2, "")
     assert "--at: missing; expected parameters such as" in err
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [("stiffness import", "stiffness convert"), ("assembly zone", "assembly solve")],
+)
+def test_schema_of_an_old_command_is_that_of_the_new_one(run, old, new):
+    status, expected, _ = run("schema", *new.split())
+    assert status == 0
+    assert run("schema", *old.split())[:2] == (0, expected)

@@ -9,7 +9,7 @@ import pytest
 from forcefit.assembly.files.robot_file import write_robot
 from forcefit.assembly.model.robot import BeamLink, Frame, Robot
 from forcefit.assembly.path.path_file import PathTable
-from forcefit.assembly.path.request import PathTimes, errors_along_path
+from forcefit.assembly.path.request import errors_along_path
 from forcefit.assembly.sweeps.dataset import open_dataset
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "hexapod_path.csv"
@@ -135,7 +135,7 @@ def test_interval_spaces_the_rows_of_a_table_without_times(run, slide):
 def test_path_in_python_equals_that_of_the_command(run, slide):
     table = PathTable(("q.rail",), np.array([[0.0], [0.1]]))
     found = errors_along_path(
-        slide / "slide.toml", table, times=PathTimes("quintic", 0.05, points=51)
+        slide / "slide.toml", table, profile="quintic", duration=0.05, points=51
     )
     _, out, _ = run(
         "assembly", "path", slide / "slide.toml", "--path", slide / "way.csv",

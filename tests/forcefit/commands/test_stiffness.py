@@ -153,12 +153,12 @@ def test_fea_refuses_a_link_without_a_material_everywhere(change, message):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ([], "--wrench: missing; expected a wrench"),
+        ([], "--load: missing; expected a load"),
         (["--gravity", "w=1"], "--gravity"),
         (["--gravity", "z=-9.81", "--figure", "x.png"], "--figure: found together"),
         (
             [
-                "--wrench",
+                "--load",
                 "fx=1",
                 "--radius",
                 "0.04",

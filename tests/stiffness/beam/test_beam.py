@@ -1,6 +1,7 @@
 """Compliance and stiffness of beams against tables, textbooks and hand calculation."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -201,3 +202,29 @@ def test_invalid_compliance_is_refused(C, message):
 def test_direction_that_does_not_consist_of_three_finite_numbers_is_refused(vector):
     with pytest.raises(BadInput, match="axis: found .*, expected 3 finite numbers"):
         unit_vector("axis", vector)
+
+
+@pytest.mark.parametrize(
+    ("section", "moment"),
+    [
+        ({"radius": 0.02}, np.pi * 0.02**4 / 4),
+        ({"radius": 0.02, "inner_radius": 0.015}, np.pi * (0.02**4 - 0.015**4) / 4),
+        ({"width": 0.03, "height": 0.05}, 0.03 * 0.05**3 / 12),
+    ],
+)
+def test_section_given_by_its_lengths_bends_as_in_the_textbook(section, moment):
+    """L^3 / (3 E I) along y, which is up by default."""
+    C = beam_compliance(0.5, section, E=7e10, nu=0.33, theory="euler")
+    assert C[4, 4] == pytest.approx(0.5**3 / (3 * 7e10 * moment), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("section", "message"),
+    [
+        ({"radus": 0.02}, 'section: unknown "radus"; did you mean'),
+        (0.02, 'section: found 0.02, expected {"radius": 0.02}'),
+    ],
+)
+def test_section_that_is_none_is_refused(section, message):
+    with pytest.raises(BadInput, match=re.escape(message)):
+        beam_compliance(0.5, section, E=7e10, nu=0.33)

@@ -181,7 +181,7 @@ def test_export_refuses_an_ending_of_another_format(run, tmp_path):
     run("stiffness", "beam", "--length", 0.4, "--radius", 0.02, "--young", 7e10,
         "--poisson", 0.3, "--json", tmp_path / "rod.json")  # fmt: skip
     for to, name in (("numpy", "rod.npz"), ("nastran", "rod.npy")):
-        status, _, err = run("stiffness", "export", tmp_path / "rod.json", "--to", to,
+        status, _, err = run("stiffness", "convert", tmp_path / "rod.json", "--to", to,
                              "-o", tmp_path / name)  # fmt: skip
         assert status == 2
         assert f'--output: found "{name}", expected the ending' in err
@@ -248,7 +248,7 @@ def test_matrix_that_is_not_the_stiffness_of_a_link_is_refused_in_one_line(
 ):
     path = tmp_path / "k.npy"
     np.save(path, matrix(textbook_beam()))
-    status, out, err = run("stiffness", "import", path, *options)
+    status, out, err = run("stiffness", "convert", path, *options)
     assert (status, out) == (2, "")
     assert message in err.splitlines()[-1]
 
@@ -273,7 +273,7 @@ def test_matrix_that_is_not_the_stiffness_of_a_link_is_refused_in_one_line(
 ])  # fmt: skip
 def test_wrong_matrix_file_is_refused_in_one_line(run, name, text, message, tmp_path):
     (tmp_path / name).write_text(text)
-    status, out, err = run("stiffness", "import", tmp_path / name)
+    status, out, err = run("stiffness", "convert", tmp_path / name)
     assert (status, out) == (2, "")
     assert message in err.splitlines()[-1]
 
@@ -283,9 +283,9 @@ def test_beam_exported_to_nastran_and_imported_keeps_its_stiffness(run, tmp_path
     f = tmp_path
     beam = ["--length", 0.5, "--radius", 0.01, "--young", 2.1e11, "--poisson", 0.3]
     assert run("stiffness", "beam", *beam, "--json", f / "b.json")[0] == 0
-    words = ["stiffness", "export", f / "b.json", "--to", "nastran", "-o", f / "b.pch"]
+    words = ["stiffness", "convert", f / "b.json", "--to", "nastran", "-o", f / "b.pch"]
     assert run(*words)[0] == 0
-    status, out, _ = run("stiffness", "import", f / "b.pch", "--json", "-")
+    status, out, _ = run("stiffness", "convert", f / "b.pch", "--json", "-")
     assert status == 0
     K, _ = read_link_results(f / "b.json")
     assert_same(np.array(json.loads(out)["stiffness"]), K, 1e-8)
@@ -293,18 +293,50 @@ def test_beam_exported_to_nastran_and_imported_keeps_its_stiffness(run, tmp_path
     assert status == 2
     assert 'did you mean "nastran"?' in err
     assert "exudyn" in FORMATS
+    (f / "d.json").write_text("{}")
     status, _, err = run(
-        "stiffness", "export", f / "b.pch", "--to", "abaqus", "-o", f / "d"
+        "stiffness", "convert", f / "d.json", "--to", "abaqus", "-o", f / "d"
     )
     assert status == 2
     assert "found no stiffness, base and tip" in err
+
+
+def test_matrix_of_one_program_becomes_that_of_another_in_one_step(run, tmp_path):
+    """A free beam is the same body after it passed through both files."""
+    first, second = tmp_path / "k.pch", tmp_path / "k.mtx"
+    K, offset = expected_stiffness(), np.array([-0.5, 0, 0])
+    first.write_bytes(link_file(K, offset, "nastran", "mm"))
+    status, out, _ = run(
+        "stiffness", "convert", first, "--unit", "mm", "--to", "abaqus", "-o", second,
+        "--json", "-",
+    )  # fmt: skip
+    assert status == 0
+    assert_same(np.array(json.loads(out)["stiffness"]), K, 1e-8)
+    link = import_link(second, unit="mm")
+    assert_same(link.stiffness, K, 1e-8)
+    assert link.base - link.tip == pytest.approx(offset, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["k.pch", "--to", "abaqus"], "found only one of --to and --output"),
+        (["k.json"], "--to: missing; expected the format of the file to write"),
+        (["k.json", "--tip", "2", "--to", "numpy", "-o", "k.npy"],
+         "--tip: found together with the results k.json"),
+    ],
+)  # fmt: skip
+def test_options_that_do_not_fit_a_conversion_are_refused(run, words, message):
+    status, out, err = run("stiffness", "convert", *words)
+    assert (status, out) == (2, "")
+    assert message in err
 
 
 def test_export_replaces_only_a_matrix_of_the_same_format(run, tmp_path):
     link, out = tmp_path / "rod.json", tmp_path / "rod.mtx"
     assert run("stiffness", "beam", "--length", 0.4, "--radius", 0.02, "--young", 6e10,
                "--poisson", 0.3, "--json", link)[0] == 0  # fmt: skip
-    words = ["stiffness", "export", link, "-o", out, "--to"]
+    words = ["stiffness", "convert", link, "-o", out, "--to"]
     assert run(*words, "matrix-market")[0] == 0
     assert run(*words, "matrix-market", "--unit", "mm")[0] == 0
     before = out.read_bytes()
@@ -317,7 +349,7 @@ def test_stiffness_above_1e100_is_not_exported(run, tmp_path):
     link = tmp_path / "rod.json"
     K = np.diag([1e300, 1, 1, 1, 1, 1]).tolist()
     link.write_text(json.dumps({"stiffness": K, "base": [0] * 3, "tip": [0, 0, 1]}))
-    status, _, err = run("stiffness", "export", link, "--to", "abaqus", "-o",
+    status, _, err = run("stiffness", "convert", link, "--to", "abaqus", "-o",
                          tmp_path / "rod.mtx")  # fmt: skip
     assert status == 2
     assert "numbers above 1e100" in err

@@ -166,4 +166,4 @@ def test_failed_first_mesh_is_retried_with_smaller_edges_while_time_remains(
 def test_text_of_an_interface_that_cannot_be_read_is_named():
     surface = Path(__file__).parents[3] / "meshes/tapered_arm.stl"
     with pytest.raises(BadInput, match="base: found 'q=0', expected"):
-        mesh_link(surface, "q=0", "z=0.35", Material(E=7e10, nu=0.33))
+        mesh_link(surface, "q=0", "z=0.35", E=7e10, nu=0.33)

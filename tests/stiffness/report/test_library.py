@@ -236,24 +236,24 @@ def test_library_commands_build_entries_and_read_them(tmp_path):
         assert result.exit_code == 0, result.output
         return result.stdout
 
-    keys = json.loads(run("build", spec, "--json", "-"))["keys"]
+    keys = json.loads(run(spec, "--json", "-"))["keys"]
     assert len(keys) == 16
-    assert run("read", folder).count("\n") == 16
+    assert run(folder).count("\n") == 16
     at = "length=0.37,radius=0.02,young=6e10,poisson=0.3"
-    table = json.loads(run("read", folder, "--at", at, "--json", "-"))
+    table = json.loads(run(folder, "--at", at, "--json", "-"))
     truth = exact(0.37, 0.02)
     gap = np.abs(scaled(np.array(table["stiffness"]) - truth, truth)).max()
     assert gap < table["relative_error_estimate"] < 0.02
-    rows = list(csv.DictReader(io.StringIO(run("read", folder, "--to", "csv"))))
+    rows = list(csv.DictReader(io.StringIO(run(folder, "--to", "csv"))))
     assert len(rows) == 16
     row = next(r for r in rows if r["length"] == "0.45" and r["radius"] == "0.04")
     assert float(row["K_RX_RX"]) == pytest.approx(exact(0.45, 0.04)[0, 0], rel=1e-9)
-    text = run("read", folder, "--to", "mapdl", "--key", keys[0])
+    text = run(folder, "--to", "mapdl", "--key", keys[0])
     assert text.count("RMORE") == 12
     with pytest.raises(BadInput, match="--key: missing"):
-        run("read", folder, "--to", "adams")
+        run(folder, "--to", "adams")
     with pytest.raises(BadInput, match="expected NAME=NUMBER"):
-        run("read", folder, "--at", "length")
+        run(folder, "--at", "length")
 
 
 def test_stiffness_for_other_programs_has_translations_first():
@@ -394,7 +394,7 @@ def test_shipped_square_links_are_slightly_stiffer_than_their_beams(shape):
 @pytest.mark.parametrize("length", [0.19, 0.46])
 def test_shipped_library_refuses_a_length_outside_its_grid(length):
     result = CliRunner().invoke(
-        app, ["library", "read", str(SHIPPED / "tube"), "--at", f"length={length}"]
+        app, ["library", str(SHIPPED / "tube"), "--at", f"length={length}"]
     )
     assert isinstance(result.exception, BadInput)
     assert "outside the grid, expected 0.2 .. 0.45" in str(result.exception)

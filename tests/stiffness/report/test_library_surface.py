@@ -70,7 +70,7 @@ def test_surface_entry_has_the_digest_of_its_file_and_an_error_estimate(
     """Held ends make a bar of L / r = 7 stiffer than its beam, by less than 10 %."""
     spec = tmp_path / "spec.toml"
     spec.write_text(LINKS)
-    command = ["library", "build", str(spec), "--json", "-"]
+    command = ["library", str(spec), "--json", "-"]
     result = CliRunner().invoke(app, command, catch_exceptions=False)
     assert json.loads(result.stdout)["keys"] == ["bar"]
     entry = read_entry(tmp_path / "links", "bar")

@@ -160,7 +160,7 @@ def test_comparison_of_a_beam_with_another_tip_is_refused():
 def test_wrench_and_ratio_options_are_parsed():
     np.testing.assert_array_equal(parse_load(["fx=1,mz=-2"], "-w"), [0, 0, -2, 1, 0, 0])
     with pytest.raises(BadInput, match='unknown component "fq"; valid: fx'):
-        parse_load(["fq=1"], "--wrench")
+        parse_load(["fq=1"], "--load")
     assert parse_sizes("--ratios", "20,5", "1") == [5.0, 20.0]
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import xarray
 
+import forcefit as ff
 from forcefit.assembly.files.robot_file import write_robot
 from forcefit.assembly.kinematics.posture import place_robot
 from forcefit.assembly.report.pose_errors import pose_error_of
@@ -47,10 +48,11 @@ def study_file(tmp_path, text):
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
-    study = read_study(study_file(folder, SMALL), folder / "out")
     steps = []
-    results = run_study(study, lambda *step: steps.append(step))
-    write_study(results)
+    results = ff.run_study(
+        study_file(folder, SMALL), lambda *step: steps.append(step),
+        output=folder / "out",
+    )  # fmt: skip
     return results, folder / "out", steps
 
 
@@ -401,3 +403,15 @@ def test_example_study_with_finite_elements_has_the_converged_stiffness(tmp_path
     assert irsbot2_with(NUMBERS["cases"][0]).errors == pytest.approx(
         results.robot.errors, abs=0
     )
+
+
+def test_study_without_an_output_folder_writes_no_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    file = study_file(tmp_path, 'robot = "five_bar"\n[checks]\ncrosscheck = false\n')
+    read = read_study(file)
+    assert ff.run_study(file).solution["status"] == "ok"
+    assert ff.run_study(read).solution["status"] == "ok"
+    assert list(tmp_path.iterdir()) == [file]
+    ff.run_study(read, output="report")
+    names = {path.name for path in (tmp_path / "report").iterdir()}
+    assert names == {"report.html", "results.json"}

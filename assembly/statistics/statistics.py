@@ -1,0 +1,191 @@
+"""Random errors in one call: from a posture and its errors to draws and yields.
+
+Start with :func:`statistics`; the command ``forcefit assembly statistics`` has the same
+options.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.model.given_load import Load
+from forcefit.assembly.statistics.callout_sources import Sources, sources_of
+from forcefit.assembly.statistics.clearance_positions import CLEARANCE_MODELS
+from forcefit.assembly.statistics.experiment import Experiment, precision_for
+from forcefit.assembly.statistics.importance_table import ImportanceOptions
+from forcefit.assembly.statistics.monte_carlo import run_draws
+from forcefit.assembly.statistics.plot import histogram_figure
+from forcefit.assembly.statistics.summary import summarise, summary_text
+from forcefit.assembly.sweeps.point_table import point_table
+from forcefit.inputs.errors import BadInput, describe, nearest
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+    from matplotlib.figure import Figure
+
+_WORDS: dict[str, tuple[str | None, ...]] = {
+    "clearance": tuple(CLEARANCE_MODELS), "by": ("source", "frame", "kind"),
+    "state": (None, "contact", "exact"),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Statistics:
+    """The draws of the random errors at a posture, and what they say about yields.
+
+    Attributes:
+        data: data set over ``draw``, with units.
+        summary: yields, quantiles and most probable values, as ``forcefit assembly
+            statistics --json`` writes them; see
+            :func:`forcefit.assembly.statistics.summary.summarise`.
+    """
+
+    data: "xarray.Dataset"
+    summary: dict[str, Any]
+
+    def __repr__(self) -> str:
+        return summary_text(self.summary)
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return the draws as a data set."""
+        return self.data
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Return the draws as a table with one row for each draw."""
+        return point_table(self.data)
+
+    def plot(self) -> "Figure":
+        """Return histograms of the quantities."""
+        return histogram_figure(self.data)
+
+
+def statistics(
+    posture: Posture,
+    errors: Sources | Path | str | None = None,
+    *,
+    draws: int = 10_000,
+    seed: int = 1,
+    clearance: str = "worst",
+    contact_length: float | None = None,
+    load: Load | None = None,
+    gravity: ArrayLike | None = None,
+    limits: Mapping[str, float] | None = None,
+    yield_strength: float | None = None,
+    capability: bool = False,
+    importance: int | None = None,
+    by: str = "kind",
+    margins: bool = True,
+    state: str | None = None,
+    confidence: float = 0.95,
+    workers: int = 1,
+    output: Path | str | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Statistics:
+    """Draw random errors of a robot: estimate the yield and the pose errors.
+
+    Args:
+        posture: posture of the robot; drawn errors replace the robot file's errors.
+        errors: file with the distributions of errors (TOML, see docs/statistics.md), in
+            addition to the tolerances and fits in the robot file; None for these alone.
+            Sources of errors are accepted too; those of
+            :func:`forcefit.assembly.statistics.callout_sources.sources_of` may include
+            errors that are the same in every draw.
+        draws: number of draws, at least 2.
+        seed: seed of the draws.
+        clearance: positions within the clearances: ``"worst"``, ``"uniform"``,
+            ``"contact"`` or ``"least"``, see
+            :data:`forcefit.assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
+        contact_length: [m] ratio of random moments to random forces with ``"contact"``;
+            None for the length of the longest body.
+        load: load on the platform at its origin in base axes, (6,) [N m, N] or by
+            component, ``{"fz": -50}``.
+        gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
+        limits: limits of results in SI units, such as ``{"translation": 2e-4}``; a draw
+            meets the limits if it exceeds none.
+        yield_strength: [Pa] yield strength of the links, the limit of their stress.
+        capability: whether Cp, Cpk and parts per million of each limit are computed.
+        importance: number of base draws for the Sobol indices of the errors; None to
+            omit the indices.
+        by: groups of errors in the Sobol indices: ``"source"``, ``"frame"`` or
+            ``"kind"``.
+        margins: whether the assembly margins, problem (21), are computed.
+        state: state in which the platform's stiffness is computed for each draw,
+            ``"contact"`` or ``"exact"``; None to omit it.
+        confidence: confidence level of all intervals.
+        workers: number of threads.
+        output: NetCDF file to write.  Finished draws are stored in
+            ``<output>.journal``.  After an interruption, the same call resumes from it.
+        progress: called with the number of finished draws and the number of all draws.
+
+    Returns:
+        The draws and their summary.
+
+    Raises:
+        BadInput: an argument is out of its range; a file violates a rule; the robot has
+            neither tolerances nor ``errors``; a limited quantity is not computed; the
+            load acts along a motion without stiffness; or the journal belongs to
+            another run.
+        ModuleNotFoundError: xarray is missing.
+
+    Example:
+        >>> import forcefit as ff
+        >>> posture = ff.place_robot(ff.load_robot("examples/drawn/four_bar.toml"))
+        >>> found = statistics(posture, draws=100, limits={"translation": 1.5e-4})
+        >>> found.summary["assembled"]
+        100
+    """
+    limits = dict(limits or {})
+    _check_words(clearance=clearance, by=by, state=state)
+    _check_numbers(draws, workers, confidence, yield_strength)
+    if capability and not limits:
+        raise BadInput("capability: found no limits, expected one or more")
+    if contact_length is not None and clearance != "contact":
+        raise BadInput(
+            f'contact_length: found with clearance "{clearance}", expected "contact"'
+        )
+    g = None if gravity is None else tuple(np.array(gravity, dtype=float).tolist())
+    experiment = Experiment(
+        posture, sources_of(posture.robot, errors), seed, clearance, margins, load=load,
+        gravity=g, stiffness=state or "", precision=precision_for(limits),
+        contact_length=contact_length,
+    )  # fmt: skip
+    experiment.check_limits([*limits, *(["stress"] if yield_strength else [])])
+    options = None
+    if importance is not None:
+        options = ImportanceOptions(importance, by, confidence)
+    data = run_draws(experiment, draws, output, workers, progress, options)
+    summary = {
+        "robot": posture.robot.name, "pose": posture.pose(), "seed": seed,
+        "load": experiment.wrench, "gravity": experiment.gravity,
+        **summarise(data, limits, yield_strength, confidence, capability),
+    }  # fmt: skip
+    return Statistics(data, summary)
+
+
+def _check_words(**words: str | None) -> None:
+    """Raise an error for a word that is not among those of its argument."""
+    for name, word in words.items():
+        if word not in _WORDS[name]:
+            valid = [one for one in _WORDS[name] if one is not None]
+            raise BadInput(f"{name}: found {describe(word)}{nearest(str(word), valid)}")
+
+
+def _check_numbers(
+    draws: int, workers: int, confidence: float, yield_strength: float | None
+) -> None:
+    """Raise an error for a number that is out of its range."""
+    for name, count, least in (("draws", draws, 2), ("workers", workers, 1)):
+        if count < least:
+            raise BadInput(f"{name}: found {count}, expected at least {least}")
+    if not 0 < confidence < 1:
+        raise BadInput(
+            f"confidence: found {confidence}, expected a number between 0 and 1"
+        )
+    if yield_strength is not None and not 0 < yield_strength < np.inf:
+        raise BadInput(f"yield_strength: found {yield_strength}, expected > 0 Pa")

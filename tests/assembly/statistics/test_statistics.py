@@ -1,0 +1,139 @@
+"""Statistics in one call, against distributions that are known in closed form."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import forcefit as ff
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import Frame, Robot
+
+pytest.importorskip("xarray")
+NORMAL = """
+[[errors]]
+frames = ["tip"]
+distribution = "normal"
+deviation = [0, 0, 0, 0, 0, 1e-4]
+"""
+UNIFORM = """
+[[errors]]
+frames = ["tip"]
+most = [0, 0, 0, 3e-5, 0, 4e-5]
+"""
+
+
+@pytest.fixture
+def tip():
+    """A rigid frame at the base: its error is the pose error."""
+    return home_posture(Robot("block", "tip", (Frame("tip"),)))
+
+
+@pytest.fixture
+def normal(tmp_path):
+    file = tmp_path / "normal.toml"
+    file.write_text(NORMAL)
+    return file
+
+
+def test_yield_of_a_normal_error_is_that_of_the_normal_distribution(tip, normal):
+    """P(|x| <= sigma) = 0.6827, and the median of |x| is 0.6745 sigma."""
+    found = ff.statistics(tip, normal, draws=4000, limits={"translation": 1e-4})
+    share = found.summary["within_limits"]
+    assert share["lower"] < 0.68269 < share["upper"]
+    median = found.summary["quantities"]["translation"]["quantiles"]["0.5"]
+    assert median["lower"] < 0.67449e-4 < median["upper"]
+
+
+def test_draws_are_a_table_and_a_figure(tip, normal):
+    file = normal.with_suffix(".nc")
+    found = ff.statistics(tip, normal, draws=50, output=file)
+    table = found.to_pandas()
+    assert len(table) == 50
+    np.testing.assert_array_equal(table["translation", ""], found.data["translation"])
+    drawn = [ff.show(found), ff.show(found.data, kind="histogram"), ff.show(file)]
+    titles = {tuple(axes.get_title() for axes in one.axes) for one in drawn}
+    titles.add(tuple(axes.get_title() for axes in found.plot().axes))
+    assert len(titles) == 1
+    assert "translation [clearance worst]" in repr(found)
+
+
+def test_statistics_in_python_equal_those_of_the_command(run):
+    robot = Path(__file__).parents[3] / "examples" / "drawn" / "four_bar.toml"
+    limits = {"translation": 1e-4}
+    found = ff.statistics(
+        ff.place_robot(ff.load_robot(robot)), draws=40, seed=3, limits=limits,
+        load={"fx": 2.0}, capability=True,
+    )  # fmt: skip
+    status, out, _ = run(
+        "assembly", "statistics", robot, "--draws", 40, "--seed", 3, "--capability",
+        "--limit", "translation=1e-4", "--load", "fx=2", "--json", "-",
+    )  # fmt: skip
+    assert status == 0
+    expected = json.loads(out)
+    for key in ("exceeds", "within_limits", "capability", "platform_screw"):
+        ours = json.loads(json.dumps(found.summary[key], default=np.ndarray.tolist))
+        assert ours == expected[key], key
+
+
+def test_worst_pose_of_two_uniform_errors_is_the_diagonal_of_their_box(tip, tmp_path):
+    file = tmp_path / "uniform.toml"
+    file.write_text(UNIFORM)
+    worst = ff.worst_pose(tip, file)
+    assert worst.attained == pytest.approx(5e-5, rel=1e-9)
+    assert worst.bound == pytest.approx(5e-5, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"clearance": "wrost"}, "clearance: found 'wrost'; did you mean \"worst\""),
+        ({"by": "x"}, "by: found 'x'"),
+        ({"state": "nominal"}, "state: found 'nominal'"),
+        ({"draws": 1}, "draws: found 1, expected at least 2"),
+        ({"workers": 0}, "workers: found 0, expected at least 1"),
+        ({"confidence": 2.0}, "confidence: found 2.0, expected a number between"),
+        ({"yield_strength": -1.0}, "yield_strength: found -1.0, expected > 0 Pa"),
+        ({"capability": True}, "capability: found no limits"),
+        ({"contact_length": 0.1}, "contact_length: found with clearance"),
+        ({"limits": {"enrgy": 1.0}}, "limit enrgy: found a quantity"),
+    ],
+)
+def test_statistics_refuse_an_argument_out_of_its_range(tip, normal, options, message):
+    with pytest.raises(ff.BadInput, match=message):
+        ff.statistics(tip, normal, **{"draws": 10, **options})
+
+
+def test_worst_pose_refuses_an_unknown_quantity(tip, normal):
+    with pytest.raises(ff.BadInput, match="quantity: found 'translaton'"):
+        ff.worst_pose(tip, normal, "translaton")
+
+
+def test_statistics_without_errors_name_what_is_missing(tip):
+    with pytest.raises(ff.BadInput, match="no --errors"):
+        ff.statistics(tip)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"errors": "translation"}, "found errors or interactive=True for a data set"),
+        ({"kind": "tornado"}, "show: "),
+        ({"quantities": ["enrgy"]}, "enrgy"),
+    ],
+)
+def test_show_refuses_options_that_do_not_fit_draws(tip, normal, options, message):
+    found = ff.statistics(tip, normal, draws=4)
+    with pytest.raises(ff.BadInput, match=message):
+        ff.show(found, **options)
+
+
+def test_show_refuses_a_file_that_is_not_a_data_set(normal):
+    with pytest.raises(ff.BadInput, match="normal.toml"):
+        ff.show(normal)
+
+
+def test_show_refuses_options_of_data_sets_for_a_robot():
+    with pytest.raises(ff.BadInput, match="expected them for a data set"):
+        ff.show(ff.load_robot("five_bar"), quantities=["energy"])
