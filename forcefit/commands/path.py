@@ -18,8 +18,10 @@ from forcefit.commands.options import (
     MismatchOption,
     RestOption,
     RobotArgument,
+    UnderOption,
     note_closing,
     parse_assignments,
+    parse_covariates,
     parse_gravity,
     parse_load,
     parse_state,
@@ -97,6 +99,7 @@ def path(
         ),
     ] = "nominal",
     drive_force: DriveForceOption = None,
+    under: UnderOption = None,
     rest: RestOption = None,
     mismatch: MismatchOption = None,
     output: Annotated[
@@ -130,8 +133,8 @@ def path(
     with one_thread(), progress_lines() as update, _resumable(output) as note:
         errors = errors_along_path(
             machine, path, times=times, load=wrench, gravity=g, assumption=assumption,
-            state=parse_state(state), drive_force=forces or None, output=output,
-            command=source.command,
+            state=parse_state(state), drive_force=forces or None,
+            under=parse_covariates(under), output=output, command=source.command,
             progress=lambda done, total: update("points", note(done), total),
         )  # fmt: skip
     summary = path_summary(errors)
