@@ -164,7 +164,7 @@ _CONTACTS = record(
         width=number("width along x", "m"), height=number("height along y", "m"),
     ),
     pad_=record(
-        gap=_GAP, length=number("length along x", "m"),
+        gap_=_GAP, fit_=_FIT, length=number("length along x", "m"),
         width=number("width along y", "m"),
     ),
 )  # fmt: skip
