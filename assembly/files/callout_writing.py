@@ -55,4 +55,6 @@ def _datum_table(datum: Datum) -> str | dict[str, Any]:
         table["at"] = list(datum.at)
     if datum.hole:
         table |= {"hole": datum.hole, "hole_of": datum.hole_of}
+    if datum.extent:
+        table["extent"] = datum.extent
     return table

@@ -130,6 +130,23 @@ def shifting_datum(rng, variant):
     return arm(callout), np.linalg.norm(moved, axis=1)
 
 
+def tilting_datum(rng, variant):
+    """A bore whose datum A is a hole 12 H7 at maximum material, which tilts too."""
+    width, length = rng.uniform(1e-5, 4e-5), rng.uniform(0.02, 0.05)
+    extent = (0.02, 0.04)[variant]
+    callout = Callout(
+        "bore", "feature", (Datum("first", hole="12 H7", extent=extent),),
+        extent=(length,), widths={"position": width},
+    )  # fmt: skip
+    turn = Rotation.from_rotvec([0, np.pi / 2, 0])
+    own, _ = moved_axes(rng, width / 2, length, TURNED)
+    point = np.array([0.4, 0.1, 0.05]) + turn.apply(TURNED)
+    size = rng.uniform(0, 9e-6, FINITE)
+    tilted, about = moved_axes(rng, size, extent, point)
+    moved = tilted + about.apply(turn.apply(own))
+    return arm(callout), np.linalg.norm(moved, axis=1)
+
+
 PIN = """
 format = 2
 name = "pin"
@@ -204,17 +221,17 @@ def _pin(folder, **given):
     return read_robot(path)
 
 
-CASES = [round_face, envelope, shifting_datum, form, coupled_hole]
+CASES = [round_face, envelope, shifting_datum, tilting_datum, form, coupled_hole]
 
 
 @pytest.mark.slow
 def test_yields_of_further_zones_equal_those_of_finite_geometry(tmp_path):
-    """20 cases, 95 % intervals: one miss is expected, four have a chance of 1.6 %."""
+    """24 cases, 95 % intervals: one miss is expected, four have a chance of 3 %."""
     inside = []
-    for number in range(20):
-        case, rng = CASES[number % 5], np.random.default_rng([13, number])
+    for number in range(24):
+        case, rng = CASES[number % 6], np.random.default_rng([13, number])
         folder = [tmp_path] if case in (form, coupled_hole) else []
-        robot, sizes = case(rng, number // 5 % 2, *folder)
+        robot, sizes = case(rng, number // 6 % 2, *folder)
         limit = np.quantile(sizes, rng.uniform(0.5, 0.99))
         share = np.mean(sizes <= limit)
         experiment = Experiment(
@@ -225,4 +242,4 @@ def test_yields_of_further_zones_equal_those_of_finite_geometry(tmp_path):
         met = int((experiment.solve(0, draws)["translation"] <= limit).sum())
         interval = proportion(met, draws)
         inside.append(interval["lower"] <= share <= interval["upper"])
-    assert sum(inside) >= 17, inside
+    assert sum(inside) >= 21, inside
