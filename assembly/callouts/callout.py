@@ -54,6 +54,8 @@ class Datum:
         hole: size of a hole that is a datum at maximum material, such as ``"12 H7"``:
             the larger the hole, the more the datum can shift.  Empty for other datums.
         hole_of: as for :attr:`Callout.hole_of`.
+        extent: [m] length of a hole that is datum A at maximum material, so that the
+            datum can tilt too; 0 for other datums.
     """
 
     frame: str
@@ -62,6 +64,7 @@ class Datum:
     at: tuple[float, float, float] = (0.0, 0.0, 0.0)
     hole: str = ""
     hole_of: str = ""
+    extent: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

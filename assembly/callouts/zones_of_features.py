@@ -112,18 +112,23 @@ def point_position(width: float) -> Zone:
     return Zone((np.hstack([np.zeros((3, 3)), np.eye(3)]) * 2 / width,))
 
 
-def datum_shift(hole: str) -> Zone:
+def datum_shift(hole: str, length: float = 0.0) -> Zone:
     """Return the zone of the shift of a hole that is a datum at maximum material.
 
     Args:
         hole: size of the hole, such as ``"12 H7"``.
+        length: [m] length of the hole if it is datum A; 0 if an earlier datum fixes the
+            tilt.
 
     Returns:
-        A disc across the hole's axis. Its diameter is the size of the hole minus the
-        least size, so the disc is a point for the smallest hole.
+        A disc across the hole's axis, or one disc at each of its ends. The diameter is
+        the size of the hole minus the least size, so the disc is a point for the
+        smallest hole.
     """
     growth = float(np.ptp(parse_hole(hole)[1]))
-    return Zone((offset_rows(0.0) * 2 / growth,), from_zero=True)
+    heights = (length / 2, -length / 2) if length else (0.0,)
+    ends = tuple(offset_rows(z) * 2 / growth for z in heights)
+    return Zone(ends, from_zero=True)
 
 
 def shift_along(tolerance: float, direction: NDArray) -> Zone:

@@ -78,7 +78,15 @@ def _of_frames(
         shape = _DATUM_SHAPES.get(of_datum.kind, "axis")
         hole_of = _hole_of(passed[datum.frame], drawn) if datum.hole else ""
         datums.append(
-            Datum(name, shape, axis, _point(of, of_datum), datum.hole, hole_of)
+            Datum(
+                name,
+                shape,
+                axis,
+                _point(of, of_datum),
+                datum.hole,
+                hole_of,
+                datum.extent,
+            )  # fmt: skip
         )
     return replace(
         callout, feature=frame, after=after, datums=tuple(datums),

@@ -27,15 +27,23 @@ chains  contacts            small screws that the contacts allow, in the joint's
 - Pad: the four corners stay within the gap.  The first chain rotates about the lines
   through two of three corners, and so moves each of the three by at most g.  In the
   second chain, only the height of the fourth corner is bounded.
+
+The double cone of a disc pad, ``|TZ| + r |(RX, RY)| <= g``, is not such a set.  Each
+cone of a clearance is a ball of fixed radius, which has one tangent plane at each point
+of its boundary.  The directions that lead from a point into an intersection of such
+balls, or into its image, therefore fill a polyhedral cone.  At the tip of the double
+cone, they fill a circular cone.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.assembly.callouts.fits import FittedEnd
+from forcefit.assembly.model.joint_names import BEARING, GUIDE, GUIDE_FAR, PAD
 from forcefit.assembly.model.robot import Clearance
 from forcefit.stiffness.screws import transform
 
@@ -63,25 +71,26 @@ class Contact:
 
 
 def bearings(
-    first: tuple[float, float], second: tuple[float, float], name: str = "bearing"
-) -> tuple[Contact, ...]:
+    first: tuple[float, float], second: tuple[float, float],
+    names: tuple[str, str] = BEARING,
+) -> tuple[Contact, ...]:  # fmt: skip
     """Return the contacts of a shaft along z in two bearings or in a bore's two ends.
 
     Args:
         first: [m] height z and radial gap of the lower bearing or bore end. The radial
             gap is half the diametral clearance.
         second: [m] height z and radial gap of the upper bearing or bore end.
-        name: beginning of the contacts' names.
+        names: names of the two contacts.
 
     Returns:
         Two contacts, whose sum is exactly the set of small screws of the shaft.
     """
     (z1, c1), (z2, c2) = first, second
     # a rotation about one place moves the shaft only at the other place
-    turns = ((f"{name}_start", z1, c2), (f"{name}_end", z2, c1))
+    turns = zip(names, ((z1, c2), (z2, c1)), strict=True)
     return tuple(
         Contact(suffix, _along_z(z), Clearance(tilt=gap / (z2 - z1)))
-        for suffix, z, gap in turns
+        for suffix, (z, gap) in turns
     )
 
 
@@ -129,24 +138,23 @@ def guide(
     most = 2 * min(2 * c_y / width, 2 * c_x / height)
     rolls = Clearance(spin=most), Clearance(spin=np.inf, axial=np.inf)
     contacts: list[Contact] = []
-    for chain, (name, side) in enumerate((("guide", 1.0), ("guide_far", -1.0))):
+    for chain, (names, side) in enumerate(((GUIDE, 1.0), (GUIDE_FAR, -1.0))):
         at = transform(side * edge, np.eye(3))
-        contacts.append(Contact(f"{name}_roll", at, rolls[chain], chain=chain))
-        contacts += _tilts(name, gaps, length, chain)
+        contacts.append(Contact(names[0], at, rolls[chain], chain=chain))
+        contacts += _tilts(names[1:], gaps, length, chain)
     return tuple(contacts)
 
 
 def _tilts(
-    name: str, gaps: tuple[float, float], length: float, chain: int
+    names: tuple[str, ...], gaps: tuple[float, float], length: float, chain: int
 ) -> Iterator[Contact]:
     """Yield rotations at both ends of a guide; each moves only the other end."""
     # columns: axes of a frame whose z is the joint's y, then the joint's x
     axes = np.eye(3)[:, [2, 0, 1]], np.eye(3)[:, [1, 2, 0]]
-    for turn, gap, R in zip(("yaw", "pitch"), gaps, axes, strict=True):
-        for end, z in (("start", -length / 2), ("end", length / 2)):
-            pose = transform([0.0, 0.0, z], R)
-            bound = Clearance(spin=gap / length)
-            yield Contact(f"{name}_{turn}_{end}", pose, bound, chain=chain)
+    ends = product(zip(gaps, axes, strict=True), (-length / 2, length / 2))
+    for name, ((gap, R), z) in zip(names, ends, strict=True):
+        bound = Clearance(spin=gap / length)
+        yield Contact(name, transform([0.0, 0.0, z], R), bound, chain=chain)
 
 
 def fitted_guide(
@@ -171,21 +179,25 @@ def fitted_guide(
     return tuple(found)
 
 
-def pad(gap: float, length: float, width: float) -> tuple[Contact, ...]:
+def pad(gap: float, length: float, width: float, fit: str = "") -> tuple[Contact, ...]:
     """Return the contacts of a rectangular pad between two planes, normal to z.
 
     Args:
-        gap: [m] gap g from the centred pad to one plane.
+        gap: [m] gap g from the centred pad to one plane; with a fit, its mean.
         length: [m] length 2A along x, > 0.
         width: [m] width 2B along y, > 0.
+        fit: fit of the distance of the planes and the thickness of the pad, or empty.
 
     Returns:
-        Two chains: rotations that move three corners, and the fourth corner.
+        Two chains: rotations that move three corners, and the fourth corner.  With a
+        fit, a rotation moves the fourth corner too, because the fit then determines
+        rotations only.
     """
     A, B = length / 2, width / 2
     corners = np.array([[A, B, 0.0], [-A, B, 0.0], [-A, -B, 0.0], [A, -B, 0.0]])
     contacts = []
-    for k, (here, one, other) in enumerate(((0, 1, 2), (1, 2, 0), (2, 0, 1)), 1):
+    turns = [(0, 1, 2), (1, 2, 0), (2, 0, 1)] + [(3, 0, 2)] * bool(fit)
+    for k, (here, one, other) in enumerate(turns):
         # a rotation about the line through two corners moves only the third corner
         line = corners[other] - corners[one]
         along = line / np.linalg.norm(line)
@@ -193,10 +205,13 @@ def pad(gap: float, length: float, width: float) -> tuple[Contact, ...]:
         arm = abs(across @ (corners[here] - corners[one]))
         R = np.column_stack([across, [0.0, 0.0, 1.0], along])
         turn = Clearance(spin=float(gap / arm))
-        contacts.append(Contact(f"pad_{k}", transform(corners[one], R), turn))
-    free = Clearance(tilt=np.inf, spin=np.inf, radial=np.inf, axial=gap)
+        end = FittedEnd(float(arm), "", "spin") if fit else None
+        pose, chain = transform(corners[one], R), int(here == 3)
+        contacts.append(Contact(PAD[k], pose, turn, fit, end, chain))
+    height = None if fit else gap
+    free = Clearance(tilt=np.inf, spin=np.inf, radial=np.inf, axial=height)
     last = transform(corners[3], np.eye(3))
-    return (*contacts, Contact("pad_4", last, free, chain=1))
+    return (*contacts, Contact(PAD[len(turns)], last, free, chain=1))
 
 
 def _along_z(z: float) -> NDArray:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from forcefit.assembly.drawing.contacts import Contact
 from forcefit.assembly.drawing.drawing import FREE_ROWS, DrawnJoint, JointNumbers
+from forcefit.assembly.model.joint_names import CHAIN_END, CHAIN_START, FAR_END
 from forcefit.stiffness.screws import transform
 
 _FLIP = np.diag([1.0, -1.0, -1.0])  # rotation by 180 degrees about x
@@ -64,9 +65,9 @@ def parts_of(joint: DrawnJoint, reverse: bool = False) -> list[Part]:
     parts = _passed([part for part, chain in every if chain == 0], reverse)
     if any(chain == 1 for _, chain in every):
         at = 1 + max(i for i, part in enumerate(parts) if part.contact)
-        parts.insert(at, _bare(joint, "contacts_end"))
+        parts.insert(at, _bare(joint, CHAIN_END))
         if parts[0].contact:  # errors of the preceding body move both chains
-            parts.insert(0, _bare(joint, "contacts_start"))
+            parts.insert(0, _bare(joint, CHAIN_START))
     return parts
 
 
@@ -86,7 +87,7 @@ def parallel_parts(joint: DrawnJoint, reverse: bool = False) -> Parallel | None:
     parts = parts_of(joint, reverse)
     contacts = [i for i, part in enumerate(parts) if part.contact]
     start, meets = parts[contacts[0] - 1].name, parts[contacts[-1] + 1].name
-    end = _bare(joint, "contacts_far_end")
+    end = _bare(joint, FAR_END)
     return Parallel(start, [*_passed(chain, reverse), end], meets)
 
 

@@ -176,7 +176,7 @@ def _callout(
     after: bool, axis: Vector | None,
 ) -> Callout:  # fmt: skip
     """Return a callout from the keys that occur in both file formats."""
-    if len({replace(d, hole="", hole_of="") for d in datums}) < len(datums):
+    if len({replace(d, hole="", hole_of="", extent=0.0) for d in datums}) < len(datums):
         names = [datum.frame for datum in datums]
         raise table.bad("datums", f"found {names}, expected each datum once")
     widths, hole = _widths(table, shape)

@@ -50,9 +50,13 @@ def _datum_table(datum: Datum) -> str | dict[str, Any]:
     """Return the value that describes a datum in a robot file."""
     if datum == Datum(datum.frame):
         return datum.frame
-    table = {"frame": datum.frame, "shape": datum.shape, "axis": list(datum.axis)}
+    table: dict[str, Any] = {
+        "frame": datum.frame, "shape": datum.shape, "axis": list(datum.axis)
+    }  # fmt: skip
     if datum.at != ORIGIN:
         table["at"] = list(datum.at)
     if datum.hole:
         table |= {"hole": datum.hole, "hole_of": datum.hole_of}
+    if datum.extent:
+        table["extent"] = datum.extent
     return table

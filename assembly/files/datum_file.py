@@ -7,6 +7,7 @@ import numpy as np
 
 from forcefit.assembly.callouts.callout import HELD, Datum
 from forcefit.assembly.callouts.fits import parse_hole
+from forcefit.assembly.callouts.written_tolerances import parse_width
 from forcefit.assembly.drawing.drawing import DrawnJoint
 from forcefit.assembly.model.largest import LARGEST_LENGTH
 from forcefit.inputs.table import BadInput, Table, describe, nearest, quoted
@@ -26,9 +27,11 @@ def frame_datums(table: Table, frames: list[str]) -> tuple[Datum, ...]:
         BadInput: a rule of the format is broken.
     """
     datums = tuple(_datum(table, value, frames) for value in _datum_list(table))
-    if datums[0].hole:
-        fault = "found a hole at maximum material as datum A, whose tilt would change"
-        raise table.bad("datums", f"{fault} too; expected it at B or C")
+    for number, datum in enumerate(datums):
+        if bool(datum.extent) != bool(datum.hole and number == 0):
+            fault = f"found {quoted(datum.frame)} with" + "out" * (number == 0)
+            expected = '"extent" exactly for a hole at maximum material as datum A'
+            raise table.bad("datums", f'{fault} "extent"; expected {expected}')
     return datums
 
 
@@ -51,9 +54,11 @@ def joint_datums(
         BadInput: a rule of the format is broken.
     """
     datums = []
-    hole = table.text("datum_hole", "")
+    hole, extent = table.text("datum_hole", ""), 0.0
     if hole:
         parsed_value(table, "datum_hole", parse_hole)
+    if table.has("datum_extent"):
+        extent = _extent(table, "datum_extent")
     for number, value in enumerate(_datum_list(table)):
         if not isinstance(value, str):
             fault = f"found {describe(value)}, expected names of joints"
@@ -66,26 +71,34 @@ def joint_datums(
             fault = f"found {quoted(value)}, which is the feature itself"
             raise table.bad("datums", f"{fault}, expected another joint of the body")
         if at_most:
-            _check_shifting(table, value, number, joint.kind, hole)
-        datums.append(Datum(joint.name, hole=hole if at_most else ""))
+            _check_shifting(table, value, joint.kind, hole)
+            if number == 0 and not extent:
+                fault = f"found {quoted(value)} as datum A, which can tilt in the hole"
+                expected = 'expected "datum_extent" too, the length of this hole'
+                raise table.bad("datums", f"{fault}; {expected}")
+        datums.append(
+            Datum(
+                joint.name,
+                hole=hole if at_most else "",
+                extent=extent if at_most and number == 0 else 0.0,
+            )  # fmt: skip
+        )
     shifting = [datum.frame for datum in datums if datum.hole]
     if hole and len(shifting) != 1:
         fault = f"found a hole size, and {len(shifting)} datums with (M)"
         raise table.bad("datum_hole", f'{fault}; expected one, such as "B (M)"')
+    if extent and not datums[0].hole:
+        fault = "found it without (M) at datum A"
+        raise table.bad("datum_extent", f"{fault}; expected none")
     return datums
 
 
-def _check_shifting(
-    table: Table, value: str, number: int, kind: str, hole: str
-) -> None:
-    """Raise BadInput for (M) at datum A, or at a datum that is not a sized hole."""
+def _check_shifting(table: Table, value: str, kind: str, hole: str) -> None:
+    """Raise BadInput for (M) at a datum that is not a hole with a size."""
     if kind not in _HOLES:
         fault = f"found {quoted(value)}, a {kind} joint"
         expected = f"expected (M) at a {' or '.join(_HOLES)} joint"
         raise table.bad("datums", f"{fault}; {expected}")
-    if number == 0:
-        fault = f"found {quoted(value)} as datum A, whose tilt would change too"
-        raise table.bad("datums", f"{fault}; expected (M) at datum B or C")
     if not hole:
         expected = 'expected "datum_hole" too, such as datum_hole = "12 H7"'
         raise table.bad(
@@ -110,14 +123,24 @@ def _datum(table: Table, value: Any, frames: list[str]) -> Datum:
         shape = inner.choice("shape", HELD, "axis")
         axis, at = read_direction(inner, "axis") or Z_AXIS, read_point(inner)
         hole, hole_of = _hole_of_datum(inner, name, shape)
+        extent = _extent(inner, "extent") if inner.has("extent") else 0.0
         inner.finish()
     else:
         if not isinstance(value, str):
             fault = f"found {describe(value)}, expected names of frames"
             raise table.bad("datums", fault)
         name, shape, axis, at, hole, hole_of = value, "axis", Z_AXIS, ORIGIN, "", ""
+        extent = 0.0
     check_frame(table, "datums", name, frames)
-    return Datum(name, shape, axis, at, hole, hole_of)
+    return Datum(name, shape, axis, at, hole, hole_of, extent)
+
+
+def _extent(table: Table, key: str) -> float:
+    """Return the length [m] of a datum hole."""
+    length, at_most = parsed_value(table, key, parse_width)
+    if at_most:
+        raise table.bad(key, "found (M), expected a length without (M)")
+    return length
 
 
 def _hole_of_datum(table: Table, name: str, shape: str) -> tuple[str, str]:

@@ -13,6 +13,7 @@ from forcefit.assembly.drawing.drawing import FREE_ROWS
 from forcefit.assembly.files.joint_file import fit_of, read_bounds
 from forcefit.assembly.files.written_units import without_units
 from forcefit.assembly.model.clearance import BOUNDS, CONES
+from forcefit.assembly.model.joint_names import BORE
 from forcefit.assembly.model.largest import LARGEST_LENGTH
 from forcefit.assembly.model.robot import Clearance
 from forcefit.inputs.table import Table, describe, quoted
@@ -48,9 +49,8 @@ def read_drawn_clearance(table: Table, kind: str) -> _Clearance:
         fault = f"found together with {quoted(contacts[0])}"
         raise inner.bad(contacts[1], f"{fault}, expected one of them")
     if contacts not in ([], ["length"]) and inner.has("fit"):
-        expected = {"bearings": "it in each bearing", "guide": "it in the guide"}
-        instead = expected.get(contacts[0], "only a gap in m")
-        fault = f"found together with {quoted(contacts[0])}, expected {instead}"
+        where = "each bearing" if contacts == ["bearings"] else f"the {contacts[0]}"
+        fault = f"found together with {quoted(contacts[0])}, expected it in {where}"
         raise inner.bad("fit", fault)
     found: _Clearance = bounds, ()
     for key in contacts:
@@ -66,7 +66,7 @@ def _in_bore(table: Table, kind: str, bounds: Clearance) -> _Clearance:
     _refuse_without_shaft(table, "length", kind)
     half = _length(table, "length") / 2
     gap, fit = _gap(table)
-    contacts = bearings((-half, gap), (half, gap), "bore")
+    contacts = bearings((-half, gap), (half, gap), BORE)
     return _of_shaft(bounds), fitted(contacts, (fit, fit), ("", ""), 2 * half)
 
 
@@ -99,12 +99,14 @@ def _bearing(table: Table, number: int, content: dict) -> tuple[float, float, st
     return z, gap, fit, f"bearing_{number}"
 
 
-def _gap(table: Table) -> tuple[float, str]:
-    """Return the radial gap [m], or the mean gap of a fit; and the fit, or ``""``."""
+def _gap(table: Table, key: str = "radial") -> tuple[float, str]:
+    """Return the gap [m] of a key, or the mean gap of a fit; and the fit, or ``""``."""
     fit = fit_of(table)
     if fit is not None:
+        if table.has(key):
+            raise table.bad(key, 'found it together with "fit", expected one of them')
         return fit.mean_radial, fit.text
-    return table.number("radial", "m", least=0.0, largest=LARGEST_LENGTH), ""
+    return table.number(key, "m", least=0.0, largest=LARGEST_LENGTH), ""
 
 
 def _of_shaft(bounds: Clearance) -> Clearance | None:
@@ -171,10 +173,10 @@ def _on_pad(table: Table, kind: str, bounds: Clearance) -> _Clearance:
     _refuse_type(table, "pad", kind, "planar")
     _refuse_with(table, "pad", ("axial", "tilt", "ball"))
     inner = _sizes(table, "pad", ("gap", "length", "width"))
-    gap = inner.number("gap", "m", least=0.0, largest=LARGEST_LENGTH)
+    gap, fit = _gap(inner, "gap")
     length, width = (_length(inner, key) for key in ("length", "width"))
     inner.finish()
-    return (None if bounds == Clearance() else bounds), pad(gap, length, width)
+    return (None if bounds == Clearance() else bounds), pad(gap, length, width, fit)
 
 
 _CONTACTS = {

@@ -114,11 +114,11 @@ def _widened(
     """Return the clearance with a larger gap; None without a gap."""
     if word == "flatness":
         pad = given.get("pad")
-        return (
-            None
-            if not isinstance(pad, dict)
-            else (given | {"pad": _added(joint, pad, "gap", added)})
-        )
+        if not isinstance(pad, dict):
+            return None
+        if "fit" in pad:
+            return given | {"pad": pad | {"fit": _looser(pad["fit"], added)}}
+        return given | {"pad": _added(joint, pad, "gap", added)}
     if "fit" in given:
         return given | {"fit": _looser(given["fit"], added)}
     if "radial" in given:

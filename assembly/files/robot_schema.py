@@ -123,13 +123,15 @@ _OF_FRAME_FEATURE = record(
         text("frame"),
         record(frame=text("frame"), shape_=Words((*HELD,)), axis_=_DIRECTION,
                at_=_POINT, hole_=text("size of a hole at maximum material"),
-               hole_of_=text("its fit or joint")),
+               hole_of_=text("its fit or joint"),
+               extent_=number("length of this hole as datum A", "m")),
     ))),
     hole_of_=text("fit or joint of the hole"),
 )  # fmt: skip
 _OF_BODY_FEATURE = record(
     "", _CALLOUT, datums=text('joints, A first; "B (M)" at maximum material', "joint"),
     datum_hole_=text('size of the datum with (M), such as "12 H7"'),
+    datum_extent_=_WIDTH,
     flatness_=_WIDTH, cylindricity_=_WIDTH,
 )  # fmt: skip
 _NUMBERS = Each(number("parameter", ""))
@@ -164,7 +166,7 @@ _CONTACTS = record(
         width=number("width along x", "m"), height=number("height along y", "m"),
     ),
     pad_=record(
-        gap=_GAP, length=number("length along x", "m"),
+        gap_=_GAP, fit_=_FIT, length=number("length along x", "m"),
         width=number("width along y", "m"),
     ),
 )  # fmt: skip

@@ -94,7 +94,10 @@ def place_callouts(home: Posture) -> tuple[PlacedCallout, ...]:
              for c, d in zip(callouts, datums, strict=True)]  # fmt: skip
     shifting = [(k, j) for k, c in enumerate(callouts)
                 for j, datum in enumerate(c.datums) if datum.hole]  # fmt: skip
-    zones += [datum_shift(callouts[k].datums[j].hole) for k, j in shifting]
+    zones += [
+        datum_shift(datum.hole, datum.extent)
+        for datum in (callouts[k].datums[j] for k, j in shifting)
+    ]
     widths = np.cumsum([0, *(sum(zone.dimensions) for zone in zones)])
     own = [_own_screw(zone, end, widths[-1])
            for zone, end in zip(zones, widths[1:], strict=True)]  # fmt: skip

@@ -276,12 +276,19 @@ def _turned(R: NDArray, vectors: NDArray) -> NDArray:
     return np.einsum("rij,...j->ri" if vectors.ndim == 1 else "rij,rj->ri", R, vectors)
 
 
-def assemble_row(conditions: Conditions, row: int) -> Assembly | ExactAssembly:
+def assemble_row(
+    conditions: Conditions, row: int, bodies: NDArray | None = None,
+    carried: NDArray | None = None,
+) -> Assembly | ExactAssembly:  # fmt: skip
     """Solve one row and return all screws and wrenches of the robot.
 
     Args:
         conditions: conditions of all rows.
         row: index of the row.
+        bodies: (n, 6) [N m, N] additional loads on the bodies, as for
+            :func:`forcefit.assembly.linear.energy.solve_assembly`; only for the linear
+            model.
+        carried: (n, 6) [N m, N] additional loads on the parts that the joints carry.
 
     Returns:
         The linear or the exact assembly, depending on the conditions.
@@ -292,7 +299,7 @@ def assemble_row(conditions: Conditions, row: int) -> Assembly | ExactAssembly:
         SolverFailed: the solver failed, or contacts did not converge.
     """
     if conditions.yields:
-        return _assemble_yielding(with_springs(conditions, row))
+        return _assemble_yielding(with_springs(conditions, row), bodies, carried)
     posture = conditions.posture(row)
     load = conditions.load_at_origin()[row]
     gravity = conditions.gravity[row] if conditions.gravity[row].any() else None
@@ -309,7 +316,7 @@ def assemble_row(conditions: Conditions, row: int) -> Assembly | ExactAssembly:
                 softer, conditions.load[row], gravity=gravity, point=conditions.point
             )
         else:
-            assembly = solve_assembly(softer, load, gravity=gravity)
+            assembly = solve_assembly(softer, load, bodies, gravity, carried=carried)
         before, compliances = compliances, secants(assembly, conditions.laws)
         tolerance = _CONVERGED_FINITE if conditions.exact else CONVERGED
         if np.all(np.abs(compliances - before) <= tolerance * compliances):
@@ -317,18 +324,22 @@ def assemble_row(conditions: Conditions, row: int) -> Assembly | ExactAssembly:
     raise SolverFailed("contact", f"no convergence in {ITERATIONS} iterations")
 
 
-def _assemble_yielding(row: Conditions) -> Assembly | ExactAssembly:
+def _assemble_yielding(
+    row: Conditions, bodies: NDArray | None, carried: NDArray | None
+) -> Assembly | ExactAssembly:
     """Solve one row with compliant places that have laws."""
 
     def solve(held: Conditions) -> tuple[Assembly | ExactAssembly, NDArray]:
-        assembly = assemble_row(held, 0)
+        assembly = assemble_row(held, 0, bodies, carried)
         return assembly, wrenches_through(assembly).reshape(1, -1)
 
     def stress(yields: Yields) -> NDArray:
         tight = replace(row.postures, robot=without_joint_clearances(row.robot))
         return flexibility(tight).self_stress(yields.places, yields.read)
 
-    return settle_yields(row, solve, stress) if row.yields else assemble_row(row, 0)
+    if row.yields:
+        return settle_yields(row, solve, stress)
+    return assemble_row(row, 0, bodies, carried)
 
 
 def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:

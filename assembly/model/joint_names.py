@@ -7,7 +7,6 @@ have them.  A user names the joint; the functions of this module return the fram
 that joint.  :mod:`forcefit.assembly.model.frame_series` finds the joints.
 """
 
-import re
 from collections.abc import Container, Sequence
 
 from forcefit.assembly.model.frame_series import NamedJoint
@@ -15,10 +14,18 @@ from forcefit.assembly.model.robot import BASE, Robot
 from forcefit.stiffness.screws import SCREW
 
 # ends of the names of the frames that model contacts (assembly/drawing/contacts.py)
-_CONTACT = re.compile(
-    r"(bore|bearing)_(start|end)|guide(_far)?_(roll|(yaw|pitch)_(start|end))|pad_[1-4]"
-    r"|contacts_(start|end|far_end)"
+BORE = "bore_start", "bore_end"
+BEARING = "bearing_start", "bearing_end"
+_TURNS = "roll", "yaw_start", "yaw_end", "pitch_start", "pitch_end"
+GUIDE, GUIDE_FAR = (
+    tuple(f"{name}_{turn}" for turn in _TURNS) for name in ("guide", "guide_far")
 )
+PAD = "pad_1", "pad_2", "pad_3", "pad_4", "pad_5"
+# frames at which two chains of contacts begin and meet
+CHAIN_START, CHAIN_END, FAR_END = "contacts_start", "contacts_end", "contacts_far_end"
+_CONTACTS = {
+    *BORE, *BEARING, *GUIDE, *GUIDE_FAR, *PAD, CHAIN_START, CHAIN_END, FAR_END,
+}  # fmt: skip
 # for each component of a planar joint, the component of its frame slide_x, whose z axis
 # is the joint's x axis
 _OF_PLANE = (2, 0, 1, 5, 3, 4)
@@ -155,7 +162,7 @@ def owner_of_contact(name: str, names: Container[str]) -> str:
         frame that is not a contact.
     """
     stem, _, end = name.rpartition(".")
-    return stem if stem in names and _CONTACT.fullmatch(end) else ""
+    return stem if stem in names and end in _CONTACTS else ""
 
 
 def closing_names(

@@ -64,7 +64,7 @@ def path_dataset(errors: "PathErrors", command: str = "") -> "xarray.Dataset":
         labels |= {dim: list(LABELS[dim]) for dim in dims if dim in LABELS}
     about: dict[str, Any] = {
         "robot": robot.name,
-        "robot_sha256": robot_hash(robot),
+        "robot_sha256": robot_hash(errors.declared),
         "program": f"forcefit {version('forcefit')}",
         "program_sha256": program_hash(),
         "path_law": errors.trajectory.law,

@@ -16,13 +16,20 @@ from numpy.typing import ArrayLike, NDArray
 from forcefit.assembly.kinematics.nominal import Target
 from forcefit.assembly.kinematics.posture import Posture, together
 from forcefit.assembly.kinematics.verdict import verdicts
-from forcefit.assembly.linear.energy import Assembly, solve_assembly
+from forcefit.assembly.linear.energy import Assembly
 from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.measurement.conditions import Conditions
 from forcefit.assembly.model.link_stress import stressed_links
 from forcefit.assembly.model.links import own_screw
 from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.model.statuses import OK, SINGULAR
 from forcefit.assembly.path.beam_inertia import beam_stress
+from forcefit.assembly.path.conditions import (
+    Covariates,
+    check_effects,
+    equilibria,
+    path_conditions,
+)
 from forcefit.assembly.path.idle_motions import (
     idle_motions,
     momentum_free_rates,
@@ -30,9 +37,10 @@ from forcefit.assembly.path.idle_motions import (
 )
 from forcefit.assembly.path.inertial_loads import InertialLoads, inertial_loads
 from forcefit.assembly.path.motion import Motion, NotFollowed, follow_path
-from forcefit.assembly.path.placing import check_path_robot, first_frequency, placed
-from forcefit.assembly.path.tangents import check_state, compliances
+from forcefit.assembly.path.placing import first_frequency, placed
+from forcefit.assembly.path.tangents import check_linear, check_state, compliances
 from forcefit.assembly.path.trajectory import Trajectory
+from forcefit.assembly.platform_stiffness.vibration import check_masses
 from forcefit.assembly.sweeps.targets import goals_of, of_joints
 from forcefit.inputs.table import BadInput, nearest
 from forcefit.results.display import Figures, html_table, largest, short_repr
@@ -59,7 +67,9 @@ class PathErrors:
     """Results at k instants of a path, of a robot of n frames.
 
     Attributes:
-        robot: the robot.
+        robot: the robot with the effects of its file applied; an elastic foundation is
+            an additional frame.
+        declared: the robot as declared in its file.
         trajectory: path as components of the pose over time.
         assumption: assumption of the bounds of problem (27); ``"none"`` for no bounds.
         state: state in which the compliance is computed.
@@ -82,6 +92,7 @@ class PathErrors:
     """
 
     robot: Robot
+    declared: Robot
     trajectory: Trajectory
     assumption: str
     state: str
@@ -147,6 +158,7 @@ def path_errors(
     gravity: ArrayLike | None = None,
     assumption: str = "none",
     state: str = "nominal",
+    under: Covariates | None = None,
     progress: Progress = lambda done, most: None,
     recall: Recall = lambda compute, *given: compute(),
 ) -> PathErrors:
@@ -162,6 +174,8 @@ def path_errors(
             ``"free"``; ``"none"`` for no bounds.
         state: state of the compliance: ``"nominal"``, ``"contact"`` or ``"exact"``; the
             latter two under the loads of each instant.
+        under: values by name of the covariates on which the effects of the robot's file
+            depend, such as ``temperature``; ``time`` is that of the first instant.
         progress: called with the numbers of solved points and of all points.
         recall: method of :class:`forcefit.assembly.statistics.replay.Replay`, which
             stores blocks of points; by default every block is computed.
@@ -170,16 +184,20 @@ def path_errors(
         The results at all instants.
 
     Raises:
-        BadInput: nothing has a mass, the robot has effects, a point is out of reach or
-            cannot be followed, the assumption or the state is unknown, or a link has a
-            mass and the state is ``"exact"``.
+        BadInput: nothing has a mass, an effect cannot be computed along a path, a point
+            is out of reach or cannot be followed, the assumption or the state is
+            unknown, a link has a mass and the state is ``"exact"``, or an effect has a
+            nonlinear law and the state is not ``"nominal"``.
     """
     if assumption not in ASSUMPTIONS:
         hint = nearest(assumption, ASSUMPTIONS)
         raise BadInput(f'--assumption: found "{assumption[:60]}"{hint}')
-    check_path_robot(robot)
+    check_masses(robot)
+    check_effects(robot, under or {})
     check_state(robot, state)
-    asked = _Asked(robot, trajectory, load, gravity, assumption, state)
+    asked = _Asked(robot, trajectory, load, gravity, assumption, state, under or {})
+    start = _conditions(asked, slice(0, 1), _placed(asked, slice(0, 1)))
+    check_linear(start, state)
     count, parts = len(trajectory.times), []
     block = _BLOCK if state == "nominal" else _BLOCK_OF_TANGENTS
     progress(0, count)
@@ -190,10 +208,11 @@ def path_errors(
     arrays = {name: np.concatenate([p[name] for p in parts]) for name in parts[0]}
     status, reason = arrays.pop("status"), arrays.pop("reason")
     free = int(arrays.pop("free").max())
-    frequency = first_frequency(robot, trajectory)
+    frequency = first_frequency(robot, trajectory, load, gravity, asked.under)
     return PathErrors(
-        robot, trajectory, assumption, state, frequency, free, arrays, status, reason
-    )
+        start.robot, robot, trajectory, assumption, state, frequency, free, arrays,
+        status, reason,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,6 +225,7 @@ class _Asked:
     gravity: ArrayLike | None
     assumption: str
     state: str
+    under: Covariates
 
 
 def _recalled(asked: _Asked, rows: slice, recall: Recall) -> dict[str, NDArray]:
@@ -223,8 +243,10 @@ def _recalled(asked: _Asked, rows: slice, recall: Recall) -> dict[str, NDArray]:
 
 def _solve(asked: _Asked, rows: slice) -> dict[str, NDArray]:
     """Return the results of a block of points."""
-    motion, verdict = _moved(asked, rows)
-    gravity = np.zeros(3) if asked.gravity is None else np.asarray(asked.gravity, float)
+    there = _placed(asked, rows)
+    conditions = _conditions(asked, rows, there)
+    gravity = conditions.gravity
+    motion = _followed(asked, rows, conditions.postures)
     idle = idle_motions(motion)
     if idle is not None:
         motion = _followed(
@@ -234,11 +256,12 @@ def _solve(asked: _Asked, rows: slice) -> dict[str, NDArray]:
     loads = inertial_loads(motion, gravity)
     still = np.zeros_like(motion.twists)
     at_rest = replace(motion, twists=still, accelerations=still)
-    assembly = _assembled(asked, motion, loads)
-    static = _assembled(asked, motion, inertial_loads(at_rest, gravity))
-    robot, T = asked.robot, motion.postures.platform
+    found = equilibria(conditions, loads)
+    assembly = found.assembly
+    static = equilibria(conditions, inertial_loads(at_rest, gravity)).assembly
+    robot, T = conditions.robot, motion.postures.platform
     platform = robot.index(robot.platform)
-    wrenches = assembly.wrenches - loads.at_tips
+    wrenches = found.wrenches - loads.at_tips
     out = {
         "coordinates": motion.postures.coordinates,
         "rates": motion.rates,
@@ -253,15 +276,15 @@ def _solve(asked: _Asked, rows: slice) -> dict[str, NDArray]:
         "inertial_screw": assembly.platform_screw - static.platform_screw,
         "energy": assembly.energy,
         "wrench": wrenches,
-        "drive_force": _drive_forces(robot, assembly.joint_wrenches),
+        "drive_force": _drive_forces(robot, found.joint_wrenches),
         "stress": _stresses(robot, loads, wrenches),
-        "compliance": compliances(motion.postures, asked.state, asked.load, loads),
+        "compliance": compliances(conditions, asked.state, loads),
     }
     if asked.assumption != "none":
         bounds = bound_pose_error(assembly, asked.assumption)
         out["rotation_error"] = bounds.rotation_error
         out["translation_error"] = bounds.translation_error
-    status, reason = _statuses(assembly, verdict)
+    status, reason = _statuses(assembly, _verdicts(asked, rows, there))
     for name in out.keys() - _GEOMETRIC:
         out[name] = np.array(out[name], dtype=float)
         out[name][status != OK] = np.nan
@@ -269,19 +292,31 @@ def _solve(asked: _Asked, rows: slice) -> dict[str, NDArray]:
     return out | {"status": status, "reason": reason, "free": free}
 
 
-def _moved(asked: _Asked, rows: slice) -> tuple[Motion, list[tuple[str, str]]]:
-    """Return the motion of a block of points; also whether each posture is usable."""
-    robot, path = asked.robot, asked.trajectory
-    values = path.values[rows]
-    postures, reasons = placed(robot, path.names, values)
+def _placed(asked: _Asked, rows: slice) -> Posture:
+    """Return the postures of a block of points."""
+    path, values = asked.trajectory, asked.trajectory.values[rows]
+    postures, reasons = placed(asked.robot, path.names, values)
     for i, reason in enumerate(reasons):
         if reason:
             raise BadInput(f"path at {path.times[rows][i]:.6g} s: {reason}")
-    there = together([one for one in postures if one is not None])
-    goals = goals_of(path.names, robot, values)
-    target = Target(coordinates=goals) if of_joints(path.names) else Target(goals)
-    verdict = verdicts(robot, target, there.coordinates, there.transforms)
-    return _followed(asked, rows, there), verdict
+    return together([one for one in postures if one is not None])
+
+
+def _conditions(asked: _Asked, rows: slice, there: Posture) -> Conditions:
+    """Return loads and effects of a block of points."""
+    times = asked.trajectory.times
+    return path_conditions(
+        asked.robot, there, times[rows] - times[0], asked.load, asked.gravity,
+        asked.under,
+    )  # fmt: skip
+
+
+def _verdicts(asked: _Asked, rows: slice, there: Posture) -> list[tuple[str, str]]:
+    """Return whether each posture is usable, as a status and its reason."""
+    names = asked.trajectory.names
+    goals = goals_of(names, asked.robot, asked.trajectory.values[rows])
+    target = Target(coordinates=goals) if of_joints(names) else Target(goals)
+    return verdicts(asked.robot, target, there.coordinates, there.transforms)
 
 
 def _followed(
@@ -298,13 +333,6 @@ def _followed(
             "the velocity and acceleration of the path here; expected a path without "
             "singular postures"
         ) from None
-
-
-def _assembled(asked: _Asked, motion: Motion, loads: InertialLoads) -> Assembly:
-    """Return the least-energy solutions under loads on the bodies and the platform."""
-    return solve_assembly(
-        motion.postures, asked.load, loads.bodies, carried=loads.carried
-    )
 
 
 def _statuses(

@@ -1,13 +1,17 @@
 """Postures along a path, and the first natural frequency at these postures."""
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from forcefit.assembly.effects.robot_effects import apply_robot_effects
 from forcefit.assembly.kinematics.posture import Posture, place_many, place_many_joints
+from forcefit.assembly.linear.energy import CannotAssemble
+from forcefit.assembly.linear.reference.reduction import FreeMotion
 from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.path.conditions import Covariates
 from forcefit.assembly.path.path_file import PathTable
 from forcefit.assembly.path.trajectory import Trajectory
-from forcefit.assembly.platform_stiffness.vibration import check_masses, natural_modes
+from forcefit.assembly.platform_stiffness.vibration import natural_modes
 from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.assembly.sweeps.targets import goals_of, of_joints
 from forcefit.inputs.table import BadInput
@@ -32,23 +36,6 @@ def placed(
     return place(robot, goals_of(names, robot, values))
 
 
-def check_path_robot(robot: Robot) -> None:
-    """Reject a robot without masses, or with effects, which a path does not include.
-
-    Args:
-        robot: any robot.
-
-    Raises:
-        BadInput: the robot has no masses, or has effects.
-    """
-    if robot.has_effects:
-        raise BadInput(
-            f"{robot.name}: found effects of the machine, which are not computed along "
-            "a path; expected a robot without effects"
-        )
-    check_masses(robot)
-
-
 def check_rows(robot: Robot, table: PathTable, where: str = "path") -> None:
     """Reject a path with a row that is out of the robot's reach.
 
@@ -66,24 +53,34 @@ def check_rows(robot: Robot, table: PathTable, where: str = "path") -> None:
             raise BadInput(f"{where}: {table.row_name(row)}: {reason}")
 
 
-def first_frequency(robot: Robot, trajectory: Trajectory) -> float:
+def first_frequency(
+    robot: Robot, trajectory: Trajectory, load: ArrayLike | None,
+    gravity: ArrayLike | None, under: Covariates,
+) -> float:  # fmt: skip
     """Return the least natural frequency along a path with locked drives.
 
     Args:
         robot: any robot.
         trajectory: the path.
+        load: (6,) [N m, N] load on the platform, on which the secant stiffness of a
+            nonlinear effect depends.
+        gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
+        under: values by name of the covariates of the robot's effects.
 
     Returns:
-        [Hz] frequency of the nominal robot; NaN if nothing vibrates.
+        [Hz] frequency of the robot with its effects; NaN if nothing vibrates.
     """
     count = len(trajectory.times)
     rows = np.unique(np.linspace(0, count - 1, _FREQUENCIES).astype(int))
     postures, _ = placed(robot, trajectory.names, trajectory.values[rows])
     found = []
     for posture in postures:
+        if posture is None:
+            continue
         try:
-            modes = natural_modes(posture, 6) if posture is not None else None
-        except (BadInput, SolverFailed):
+            applied = apply_robot_effects(posture, load, gravity, under)
+            modes = natural_modes(applied.posture, 6)
+        except (BadInput, CannotAssemble, FreeMotion, SolverFailed):
             continue
         if modes is not None:
             found += [f for f in modes.frequencies.tolist() if f > 0.0]

@@ -15,12 +15,14 @@ from forcefit.assembly.exchange.robot_files import load_robot
 from forcefit.assembly.kinematics.nominal import size_of
 from forcefit.assembly.model.force_control import with_drive_forces
 from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.path.conditions import Covariates, check_effects
 from forcefit.assembly.path.dataset import path_dataset
 from forcefit.assembly.path.path_errors import PathErrors, Progress, path_errors
 from forcefit.assembly.path.path_file import PathTable, check_path, read_path
-from forcefit.assembly.path.placing import check_path_robot, check_rows
+from forcefit.assembly.path.placing import check_rows
 from forcefit.assembly.path.tangents import check_state
 from forcefit.assembly.path.trajectory import Trajectory, profiled, timed
+from forcefit.assembly.platform_stiffness.vibration import check_masses
 from forcefit.assembly.statistics.replay import journalled
 from forcefit.assembly.sweeps.dataset import save_dataset
 from forcefit.assembly.sweeps.identity import program_hash, robot_hash
@@ -90,6 +92,7 @@ def errors_along_path(
     assumption: str = "none",
     state: str = "nominal",
     drive_force: Mapping[str, float] | None = None,
+    under: Covariates | None = None,
     output: Path | str | None = None,
     command: str = "",
     progress: Progress = lambda done, most: None,
@@ -118,6 +121,8 @@ def errors_along_path(
             instant.
         drive_force: [N m or N] force by drive. Such a drive applies this force instead
             of holding its coordinate.
+        under: values by name of the covariates on which the effects of the robot's file
+            depend, such as ``temperature``; ``time`` is that of the first instant.
         output: NetCDF file to write.  Finished points are stored in
             ``<output>.journal``. After an interruption, the same call resumes from it.
         command: command line for the provenance in the file; empty if there is none.
@@ -134,14 +139,16 @@ def errors_along_path(
     if drive_force:
         machine = with_drive_forces(machine, drive_force)
     check_state(machine, state)
+    check_effects(machine, under or {})
     times = PathTimes(profile, duration, speed, acceleration, interval, ends, points)
     trajectory = trajectory_of(machine, path, times)
     asked = {"load": load, "gravity": gravity, "assumption": assumption, "state": state}
+    asked["under"] = str(sorted((under or {}).items()))
     file = None if output is None else Path(output)
     with journalled(file, _identity(machine, trajectory, asked)) as replay:
         errors = path_errors(
             machine, trajectory, load=load, gravity=gravity, assumption=assumption,
-            state=state, progress=progress, recall=replay.recall,
+            state=state, under=under, progress=progress, recall=replay.recall,
         )  # fmt: skip
         if file is not None:
             save_dataset(path_dataset(errors, command), file)
@@ -185,7 +192,7 @@ def trajectory_of(
     Raises:
         BadInput: for the reasons of :func:`errors_along_path`.
     """
-    check_path_robot(robot)
+    check_masses(robot)
     where = "path" if isinstance(path, PathTable) else str(path)
     table = path if isinstance(path, PathTable) else read_path(path, robot)
     check_path(table, where)

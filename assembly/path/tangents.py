@@ -7,13 +7,15 @@ These are dead loads: they remain constant while the platform moves.
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from forcefit.assembly.exact.exact import solve_exact
-from forcefit.assembly.kinematics.posture import Posture
-from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
+from forcefit.assembly.linear.energy import CannotAssemble
 from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.yields import with_springs
 from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.path.conditions import equilibrium_of_row
 from forcefit.assembly.path.inertial_loads import InertialLoads
 from forcefit.assembly.platform_stiffness.exact_tangent import exact_tangent
 from forcefit.assembly.platform_stiffness.linear_tangent import in_contact
@@ -47,16 +49,34 @@ def check_state(robot: Robot, state: str) -> None:
         )
 
 
-def compliances(
-    postures: Posture, state: str, load: ArrayLike | None, loads: InertialLoads
-) -> NDArray:
+def check_linear(conditions: Conditions, state: str) -> None:
+    """Reject nonlinear effects in the states ``"contact"`` and ``"exact"``.
+
+    Args:
+        conditions: conditions at any instants.
+        state: state in which the compliance is computed.
+
+    Raises:
+        BadInput: the law of an effect is nonlinear, so that its tangent stiffness is
+            not computed.
+    """
+    places = [law.frame for law in conditions.laws]
+    places += [place.frame for place in conditions.yields if not place.linear]
+    if places and state != "nominal":
+        raise BadInput(
+            f"--state {state}: found an effect with a nonlinear law at frame "
+            f"{quoted(places[0])}, whose tangent stiffness is not computed; expected "
+            "--state nominal, in which the compliance leaves this effect out"
+        )
+
+
+def compliances(conditions: Conditions, state: str, loads: InertialLoads) -> NDArray:
     """Return the compliance of the platform at k instants.
 
     Args:
-        postures: k postures.
+        conditions: conditions at k instants.
         state: ``"nominal"``, ``"contact"`` or ``"exact"``, as in
             :func:`forcefit.assembly.platform_stiffness.platform_stiffness.platform_stiffness`.
-        load: (6,) [N m, N] load on the platform at its origin, base axes.
         loads: d'Alembert loads and weight at each instant.
 
     Returns:
@@ -64,28 +84,28 @@ def compliances(
         without an equilibrium.  A clearance that touches its bound without a force is
         free.
     """
-    if state == "nominal":
-        many: Any = platform_stiffness(postures)  # Stiffnesses, as k postures are given
+    if state == "nominal" and not conditions.yields:
+        many: Any = platform_stiffness(conditions.postures)  # for k postures
         return np.asarray(many.compliance)
-    found = np.full((len(postures.transforms), 6, 6), np.nan)
+    found = np.full((len(conditions), 6, 6), np.nan)
     for i in range(len(found)):
         try:
-            found[i] = _compliance(
-                postures[i], state, load, loads.bodies[i], loads.carried[i]
-            )
+            found[i] = _compliance(conditions, state, loads, i)
         except (CannotAssemble, FreeMotion, SolverFailed):
             continue
     return found
 
 
 def _compliance(
-    posture: Posture, state: str, load: ArrayLike | None, bodies: NDArray,
-    carried: NDArray,
-) -> NDArray:  # fmt: skip
-    """Return the platform's compliance (6, 6) under loads on bodies and platform."""
+    conditions: Conditions, state: str, loads: InertialLoads, i: int
+) -> NDArray:
+    """Return the platform's compliance (6, 6) at one instant."""
     if state == "contact":
-        assembly = solve_assembly(posture, load, bodies, carried=carried)
-        return in_contact(assembly, "unloading").compliance
-    exact = solve_exact(posture, load, bodies=bodies)
+        found = equilibrium_of_row(conditions, loads, i)
+        return in_contact(found, "unloading").compliance
+    posture = with_springs(conditions, i).posture(0)
+    if state == "nominal":
+        return platform_stiffness(posture).compliance
+    exact = solve_exact(posture, conditions.load_at_origin()[i], bodies=loads.bodies[i])
     tangent = exact_tangent(exact, "unloading")
     return tangent.at(exact.placement.platform[:3, 3]).compliance

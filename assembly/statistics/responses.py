@@ -50,7 +50,8 @@ def respond(
             :data:`forcefit.assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
             In the worst model, the value and its derivatives belong to the largest
             error found. For uniform and contact positions the derivatives belong to the
-            least-energy solution (22).
+            least-energy solution (22).  They leave out the motion of clearances that
+            the least energy does not determine.
         contact_length: [m] length of the contact model, see
             :class:`forcefit.assembly.statistics.experiment.Experiment`.
 

@@ -18,8 +18,10 @@ from forcefit.commands.options import (
     MismatchOption,
     RestOption,
     RobotArgument,
+    UnderOption,
     note_closing,
     parse_assignments,
+    parse_covariates,
     parse_gravity,
     parse_load,
     parse_state,
@@ -97,6 +99,7 @@ def path(
         ),
     ] = "nominal",
     drive_force: DriveForceOption = None,
+    under: UnderOption = None,
     rest: RestOption = None,
     mismatch: MismatchOption = None,
     output: Annotated[
@@ -129,8 +132,8 @@ def path(
             machine, path, profile=profile, duration=duration, speed=speed,
             acceleration=acceleration, interval=interval, ends=ends, points=points,
             load=wrench, gravity=g, assumption=assumption,
-            state=parse_state(state), drive_force=forces or None, output=output,
-            command=source.command,
+            state=parse_state(state), drive_force=forces or None,
+            under=parse_covariates(under), output=output, command=source.command,
             progress=lambda done, total: update("points", note(done), total),
         )  # fmt: skip
     summary = path_summary(errors)

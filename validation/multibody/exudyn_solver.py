@@ -42,6 +42,7 @@ _CLOSING_STEPS = 30
 # Largest number of steps; each reduces the residual by a factor of a million.
 _RELAXING_STEPS = 4
 _RESTS = 1e-10  # [rad, m] change below which free motions count as at rest
+NO_EQUILIBRIUM = "no equilibrium"  # begins the status of a solution that fails
 _STAGES = (
     "closures are closed and loads increase",
     "contacts stiffen and free motions are released",
@@ -181,7 +182,7 @@ def equilibrate(model: Model, start: float, steps: int) -> None:
     except model.exu.ExudynError as error:
         raise_callback_error(model, stage)
         reason = str(error).splitlines()[0]
-        status = f"no equilibrium while {stage} (Exudyn: {reason})"
+        status = f"{NO_EQUILIBRIUM} while {stage} (Exudyn: {reason})"
         raise SimulationFailed(model.robot, status) from None
     finally:
         timer.timeout = -1.0  # all models share one timer

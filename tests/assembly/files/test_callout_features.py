@@ -9,6 +9,8 @@ from forcefit.assembly.files.robot_file import read_robot, write_robot
 from forcefit.assembly.kinematics.callout_maps import place_callouts
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.statistics.callout_sources import sources_of
+from forcefit.assembly.statistics.linear_response import linear_response
+from forcefit.assembly.statistics.worst_pose import worst_pose
 from forcefit.inputs.table import BadInput
 
 # a bracket: mounting face A, bore B 12 H7, bore C; a rod turns in C
@@ -68,6 +70,40 @@ axis = [0, 0, 1]
 """
 
 
+# a plate on an exact pin in its hole B 12 H7; a rod in a second hole C of the plate
+PLATE = """
+format = 2
+name = "plate"
+platform = "rod"
+platform_at = [0, 0, "50 mm"]
+[[body]]
+name = "plate"
+[[body.tolerance]]
+feature = "C"
+datums = ["B (M)"]
+datum_hole = "12 H7"
+datum_extent = "20 mm"
+position = 1e-12
+extent = "20 mm"
+[[body]]
+name = "rod"
+[[joint]]
+name = "B"
+type = "revolute"
+between = ["base", "plate"]
+at = [0, 0, 0]
+axis = [0, 0, 1]
+actuated = true
+[[joint]]
+name = "C"
+type = "revolute"
+between = ["plate", "rod"]
+at = ["100 mm", 0, "20 mm"]
+axis = [0, 0, 1]
+actuated = true
+"""
+
+
 def read(tmp_path, text, name="robot.toml"):
     path = tmp_path / name
     path.write_text(text)
@@ -124,6 +160,25 @@ def test_shift_of_a_datum_uses_the_hole_of_its_fit(tmp_path):
     assert shift.max() > 8
 
 
+def test_primary_datum_at_maximum_material_shifts_and_tilts_the_whole_body(tmp_path):
+    """Both ends of the bore B of 20 mm are within s of 0 to 9 um: at a height h, s
+    max(1, 2 h / 20 mm), with a variance of E[s^2] (1/8 + (h / 20 mm)^2 / 2) per axis.
+    The rod's point is 50 mm above the middle of B; the zone of bore C is a point.
+    """
+    robot = read(tmp_path, PLATE)
+    sources = sources_of(robot)
+    prepared = linear_response(home_posture(robot))
+    found = worst_pose(prepared, sources, "translation")
+    assert found.attained == pytest.approx(45e-6, rel=1e-6)
+    draws = prepared.solve(sources.errors(sources.draw(0, 40_000, 1)))
+    variance = (9e-6) ** 2 / 3 * (1 / 8 + (50 / 20) ** 2 / 2)
+    shifts = draws.platform_screw[:, 3:]
+    assert shifts.var(axis=0) == pytest.approx([variance, variance, 0], rel=0.03)
+    write_robot(robot, tmp_path / "frames.toml")
+    again = read_robot(tmp_path / "frames.toml")
+    assert [vars(c) for c in again.callouts] == [vars(c) for c in robot.callouts]
+
+
 def test_envelope_requirement_limits_the_tilt_of_a_face_by_its_length(tmp_path):
     """30 +- 0.05 mm: 50 um along the normal for both; with (E) over a diameter of
     40 mm a tilt of at most 50 um / 20 mm."""
@@ -146,8 +201,12 @@ def test_envelope_requirement_limits_the_tilt_of_a_face_by_its_length(tmp_path):
     [
         ('"B (M)"', '"B (M"', 'datums: found "B (M", expected a joint of "bracket"'),
         ('["A", "B (M)"]', '["B (M)", "A"]',
-         'datums: found "B (M)" as datum A, whose tilt would change too; expected (M) '
-         "at datum B or C"),
+         'datums: found "B (M)" as datum A, which can tilt in the hole; expected '
+         '"datum_extent" too, the length of this hole'),
+        ('datum_hole = "12 H7"', 'datum_hole = "12 H7"\ndatum_extent = "20 mm"',
+         "datum_extent: found it without (M) at datum A; expected none"),
+        ('datum_hole = "12 H7"', 'datum_hole = "12 H7"\ndatum_extent = "20 mm (M)"',
+         "datum_extent: found (M), expected a length without (M)"),
         ('["A", "B (M)"]', '["B", "A (M)"]', 'found "A (M)", a planar joint; expected'),
         ('datum_hole = "12 H7"', "", 'found "B (M)" without a hole size, expected'),
         ('datum_hole = "12 H7"', 'datum_hole = "12 H8"',

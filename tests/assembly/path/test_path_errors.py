@@ -167,15 +167,12 @@ def test_no_load_makes_a_rod_between_two_ball_joints_spin():
     assert found.status[0] == "ok"
 
 
-def test_weightless_robot_and_robot_with_effects_are_refused():
+def test_weightless_robot_and_unknown_assumption_are_refused():
     path = instants(["q.hub"], [[0.0]], [[1.0]], [[0.0]])
     frames = (hinge("hub"), Frame("arm", "hub", [0.3, 0, 0]))
     with pytest.raises(ValueError, match="found no moving mass"):
         path_errors(Robot("arm", "arm", frames), path)
     heavy_arm = (frames[0], Frame("arm", "hub", [0.3, 0, 0], **rod(1.0, 0.3)))
-    effects = {"registration": {"rx": 1e-3}}
-    with pytest.raises(ValueError, match="found effects of the machine"):
-        path_errors(Robot("arm", "arm", heavy_arm, effects=effects), path)
     with pytest.raises(ValueError, match='--assumption: found "frosen"'):
         path_errors(Robot("arm", "arm", heavy_arm), path, assumption="frosen")
 

@@ -220,3 +220,19 @@ def test_path_notes_components_that_it_leaves_free(run, tmp_path):
     )  # fmt: skip
     assert status == 0
     assert "the path states tx, tz alone, and the platform has 6 freedoms" in out
+
+
+def test_path_applies_effects_under_the_given_conditions(run, slide):
+    """A bar of 0.2 m that is 5 K warmer, with 2e-5 1/K, is 20 um longer."""
+    robot = slide / "slide.toml"
+    effect = '[[effect]]\nname = "thermal_expansion"\nparameters = { tool = 2e-5 }\n'
+    robot.write_text(robot.read_text() + "\n" + effect)
+    arguments = ["assembly", "path", robot, "--path", slide / "way.csv", "--profile",
+                 "quintic", "--duration", 1e3, "--points", 3]  # fmt: skip
+    status, _, _ = run(*arguments, "--under", "temperature=5", "-o", slide / "warm.nc")
+    assert status == 0
+    with open_dataset(slide / "warm.nc") as data:
+        assert data.platform_screw.values[:, 4] == pytest.approx(2e-5, rel=1e-9)
+    status, _, err = run(*arguments)
+    assert status == 2
+    assert 'effect "thermal_expansion" depends on temperature' in err

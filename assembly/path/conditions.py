@@ -1,0 +1,182 @@
+"""Conditions at the instants of a path: loads and effects of the robot's file.
+
+The effects change errors, springs, masses, loads and gravity at each instant as they do
+in ``forcefit assembly solve``.  Errors of the measuring device do not change the pose
+error.  Effects of two kinds are not accepted, because the path does not state their
+inputs: those that depend on the side from which a position is approached, and functions
+that depend on earlier rows of a campaign.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from forcefit.assembly.effects import LIBRARY, apply_known
+from forcefit.assembly.effects.forms import FORMS
+from forcefit.assembly.effects.functions import covariates_of
+from forcefit.assembly.effects.robot_effects import check_covariates
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.energy import (
+    Assembly,
+    CannotAssemble,
+    solve_assembly,
+    together_at,
+)
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.measurement.conditions import Conditions, as_declared
+from forcefit.assembly.measurement.predict import assemble_row
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.path.inertial_loads import InertialLoads
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.inputs.table import BadInput
+
+Covariates = Mapping[str, float | str]
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibria:
+    """Least-energy solutions at k instants of a path, of a robot of n frames.
+
+    Attributes:
+        assembly: solutions of all instants.
+        wrenches: (k, n, 6) [N m, N] wrenches of the links' springs; NaN without a
+            solution.
+        joint_wrenches: (k, n, 6) [N m, N] wrenches through the joints.
+    """
+
+    assembly: Assembly
+    wrenches: NDArray
+    joint_wrenches: NDArray
+
+
+def check_effects(robot: Robot, under: Covariates) -> None:
+    """Reject effects that cannot be computed along a path.
+
+    Args:
+        robot: robot with the effects of its file.
+        under: values of covariates by name.
+
+    Raises:
+        BadInput: an effect depends on the direction of approach, on earlier rows of a
+            campaign or on finite motions; or a covariate is unknown or missing.
+    """
+    session = str(under.get("session"))
+    for name in (*robot.effects, *robot.session_effects.get(session, ())):
+        if "approach" in LIBRARY[name].needs:
+            raise BadInput(
+                f'{robot.name}: effect "{name}" depends on the side from which a '
+                "position is approached; a path has no such side, because its drives "
+                "reverse; expected a robot without this effect"
+            )
+    for function in robot.functions:
+        if function.session not in (None, session):
+            continue
+        form = FORMS.get(function.form)
+        if form is not None and form.remembers:
+            raise BadInput(
+                f'{robot.name}: the function "{function.title}" has the form '
+                f'"{function.form}", which depends on earlier rows of a campaign; a '
+                "path has no such rows; expected a robot without this function"
+            )
+    approached = covariates_of(robot, [session]).get("approach")
+    if approached is not None:
+        raise BadInput(
+            f'{robot.name}: the function "{approached}" depends on the side from which '
+            "a position is approached; a path has no such side, because its drives "
+            "reverse; expected a robot without this function"
+        )
+    check_covariates(robot, under)
+
+
+def path_conditions(
+    robot: Robot, postures: Posture, times: NDArray, load: ArrayLike | None,
+    gravity: ArrayLike | None, under: Covariates,
+) -> Conditions:  # fmt: skip
+    """Return the conditions at k instants, after applying the effects of the file.
+
+    Args:
+        robot: robot with the effects of its file.
+        postures: k postures of this robot.
+        times: (k,) [s] instants.  The covariate ``time`` at an instant is its value in
+            ``under`` plus the instant.
+        load: (6,) [N m, N] constant load on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
+        under: values of covariates by name.
+
+    Returns:
+        Conditions with k rows.  Their robot has the springs, clearances and masses
+        that result from the effects; an elastic foundation is an additional frame.
+    """
+    covariates: dict[str, ArrayLike] = dict(under)
+    if "time" in covariates:
+        covariates["time"] = np.asarray(covariates["time"], dtype=float) + times
+    declared = as_declared(
+        replace(postures, robot=robot.without_effects()), load,
+        mismatch=postures.mismatch,
+        gravity=np.zeros(3) if gravity is None else gravity, covariates=covariates,
+    )  # fmt: skip
+    return apply_known(declared, robot)
+
+
+def equilibria(conditions: Conditions, loads: InertialLoads) -> Equilibria:
+    """Return the least-energy solutions, problem (22), under loads on the bodies.
+
+    Args:
+        conditions: conditions at k instants.
+        loads: d'Alembert loads and weight at each instant.
+
+    Returns:
+        The solutions.  Instants with compliant places of nonlinear laws are solved one
+        by one.
+    """
+    if not (conditions.laws or conditions.yields):
+        found = solve_assembly(
+            conditions.postures, conditions.load_at_origin(), loads.bodies,
+            errors=conditions.errors, carried=loads.carried,
+        )  # fmt: skip
+        return Equilibria(found, found.wrenches, found.joint_wrenches)
+    points = [_equilibrium(conditions, loads, i) for i in range(len(conditions))]
+    wrenches, through = np.full((2, *loads.bodies.shape), np.nan)
+    for i, point in enumerate(points):
+        if isinstance(point, Assembly):
+            wrenches[i], through[i] = point.wrenches, point.joint_wrenches
+    found = together_at(conditions.postures, points)
+    return Equilibria(found, wrenches, through)
+
+
+def _equilibrium(
+    conditions: Conditions, loads: InertialLoads, i: int
+) -> Assembly | Exception:
+    """Return the solution at one instant, or the exception that its solution raised."""
+    try:
+        found = equilibrium_of_row(conditions, loads, i)
+    except (CannotAssemble, FreeMotion, SolverFailed) as error:
+        return error
+    return found
+
+
+def equilibrium_of_row(
+    conditions: Conditions, loads: InertialLoads, i: int
+) -> Assembly:
+    """Return the least-energy solution at one instant under loads on the bodies.
+
+    Args:
+        conditions: conditions at k instants.
+        loads: d'Alembert loads and weight at each instant.
+        i: index of the instant.
+
+    Returns:
+        The solution.
+
+    Raises:
+        CannotAssemble: a closure cannot be closed.
+        FreeMotion: a load acts along a motion without stiffness.
+        SolverFailed: the solver failed, or contacts did not converge.
+    """
+    # the loads on the bodies include the weight
+    weightless = replace(conditions, gravity=np.zeros_like(conditions.gravity))
+    found = assemble_row(weightless, i, loads.bodies[i], loads.carried[i])
+    assert isinstance(found, Assembly)
+    return found

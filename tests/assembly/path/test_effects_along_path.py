@@ -1,0 +1,241 @@
+"""Effects of a robot's file along a path, by closed forms and by single postures."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from forcefit.assembly.effects.robot_effects import apply_robot_effects
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.function import Function
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.assembly.path.path_errors import path_errors
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.inputs.table import BadInput
+from tests.assembly.path.moving_robots_for_tests import hinge, instants, rod
+from tests.assembly.path.test_path_errors import heavy, without_clearance
+
+MASS, LENGTH, ALPHA = 2.0, 0.5, 40.0
+TORQUE = MASS * LENGTH**2 / 3 * ALPHA  # of a thin rod about its end
+GRAVITY = [0.0, -9.81, 0.0]
+LOAD = [5.0, 0, 0, 100.0, -40.0, -200.0]
+WARM = {"temperature": 8.0, "time": 60.0}
+EFFECTS = {
+    "self_weight": {"g.z": -9.81},
+    "thermal_expansion": {"leg1.link_a": 2e-5},
+    "delayed_expansion": {"leg2.link_a": 2e-5, "leg2.link_a.time_constant": 600.0},
+    "drive_compliance": {"leg2.drive": 4e4},
+    "encoder_offset": {"leg1.drive": 1e-4},
+    "encoder_eccentricity": {"leg1.drive.amplitude": 2e-4, "leg1.drive.phase": 0.5},
+    "link_length": {"leg1.link_a": 1e-5},
+    "registration": {"base.rx": 1e-3},
+    "device_scale": {"factor": 1.001},
+    "modulus_scale": {"leg1.link_a": 0.9},
+    "body_mass": {"platform.mass": 0.4},
+    "contact_stiffening": {"leg1.drive.coefficient": 3e6, "leg1.drive.exponent": 1.5},
+    "load_gain": {"factor": 1.1, "offset.fz": -3.0},
+    "drift": {"amplitude.tz": 1e-5, "time_constant": 600.0},
+    "base_compliance": {"stiffness.rz": 5e4, "stiffness.tx": 4e6},
+}
+SOFT = Function(
+    "leg2.drive", ("rz",), ("q.leg2.drive",), "powers", {"0": 1e-6, "1": 2e-6},
+    kind="compliance",
+)  # fmt: skip
+ERRORS = ("encoder_offset", "link_length", "thermal_expansion")
+
+
+def arm(**other):
+    """A rod on a hinge about z, accelerated from rest, without gravity."""
+    tip = Frame("arm", "hub", [LENGTH, 0, 0], **rod(MASS, LENGTH))
+    return Robot("arm", "arm", (hinge("hub"), tip), **other)
+
+
+def turned(robot, **given):
+    """The inertial rotation [rad] of the accelerated rod about z."""
+    path = instants(["q.hub"], [[0.0]], [[0.0]], [[ALPHA]])
+    found = path_errors(robot, path, **given)
+    assert found.status[0] == "ok"
+    return found.inertial[0, 2]
+
+
+@pytest.mark.parametrize(
+    ("effects", "rotation"),
+    [
+        ({"drive_compliance": {"hub": 4e3}}, TORQUE / 4e3),
+        ({"base_compliance": {"stiffness.rz": 2e3}}, TORQUE / 2e3),
+        (
+            {
+                "drive_compliance": {"hub": 4e3},
+                "base_compliance": {"stiffness.rz": 2e3},
+            },
+            TORQUE / 4e3 + TORQUE / 2e3,
+        ),
+        (
+            {"contact_stiffening": {"hub.coefficient": 1e6, "hub.exponent": 1.5}},
+            (TORQUE / 1e6) ** (1 / 1.5),
+        ),
+        # one kilogram more at the middle of the rod
+        (
+            {
+                "drive_compliance": {"hub": 4e3},
+                "body_mass": {"arm.mass": 1.0, "arm.moment.x": -LENGTH / 2},
+            },
+            (TORQUE + 1.0 * (LENGTH / 2) ** 2 * ALPHA) / 4e3,
+        ),
+    ],
+)
+def test_accelerated_rod_turns_by_its_torque_over_the_stiffness_of_the_effects(
+    effects, rotation
+):
+    assert turned(arm(effects=effects)) == pytest.approx(-rotation, rel=1e-9)
+
+
+@pytest.mark.parametrize("state", ["nominal", "contact", "exact"])
+def test_compliance_function_deflects_under_the_torque_of_the_acceleration(state):
+    """At q = 0.5 the drive's compliance is 1e-6 + 2e-6 q = 2e-6 rad/(N m)."""
+    soft = Function("hub", ("rz",), ("q.hub",), "powers", {"0": 1e-6, "1": 2e-6},
+                    kind="compliance")  # fmt: skip
+    path = instants(["q.hub"], [[0.5]], [[0.0]], [[ALPHA]])
+    found = path_errors(arm(functions=(soft,)), path, state=state)
+    assert found.inertial[0, 2] == pytest.approx(-TORQUE * 2e-6, rel=1e-9)
+    assert found.arrays["drive_force"][0, 0] == pytest.approx(TORQUE, rel=1e-9)
+    assert found.arrays["compliance"][0, 2, 2] == pytest.approx(2e-6, rel=1e-9)
+
+
+def test_first_frequency_along_a_path_includes_the_compliance_of_the_drive():
+    robot = arm(effects={"drive_compliance": {"hub": 4e3}})
+    path = instants(["q.hub"], [[0.0], [0.1]], [[0.0]] * 2, [[0.0]] * 2)
+    expected = np.sqrt(4e3 / (TORQUE / ALPHA)) / (2 * np.pi)
+    assert path_errors(robot, path).frequency == pytest.approx(expected, rel=1e-9)
+
+
+def test_errors_that_effects_add_do_not_change_the_deflection_by_acceleration():
+    """A rod that is 8 K warmer and 30 um longer has the same inertial loads."""
+    effects = {
+        "drive_compliance": {"hub": 4e3}, "link_length": {"arm": 3e-5},
+        "thermal_expansion": {"arm": 1e-5},
+    }  # fmt: skip
+    path = instants(["q.hub"], [[0.0]], [[0.0]], [[ALPHA]])
+    found = path_errors(arm(effects=effects), path, under={"temperature": 8.0})
+    assert found.arrays["platform_screw"][0, 3] == pytest.approx(
+        1e-5 * LENGTH * 8.0 + 3e-5, rel=1e-12
+    )
+    assert found.inertial[0, 2] == pytest.approx(-TORQUE / 4e3, rel=1e-9)
+
+
+def test_time_of_an_effect_is_the_time_of_the_first_instant_plus_that_of_the_path():
+    growing = Function("arm", ("tx",), ("time",), "powers", {"1": 1e-6})
+    path = instants(["q.hub"], [[0.0]] * 3, [[0.0]] * 3, [[0.0]] * 3)
+    path = replace(path, times=np.array([5.0, 6.0, 8.0]))
+    found = path_errors(arm(functions=(growing,)), path, under={"time": 100.0})
+    np.testing.assert_allclose(
+        found.arrays["platform_screw"][:, 3], [100e-6, 101e-6, 103e-6], rtol=1e-12
+    )
+
+
+def at_rest(robot, gravity=None, load=None, **given):
+    """A path through three poses of the robot of the paper at zero speed."""
+    values = np.array([[-0.05, -0.5], [0.0, -0.45], [0.06, -0.42]])
+    path = instants(["tx", "tz"], values, np.zeros((3, 2)), np.zeros((3, 2)))
+    found = path_errors(robot, path, gravity=gravity, load=load, under=WARM, **given)
+    poses = [{"tx": tx, "tz": tz} for tx, tz in values.tolist()]
+    postures = [place_robot(robot, pose=pose) for pose in poses]
+    applied = [apply_robot_effects(p, load, gravity, WARM) for p in postures]
+    return found, applied
+
+
+@pytest.mark.parametrize("name", [*EFFECTS, "all", "function"])
+def test_path_at_zero_speed_equals_single_postures_with_the_same_effects(name):
+    effects = (
+        EFFECTS if name == "all" else {k: EFFECTS[k] for k in EFFECTS if k == name}
+    )
+    functions = (SOFT,) if name in {"all", "function"} else ()
+    robot = replace(
+        without_clearance(heavy("irsbot2")), effects=effects, functions=functions
+    )
+    found, applied = at_rest(robot, GRAVITY, LOAD)
+    for i, one in enumerate(applied):
+        alone = solve_assembly(one.posture, one.load, gravity=one.gravity)
+        screw = found.arrays["platform_screw"][i]
+        scale = np.abs(alone.platform_screw).max()
+        np.testing.assert_allclose(screw, alone.platform_screw, atol=1e-12 * scale)
+        assert found.arrays["energy"][i] == pytest.approx(alone.energy, rel=1e-9)
+        nominal = platform_stiffness(one.posture).compliance
+        if "contact_stiffening" not in effects:
+            np.testing.assert_allclose(
+                found.arrays["compliance"][i], nominal,
+                atol=1e-12 * np.abs(nominal).max(),
+            )  # fmt: skip
+    np.testing.assert_array_equal(found.inertial, 0.0)
+
+
+def test_path_with_clearances_and_errors_of_effects_equals_single_postures():
+    """Without loads, clearances leave the pose open, but the energy is unique."""
+    effects = {name: EFFECTS[name] for name in ERRORS}
+    robot = replace(heavy("irsbot2"), effects=effects)
+    found, applied = at_rest(robot, assumption="frozen")
+    energies = [solve_assembly(one.posture).energy for one in applied]
+    np.testing.assert_allclose(found.arrays["energy"], energies, rtol=1e-12, atol=1e-15)
+    assert (found.status == "ok").all()
+
+
+def test_self_weight_along_a_path_equals_the_option_gravity():
+    path = instants(["q.hub"], [[0.3]], [[2.0]], [[ALPHA]])
+    springs = {"drive_compliance": {"hub": 4e3}}
+    known = path_errors(
+        arm(effects=springs | {"self_weight": {"g.y": -9.81}}), path
+    ).arrays
+    asked = path_errors(arm(effects=springs), path, gravity=GRAVITY).arrays
+    for name in ("platform_screw", "wrench", "drive_force"):
+        np.testing.assert_array_equal(known[name], asked[name])
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            {"effects": {"friction_hysteresis": {"hub": 1.0}}},
+            '"friction_hysteresis" depends on the side from which',
+        ),
+        (
+            {"effects": {"geometric_stiffening": {}}},
+            '"geometric_stiffening" is defined for finite motions',
+        ),
+        ({"effects": {"thermal_expansion": {"arm": 1e-5}}}, "depends on temperature"),
+        (
+            {
+                "functions": (
+                    Function("arm", ("tx",), ("approach",), "powers", {"1": 1.0}),
+                )
+            },
+            "arm tx of approach.* depends on the side from which",
+        ),
+        (
+            {
+                "functions": (
+                    Function("arm", ("tx",), ("cov.oil",), "lag",
+                             {"gain": 1e-6, "time_constant": 60.0}),
+                )
+            },
+            '"arm tx of cov.oil" has the form "lag", which depends on earlier rows',
+        ),
+    ],
+)  # fmt: skip
+def test_effect_that_a_path_cannot_include_is_refused_by_name(changes, message):
+    path = instants(["q.hub"], [[0.0]], [[0.0]], [[ALPHA]])
+    with pytest.raises(BadInput, match=message):
+        path_errors(arm(**changes), path)
+
+
+def test_state_of_a_nonlinear_effect_other_than_nominal_is_refused():
+    effects = {"contact_stiffening": {"hub.coefficient": 1e6, "hub.exponent": 1.5}}
+    path = instants(["q.hub"], [[0.0]], [[0.0]], [[ALPHA]])
+    with pytest.raises(BadInput, match='nonlinear law at frame "hub"'):
+        path_errors(arm(effects=effects), path, state="contact")
+
+
+def test_unknown_covariate_of_a_path_is_refused():
+    path = instants(["q.hub"], [[0.0]], [[0.0]], [[ALPHA]])
+    with pytest.raises(BadInput, match='--under: unknown covariate "heat"'):
+        path_errors(arm(), path, under={"heat": 1.0})
