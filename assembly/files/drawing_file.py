@@ -18,6 +18,7 @@ from forcefit.assembly.files.drawn_body import (
     LONGEST_NAME,
     Copy,
     link_remarks,
+    mass_remarks,
     place_of,
     read_bodies,
     with_ends,
@@ -77,7 +78,10 @@ def read_drawing(root: Table, name: str, description: str) -> Drawing:
         with_ends(body, copied, joints, at if body.name == platform else None)
         for body, copied in found
     ]
-    remarks = (*link_remarks(bodies, joints, copies), *_form_remarks(forms))
+    remarks = (
+        *link_remarks(bodies, joints, copies), *mass_remarks(copies),
+        *_form_remarks(forms),
+    )  # fmt: skip
     callouts = [
         callout for copied in copies
         for callout in read_drawn_callouts(copied, bodies, joints)

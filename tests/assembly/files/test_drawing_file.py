@@ -100,6 +100,14 @@ def test_remarks_name_the_joints_at_which_loops_are_closed(read):
     )
 
 
+def test_remark_names_the_bodies_whose_mass_has_no_centre(read):
+    """Without a centre the mass of the platform is 450 mm away from the platform."""
+    text = TSAI.replace('centre = [0, 0, "450 mm"]\n', "")
+    remark = 'masses without "centre" act at [0, 0, 0] of the drawing: "platform"'
+    assert remark in read(text).remarks
+    assert not any("centre" in found for found in read(TSAI).remarks)
+
+
 def test_remark_states_between_which_of_many_joints_a_link_is_placed(read):
     """Of the platform, which has one in each leg; none where a key says it."""
     link = "link = { beam = { radius = 0.01 }, young = 7e10, poisson = 0.3 }"
