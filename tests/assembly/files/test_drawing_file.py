@@ -635,3 +635,44 @@ def test_mistake_in_a_drawing_is_reported_in_one_line(case, read):
     assert "\n" not in text
     assert message in text
     assert "drawn.toml" in text
+
+
+SLOTTED = """
+format = 2
+platform = "arm"
+platform_at = [0.5, 0, 0]
+body = [{ name = "stand" }, { name = "arm" }]
+[[joint]]
+name = "slot"
+type = "fixed"
+between = ["base", "stand"]
+at = [0, 0, 0]
+clearance = { radial = 1e-4 }
+locked_at = LOCKED
+[[joint]]
+name = "hinge"
+type = "revolute"
+between = ["stand", "arm"]
+at = [0, 0, 0]
+axis = [0, 0, 1]
+actuated = true
+"""
+
+
+@pytest.mark.parametrize(
+    ("written", "plain"),
+    [
+        ('{ joints = { hinge = "90 deg" } }', {"hinge": np.pi / 2}),
+        ('{ pose = { tx = "400 mm" } }', {"tx": 0.4}),
+        ('{ pose = { rz = "30 deg" } }', {"rz": np.pi / 6}),
+    ],
+)
+def test_pose_at_which_a_joint_is_bolted_can_have_units(read, written, plain):
+    bolt = read(SLOTTED.replace("LOCKED", written)).frames[0].locked_at
+    assert {**bolt.pose, **bolt.joints} == pytest.approx(plain)
+
+
+def test_angle_of_a_bolted_joint_is_not_accepted_in_a_unit_of_length(read):
+    text = SLOTTED.replace("LOCKED", '{ joints = { hinge = "90 mm" } }')
+    with pytest.raises(BadInput, match=r'"slot".locked_at.joints.hinge: found .90 mm'):
+        read(text)
