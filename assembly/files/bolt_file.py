@@ -1,7 +1,9 @@
 """Reader of the key ``locked_at``: the pose at which a fixed joint is bolted."""
 
+from collections.abc import Mapping
 from typing import Any
 
+from forcefit.assembly.files.written_units import without_units
 from forcefit.assembly.kinematics.posture import POSE
 from forcefit.assembly.model.frame import LEFT
 from forcefit.assembly.model.largest import LARGEST_LENGTH
@@ -64,6 +66,32 @@ def _numbers(table: Table, key: str, names: tuple[str, ...] | None) -> dict[str,
     }
     inner.finish()
     return numbers
+
+
+def bolt_without_units(table: Table, kinds: Mapping[str, str]) -> None:
+    """Replace texts such as ``"30 deg"`` in ``locked_at`` by numbers in m or rad.
+
+    Args:
+        table: table of a drawn joint; its content is changed.
+        kinds: type of every joint by its name.
+
+    Raises:
+        BadInput: a text is not a number with a unit of its coordinate.
+    """
+    if not isinstance(table.content.get("locked_at"), dict):
+        return
+    bolt = table.table("locked_at")
+    for key in ("pose", "joints"):
+        if isinstance(bolt.content.get(key), dict):
+            given = bolt.table(key)
+            for name in given.content:
+                shift = name[0] == "t" if key == "pose" else _slides(kinds, name)
+                without_units(given, name, "length" if shift else "angle")
+
+
+def _slides(kinds: Mapping[str, str], name: str) -> bool:
+    """Return whether the coordinate of a joint is a length."""
+    return kinds.get(name) == "prismatic"
 
 
 def bolt_table(bolt: LockedAt) -> Any:

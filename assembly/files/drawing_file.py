@@ -13,11 +13,13 @@ from forcefit.assembly.drawing.drawing import (
     DrawnJoint,
     turned_joint,
 )
+from forcefit.assembly.files.bolt_file import bolt_without_units
 from forcefit.assembly.files.callout_file import read_drawn_callouts
 from forcefit.assembly.files.drawn_body import (
     LONGEST_NAME,
     Copy,
     link_remarks,
+    mass_remarks,
     place_of,
     read_bodies,
     with_ends,
@@ -67,7 +69,13 @@ def read_drawing(root: Table, name: str, description: str) -> Drawing:
     names = [body.name for body, _ in found]
     _check_distinct(root, "body", [BASE, *names])
     forms = forms_of_joints(copies)
-    joints = [joint for copied in copies for joint in _joints(copied, names, forms)]
+    kinds = {
+        f"{copied.prefix}{table.content.get('name')}": str(table.content.get("type"))
+        for copied in copies for table in copied.table.tables("joint")
+    }  # fmt: skip
+    joints = [
+        joint for copied in copies for joint in _joints(copied, names, forms, kinds)
+    ]
     _check_distinct(root, "joint", [BASE, *(joint.name for joint in joints)])
     if platform not in names:
         hint = nearest(platform, names)
@@ -77,7 +85,10 @@ def read_drawing(root: Table, name: str, description: str) -> Drawing:
         with_ends(body, copied, joints, at if body.name == platform else None)
         for body, copied in found
     ]
-    remarks = (*link_remarks(bodies, joints, copies), *_form_remarks(forms))
+    remarks = (
+        *link_remarks(bodies, joints, copies), *mass_remarks(copies),
+        *_form_remarks(forms),
+    )  # fmt: skip
     callouts = [
         callout for copied in copies
         for callout in read_drawn_callouts(copied, bodies, joints)
@@ -133,8 +144,9 @@ def _repeated(leg: Table, name: str) -> Iterator[Copy]:
 
 
 def _joints(
-    copied: Copy, names: list[str], forms: dict[str, tuple[str, float]]
-) -> Iterator[DrawnJoint]:
+    copied: Copy, names: list[str], forms: dict[str, tuple[str, float]],
+    kinds: dict[str, str],
+) -> Iterator[DrawnJoint]:  # fmt: skip
     """Yield the joints of a copy, between bodies of the copy or of the whole robot."""
 
     def find(name: str) -> str | None:
@@ -147,6 +159,7 @@ def _joints(
         first, second = _between(table, find, names)
         if copied.prefix + name in forms:
             widen_clearance(table, *forms[copied.prefix + name])
+        bolt_without_units(table, kinds)
         joint = read_drawn_joint(table, copied.prefix + name, first, second)
         yield turned_joint(joint, copied.T)
     if copied.prefix:

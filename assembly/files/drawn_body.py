@@ -165,3 +165,15 @@ def link_remarks(
             ends = " to ".join(quoted(end) for end in body.ends if end)
             texts.append(f"{quoted(body.name)} {ends}")
     return (f"links from first to second joint: {', '.join(texts)}",) if texts else ()
+
+
+def mass_remarks(copies: list[Copy]) -> tuple[str, ...]:
+    """Return a remark on masses whose centre is not stated."""
+    names = [
+        quoted(copied.prefix + table.content["name"])
+        for copied in copies
+        for table in copied.table.tables("body")
+        if table.content.get("mass") and "centre" not in table.content
+    ]
+    fault = 'masses without "centre" act at [0, 0, 0] of the drawing'
+    return (f"{fault}: {', '.join(names)}",) if names else ()

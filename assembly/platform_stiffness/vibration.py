@@ -213,7 +213,8 @@ def _modes(K: NDArray, M: NDArray, rounding: NDArray) -> tuple[NDArray, NDArray]
         return np.zeros(0), np.zeros((len(K), 0))
     basis = vectors[:, kept] / np.sqrt(values[kept])
     inertia, turned = np.linalg.eigh(basis.T @ M @ basis)
-    heavy = inertia > _NULL * inertia.max()
+    noise = np.sum(turned * (basis.T @ rounding @ basis @ turned), axis=0)
+    heavy = inertia > np.maximum(_NULL * inertia.max(), noise)
     inertia, turned = inertia[heavy][::-1], turned[:, heavy][:, ::-1]
     squares = 1.0 / inertia - shift
     squares[np.abs(squares) < 1e-9 * shift] = 0.0

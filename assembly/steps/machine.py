@@ -18,6 +18,7 @@ from forcefit.assembly.linear.closure import (
     virtual_joints,
 )
 from forcefit.assembly.linear.load import FrameLoads
+from forcefit.assembly.model.joint_names import closing_names, names_of, row_of
 from forcefit.assembly.steps.equilibrium import Equilibrium, Movable
 
 Part = tuple[str, str] | str
@@ -77,14 +78,16 @@ class Machine:
 
         Returns:
             (6, 6n) rows in the axes of the frame or of the closure's first frame, at
-            its origin; lengths in reference lengths.
+            its origin; lengths in reference lengths.  If the first frame is the end of
+            a drawn joint, the rows are in the axes of this joint, at its point.
         """
         robot, paths = self.posture.robot, self.posture.paths
         if isinstance(part, str):
             row = robot.index(part)
             signs = robot.on_path[row].astype(float)
         else:
-            row = robot.index(part[0])
+            ends = closing_names([part], names_of(robot))
+            row = row_of(robot, ends.get(part[0], part[0]))
             signs = closure_signs(robot)[robot.closures.index(part)].astype(float)
         at_platform = np.swapaxes(signs[:, None, None] * paths, 0, 1).reshape(6, -1)
         return self.scale[:, None] * np.linalg.solve(paths[row], at_platform)

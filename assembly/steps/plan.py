@@ -2,7 +2,8 @@
 
 A frame's screw is expressed at the frame's origin in its axes, after its joint.  The
 opening of a closure is expressed at the origin of the closure's first frame, in the
-axes of that frame.  Components are named ``RX RY RZ TX TY TZ`` as for a screw.
+axes of that frame; after a drawn joint, at the joint's point and in its axes.
+Components are named ``RX RY RZ TX TY TZ`` as for a screw.
 """
 
 from collections.abc import Mapping

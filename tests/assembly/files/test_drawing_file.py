@@ -100,6 +100,14 @@ def test_remarks_name_the_joints_at_which_loops_are_closed(read):
     )
 
 
+def test_remark_names_the_bodies_whose_mass_has_no_centre(read):
+    """Without a centre the mass of the platform is 450 mm away from the platform."""
+    text = TSAI.replace('centre = [0, 0, "450 mm"]\n', "")
+    remark = 'masses without "centre" act at [0, 0, 0] of the drawing: "platform"'
+    assert remark in read(text).remarks
+    assert not any("centre" in found for found in read(TSAI).remarks)
+
+
 def test_remark_states_between_which_of_many_joints_a_link_is_placed(read):
     """Of the platform, which has one in each leg; none where a key says it."""
     link = "link = { beam = { radius = 0.01 }, young = 7e10, poisson = 0.3 }"
@@ -627,3 +635,44 @@ def test_mistake_in_a_drawing_is_reported_in_one_line(case, read):
     assert "\n" not in text
     assert message in text
     assert "drawn.toml" in text
+
+
+SLOTTED = """
+format = 2
+platform = "arm"
+platform_at = [0.5, 0, 0]
+body = [{ name = "stand" }, { name = "arm" }]
+[[joint]]
+name = "slot"
+type = "fixed"
+between = ["base", "stand"]
+at = [0, 0, 0]
+clearance = { radial = 1e-4 }
+locked_at = LOCKED
+[[joint]]
+name = "hinge"
+type = "revolute"
+between = ["stand", "arm"]
+at = [0, 0, 0]
+axis = [0, 0, 1]
+actuated = true
+"""
+
+
+@pytest.mark.parametrize(
+    ("written", "plain"),
+    [
+        ('{ joints = { hinge = "90 deg" } }', {"hinge": np.pi / 2}),
+        ('{ pose = { tx = "400 mm" } }', {"tx": 0.4}),
+        ('{ pose = { rz = "30 deg" } }', {"rz": np.pi / 6}),
+    ],
+)
+def test_pose_at_which_a_joint_is_bolted_can_have_units(read, written, plain):
+    bolt = read(SLOTTED.replace("LOCKED", written)).frames[0].locked_at
+    assert {**bolt.pose, **bolt.joints} == pytest.approx(plain)
+
+
+def test_angle_of_a_bolted_joint_is_not_accepted_in_a_unit_of_length(read):
+    text = SLOTTED.replace("LOCKED", '{ joints = { hinge = "90 mm" } }')
+    with pytest.raises(BadInput, match=r'"slot".locked_at.joints.hinge: found .90 mm'):
+        read(text)

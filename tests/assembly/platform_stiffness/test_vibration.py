@@ -184,3 +184,51 @@ def test_massless_rods_that_spin_freely_do_not_change_the_frequencies(tmp_path):
     modes = natural_modes(home_posture(read_robot(file)), 3)
     expected = [241.53112443, 349.76392046, 970.11496002]
     np.testing.assert_allclose(modes.frequencies, expected, rtol=1e-8)
+
+
+LINEAR_DELTA = """
+format = 2
+platform = "plate"
+platform_at = [0, 0, -0.1]
+body = [{ name = "plate", mass = 1.5, centre = [0, 0, -0.1] }]
+[[leg]]
+name = "axis"
+repeat = { count = 3, about = [0, 0, 1] }
+body = [
+    { name = "slider" },
+    { name = "left", link = { beam = { radius = 0.008 }, young = 7e10, poisson = 0.3 } },
+    { name = "right", link = { beam = { radius = 0.008 }, young = 7e10, poisson = 0.3 } },
+]
+joint = [
+    { name = "motor", type = "prismatic", between = ["base", "slider"], at = [0.4, 0, 0.4], axis = [0, 0, 1], actuated = true, drive_stiffness = 1e7 },
+    { name = "a", type = "spherical", between = ["slider", "left"], at = [0.35, 0.06, 0.4] },
+    { name = "b", type = "spherical", between = ["left", "plate"], at = [0.08, 0.06, -0.1] },
+    { name = "c", type = "spherical", between = ["slider", "right"], at = [0.35, -0.06, 0.4] },
+    { name = "d", type = "spherical", between = ["right", "plate"], at = [0.08, -0.06, -0.1] },
+]
+"""  # noqa: E501
+
+
+def test_point_mass_on_six_rods_has_three_modes_and_no_rounding_modes(tmp_path):
+    """Expected: K of the six bars, condensed to the translations of the mass.
+
+    The two bars of a leg are springs EA/L, and their common drive is a spring along z.
+    """
+    file = tmp_path / "robot.toml"
+    file.write_text(LINEAR_DELTA)
+    rod = np.array([-0.27, 0.0, -0.5])
+    length = np.linalg.norm(rod)
+    bar = length / (7e10 * np.pi * 0.008**2)
+    drive = (rod[2] / length) ** 2 / 1e7
+    leg = np.linalg.inv(bar * np.eye(2) + drive * np.ones((2, 2)))
+    K = np.zeros((6, 6))
+    for k in range(3):
+        R = rotation_matrix([0.0, 0.0, 2 * np.pi * k / 3])
+        u = R @ rod / length
+        arms = [R @ [0.08, 0.06, 0.0], R @ [0.08, -0.06, 0.0]]
+        wrenches = np.array([[*np.cross(p, u), *u] for p in arms])
+        K += wrenches.T @ leg @ wrenches
+    condensed = K[3:, 3:] - K[3:, :3] @ np.linalg.solve(K[:3, :3], K[:3, 3:])
+    expected = np.sqrt(np.linalg.eigvalsh(condensed) / 1.5) / (2 * np.pi)
+    modes = natural_modes(home_posture(read_robot(file)), 6)
+    np.testing.assert_allclose(modes.frequencies, expected, rtol=1e-8)

@@ -1,0 +1,73 @@
+"""Steps of a drawn robot: openings are measured at the joint, in its axes.
+
+A plate on the sprung joint ``foot`` at the origin is closed to a second joint ``peg``.
+"""
+
+import pytest
+
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.files.step_file import read_steps
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.steps.run import assemble_in_steps
+
+PLATE = """
+format = 2
+platform = "plate"
+platform_at = [0.1, 0.2, 0.3]
+body = [{ name = "plate" }]
+[[joint]]
+name = "foot"
+type = "fixed"
+between = ["base", "plate"]
+at = [0, 0, 0]
+joint_stiffness = [inf, 2e3, inf, 1e6, 2e6, 3e6]
+"""
+SLOTTED = """
+[[joint]]
+name = "peg"
+type = "fixed"
+between = ["base", "plate"]
+at = [0, 0, 0.05]
+axis = [1, 0, 0]
+axis2 = [0, 1, 0]
+geometric_error = [0, 0, 0, 10e-6, 20e-6, 40e-6]
+"""
+BALL = """
+[[joint]]
+name = "peg"
+type = "spherical"
+between = ["base", "plate"]
+at = [0.4, 0, 0]
+geometric_error = [0, 0, 0, 0, 0, 30e-6]
+"""
+JOIN = '[[step]]\njoin = ["peg", "plate"]\n'
+
+
+@pytest.fixture
+def joined(tmp_path):
+    def run(joint, plan):
+        (tmp_path / "robot.toml").write_text(PLATE + joint)
+        (tmp_path / "plan.toml").write_text(plan)
+        robot = read_robot(tmp_path / "robot.toml")
+        plan = read_steps(tmp_path / "plan.toml", robot)
+        return assemble_in_steps(plan, home_posture(robot))[-1]
+
+    return run
+
+
+def test_slotted_hole_leaves_the_motion_along_the_axis_of_its_joint_open(joined):
+    """The peg's z axis is the base's x axis, its x axis is y, its y axis is z.
+
+    The errors along y and z of the base are closed: (ky y^2 + kz z^2) / 2.
+    """
+    step = joined(SLOTTED, JOIN + 'locked = ["tz"]\n')
+    assert step.energy == pytest.approx((2e6 * 10e-6**2 + 3e6 * 20e-6**2) / 2)
+    assert step.platform_screw[0, 3:] == pytest.approx([0, 10e-6, 20e-6], abs=1e-12)
+
+
+def test_closing_wrench_of_a_ball_joint_is_a_force_through_its_centre(joined):
+    """F = d / (1/kz + r^2/k_ry), and no moment, since the ball turns freely."""
+    step = joined(BALL, JOIN)
+    force = 30e-6 / (1 / 3e6 + 0.4**2 / 2e3)
+    assert step.closing_force == pytest.approx(force)
+    assert step.closing_wrench[0, :3] == pytest.approx([0, 0, 0], abs=1e-9 * force)
