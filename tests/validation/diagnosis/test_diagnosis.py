@@ -90,6 +90,7 @@ def test_single_effect_is_identified_with_its_value(diagnosed, tmp_path):
     assert found.noise.position == pytest.approx(SIGMA[3])
 
 
+@pytest.mark.slow
 def test_wrong_readings_of_held_out_rows_do_not_change_the_selected_model(tmp_path):
     """The answer says that the fitted rows contain only noise."""
     campaign = measured(tmp_path, seed=1, configurations=60, passes=1, **CASES["one"])
@@ -102,6 +103,21 @@ def test_wrong_readings_of_held_out_rows_do_not_change_the_selected_model(tmp_pa
     assert (found.verdict, found.claimed) == ("outside_library", ())
     assert found.effects == right.effects
     assert "The fitted rows contain only noise" in sentence(found)
+
+
+@pytest.mark.slow
+def test_function_that_fails_on_held_out_rows_is_not_reported(tmp_path):
+    """The held-out rows deviate in the opposite direction."""
+    campaign = measured(
+        tmp_path, seed=1, configurations=60, passes=1, **CASES["outside"]
+    )
+    held = hold_out(campaign).rows
+    opposite = np.where(held[:, None], -campaign.measured, campaign.measured)
+    found = diagnose(replace(campaign, measured=opposite))
+    assert found.fit.unknowns.functions
+    assert found.after.normalised > found.before.normalised
+    assert (found.verdict, table(found)["learned"]) == ("outside_library", [])
+    assert "learned:" not in text(found)
 
 
 def test_correlated_noise_widens_standard_deviations(diagnosed, tmp_path):
