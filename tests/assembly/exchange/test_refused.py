@@ -158,12 +158,12 @@ REFUSED = {
         "closed_loop: []\njoint_name: [j]\njoint_type: [BALL]",
         "joint_type: found 'BALL'; valid: FIXED, SPHERICAL, UJOINT_XY, UJOINT_XZ, "
         "UJOINT_YX, UJOINT_YZ, UJOINT_ZX, UJOINT_ZY"),
-    ("yaml", "half a list"): ("[1",
-        "not valid YAML: while parsing a flow sequence"),
+    ("yaml", "half a list"): ("[1\n",
+        "not valid YAML: line 2, column 1: expected ',' or ']'"),
     ("yaml", "a list"): ("- 1",
         "found [1], expected keys such as closed_loop"),
     ("yaml", "code"): ("!!python/object/apply:os.getcwd []",
-        "not valid YAML: could not determine a constructor for the tag"),
+        "not valid YAML: line 1, column 1: could not determine a constructor"),
     ("xml", "soft bodies"): (mjcf("<worldbody><composite/></worldbody>"),
         "composite: found composite, which generates bodies; expected rigid "
         "bodies written out"),
