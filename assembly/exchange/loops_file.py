@@ -155,6 +155,14 @@ def loops_text(loops: LoopsFile) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _reason(error: Exception) -> str:
+    """Return the place and the cause of a YAML error in one line."""
+    mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", "")
+    if mark is None or not problem:
+        return one_line(str(error), 200)
+    return f"line {mark.line + 1}, column {mark.column + 1}: {one_line(problem, 200)}"
+
+
 def _yaml(path: Path | str) -> dict[str, Any]:
     """Return the root mapping of a YAML file."""
     with naming_packages(f"{path}: YAML"):
@@ -164,9 +172,9 @@ def _yaml(path: Path | str) -> dict[str, Any]:
     try:
         content = yaml.safe_load(text)
     except (yaml.YAMLError, RecursionError, ValueError) as error:
-        raise BadInput(f"{path}: not valid YAML: {one_line(str(error), 200)}") from None
+        raise BadInput(f"{path}: not valid YAML: {_reason(error)}") from None
     if not isinstance(content, dict):
-        kind = describe(content)
+        kind = "an empty file" if content is None else describe(content)
         raise BadInput(f"{path}: found {kind}, expected keys such as closed_loop")
     content = {str(k): v for k, v in content.items()}
     if "closed_loop" not in content:

@@ -175,7 +175,7 @@ def _filled(node: Node, childclass: str, reading: _Reading) -> Node:
     given = {**reading.defaults[name].get(node.tag, {}), **node.element.attrib}
     element = type(node.element)(node.element.tag, given)
     element.extend(list(node.element))
-    return Node(element, node.file)
+    return replace(node, element=element)
 
 
 def _inside(frame: Node, place: _Place) -> _Place:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from forcefit.assembly.exchange.orientation import from_euler, from_quaternion, onto
 from forcefit.assembly.exchange.xml_file import Node, placed
+from forcefit.inputs.errors import describe
 from forcefit.stiffness.screws import rotation_matrix
 
 
@@ -35,10 +36,11 @@ class Angles:
             automatic = compiler.text("autolimits", automatic)
             if len(sequence) != 3 or not set(sequence.lower()) <= set("xyz"):
                 raise compiler.bad(
-                    "eulerseq", "expected three axis letters out of x, y, z, X, Y, Z"
+                    "eulerseq",
+                    f"found {describe(sequence)}, expected three axis letters out of "
+                    "x, y, z, X, Y, Z",
                 )
-            if compiler.text("coordinate", "local") != "local":
-                raise compiler.bad("coordinate", 'expected "local"')
+            compiler.choice("coordinate", ("local",), "local")
         return Angles(
             1.0 if unit == "radian" else math.pi / 180, sequence, automatic == "true"
         )

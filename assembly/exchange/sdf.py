@@ -168,7 +168,12 @@ def _left_out(frames: Frames, root: Node) -> Iterator[str]:
             add(f"{node.tag} of the world", node.optional("name"))
     for _, model in frames.of("model"):
         for node in model.node.children():
-            if node.tag not in (*FRAMES, "pose", "static", "model", "include"):
+            movable = node.tag == "static" and node.content.lower() in {
+                "",
+                "0",
+                "false",
+            }
+            if not movable and node.tag not in (*FRAMES, "pose", "model", "include"):
                 owners = {k: frames.link(k) for k in frames.named if k in tied}
                 refuse_ties(node, {**owners, **{link: link for link in links}})
                 add(f"element {node.tag}{may_tie(node, joints)}", node.optional("name"))

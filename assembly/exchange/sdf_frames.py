@@ -24,7 +24,7 @@ MODEL = "__model__"
 FRAMES = ("link", "joint", "frame")
 _AROUND = f"{WORLD}::"
 _NESTED = 20  # largest depth of nested models
-_OLD = 1.4  # last version in which joint axes are in the model's frame
+_OLD = 4  # last version, 1.4, in which joint axes are in the model's frame
 
 
 @dataclass(frozen=True)
@@ -208,11 +208,20 @@ def _take(frames: Frames, node: Node, scope: str, name: str, old: bool) -> None:
 
 
 def _is_old(root: Node) -> bool:
-    """Return whether a file's version defines joint axes in the model's frame."""
-    try:
-        return float(root.optional("version")) <= _OLD
-    except ValueError:
+    """Return whether a file's version defines joint axes in the model's frame.
+
+    Raises:
+        BadInput: the version is stated, and it is not one of 1.4, 1.5, .. 1.10, ...
+    """
+    version = root.optional("version")
+    if not version:
         return False
+    minor = version.removeprefix("1.")
+    if minor == version or not minor.isdecimal() or int(minor) < _OLD:
+        raise root.bad(
+            "version", f"found {quoted(version)}, expected 1.4 or a later version 1.x"
+        )
+    return int(minor) == _OLD
 
 
 def included(node: Node) -> tuple[Node, bool]:

@@ -1,5 +1,6 @@
 """Reader of XML files; entities and external files are rejected."""
 
+import codecs
 import re
 from collections.abc import Container, Iterator
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from forcefit.assembly.model.largest import LARGEST_LENGTH
 from forcefit.inputs.errors import BadInput, describe, nearest, one_line, quoted
-from forcefit.inputs.table import read_text
+from forcefit.inputs.table import read_bytes, read_text
 from forcefit.stiffness.screws import transform
 
 _DEEPEST = 200  # largest depth of nested elements
@@ -20,6 +21,8 @@ _SKIPPED = re.compile(
     r"<!\[CDATA\[.*?(?:\]\]>|\Z)|<!--.*?(?:-->|\Z)|<\?xml\s[^<>]*>", re.S
 )
 
+_DECLARED = re.compile(rb"""<\?xml\s[^<>]*?encoding\s*=\s*["']([A-Za-z][\w.-]*)["']""")
+_WHOLE = ("model", "world")  # elements of SDF that contain all links and joints
 _ENDLESS = 1e3  # [rad or m] larger limits count as no limits
 
 
@@ -30,10 +33,13 @@ class Node:
     Attributes:
         element: element of :mod:`xml.etree.ElementTree`.
         file: name of the file.
+        within: nearest outer element with a name, and the elements between; empty if
+            there is none; None for the root, whose name is in no message.
     """
 
     element: Any
     file: str
+    within: str | None = None
 
     @property
     def tag(self) -> str:
@@ -42,9 +48,15 @@ class Node:
 
     @property
     def place(self) -> str:
-        """Tag and ``name`` of the element, for messages."""
+        """Tag and ``name`` of the element, for messages.
+
+        Without a name, the place of the outer element comes first, such as
+        ``joint "elbow".origin``.
+        """
         name = self.element.get("name")
-        return self.tag if name is None else f"{self.tag} {quoted(name)}"
+        if name is not None:
+            return f"{self.tag} {quoted(name)}"
+        return f"{self.within}.{self.tag}" if self.within else self.tag
 
     def bad(self, key: str, message: str) -> BadInput:
         """Return the error for an attribute, which the caller raises."""
@@ -55,12 +67,18 @@ class Node:
         """Yield the inner elements with the given tags; all if none is given."""
         for element in self.element:
             if not tags or element.tag in tags:
-                yield Node(element, self.file)
+                yield Node(element, self.file, self._within_children())
 
     def descendants(self) -> Iterator["Node"]:
         """Yield this element and all inner elements, at any depth."""
         for element in self.element.iter():
             yield Node(element, self.file)
+
+    def _within_children(self) -> str:
+        """Return ``within`` of the inner elements."""
+        if self.within is None or self.tag in _WHOLE:
+            return ""
+        return self.place if self.within or self.has("name") else ""
 
     @property
     def content(self) -> str:
@@ -208,7 +226,7 @@ def read_xml(path: Path | str, *roots: str) -> Node:
         BadInput: the file cannot be read, is not XML, declares entities or a document
             type, or has another root element.
     """
-    text = _SKIPPED.sub(_blank_lines, read_text(path))
+    text = _SKIPPED.sub(_blank_lines, read_text(path, _encoding(read_bytes(path))))
     element = _parsed(text, path)
     if element.tag not in roots:
         tag = quoted(str(element.tag))
@@ -223,6 +241,27 @@ def read_xml(path: Path | str, *roots: str) -> Node:
                 f"expected at most {_DEEPEST}"
             )
     return Node(element, str(path))
+
+
+def _encoding(content: bytes) -> str:
+    """Return the encoding that a byte order mark or the XML declaration states.
+
+    The encoding is UTF-8 if none is stated, or if the stated one is unknown.
+
+    Sources:
+        W3C, XML 1.0, 4.3.3 and appendix F.
+    """
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "utf-16"
+    declared = _DECLARED.search(content[:200])
+    name = declared[1].decode() if declared else "utf-8"
+    try:
+        known = codecs.lookup(name).name
+        codecs.decode(b"", known)
+    except LookupError:
+        return "utf-8-sig"
+    # the declaration is readable as ASCII, hence the text is not UTF-16
+    return "utf-8-sig" if known.startswith("utf") else known
 
 
 def _parsed(text: str, path: Path | str) -> Any:

@@ -86,25 +86,26 @@ def read_bytes(path: Path | str) -> bytes:
     return content
 
 
-def read_text(path: Path | str) -> str:
+def read_text(path: Path | str, encoding: str = "utf-8-sig") -> str:
     r"""Return the text of a UTF-8 file, with or without a byte order mark.
 
     Args:
         path: path of the file.
+        encoding: encoding of the text, if the file itself states another one.
 
     Returns:
         The text with line ends ``\n``.
 
     Raises:
         BadInput: the file is absent, is a folder, is unreadable or too large,
-            is not UTF-8, or contains a NUL character.
+            is not in this encoding, or contains a NUL character.
     """
-    content = read_bytes(path)
+    content, name = read_bytes(path), encoding.upper().removesuffix("-SIG")
     try:
-        text = content.decode("utf-8-sig").replace("\r\n", "\n")
+        text = content.decode(encoding).replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         raise BadInput(
-            f"{path}: byte {error.start} is not UTF-8; expected a text file in UTF-8"
+            f"{path}: byte {error.start} is not {name}; expected a text file in {name}"
         ) from None
     if (place := text.find("\0")) >= 0:
         line = text.count("\n", 0, place) + 1

@@ -127,10 +127,13 @@ def interface_rows(
         rows = [row.get((node, direction), -1) for direction in (4, 5, 6, 1, 2, 3)]
         if min(rows) < 0:
             has = sorted(d for n, d in matrix.freedoms if n == node)
+            whole = sorted(n for n, d in matrix.freedoms if d == 4)
+            more = ", ..." if len(whole) > 4 else ""
+            named = f" (nodes with rotations: {', '.join(map(str, whole[:4]))}{more})"
             raise BadInput(
                 f"{option}: node {node} of {matrix.file} has the degrees of freedom "
-                f"{has or 'none'}, expected 1 to 6, or an interface such as z=0 "
-                "with --nodes"
+                f"{has or 'none'}, expected a node with 1 to 6"
+                f"{named if whole else ''}, or an interface such as z=0 with --nodes"
             )
         return np.array(rows), np.eye(6), None if nodes is None else nodes.get(node)
     interface = parse_interface(asked, option)

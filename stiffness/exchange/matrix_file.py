@@ -101,7 +101,7 @@ def read_matrix(
         matrix, freedoms = _numpy(path), None
     else:
         text = read_text(path)
-        if text.startswith("%%MatrixMarket"):
+        if text.lower().startswith("%%matrixmarket"):
             matrix, freedoms = matrix_market(path, text), None
         elif _HARWELL_BOEING.match(text):
             matrix, freedoms = harwell_boeing(path, text), None

@@ -52,8 +52,9 @@ def matrix_market(path: Path, text: str) -> csr_array:
     if words[1] == "coordinate":
         if len(sizes) < 3 or len(rest) != 3 * sizes[2]:
             raise BadInput(
-                f"{path}: found {len(rest) / 3:g} entries, expected the number "
-                "that the file states in its line of sizes; the file may be cut"
+                f"{path}: found {len(rest)} numbers after the line of sizes, expected "
+                "row, column and value of each entry that this line states; the file "
+                "may be cut"
             )
         places = rest.reshape(-1, 3)[:, :2]
         if np.any((places != places.round()) | (places < 1) | (places > n)):

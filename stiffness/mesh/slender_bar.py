@@ -30,6 +30,9 @@ _LONGEST = 2.0
 _PARALLEL = 1e-6  # [rad] largest angle between directions that count as parallel
 _SAME = 1e-6  # largest difference of equal positions, relative to the length
 _SAME_VOLUME = 1e-3
+# largest sine of the angle between a triangle of a straight side and the axis, and one
+# minus the smallest sine of the angle between a triangle of an end and the axis
+_NEARLY = 0.1
 
 
 def slender_bar(surface: Surface, base: Interface, tip: Interface) -> Solid | None:
@@ -56,9 +59,9 @@ def slender_bar(surface: Surface, base: Interface, tip: Interface) -> Solid | No
     if length == 0 or np.linalg.norm(np.cross(axis, tip.direction)) > _PARALLEL:
         return None
     along = (surface.points - base.point) @ axis
-    off = np.minimum(np.abs(along), np.abs(along - length))
-    # a bar has corners only at its ends; this test is faster than recognising shapes
-    if off.max() > 10 * _SAME * length:
+    reach = np.abs([along.min(), along.max() - length]).max()
+    # this test is faster than recognising shapes
+    if reach > 10 * _SAME * length or not _prismatic(surface, axis):
         return None
     patches = find_patches(surface, base, tip)
     section = _section(patches.shapes[2:], axis)
@@ -75,6 +78,18 @@ def slender_bar(surface: Surface, base: Interface, tip: Interface) -> Solid | No
     volume = TrueSurface(surface, patches).volume
     same = abs(_area(lengths) * length / volume - 1) < _SAME_VOLUME
     return _placed(bar, frame, foot, length) if same else None
+
+
+def _prismatic(surface: Surface, axis: NDArray) -> bool:
+    """Return whether all triangles are nearly parallel or normal to the axis.
+
+    Triangles on a cylinder are exactly parallel to its axis only if one of their edges
+    is, which is not so in triangulations of STEP files.
+    """
+    a, b, c = np.moveaxis(surface.points[surface.triangles], 1, 0)
+    normal = np.cross(b - a, c - a)
+    slope = np.abs(normal @ axis) / np.maximum(np.linalg.norm(normal, axis=1), 1e-300)
+    return bool(((slope < _NEARLY) | (slope > 1 - _NEARLY)).all())
 
 
 def _section(

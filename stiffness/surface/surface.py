@@ -278,6 +278,13 @@ def _check_closed(points: NDArray, triangles: NDArray, name: str) -> None:
         )
 
 
+def _encloses(points: NDArray, outer: NDArray, inner: NDArray) -> bool:
+    """Return whether a shell lies in the box of another one and starts inside it."""
+    a, b = points[inner].reshape(-1, 3), points[outer].reshape(-1, 3)
+    in_box = (a.min(axis=0) >= b.min(axis=0)) & (a.max(axis=0) <= b.max(axis=0))
+    return bool(in_box.all()) and _inside(a[0], points, outer)
+
+
 def _orient(
     points: NDArray, triangles: NDArray, name: str
 ) -> tuple[NDArray, list[str]]:
@@ -295,7 +302,7 @@ def _orient(
         raise BadInput(f"{name}: the surface encloses no volume")
     for k, part in enumerate(shells):
         cavity = k != main
-        if cavity and not _inside(points[part[0, 0]], points, shells[main]):
+        if cavity and not _encloses(points, shells[main], part):
             raise BadInput(
                 f"{name}: found {len(shells)} separate bodies, the second near "
                 f"{_place(points[part].reshape(-1, 3).mean(axis=0))}; expected "

@@ -197,6 +197,7 @@ def _check_printable(path: Path, line: int, rows: list[list[str]]) -> None:
             raise BadInput(
                 f"{path}: line {line}, {column}: found {describe(cell)}, expected text "
                 "without line breaks and control characters"
+                f"{_other(row) if len(rows) == 1 else ''}"
             )
 
 
@@ -313,7 +314,7 @@ def _numbers(
 def _number_hint(name: str, cell: str, dialect: Dialect) -> str:
     """Return the likely meaning of a cell that cannot be read as a number."""
     other = "," if dialect.decimal == "." else "."
-    if math.isfinite(parse_number(cell, other)):
+    if other in cell and math.isfinite(parse_number(cell, other)):
         written = quoted(cell.replace(other, dialect.decimal))
         setting = f'decimal = "{other}" in campaign.toml'
         # The decimal comma is written in quotes, because the delimiter is a comma too.

@@ -79,8 +79,9 @@ def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]
     if not turned.any() and not off_one_line(thought):
         raise BadInput(
             f"{campaign.name}: found an unknown registration, but neither rotations "
-            f"nor {_FEWEST_POINTS} measured points that are not on one line; "
-            "expected one of the two"
+            f"nor {_FEWEST_POINTS} measured points that are not on one line, each in "
+            'x, y and z; expected one of the two, or registration = "known" in '
+            "campaign.toml"
         )
     parts = campaign.measured[turned, :3], model[turned, :3]
     turns = [rotation_matrix(vectors) for vectors in parts]

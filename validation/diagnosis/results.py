@@ -209,7 +209,13 @@ def _unnamed(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 
 def learned(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Return the learned functions in the public format."""
+    """Return the learned functions in the public format.
+
+    A function that does not decrease the error of the held-out rows is not reported:
+    outliers and other noise of the fitted rows also lead to functions.
+    """
+    if not diagnosis.better:
+        return []
     sequence = diagnosis.sequence
     places = [k for k, s in enumerate(sequence) if s.term == LEARNED]
     places = places or [len(sequence) - 1]

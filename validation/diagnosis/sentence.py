@@ -57,6 +57,11 @@ def sentence(diagnosis: Diagnosis) -> str:
         return f"This design cannot distinguish these effects: {sets}; {kept}."
     if diagnosis.verdict == NOT_ENOUGH_ROWS:
         return f"These rows are too few to distinguish a cause from chance; {both}."
+    if not diagnosis.lack.significant:
+        return (
+            "The fitted rows contain only noise after the fit "
+            f"({diagnosis.lack.rms:.2f} sigma), but the model is not confirmed; {both}."
+        )
     seen = ", ".join(t.against for t in diagnosis.trends[:3])
     varies = f", which varies with {seen}" if seen else ""
     return (

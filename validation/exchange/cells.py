@@ -13,6 +13,9 @@ from forcefit.inputs.table import read_bytes
 
 _MARKS = (";", "\t", ",")  # separators between cells, the most probable first
 _BLANK = " "
+_QUOTED = re.compile(
+    r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?"
+)  # number in quotes, between commas
 # Largest number of characters in a cell; the search for units takes quadratic time.
 _LONGEST = 1000
 _SAMPLE = 2000  # number of lines from which the separator is determined
@@ -40,7 +43,7 @@ def read_sheet(path: Path | str, decimal: str = ".") -> Sheet:
     Args:
         path: a text file in UTF-8, UTF-16 or Latin-1.
         decimal: the declared decimal mark; in a comma-separated table the mark is a
-            point.
+            point, unless a number in quotes contains a comma.
 
     Returns:
         The table.
@@ -65,7 +68,8 @@ def read_sheet(path: Path | str, decimal: str = ".") -> Sheet:
             )
     if mark == _BLANK:
         rows = _with_names_of_words(lines, rows)
-    return Sheet(str(path), "." if mark == "," else decimal, rows)
+    quoted = any(_QUOTED.fullmatch(cell) for _, cells in rows for cell in cells)
+    return Sheet(str(path), "." if mark == "," and not quoted else decimal, rows)
 
 
 def _with_names_of_words(

@@ -8,6 +8,7 @@ the table or in the targets file.  A decimal comma and the orders of dates and a
 must be given in the targets file.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.inputs.errors import BadInput
+from forcefit.inputs.errors import BadInput, quoted
 from forcefit.validation.campaign.dialect import parse_number
 from forcefit.validation.exchange.cell_values import CellValues, missing
 from forcefit.validation.exchange.cells import read_sheet
@@ -29,6 +30,9 @@ from forcefit.validation.exchange.orientation import (
 )
 from forcefit.validation.exchange.plain_rows import read_plain_rows
 from forcefit.validation.exchange.reading import Reading, Writing
+
+# headings of the angles and distances that a tracker measures
+_SPHERICAL = {"az", "azimuth", "el", "elevation", "hz", "range", "distance", "theta"}
 
 
 def read_device_table(
@@ -57,6 +61,7 @@ def read_device_table(
         rows = _HeadedRows(CellValues(sheet, header, writing))
         return [r for row in sheet.rows[header.first :] for r in rows.readings(*row)]
     header = without_header(sheet.rows, sheet.decimal)
+    _refuse_other_headings(path, sheet.rows[: header.first + 1])
     line, cells = sheet.rows[header.first]
     if not _is_data(cells, sheet.decimal):
         raise BadInput(
@@ -65,6 +70,21 @@ def read_device_table(
         )
     values = CellValues(sheet, header, writing)
     return read_plain_rows(values, sheet.rows[header.first :], targets)
+
+
+def _refuse_other_headings(
+    path: Path | str, rows: Sequence[tuple[int, list[str]]]
+) -> None:
+    """Raise BadInput if the row above the data names other columns than x, y, z."""
+    if len(rows) < 2:
+        return
+    (line, heads), (_, cells) = rows[-2:]
+    angular = _SPHERICAL & {re.sub(r"[^a-z].*", "", head.lower()) for head in heads}
+    if angular and len(heads) == len(cells):
+        raise BadInput(
+            f"{path}: line {line}: found the column {quoted(min(angular))}, expected "
+            "Cartesian coordinates in columns x, y, z"
+        )
 
 
 def _lacking(cells: Sequence[str]) -> str:

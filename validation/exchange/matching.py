@@ -1,5 +1,6 @@
 """Assign readings to targets and commands."""
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -62,16 +63,17 @@ def match(
     ours = _of_targets(readings, list(targets))
     lost = {id(reading) for reading, _ in ours}
     strangers = [reading for reading in readings if id(reading) not in lost]
-    ids = {label: i for i, label in enumerate(commands.ids)}
-    asked = [
-        [ids[part] for part in reading.names if part in ids and part != target]
-        for reading, target in ours
-    ]
     clocks = [*commands.times, *(reading.time for reading, _ in ours)]
-    if sum(len(indices) == 1 for indices in asked) > len(asked) / 2:
-        how, at = "name", [indices[0] if len(indices) == 1 else -1 for indices in asked]
+    ids = set(commands.ids)
+    parts = [[part for part in r.names if part in ids] for r, _ in ours]
+    if named := _of_commands(ours, parts, commands.ids):
+        how, at = "name", named
     elif np.isfinite(clocks).all():
         how, at = "time", [_nearest(reading, commands, window) for reading, _ in ours]
+    elif named := _of_commands(
+        ours, _within([reading for reading, _ in ours], commands.ids), commands.ids
+    ):
+        how, at = "name", named
     else:
         how, at = "order", _in_order(ours, commands)
     table: dict[tuple[int, int], dict[str, Reading]] = {}
@@ -126,8 +128,12 @@ def _of_targets(
 ) -> list[tuple[Reading, str]]:
     """Return the readings of targets; unnamed readings belong to the only target."""
     ours = []
-    for reading in readings:
-        named = [part for part in reading.names if part in targets]
+    found = [
+        [part for part in reading.names if part in targets] for reading in readings
+    ]
+    for reading, named in zip(
+        readings, found if any(found) else _within(readings, targets), strict=True
+    ):
         if len(named) > 1:
             expected = ", ".join(map(quoted, targets[:6]))
             raise BadInput(
@@ -145,6 +151,32 @@ def _of_targets(
             f"{expected}"
         )
     return ours
+
+
+def _of_commands(
+    ours: list[tuple[Reading, str]], found: list[list[str]], ids: Sequence[str]
+) -> list[int]:
+    """Return the index of the command in each name, or -1; empty if few name one."""
+    index = {label: i for i, label in enumerate(ids)}
+    asked = [
+        [index[label] for label in labels if label != target]
+        for labels, (_, target) in zip(found, ours, strict=True)
+    ]
+    if sum(len(indices) == 1 for indices in asked) <= len(asked) / 2:
+        return []
+    return [indices[0] if len(indices) == 1 else -1 for indices in asked]
+
+
+def _within(readings: Sequence[Reading], labels: Sequence[str]) -> list[list[str]]:
+    """Return the labels that each name contains, such as SMR1 in ``p04_SMR1``.
+
+    No letter or digit may come before or after the label.  Of labels that overlap, the
+    longer one is returned.
+    """
+    longest = sorted(labels, key=len, reverse=True)
+    words = "|".join(map(re.escape, longest))
+    pattern = re.compile(rf"(?<![^\W_])(?:{words})(?![^\W_])")
+    return [pattern.findall(" ".join(reading.names)) for reading in readings]
 
 
 def _nearest(reading: Reading, commands: Commands, window: float) -> int:

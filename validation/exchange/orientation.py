@@ -20,6 +20,9 @@ ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180}
 # Inverse rotations fit far better if their scatter is below this fraction of the
 # scatter of the given rotations.
 _FAR_BETTER = 0.25
+# [rad] scatter above which orientations are unrelated to the commands; orientations of
+# real machines scatter by less than 0.02 rad
+_UNRELATED = 0.2
 _GROSS = 20.0  # multiple of the scatter of readings excluded from the mean
 # Ratio of the median length of a Gaussian vector in space to the sigma of one
 # component.
@@ -145,7 +148,8 @@ def turns_of(
         The deviations.
 
     Raises:
-        BadInput: the inverses of the rotations fit far better.
+        BadInput: the inverses of the rotations fit far better, or the orientations do
+            not follow the commands.
     """
     best = _turns(base @ seen, nominal, mount)
     other = _turns(base @ np.swapaxes(seen, 1, 2), nominal, mount)
@@ -155,6 +159,13 @@ def turns_of(
             f"better (scatter {other.scatter:.2g} rad instead of "
             f"{best.scatter:.2g} rad); expected the orientation of the target's "
             "axes relative to the device's axes"
+        )
+    if best.scatter > _UNRELATED:
+        raise BadInput(
+            f"{file}: found orientations that do not follow the commands (scatter "
+            f"{best.scatter:.2g} rad); expected the right order and unit of the "
+            "angles, the right order of a quaternion's columns, and the right "
+            "[rotations]"
         )
     return best
 

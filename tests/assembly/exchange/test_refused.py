@@ -52,6 +52,19 @@ REFUSED = {
         "joint \"j\".type: found 'revolut', expected revolute | continuous | "
         "prismatic | fixed | spherical | ball | universal | planar | floating; did "
         'you mean "revolute"?'),
+    ("urdf", "an angle that a macro computes"): (
+        urdf(more='<origin rpy="${pi/2} 0 0"/>'),
+        "joint \"j\".origin.rpy: found '${pi/2} 0 0', expected 3 finite numbers [rad]"),
+    ("urdf", "an axis without a direction"): (
+        urdf(more='<axis xyz="0 0 0"/>'),
+        'joint "j".axis.xyz: found [0.0, 0.0, 0.0], expected a direction'),
+    ("sdf", "a pose of five numbers"): (
+        sdf('<link name="a"><pose>0 0 0 0 0</pose></link>'
+            + sdf_joint("j", "base", "a")),
+        "link \"a\".pose: found '0 0 0 0 0', expected 6 finite numbers"),
+    ("sdf", "a version of which the rules are unknown"): (
+        sdf("").replace("1.9", "1.3"),
+        'sdf.version: found "1.3", expected 1.4 or a later version 1.x'),
     ("urdf", "an unknown link"): (urdf(child="c"),
         'joint "j": found "c", expected the name of a link; valid: a, b'),
     ("urdf", "a ring of parents"): (urdf(child="a"),
@@ -63,13 +76,11 @@ REFUSED = {
     ("urdf", "a link twice"): (urdf(links='<link name="b"/>'),
         'link "b".name: found this name twice; expected unique names'),
     ("urdf", "two numbers for three"): (urdf(more='<origin xyz="0 0"/>'),
-        "origin.xyz: found '0 0', expected 3 finite numbers [m]"),
+        "joint \"j\".origin.xyz: found '0 0', expected 3 finite numbers [m]"),
     ("urdf", "nan"): (urdf(more='<origin xyz="0 0 nan"/>'),
-        "origin.xyz: found '0 0 nan', expected 3 finite numbers [m]"),
-    ("urdf", "an axis of zero"): (urdf(more='<axis xyz="0 0 0"/>'),
-        "axis.xyz: found [0.0, 0.0, 0.0], expected a direction"),
+        "joint \"j\".origin.xyz: found '0 0 nan', expected 3 finite numbers [m]"),
     ("urdf", "an unknown leader"): (urdf(more='<mimic joint="k"/>'),
-        'mimic.joint: found "k", expected a joint with one degree'),
+        'joint "j".mimic.joint: found "k", expected a joint with one degree'),
     ("urdf", "a joint that follows itself"): (
         urdf_with(follower("k", "b", "c", "k", 1, 0)),
         'joint "k": found a cycle of couplings in which it follows itself ("k")'),
@@ -147,12 +158,12 @@ REFUSED = {
         "closed_loop: []\njoint_name: [j]\njoint_type: [BALL]",
         "joint_type: found 'BALL'; valid: FIXED, SPHERICAL, UJOINT_XY, UJOINT_XZ, "
         "UJOINT_YX, UJOINT_YZ, UJOINT_ZX, UJOINT_ZY"),
-    ("yaml", "half a list"): ("[1",
-        "not valid YAML: while parsing a flow sequence"),
+    ("yaml", "half a list"): ("[1\n",
+        "not valid YAML: line 2, column 1: expected ',' or ']'"),
     ("yaml", "a list"): ("- 1",
         "found [1], expected keys such as closed_loop"),
     ("yaml", "code"): ("!!python/object/apply:os.getcwd []",
-        "not valid YAML: could not determine a constructor for the tag"),
+        "not valid YAML: line 1, column 1: could not determine a constructor"),
     ("xml", "soft bodies"): (mjcf("<worldbody><composite/></worldbody>"),
         "composite: found composite, which generates bodies; expected rigid "
         "bodies written out"),
@@ -189,7 +200,7 @@ REFUSED = {
         'frame "tool".pose: found a cycle of relative_to'),
     ("sdf", "a word for a mass"): (
         four_bar().replace("<mass>0.5</mass>", "<mass>x</mass>"),
-        "mass: found 'x', expected 1 finite number [kg]"),
+        "link \"crank\".inertial.mass: found 'x', expected 1 finite number [kg]"),
     ("sdf", "an include of nothing"): (sdf("<include/>"),
         "include.uri: missing; expected the name of a link"),
     ("sdf", "an include of no file"): (sdf("<include><uri>model://x</uri></include>"),
@@ -200,7 +211,7 @@ REFUSED = {
         "found 2 models, expected exactly one"),
     ("sdf", "an axis of zero"): (
         four_bar().replace("<xyz>0 0 1</xyz>", "<xyz>0 0 0</xyz>"),
-        "xyz: found [0.0, 0.0, 0.0], expected a direction"),
+        "joint \"drive\".axis.xyz: found [0.0, 0.0, 0.0], expected a direction"),
     ("sdf", "a joint to its own parent"): (
         sdf('<frame name="f" attached_to="base"/>' + sdf_joint("j", "f", "base")),
         'joint "j".child: found "base", which is also its parent; expected another '

@@ -46,6 +46,9 @@ Z_UP = "<axis><xyz>0 0 1</xyz>{}</axis>"
             "<use_parent_model_frame>true</use_parent_model_frame>"), [0, 0, 1]),
         ("1.9", '<axis><xyz expressed_in="__model__">0 0 1</xyz></axis>', [0, 0, 1]),
         ("1.9", '<axis><xyz expressed_in="">0 0 1</xyz></axis>', [1, 0, 0]),
+        # the version numbers 1.10 and 1.12 are later than 1.4, although 1.10 < 1.4
+        ("1.10", Z_UP.format(""), [1, 0, 0]),
+        ("1.12", Z_UP.format(""), [1, 0, 0]),
     ],
 )  # fmt: skip
 def test_sdf_version_decides_the_frame_of_a_joint_axis(

@@ -48,6 +48,24 @@ def test_urdf_variants_that_other_readers_accept_are_read(
     assert [one.name for one in read_urdf(path).joints] == ["j"]
 
 
+@pytest.mark.parametrize(
+    ("declared", "encoding"),
+    [("UTF-16", "utf-16"), ("ISO-8859-1", "latin-1"), ("windows-1252", "cp1252")],
+)
+def test_urdf_is_read_in_the_encoding_that_it_declares(declared, encoding, tmp_path):
+    path = file_of(tmp_path, joint("Gelenk_für_a", "a", "b", Z), "ab")
+    text = f"<?xml version='1.0' encoding='{declared}'?>\r\n{path.read_text()}"
+    path.write_bytes(text.encode(encoding))
+    assert [one.name for one in read_urdf(path).joints] == ["Gelenk_für_a"]
+
+
+def test_urdf_with_bytes_of_another_encoding_is_refused(tmp_path):
+    path = file_of(tmp_path, joint("Gelenk_für_a", "a", "b", Z), "ab")
+    path.write_bytes(path.read_text().encode("latin-1"))
+    with pytest.raises(BadInput, match="is not UTF-8; expected a text file in UTF-8"):
+        read_urdf(path)
+
+
 @pytest.mark.parametrize("name", ["base", "base.joint", "b", "world"])
 def test_joint_named_base_is_renamed(name, tmp_path):
     """The frame has the name of the joint, except "base", which is the fixed frame."""

@@ -93,6 +93,37 @@ def test_slender_bar_mesh_follows_a_turned_and_moved_surface():
         assert solid.volumes().sum() == pytest.approx(volume, rel=0.03)
 
 
+def twisted_tube(outer, inner, length, facets=48, levels=4):
+    """A tube whose rings turn by half a facet from level to level, as in STEP files.
+
+    No edge of a triangle is parallel to the axis.
+    """
+    step = 2 * np.pi / facets
+    rings = [(outer, k) for k in range(levels)]
+    rings += [(inner, k) for k in reversed(range(levels))]
+    points = []
+    for radius, k in rings:
+        angle = step * (np.arange(facets) + 0.5 * k)
+        z = np.full(facets, length * k / (levels - 1))
+        points.append(
+            np.column_stack([radius * np.cos(angle), radius * np.sin(angle), z])
+        )
+    i, j = np.arange(facets), (np.arange(facets) + 1) % facets
+    triangles = []
+    for k in range(len(rings)):
+        a, b = k * facets, (k + 1) % len(rings) * facets
+        far, near = (i, j) if k < levels - 1 else (j, i)
+        triangles += [np.column_stack([i + a, j + a, far + b])]
+        triangles += [np.column_stack([near + a, j + b, i + b])]
+    return check_surface(np.concatenate(points), np.concatenate(triangles), "tube")
+
+
+def test_thin_tube_with_corners_between_its_ends_is_extruded():
+    solid = slender_bar(twisted_tube(0.01, 0.0097, 0.2), *ends(0.2))
+    volume = np.pi * (0.01**2 - 0.0097**2) * 0.2
+    assert solid.volumes().sum() == pytest.approx(volume, rel=0.03)
+
+
 def test_slender_bar_mesh_is_not_made_for_other_parts():
     """A stubby bar, a tapered bar, a tube that is too short, and a side interface."""
     stubby = check_surface(*cylinder(0.02, 0.1), "bar")

@@ -121,6 +121,21 @@ def test_reversed_triangles_are_repaired_and_reported(rng, turned, hollow):
     assert edges == {(b, a) for a, b in edges}
 
 
+def test_overlapping_body_is_not_read_as_a_cavity():
+    """Edges meet only edges and diagonals, so none passes through the inside of a face.
+
+    The corners of each box are ordered by x, then y, then z.
+    """
+    box = np.array([[x, y, z] for x in (0, 2) for y in (0, 1) for z in (0, 10)]) * 0.01
+    faces = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1],
+                      [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])  # fmt: skip
+    halves = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
+    points = np.concatenate([box, box + [0.01, 0.005, 0]])
+    triangles = np.concatenate([halves, halves + 8])
+    with pytest.raises(BadInput, match="found 2 separate bodies"):
+        check_surface(points, triangles, "cubes")
+
+
 def test_second_body_is_refused_with_the_place_of_its_middle():
     far = CUBE + [0.3, 0.4, 0.5]
     points = np.concatenate([2 * CUBE, far])

@@ -23,6 +23,7 @@ from forcefit.inputs.writing import plain
 from forcefit.validation.campaign.campaign_file import read_campaign
 from forcefit.validation.diagnosis import trace
 from forcefit.validation.diagnosis.diagnose import diagnose
+from forcefit.validation.diagnosis.holdout import hold_out
 from forcefit.validation.diagnosis.report import report_page
 from forcefit.validation.diagnosis.results import effects, table
 from forcefit.validation.diagnosis.sentence import sentence
@@ -87,6 +88,36 @@ def test_single_effect_is_identified_with_its_value(diagnosed, tmp_path):
     assert found.before.normalised > 1.5 * perfect
     assert found.after.normalised <= 1.05 * perfect
     assert found.noise.position == pytest.approx(SIGMA[3])
+
+
+@pytest.mark.slow
+def test_wrong_readings_of_held_out_rows_do_not_change_the_selected_model(tmp_path):
+    """The answer says that the fitted rows contain only noise."""
+    campaign = measured(tmp_path, seed=1, configurations=60, passes=1, **CASES["one"])
+    held = hold_out(campaign).rows
+    wrong = np.where(held[:, None], 30.0, 0.0) * SIGMA
+    signs = np.random.default_rng(2).choice([-1, 1], campaign.measured.shape)
+    corrupted = replace(campaign, measured=campaign.measured + wrong * signs)
+    right, found = diagnose(campaign), diagnose(corrupted)
+    assert (right.verdict, right.effects) == ("explained", ("drive_compliance",))
+    assert (found.verdict, found.claimed) == ("outside_library", ())
+    assert found.effects == right.effects
+    assert "The fitted rows contain only noise" in sentence(found)
+
+
+@pytest.mark.slow
+def test_function_that_fails_on_held_out_rows_is_not_reported(tmp_path):
+    """The held-out rows deviate in the opposite direction."""
+    campaign = measured(
+        tmp_path, seed=1, configurations=60, passes=1, **CASES["outside"]
+    )
+    held = hold_out(campaign).rows
+    opposite = np.where(held[:, None], -campaign.measured, campaign.measured)
+    found = diagnose(replace(campaign, measured=opposite))
+    assert found.fit.unknowns.functions
+    assert found.after.normalised > found.before.normalised
+    assert (found.verdict, table(found)["learned"]) == ("outside_library", [])
+    assert "learned:" not in text(found)
 
 
 def test_correlated_noise_widens_standard_deviations(diagnosed, tmp_path):

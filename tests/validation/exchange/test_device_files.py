@@ -214,6 +214,14 @@ def test_declared_unit_that_contradicts_the_file_is_refused(lab, run):
     assert 'line 1: found the unit "in", expected "mm" as declared' in line
 
 
+def test_numbers_with_decimal_comma_in_quotes_are_read_between_commas(lab, run):
+    lab.targets(decimal='{ export = ",", commands = "." }')
+    line = 'p{k}::{name},"{x!r}","{y!r}","{z!r}"'
+    body = [row.replace(".", ",") for row in points(line=line)]
+    imported(lab, run, "\n".join(["name,x,y,z", *body]))
+    assert_exact(lab, 39)
+
+
 def test_decimal_separator_is_declared_for_each_table(lab, run):
     text = (lab.folder / "commands.csv").read_text().replace(",", ";")
     (lab.folder / "commands.csv").write_text(text)
@@ -464,6 +472,11 @@ def test_rotations_relative_to_a_declared_mount_are_unchanged(lab, run, rng):
         ("qw,qx,qy,qz", lambda R: [1, 2, 3, 4], {}, "found a quaternion of norm 5.477"),
         ("qw,qx,qy,qz", lambda R: np.roll(R.inv().as_quat(), 1), {},
          "found inverted orientations"),
+        ("qw,qx,qy,qz", lambda R: R.as_quat(), {},
+         "found orientations that do not follow the commands"),
+        ("rx [deg],ry [deg],rz [deg]", lambda R: R.as_euler("ZYX", degrees=True),
+         {"orientation": '"XYZ"'},
+         "found orientations that do not follow the commands"),
         ("rx,ry,rz", lambda R: [1, 2, 3], {"orientation": '"zzx"'},
          "orientation: found"),
     ],

@@ -214,10 +214,32 @@ def test_readings_are_joined_by_order_and_repeated_files_become_repeats(lab, run
     assert lab.table()["id"][:4] == ["p0", "p0.2", "p1", "p1.2"]
 
 
+@pytest.mark.parametrize("line", ["p{k}_{name}", "{name} p{k}", "run-p{k}.{name}"])
+def test_names_with_any_separator_are_assigned_to_targets_and_commands(line, lab, run):
+    """The rows are not in the order of the commands; p1 is not read from p10."""
+    rows = [
+        ";".join([
+            line.format(k=k, name=name),
+            *(repr(float(1e3 * x)) for x in seen(a, name)),
+        ])
+        for k, a in enumerate(ANGLES)
+        for name in "ABC"
+    ]
+    lab.export("\n".join(["name;x;y;z", *rows[::-1]]))
+    assert run(*lab.words())[0] == 0
+    table = lab.table()
+    assert table["id"] == [f"p{k}" for k in range(len(ANGLES))]
+    assert [float(x) for x in table["meas.B.tx"]] == pytest.approx(
+        [0.0] * len(ANGLES), abs=1e-9
+    )
+
+
 @pytest.mark.parametrize(("text", "targets", "message"), [
     ("name x y\nA 1 2", {}, "found no column z"),
     ("name;x;y;z\nA;1;2;3", {"unit": None}, "found no unit of lengths"),
     ("name;x [furlong];y;z\nA;1;2;3", {}, 'found the unit "furlong"'),
+    ("name;Az [deg];El [deg];Range [mm]\nA;1;2;3", {},
+     'line 1: found the column "az", expected Cartesian coordinates'),
     ("name;x;y;z\nA;1,5;2;3", {}, "if this is a decimal mark, set decimal"),
     ("name;x;y;z\nA;1;2", {}, "found 3 cells, expected 4"),
     ("name;x;y;z\nD;1;2;3", {}, 'no name of a target, expected one of: "A", "B", "C"'),
