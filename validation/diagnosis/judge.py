@@ -89,7 +89,7 @@ def judge(
     every = [stages(believed, f.fit, f.used, f.held) for f in folds]
     first = 1 if campaign.registration == "unknown" else 0
     before, after = (
-        joined([list(fold.values())[place] for fold in every]) for place in (first, -1)
+        joined([[*fold.values()][place][1] for fold in every]) for place in (first, -1)
     )
     outliers = traced.outliers | _outlying_held(campaign, traced, held, after)
     rows = held.rows & ~outliers

@@ -24,11 +24,7 @@ from numpy.typing import NDArray
 from forcefit.assembly.model.robot import BASE, BeamLink, Clearance, Frame, Robot
 from forcefit.validation.multibody.beams import beam_span
 from forcefit.validation.multibody.motion import placement, turned
-from forcefit.validation.synthetic.laws import (
-    ClearanceLaw,
-    PowerLawSpring,
-    TwoStepSpring,
-)
+from forcefit.validation.synthetic.laws import PowerLawSpring, TwoStepSpring
 
 SCREW = ("rx", "ry", "rz", "tx", "ty", "tz")
 WRENCH = ("mx", "my", "mz", "fx", "fy", "fz")
@@ -65,15 +61,16 @@ class Machine:
             are at 0.
         load: (6,) [N m, N] applied load.
         gravity: (3,) [m/s^2] gravity in base axes.
-        laws: mapping from frame to the nonlinear law of its joint; see
-            :mod:`forcefit.validation.synthetic.rest`.
+        laws: mapping from frame to the nonlinear spring of its joint, or to the
+            clearance of a joint on an open chain, where the load determines the
+            position; see :mod:`forcefit.validation.synthetic.rest`.
     """
 
     robot: Robot
     coordinates: Mapping[str, float]
     load: NDArray
     gravity: NDArray = field(default_factory=lambda: np.zeros(3))
-    laws: Mapping[str, PowerLawSpring | TwoStepSpring | ClearanceLaw] = field(
+    laws: Mapping[str, PowerLawSpring | TwoStepSpring | Clearance] = field(
         default_factory=dict
     )
 
@@ -255,7 +252,7 @@ def _joint_clearance(machine: Machine, row: Row, given: Parameters) -> Machine:
         K = np.repeat(SENSOR, 3)
         K[robot.frame(name).own_axis] = math.inf
         robot = insert_after(robot, name, "clearance", joint_stiffness=np.diag(K))
-        laws[f"{name}~clearance"] = ClearanceLaw(clearance)
+        laws[f"{name}~clearance"] = clearance
     return replace(machine, robot=robot, laws=laws)
 
 

@@ -28,7 +28,7 @@ from forcefit.validation.synthetic.effects import (
     sprung,
     wave,
 )
-from forcefit.validation.synthetic.laws import ClearanceLaw, TwoStepSpring
+from forcefit.validation.synthetic.laws import TwoStepSpring
 
 
 def _pose_stiffness(machine: Machine, row: Row, given: Parameters) -> Machine:
@@ -107,8 +107,7 @@ def _torque_backlash(machine: Machine, row: Row, given: Parameters) -> Machine:
         turns = frame.joint == "revolute"
         K = sprung(frame, SENSOR[0 if turns else 1])
         robot = insert_after(robot, name, "teeth", joint_stiffness=K)
-        bound = Clearance(**{"spin" if turns else "axial": clearance})
-        laws[f"{name}~teeth"] = ClearanceLaw(bound)
+        laws[f"{name}~teeth"] = Clearance(**{"spin" if turns else "axial": clearance})
     return replace(machine, robot=robot, laws=laws)
 
 
