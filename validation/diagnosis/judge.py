@@ -72,7 +72,7 @@ def judge(
     campaign: Campaign, traced: Traced, fit: MachineFit, held: HeldOut,
     folds: Sequence[Judged],
 ) -> Diagnosis:  # fmt: skip
-    """Return the errors on the held-out rows, and the verdict.
+    """Return the diagnosis: the errors on the held-out rows, and the verdict.
 
     Args:
         campaign: campaign of R rows, as measured.
@@ -80,9 +80,6 @@ def judge(
         fit: the machine that is saved.
         held: the held-out rows.
         folds: machines fitted without the held-out rows.
-
-    Returns:
-        The diagnosis.
     """
     used, noise = traced.used, traced.selected.noise
     believed = replace(traced.campaign, measured=campaign.measured)

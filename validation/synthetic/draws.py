@@ -39,9 +39,6 @@ def draw_effect(
         duration: [s] duration of the session.
         rng: random number generator of the draws.
 
-    Returns:
-        The effect, whose strength can be changed by :func:`strengthened`.
-
     Raises:
         BadInput: the name of the effect is unknown.
         NotApplicable: the effect cannot act at any place of the robot.
@@ -60,9 +57,6 @@ def strengthened(effect: Hidden, factor: float) -> Hidden:
     Args:
         effect: effect with its parameters.
         factor: [-] positive factor.
-
-    Returns:
-        The effect with more compliant springs or larger errors.
     """
     name, given = effect.name, dict(effect.parameters)
     for key, value in given.items():
