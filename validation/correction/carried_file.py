@@ -47,9 +47,6 @@ def covariance_of(carried: CarriedRobot, robot: Robot) -> SavedCovariance:
     Args:
         carried: the robot, fitted to the new sessions.
         robot: the robot as written to its file.
-
-    Returns:
-        The covariance of the parameters in the robot's file.
     """
     fit, rows = carried.fit, dict[Number, NDArray]()
     count, machine = len(fit.x), fit.machine

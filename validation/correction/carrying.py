@@ -205,13 +205,10 @@ def _judged(fit: SessionsFit, other: SessionsFit, number: int) -> Carried:
 
 
 def carried_robot(carried: CarriedRobot) -> Robot:
-    """Return the fitted robot without the parameters of its original session.
+    """Return the robot for a file, without the parameters of its original session.
 
     Args:
         carried: the robot, fitted to the new sessions.
-
-    Returns:
-        The robot as it is written to a file.
     """
     robot = without_session(carried.fit.robot)
     for number, one in enumerate(carried.sessions):

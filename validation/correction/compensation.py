@@ -129,32 +129,14 @@ def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
     goal = targets.transforms[:, robot.index(robot.platform)]
     machine = _Machine(targets, goal, as_read)
     q = targets.coordinates[:, driven].copy()
-    standing, reason = machine.at(q, targets)
+    standing, reason = machine.at(q)
     before = standing.error
-    going = np.array([not r for r in reason])
     limits = _limits(robot, driven)
-    for _ in range(_STEPS):
-        step = _step(standing, weights, q, limits)
-        moving = going & (np.abs(step).max(axis=1, initial=0.0) > _STILL)
-        if not moving.any():
-            break
-        share = moving.astype(float)
-        for _ in range(_HALVINGS):
-            tried = np.clip(q + share[:, None] * step, *limits)
-            next_, missed = machine.at(tried, targets)
-            worse = moving & (share > 0)
-            worse &= (missed != "") | ~(next_.size(weights) < standing.size(weights))
-            if not worse.any():
-                break
-            share = np.where(worse, share / 2, share)
-        # The remaining error is caused by rounding or by joint limits.
-        going &= moving & ~worse
-        q = np.where(going[:, None], tried, q)
-        standing = next_ if going[moving].all() else machine.at(q, targets)[0]
+    q, standing = _corrected(machine, standing, q, weights, limits, reason == "")
     far, reason = _too_far(robot, driven, q - targets.coordinates[:, driven], reason)
     if far.any():
         q = np.where(far[:, None], targets.coordinates[:, driven], q)
-        standing = machine.at(q, targets)[0]
+        standing = machine.at(q)[0]
     reason = _astray(robot, standing.error, reason)
     last = standing.campaign
     spread = deviation_spread(
@@ -173,6 +155,35 @@ def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
         limited=np.asarray(at_limit.any(axis=1)),
         reason=reason,
     )
+
+
+def _corrected(
+    machine: "_Machine", standing: "_Standing", q: NDArray, weights: NDArray,
+    limits: tuple[NDArray, NDArray], going: NDArray,
+) -> tuple[NDArray, "_Standing"]:  # fmt: skip
+    """Return the (R, d) commands of least error, and the state of the machine there.
+
+    Only rows in ``going`` (R,) bool are corrected, by damped Gauss-Newton steps.
+    """
+    for _ in range(_STEPS):
+        step = _step(standing, weights, q, limits)
+        moving = going & (np.abs(step).max(axis=1, initial=0.0) > _STILL)
+        if not moving.any():
+            break
+        share = moving.astype(float)
+        for _ in range(_HALVINGS):
+            tried = np.clip(q + share[:, None] * step, *limits)
+            next_, missed = machine.at(tried)
+            worse = moving & (share > 0)
+            worse &= (missed != "") | ~(next_.size(weights) < standing.size(weights))
+            if not worse.any():
+                break
+            share = np.where(worse, share / 2, share)
+        # The remaining error is caused by rounding or by joint limits.
+        going = going & moving & ~worse
+        q = np.where(going[:, None], tried, q)
+        standing = next_ if going[moving].all() else machine.at(q)[0]
+    return q, standing
 
 
 def _each_once(targets: Campaign) -> Campaign:
@@ -280,17 +291,12 @@ class _Machine:
         still = np.zeros(6)
         return replace(conditions, base=still, tool=still[:3], reading=0.0)
 
-    def at(self, q: NDArray, last: Campaign) -> tuple[_Standing, NDArray]:
-        """Return the state of the machine at commands, and (R,) reasons of failures.
+    def at(self, q: NDArray) -> tuple[_Standing, NDArray]:
+        """Return the state of the machine at commands (R, d), and reasons of failures.
 
-        Args:
-            q: (R, d) commands.
-            last: last reachable commands, used for rows that cannot be reached.
-
-        Returns:
-            The state and the reasons.
+        Rows that cannot be reached keep the given commands.
         """
-        campaign, reason = _commanded(last, q)
+        campaign, reason = _commanded(self.targets, q)
         conditions = self.conditions(campaign)
         prediction = predict(conditions)
         reason = np.where(reason == "", prediction.reason, reason)
@@ -300,16 +306,16 @@ class _Machine:
         ), reason
 
 
-def _commanded(last: Campaign, q: NDArray) -> tuple[Campaign, NDArray]:
+def _commanded(targets: Campaign, q: NDArray) -> tuple[Campaign, NDArray]:
     """Return a campaign with new commands; unreachable commands are not changed."""
-    robot = last.robot
+    robot = targets.robot
     driven = _driven(robot)
     wanted = np.full((len(q), len(robot.frames)), np.nan)
     wanted[:, driven] = q
     distinct, which = np.unique(wanted, axis=0, return_inverse=True)
     postures, reasons = place_many_joints(robot, distinct)
-    coordinates, transforms = last.coordinates.copy(), last.transforms.copy()
-    mismatch, reason = last.mismatch.copy(), np.full(len(q), "", dtype=object)
+    coordinates, transforms = targets.coordinates.copy(), targets.transforms.copy()
+    mismatch, reason = targets.mismatch.copy(), np.full(len(q), "", dtype=object)
     for row, k in enumerate(which.reshape(-1).tolist()):
         posture = postures[k]
         if posture is None:
@@ -318,7 +324,7 @@ def _commanded(last: Campaign, q: NDArray) -> tuple[Campaign, NDArray]:
         coordinates[row], transforms[row] = posture.coordinates, posture.transforms
         mismatch[row] = posture.mismatch
     return replace(
-        last, coordinates=coordinates, transforms=transforms, mismatch=mismatch
+        targets, coordinates=coordinates, transforms=transforms, mismatch=mismatch
     ), reason
 
 

@@ -208,9 +208,6 @@ def reading_names(commands: Campaign) -> list[tuple[str, str, int]]:
     Args:
         commands: the rows of the table.  Components that were not measured in any row
             are omitted, unless the table contains no measurement at all.
-
-    Returns:
-        One triple for each column.
     """
     points = [""]
     if commands.point is not None:

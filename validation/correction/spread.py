@@ -12,16 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.assembly.effects.functions import (
-    along,
     in_session,
     inputs_of,
     is_loaded,
-    unit_screw,
     value_of,
 )
 from forcefit.assembly.measurement.conditions import Conditions
 from forcefit.assembly.measurement.predict import predict
-from forcefit.assembly.model.function import PLACES, Function
+from forcefit.assembly.model.function import PLACES
 from forcefit.assembly.model.robot import Robot
 from forcefit.validation.campaign.campaign import READING
 from forcefit.validation.diagnosis.responses import Responses, responses
@@ -32,6 +30,7 @@ from forcefit.validation.diagnosis.saved_covariance import (
     Number,
     known_covariance,
 )
+from forcefit.validation.diagnosis.sensitivities import sensitivity_at
 
 _STEP = 0.1  # [standard deviations] step of the numerical derivative
 
@@ -114,28 +113,10 @@ def _of_function(
     inputs = list(inputs_of(conditions, one).T)
     acts = in_session(conditions, one.session)
     slope = np.zeros((len(conditions), 6))
+    robot, origin = conditions.robot, conditions.postures.platform[:, :3, 3]
     for component in one.components:
         change = value_of(other, component, inputs) - value_of(one, component, inputs)
         change = np.where(acts, change, 0.0) / step
-        slope += _answer(conditions, response, one, component) * change[:, None]
+        place = one.where, component, one.kind
+        slope += sensitivity_at(*place, robot, response, origin) * change[:, None]
     return slope
-
-
-def _answer(
-    conditions: Conditions, response: Responses, function: Function, component: str
-) -> NDArray:
-    """Return the (R, 6) derivatives of the deviation by one component of a function."""
-    unit = unit_screw(conditions.robot, function.where, component)
-    if function.where == "reading":
-        return np.broadcast_to(unit, (len(conditions), 6))
-    if function.where == "base":
-        screw = np.tile(unit, (len(conditions), 1))
-        origin = conditions.postures.platform[:, :3, 3]
-        screw[:, 3:] += np.cross(screw[:, :3], origin)
-        return np.einsum("rij,rj->ri", response.reading, screw)
-    robot, row = conditions.robot, conditions.robot.index(function.where)
-    screws = along(robot, function.where, component, response.screws[:, :, row])
-    if function.kind == "compliance":
-        through = along(robot, function.where, component, response.wrenches[:, row])
-        return screws * through[:, None]
-    return screws

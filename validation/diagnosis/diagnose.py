@@ -13,7 +13,7 @@ with the saved file (:mod:`.fit`); drop effects that the readings do not support
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -33,21 +33,6 @@ from forcefit.validation.diagnosis.signatures import conditions_of
 from forcefit.validation.diagnosis.trace import Traced, trace
 
 Update = Callable[[str, int, int], None]
-
-
-@dataclass(frozen=True, eq=False)
-class _Found:
-    """Result of the search and of the fit, without the held-out rows.
-
-    Attributes:
-        traced: result of the search.
-        fit: the fitted machine.
-        setup: set-up blunders.
-    """
-
-    traced: Traced
-    fit: MachineFit
-    setup: tuple[SetupBlunder, ...]
 
 
 def diagnose(
@@ -80,7 +65,8 @@ def diagnose(
     held = hold_out(campaign)
     design = declared(campaign, finite=finite)  # common to all folds
 
-    def found(rows: NDArray) -> _Found:
+    def found(rows: NDArray) -> tuple[Traced, MachineFit, tuple[SetupBlunder, ...]]:
+        """Return the search, the fitted machine and the blunders, from some rows."""
         part = hidden(campaign, ~rows)
         seen = part.cells.any(axis=1)
         setup = setup_blunders(part.take(seen), conditions_of(part).take(seen))
@@ -88,7 +74,7 @@ def diagnose(
         # imitate the blunders.
         nothing = dict.fromkeys((*LIBRARY, FUNCTION, GEOMETRY, SPRINGS), 0.0)
         own = nothing if setup else odds
-        return _Found(*trace(part, rows, design, update, odds=own), setup)
+        return *trace(part, rows, design, update, odds=own), setup
 
     folds = []
     for k, rows in enumerate(held.folds):
@@ -100,11 +86,11 @@ def diagnose(
         update("folds", len(held.folds), len(held.folds))
         best = found(np.ones(len(campaign), dtype=bool))
     judged = [
-        Judged(one.fit, one.traced.used, rows)
-        for one, rows in zip(folds, held.folds, strict=True)
+        Judged(fit, traced.used, rows)
+        for (traced, fit, _), rows in zip(folds, held.folds, strict=True)
     ]
-    diagnosis = judge(campaign, best.traced, best.fit, held, judged)
-    return replace(diagnosis, setup=best.setup)
+    traced, fit, setup = best
+    return replace(judge(campaign, traced, fit, held, judged), setup=setup)
 
 
 def _fitted_rows(held: HeldOut, rows: NDArray) -> NDArray:

@@ -156,15 +156,12 @@ def confounding_chart(diagnosis: Diagnosis) -> str:
 
 
 def imitation_chart(shared: NDArray, names: tuple[str, ...]) -> str:
-    """Return a chart of the fraction of each effect that another effect can imitate.
+    """Return a chart (HTML) of the fraction of each effect that another can imitate.
 
     Args:
         shared: (m, m) fraction of the row's effect that the column's effect can
             imitate.
         names: names of the m effects.
-
-    Returns:
-        HTML.
     """
     return matrix(
         shared, names, "fraction of the row's effect that the column can imitate",

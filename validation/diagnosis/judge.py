@@ -72,7 +72,7 @@ def judge(
     campaign: Campaign, traced: Traced, fit: MachineFit, held: HeldOut,
     folds: Sequence[Judged],
 ) -> Diagnosis:  # fmt: skip
-    """Return the errors on the held-out rows, and the verdict.
+    """Return the diagnosis: the errors on the held-out rows, and the verdict.
 
     Args:
         campaign: campaign of R rows, as measured.
@@ -80,16 +80,13 @@ def judge(
         fit: the machine that is saved.
         held: the held-out rows.
         folds: machines fitted without the held-out rows.
-
-    Returns:
-        The diagnosis.
     """
     used, noise = traced.used, traced.selected.noise
     believed = replace(traced.campaign, measured=campaign.measured)
     every = [stages(believed, f.fit, f.used, f.held) for f in folds]
     first = 1 if campaign.registration == "unknown" else 0
     before, after = (
-        joined([list(fold.values())[place] for fold in every]) for place in (first, -1)
+        joined([[*fold.values()][place][1] for fold in every]) for place in (first, -1)
     )
     outliers = traced.outliers | _outlying_held(campaign, traced, held, after)
     rows = held.rows & ~outliers

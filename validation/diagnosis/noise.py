@@ -91,9 +91,6 @@ def findings(
         repeats: result of :func:`repeat_scatter` for the residual.
         memory: whether the model depends on earlier rows.
         common: [rad, m] noise that the points of a measurement share.
-
-    Returns:
-        Sentences for the user.
     """
     told = []
     if any(common):

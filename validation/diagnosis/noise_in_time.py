@@ -92,7 +92,7 @@ def noise_in_time(campaign: Campaign, residual: NDArray) -> NoiseInTime | None:
 def widened(
     covariance: NDArray, slopes: NDArray, campaign: Campaign, noise: NoiseInTime
 ) -> NDArray:
-    """Return the covariance of unknowns that were fitted for white noise.
+    """Return the (k, k) covariance for correlated noise of a fit for white noise.
 
     Args:
         covariance: (k, k) covariance for white noise.
@@ -100,9 +100,6 @@ def widened(
             unknowns is the covariance times G' times the whitened readings.
         campaign: campaign of R rows with N measured cells.
         noise: the correlated noise.
-
-    Returns:
-        (k, k) covariance for the correlated noise.
     """
     along = np.zeros_like(slopes)  # product (R - 1) G
     for times, cells in _series(campaign):

@@ -45,15 +45,12 @@ def finite_conditions(campaign: Campaign, rows: NDArray | None = None) -> Condit
 def predicted(
     campaign: Campaign, robot: Robot | None = None, *, linear: bool = False
 ) -> Prediction:
-    """Return the readings of a robot for the commands of a campaign.
+    """Return the readings of a robot, with its registration, for a campaign's commands.
 
     Args:
         campaign: campaign of R rows, whose readings are not used.
         robot: robot with the same frames and closures as the campaign's.
         linear: whether motions are linearised.
-
-    Returns:
-        The predicted readings, including the registration of the robot.
     """
     campaign = replace(campaign, robot=campaign.robot if robot is None else robot)
     return predict((conditions_of if linear else finite_conditions)(campaign))

@@ -68,7 +68,7 @@ class Scores:
         return float(self._dense([e]).gains(base.marginal)[0])
 
     def best_to_add(
-        self, state: State, *, functions: bool = True, products: bool = False
+        self, state: State, *, functions: bool, products: bool = False
     ) -> list[tuple[float, Element]]:
         """Return the best elements to add to a model, with estimated log posteriors."""
         listed = [*self._library.elements, *self._explicit.elements]

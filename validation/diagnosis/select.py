@@ -115,8 +115,7 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
     if device is not None:
         hypotheses, values = [device, *hypotheses], [device.start, *values]
     effects = {e.name for s in states for e in s.elements if e.name}
-    tau, tau_std = scale(best.sizes.squares, readings.count)
-    common = tau * readings.common[0], tau * readings.common[1]
+    noise = _noise(search, best, good)
     return Selected(
         hypotheses=tuple(hypotheses),
         values=np.concatenate([np.zeros(0), *values]),
@@ -125,8 +124,8 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
             for k, e in enumerate(best.elements)
             if not e.name
         ),
-        small=_small(search, best, tau),
-        noise=Noise(tau, tau_std, _findings(search, best, good), common),
+        small=_small(search, best, noise.tau),
+        noise=noise,
         weights=good,
         models=_models(states, weights),
         probability={n: _probability(n, states, weights) for n in sorted(effects)},
@@ -146,8 +145,8 @@ def _small(search: Search, best: State, tau: float) -> tuple[Small, ...]:
     )
 
 
-def _findings(search: Search, best: State, good: NDArray) -> tuple[str, ...]:
-    """Return sentences about the noise: scale, repeatability and memory."""
+def _noise(search: Search, best: State, good: NDArray) -> Noise:
+    """Return the noise, with sentences about its scale, repeatability and memory."""
     campaign, readings = search.columns.campaign, search.readings
     row, component = (axis[readings.cells] for axis in np.nonzero(campaign.cells))
     point = np.zeros(len(row), dtype=int)
@@ -160,7 +159,8 @@ def _findings(search: Search, best: State, good: NDArray) -> tuple[str, ...]:
     memory = any(FORMS[form].remembers for form in forms)
     tau, tau_std = scale(best.sizes.squares, readings.count)
     common = tau * readings.common[0], tau * readings.common[1]
-    return findings(tau, tau_std, repeats, memory=memory, common=common)
+    said = findings(tau, tau_std, repeats, memory=memory, common=common)
+    return Noise(tau, tau_std, said, common)
 
 
 def _probability(name: str, states: Sequence[State], weights: NDArray) -> float:

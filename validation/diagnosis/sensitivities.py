@@ -26,6 +26,7 @@ from forcefit.assembly.measurement.conditions import Conditions
 from forcefit.assembly.measurement.predict import predict
 from forcefit.assembly.measurement.variables import LOADS
 from forcefit.assembly.model.function import Function
+from forcefit.assembly.model.robot import Robot
 from forcefit.validation.campaign.campaign import Campaign
 from forcefit.validation.diagnosis.candidates import (
     Candidate,
@@ -97,20 +98,8 @@ class Sensitivities:
         """Return (R, 6) changes of the reading per unit of a component at a place."""
         if where == "load":
             return self.under_load[self.rows, :, LOADS.index(component)]
-        unit = unit_screw(self.conditions.robot, where, component)
-        if where == "reading":
-            return np.broadcast_to(unit, (len(self._origin), 6))
-        if where == "base":
-            screw = np.tile(unit, (len(self._origin), 1))
-            screw[:, 3:] += np.cross(screw[:, :3], self._origin)
-            return np.einsum("rij,rj->ri", self._response.reading, screw)
-        row = self.conditions.robot.index(where)
         robot, response = self.conditions.robot, self._response
-        sensitivity = along(robot, where, component, response.screws[:, :, row])
-        if kind == "compliance":
-            through = along(robot, where, component, response.wrenches[:, row])
-            return sensitivity * through[:, None]
-        return sensitivity
+        return sensitivity_at(where, component, kind, robot, response, self._origin)
 
     def _basis(
         self, variables: tuple[str, ...], shape: CandidateShape
@@ -259,6 +248,30 @@ class Sensitivities:
         if known.all():
             return (None,)
         return tuple(dict.fromkeys(conditions.session[known].tolist()))
+
+
+def sensitivity_at(
+    where: str, component: str, kind: str,
+    robot: Robot, response: Responses, origin: NDArray,
+) -> NDArray:  # fmt: skip
+    """Return (R, 6) changes of the reading per unit of a component at a place.
+
+    The place is a frame, ``"base"`` or ``"reading"``.  ``origin`` (R, 3) [m] is the
+    position of the platform.
+    """
+    unit = unit_screw(robot, where, component)
+    if where == "reading":
+        return np.broadcast_to(unit, (len(origin), 6))
+    if where == "base":
+        screw = np.tile(unit, (len(origin), 1))
+        screw[:, 3:] += np.cross(screw[:, :3], origin)
+        return np.einsum("rij,rj->ri", response.reading, screw)
+    row = robot.index(where)
+    sensitivity = along(robot, where, component, response.screws[:, :, row])
+    if kind == "compliance":
+        through = along(robot, where, component, response.wrenches[:, row])
+        return sensitivity * through[:, None]
+    return sensitivity
 
 
 def in_cells(

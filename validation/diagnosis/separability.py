@@ -151,15 +151,12 @@ def _basis(columns: NDArray, whole: float) -> NDArray:
 def orthonormal_basis(
     columns: NDArray, rank: float = ROUNDING, floor: ArrayLike = 0.0
 ) -> NDArray:
-    """Return an orthonormal basis of columns, independent of the units of the columns.
+    """Return an (N, r) orthonormal basis of columns, independent of their units.
 
     Args:
         columns: (N, k) columns.
         rank: relative singular value below which normalised columns count as dependent.
         floor: norm up to which a column counts as zero; one value, or (k,).
-
-    Returns:
-        (N, r) orthonormal columns.
     """
     size = np.linalg.norm(columns, axis=0)
     kept = columns[:, size > floor] / size[size > floor]

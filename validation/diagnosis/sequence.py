@@ -76,22 +76,9 @@ class Step:
     error: Errors
 
 
-@dataclass(frozen=True, eq=False)
-class Stage:
-    """A model of the sequence, tested on the held-out rows of one fold.
-
-    Attributes:
-        unknowns: number of added unknowns, as in :class:`Step`.
-        residual: (R, 6) [rad, m] residual of the held-out rows, NaN elsewhere.
-    """
-
-    unknowns: float
-    residual: NDArray
-
-
 def stages(
     campaign: Campaign, fit: MachineFit, rows: NDArray, held: NDArray
-) -> dict[Place, Stage]:
+) -> dict[Place, tuple[float, NDArray]]:
     """Fit the models that lead to a fitted robot, and test each on held-out rows.
 
     Args:
@@ -101,9 +88,11 @@ def stages(
         held: (R,) bool, True for held-out rows.
 
     Returns:
-        One stage for each model, in order.  The last model is ``fit``.
+        For each model, in order, the number of added unknowns as in :class:`Step`, and
+        the (R, 6) [rad, m] residual of the held-out rows, NaN elsewhere.  The last
+        model is ``fit``.
     """
-    shown, known = dict[Place, Stage](), 0.0
+    shown, known = dict[Place, tuple[float, NDArray]](), 0.0
     finite = _has_finite_motions(fit.unknowns)
     for place, unknowns in _models(fit.unknowns).items():
         robot, told = unknowns.robot, 0.0
@@ -115,7 +104,7 @@ def stages(
         residual = np.full(campaign.measured.shape, np.nan)
         linear = finite and not _has_finite_motions(unknowns)
         residual[held] = residual_of(campaign, robot, linear=linear)[held]
-        shown[place] = Stage(max(0.0, told - known), residual)
+        shown[place] = max(0.0, told - known), residual
         known = told
     return shown
 
@@ -151,7 +140,7 @@ def _start(unknowns: Unknowns, fit: MachineFit) -> NDArray:
 
 
 def pooled(
-    campaign: Campaign, folds: list[dict[Place, Stage]], rows: NDArray
+    campaign: Campaign, folds: list[dict[Place, tuple[float, NDArray]]], rows: NDArray
 ) -> list[Step]:
     """Return the sequence tested on rows (R,) bool of all folds together.
 
@@ -164,17 +153,17 @@ def pooled(
         last = [max(own for own in fold if own <= place) for fold in folds]
         reached = [fold[own] for fold, own in zip(folds, last, strict=True)]
         unknowns = [
-            stage.unknowns if own[0] == place[0] else 0.0
-            for own, stage in zip(last, reached, strict=True)
+            added if own[0] == place[0] else 0.0
+            for own, (added, _) in zip(last, reached, strict=True)
         ]
-        error = errors_of(campaign, joined(reached), rows)
+        error = errors_of(campaign, joined([left for _, left in reached]), rows)
         steps.append(Step(_TERMS[place[0]], float(np.mean(unknowns)), error))
     return steps
 
 
-def joined(reached: Sequence[Stage]) -> NDArray:
+def joined(residuals: Sequence[NDArray]) -> NDArray:
     """Return the (R, 6) [rad, m] residual of one step, joined from all folds."""
-    residual = reached[0].residual
-    for stage in reached[1:]:
-        residual = np.where(np.isnan(stage.residual), residual, stage.residual)
+    residual = residuals[0]
+    for other in residuals[1:]:
+        residual = np.where(np.isnan(other), residual, other)
     return residual

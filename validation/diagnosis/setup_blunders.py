@@ -182,16 +182,13 @@ class _Judge:
     def residual(
         self, made: Corrections, *, loads: float = 1.0, stated: bool = False
     ) -> float:
-        """Return the trimmed rms of the residual with given corrections.
+        """Return the trimmed rms [sigma] of the residual, inf for unreachable commands.
 
         Args:
             made: corrections that are applied to the campaign.
             loads: factor on all loads.
             stated: whether the declared sigma is used even if a correction scales
                 lengths.
-
-        Returns:
-            [sigma] residual; infinite if a command cannot be reached.
         """
         setup = self.given
         for correction in made:

@@ -58,6 +58,9 @@ _GROSS = 30.0  # smallest rms of a gross blunder / median rms of all rows
 _CLEARLY = 2.0
 # [sigma] Second-order terms are added if they change a reading by more than this value.
 _BENT = 0.3
+_RIVALS = (
+    3  # largest number of rival machines, for which a next measurement is searched
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,14 +115,14 @@ class Traced:
         device = self.campaign.registration == "unknown"
         return len(found.hypotheses) - device + len(found.functions) == 1
 
-    def rivals(self, most: int = 3) -> list[Unknowns]:
-        """Return machines with effects other than the best, the most probable first."""
+    def rivals(self) -> list[Unknowns]:
+        """Return up to three machines with other effects, the most probable first."""
         states = self.selected.states
         own = frozenset(e.name for e in states[0].elements if e.name)
         found: dict[frozenset[str], Unknowns] = {}
         for state in states[1:]:
             other = frozenset(e.name for e in state.elements if e.name)
-            if own <= other or other <= own or other in found or len(found) == most:
+            if own <= other or other <= own or other in found or len(found) == _RIVALS:
                 continue
             elements = [(k, e) for k, e in enumerate(state.elements) if e.name]
             effects = [

@@ -31,9 +31,6 @@ def remarks_on(
         repeats: order of the repeats in the session.
         visits: order of the configurations in the session.
         noise: noise computed from the repeats; None without repeats.
-
-    Returns:
-        The remarks.
     """
     remarks = [
         *_on_readings(campaign), *_on_configurations(campaign, visits),

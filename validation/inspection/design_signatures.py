@@ -57,9 +57,6 @@ def design_signatures(
         campaign: campaign of N measured cells.
         progress: function called with the number of finished effects and the total
             number.
-
-    Returns:
-        The signatures of all effects.
     """
     conditions, unregistered = conditions_of(campaign), ""
     if campaign.registration == "unknown":

@@ -63,9 +63,6 @@ def revisits(campaign: Campaign, kinds: NDArray) -> Revisits:
         campaign: campaign of R rows, which are ordered by ``cov.time`` if it is
             recorded.
         kinds: (R,) int, such as ``campaign.repeat`` or ``campaign.configuration``.
-
-    Returns:
-        The order of the rows.
     """
     clock = session_clock(campaign)
     # All points of one measurement count as one row.
@@ -97,9 +94,6 @@ def session_clock(campaign: Campaign) -> NDArray:
     Args:
         campaign: campaign of R rows.  The order of the rows is used if ``cov.time`` is
             absent or constant.
-
-    Returns:
-        The relative times.
     """
     order = np.arange(len(campaign), dtype=float)
     time = campaign.covariates.get("time", order)

@@ -164,9 +164,6 @@ def rows_as_campaign(
         plan: rows of the campaign.
         design: design by which the rows were drawn.
         sigma: [rad, m] noise of the measuring device.
-
-    Returns:
-        The campaign.
     """
     asked = np.array([list(row.coordinates.values()) for row in plan.rows])
     target = Target(coordinates=asked)

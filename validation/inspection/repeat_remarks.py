@@ -22,9 +22,6 @@ def on_repeats(
         campaign: campaign of R rows.
         repeats: order of the repeats in the session.
         noise: noise computed from the repeats; None without repeats.
-
-    Returns:
-        The remarks.
     """
     if noise is None:
         text = (

@@ -89,18 +89,15 @@ class RepeatNoise:
 def repeat_noise(
     campaign: Campaign, slow: Mapping[str, NDArray] | None = None
 ) -> RepeatNoise | None:
-    """Return the noise from a campaign's repeats, with slow changes subtracted.
+    """Return the noise from a campaign's repeats; None if no row was measured twice.
 
-    Slow changes are not subtracted if their fit would use more than half of the degrees
-    of freedom.
+    Slow changes are subtracted, but not if their fit would use more than half of the
+    degrees of freedom.
 
     Args:
         campaign: campaign of N measured cells.
         slow: mapping from the name of each slow change to its (N, p) columns over
             sigma; by default the result of :func:`slow_changes`.
-
-    Returns:
-        The noise; None if no row was measured twice.
     """
     slow = slow_changes(campaign) if slow is None else slow
     suspects: list[Suspect] = []
@@ -144,14 +141,11 @@ def slow_changes(campaign: Campaign) -> dict[str, NDArray]:
 
 
 def for_each_component(campaign: Campaign, shapes: NDArray) -> NDArray:
-    """Return columns with separate changes for each component.
+    """Return (N, 6 p) columns over sigma with separate changes for each component.
 
     Args:
         campaign: campaign of R rows and N measured cells.
         shapes: (R, p) values of the changes in each row.
-
-    Returns:
-        (N, 6 p) columns over sigma.
     """
     cells = campaign.cells
     row, component = np.nonzero(cells)

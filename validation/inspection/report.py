@@ -24,15 +24,12 @@ Cells = list[list[Cell]]
 
 
 def inspection_page(inspection: Inspection, provenance: Provenance) -> str:
-    """Return the page of an inspection.
+    """Return the page of an inspection, which is self-contained HTML.
 
     Args:
         inspection: result of
             :func:`forcefit.validation.inspection.inspection.inspect_campaign`.
         provenance: command and input files.
-
-    Returns:
-        A self-contained HTML page.
     """
     c = inspection.campaign
     return page(

@@ -18,6 +18,13 @@ _PERIOD = 2400.0  # [s] period of the temperature
 _STEP = 60.0  # [s] time between measurements
 _DRAWS = 40  # largest number of random draws per configuration
 _DIGITS = 6  # number of decimal digits of commanded coordinates
+# attributes of the design that effects require
+_VARIED_FOR: dict[str, dict[str, Any]] = {
+    "_humidity": {"humidity": True},
+    "_quadratic_temperature": {"temperature": "around"},
+    "_tilting": {"tilt": 1e-4},
+    "body_mass": {"gravity": 9.81},
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,16 +100,7 @@ def varied_for(design: CampaignDesign, names: Iterable[str]) -> CampaignDesign:
     Returns:
         The design, with additional varying conditions if the effects require them.
     """
-    given: dict[str, Any] = {}
-    for name in names:
-        if name == "_humidity":
-            given["humidity"] = True
-        elif name == "_quadratic_temperature":
-            given["temperature"] = "around"
-        elif name == "_tilting":
-            given["tilt"] = 1e-4
-        elif name == "body_mass":
-            given["gravity"] = 9.81
+    given = {key: v for n in names for key, v in _VARIED_FOR.get(n, {}).items()}
     return replace(design, **given)
 
 

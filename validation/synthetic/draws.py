@@ -1,15 +1,17 @@
 """Draw plausible parameters of hidden effects, and scale effects by a factor."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from forcefit.assembly.model.robot import BeamLink, Frame, Robot
 from forcefit.inputs.table import BadInput
 from forcefit.validation.synthetic.effects import (
     LIBRARY,
     SCREW,
+    WRENCH,
     Parameters,
     own_compliance,
 )
@@ -37,9 +39,6 @@ def draw_effect(
         duration: [s] duration of the session.
         rng: random number generator of the draws.
 
-    Returns:
-        The effect, whose strength can be changed by :func:`strengthened`.
-
     Raises:
         BadInput: the name of the effect is unknown.
         NotApplicable: the effect cannot act at any place of the robot.
@@ -49,7 +48,7 @@ def draw_effect(
         raise BadInput(
             f'effect: found "{name[:60]}", expected one of {", ".join(LIBRARY)}'
         )
-    return Hidden(name, _DRAWS[name](robot, duration, rng))
+    return Hidden(name, _DRAWS[name](robot, rng, duration))
 
 
 def strengthened(effect: Hidden, factor: float) -> Hidden:
@@ -58,9 +57,6 @@ def strengthened(effect: Hidden, factor: float) -> Hidden:
     Args:
         effect: effect with its parameters.
         factor: [-] positive factor.
-
-    Returns:
-        The effect with more compliant springs or larger errors.
     """
     name, given = effect.name, dict(effect.parameters)
     for key, value in given.items():
@@ -82,13 +78,16 @@ def strengthened(effect: Hidden, factor: float) -> Hidden:
     return Hidden(name, given)
 
 
+def _one(frames: list[Frame], rng: np.random.Generator) -> str:
+    """Return the name of one of the frames, at random."""
+    return frames[rng.integers(len(frames))].name
+
+
 def _some(frames: list[Frame], rng: np.random.Generator) -> list[str]:
-    """Return one of the frames, or all of them, at random."""
+    """Return the name of one of the frames, or all names, at random."""
     if not frames:
         raise NotApplicable("the robot has no frame on which the effect acts")
-    if rng.random() < 0.5:
-        return [frames[rng.integers(len(frames))].name]
-    return [frame.name for frame in frames]
+    return [_one(frames, rng)] if rng.random() < 0.5 else [f.name for f in frames]
 
 
 def _beams(robot: Robot) -> list[Frame]:
@@ -108,7 +107,27 @@ def _turning(robot: Robot) -> list[Frame]:
     return [f for f in _drives(robot) if f.joint == "revolute"]
 
 
-def _weight(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+def _vector(name: str, components: Iterable[str], values: NDArray) -> Parameters:
+    """Return the components of a vector as parameters ``<name>.<component>``."""
+    keys = (f"{name}.{component}" for component in components)
+    return dict(zip(keys, values.tolist(), strict=True))
+
+
+def _wave(name: str, size: float, rng: np.random.Generator) -> Parameters:
+    """Return the amplitude and the phase of a wave at a frame."""
+    amplitude = size * rng.uniform(0.5, 1.0)
+    phase = rng.uniform(-math.pi, math.pi)
+    return {f"{name}.amplitude": amplitude, f"{name}.phase": phase}
+
+
+def _errors(frames: list[Frame], rng: np.random.Generator) -> Parameters:
+    """Return errors of about 1e-4 rad or m with random signs."""
+    names = _some(frames, rng)
+    signs = rng.choice([-1.0, 1.0], len(names)) * rng.uniform(0.4, 1.0, len(names))
+    return dict(zip(names, (1e-4 * signs).tolist(), strict=True))
+
+
+def _weight(robot: Robot, rng: np.random.Generator, _: float) -> Parameters:
     heavy = any(f.mass for f in robot.frames) or any(
         isinstance(f.link, BeamLink) and f.link.density for f in robot.frames
     )
@@ -116,68 +135,35 @@ def _weight(robot: Robot, duration: float, rng: np.random.Generator) -> Paramete
         raise NotApplicable("no part of the robot has a declared mass")
     tilt = rng.uniform(-0.2, 0.2, 2) if rng.random() < 0.5 else np.zeros(2)
     down = np.array([*np.sin(tilt), -1.0])
-    g = 9.81 * down / np.linalg.norm(down)
-    return dict(zip(("g.x", "g.y", "g.z"), g.tolist(), strict=True))
+    return _vector("g", "xyz", 9.81 * down / np.linalg.norm(down))
 
 
-def _expansion(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
-    return dict.fromkeys(_some(_bodies(robot), rng), 2e-5)
-
-
-def _delayed(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+def _delayed(robot: Robot, rng: np.random.Generator, _: float) -> Parameters:
     names = _some(_bodies(robot), rng)
     late = [f"{name}.time_constant" for name in names]
     return dict.fromkeys(names, 2e-5) | dict.fromkeys(late, rng.uniform(500, 2000))
 
 
-def _drive_springs(
-    robot: Robot, duration: float, rng: np.random.Generator
-) -> Parameters:
-    return {n: 1e5 * rng.uniform(0.6, 1.6) for n in _some(_drives(robot), rng)}
-
-
-def _foundation(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+def _foundation(robot: Robot, rng: np.random.Generator, _: float) -> Parameters:
     size = np.where(np.arange(6) < 3, 1e5, 1e6) * rng.uniform(0.5, 2.0, 6)
-    return {f"stiffness.{k}": v for k, v in zip(SCREW, size.tolist(), strict=True)}
+    return _vector("stiffness", SCREW, size)
 
 
-def _offsets(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
-    return _errors(_some(_drives(robot), rng), rng)
-
-
-def _lengths(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
-    return _errors(_some(_bodies(robot), rng), rng)
-
-
-def _errors(names: list[str], rng: np.random.Generator) -> Parameters:
-    """Return errors of about 1e-4 rad or m with random signs."""
-    signs = rng.choice([-1.0, 1.0], len(names)) * rng.uniform(0.4, 1.0, len(names))
-    return dict(zip(names, (1e-4 * signs).tolist(), strict=True))
-
-
-def _eccentric(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
-    given = {}
+def _eccentric(robot: Robot, rng: np.random.Generator, _: float) -> Parameters:
+    given: dict[str, float] = {}
     for name in _some(_turning(robot), rng):
-        given[f"{name}.amplitude"] = 1e-4 * rng.uniform(0.5, 1.0)
-        given[f"{name}.phase"] = rng.uniform(-math.pi, math.pi)
+        given |= _wave(name, 1e-4, rng)
     return given
 
 
-def _registered(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
-    base = 1e-4 * rng.uniform(-1, 1, 6)
-    given = {f"base.{k}": v for k, v in zip(SCREW, base.tolist(), strict=True)}
+def _registered(robot: Robot, rng: np.random.Generator, _: float) -> Parameters:
+    given = dict(_vector("base", SCREW, 1e-4 * rng.uniform(-1, 1, 6)))
     if rng.random() < 0.5:
-        tool = 1e-4 * rng.uniform(-1, 1, 3)
-        names = (f"tool.{k}" for k in SCREW[3:])
-        given |= dict(zip(names, tool.tolist(), strict=True))
+        given |= _vector("tool", SCREW[3:], 1e-4 * rng.uniform(-1, 1, 3))
     return given
 
 
-def _softer(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
-    return dict.fromkeys(_some(_beams(robot), rng), 0.8)
-
-
-def _clearances(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+def _clearances(robot: Robot, rng: np.random.Generator, _: float) -> Parameters:
     joints = [f for f in robot.frames if f.actuated and f.clearance is None]
     given: dict[str, float] = {}
     for name in _some(joints, rng):
@@ -185,14 +171,14 @@ def _clearances(robot: Robot, duration: float, rng: np.random.Generator) -> Para
     return given
 
 
-def _friction(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+def _friction(robot: Robot, rng: np.random.Generator, _: float) -> Parameters:
     elastic = [f for f in _drives(robot) if own_compliance(f) > 0.0]
     names = _some(elastic, rng)
     compliance = {n: own_compliance(robot.frame(n)) for n in names}
     return {n: 1e-5 / c * rng.uniform(0.6, 1.4) for n, c in compliance.items()}
 
 
-def _contacts(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+def _contacts(robot: Robot, rng: np.random.Generator, _: float) -> Parameters:
     given = {}
     for name in _some(_drives(robot), rng):
         given[f"{name}.coefficient"] = 1e7 * rng.uniform(0.6, 1.6)
@@ -200,149 +186,107 @@ def _contacts(robot: Robot, duration: float, rng: np.random.Generator) -> Parame
     return given
 
 
-def _gain(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+def _gain(robot: Robot, rng: np.random.Generator, _: float) -> Parameters:
     factor = 1.0 + rng.choice([-0.08, 0.08])
     if rng.random() < 0.5:
         return {"factor": factor}
     offset = rng.uniform(-2, 2, 3).round(3)
-    names = ("offset.fx", "offset.fy", "offset.fz")
-    return {"factor": factor, **dict(zip(names, offset.tolist(), strict=True))}
+    return {"factor": factor, **_vector("offset", WRENCH[3:], offset)}
 
 
-def _heavier(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+def _heavier(robot: Robot, rng: np.random.Generator, _: float) -> Parameters:
     heavy = [f for f in robot.frames if f.mass]
     if not heavy:
         raise NotApplicable("no body has a declared mass")
-    name = heavy[rng.integers(len(heavy))].name
+    name = _one(heavy, rng)
     given = {f"{name}.mass": rng.uniform(0.2, 0.6)}
     if rng.random() < 0.5:
-        moment = rng.uniform(-0.03, 0.03, 3).tolist()
-        given |= {f"{name}.moment.{k}": v for k, v in zip("xyz", moment, strict=True)}
+        given |= _vector(f"{name}.moment", "xyz", rng.uniform(-0.03, 0.03, 3))
     return given
 
 
-def _measuring(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
-    return {"factor": 1.0 + rng.choice([-1e-4, 1e-4])}
-
-
-def _stiffening(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
-    return {}
-
-
-def _drifting(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+def _drifting(robot: Robot, rng: np.random.Generator, duration: float) -> Parameters:
     size = rng.choice([-1.0, 1.0], 6) * rng.uniform(0.3, 1.0, 6) * 1e-5
-    given = {f"amplitude.{k}": v for k, v in zip(SCREW, size.tolist(), strict=True)}
-    return given | {"time_constant": duration * rng.uniform(0.15, 0.6)}
+    late = duration * rng.uniform(0.15, 0.6)
+    return {**_vector("amplitude", SCREW, size), "time_constant": late}
 
 
-def _swelling(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
-    return dict.fromkeys(_some(_beams(robot), rng), 1e-5)
+def _mesh(robot: Robot, rng: np.random.Generator, _: float) -> Parameters:
+    if not _turning(robot):
+        raise NotApplicable("the robot has no revolute drive")
+    return {f.name: 1e5 for f in _turning(robot)}
 
 
-def _mesh(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
-    return {f.name: 1e5 for f in _turning(robot)} or _nothing()
-
-
-def _geared(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
-    given = {}
+def _geared(robot: Robot, rng: np.random.Generator, _: float) -> Parameters:
+    given: dict[str, float] = {}
     for name in _some(_turning(robot), rng):
         given[f"{name}.order"] = float(rng.integers(3, 10))
-        given[f"{name}.amplitude"] = 1e-4 * rng.uniform(0.5, 1.0)
-        given[f"{name}.phase"] = rng.uniform(-math.pi, math.pi)
+        given |= _wave(name, 1e-4, rng)
     return given
 
 
-def _growing(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
-    return dict.fromkeys(_some(_beams(robot), rng), 1e-4 / duration)
-
-
-def _pressed(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
-    return {n: 1e-4 * rng.uniform(0.5, 1.0) for n in _some(_drives(robot), rng)}
-
-
-def _pulling(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
-    drives = _drives(robot)
-    return {drives[rng.integers(len(drives))].name: 5.0}
-
-
-def _slipping(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
-    drives = _drives(robot)
-    name = drives[rng.integers(len(drives))].name
+def _slipping(robot: Robot, rng: np.random.Generator, duration: float) -> Parameters:
+    name = _one(_drives(robot), rng)
     return {f"{name}.jump": 1e-4, f"{name}.at": duration * rng.uniform(0.3, 0.7)}
 
 
-def _screws(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
-    given = {}
+def _screws(robot: Robot, rng: np.random.Generator, _: float) -> Parameters:
+    given: dict[str, float] = {}
     for name in _some([f for f in _drives(robot) if f.joint == "prismatic"], rng):
-        given[f"{name}.amplitude"] = 1e-5 * rng.uniform(0.5, 1.0)
-        given[f"{name}.phase"] = rng.uniform(-math.pi, math.pi)
+        given |= _wave(name, 1e-5, rng)
         given[f"{name}.period"] = rng.choice([0.004, 0.005, 0.01, 0.016, 0.02])
     return given
 
 
-def _stepped(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
-    drives = _drives(robot)
-    name = drives[rng.integers(len(drives))].name
+def _stepped(robot: Robot, rng: np.random.Generator, _: float) -> Parameters:
+    name = _one(_drives(robot), rng)
     soft, hard = rng.permutation([1e-5, 3e-6]).tolist()
     return {f"{name}.below": soft, f"{name}.above": hard, f"{name}.knee": 4.0}
 
 
-def _pushed(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
-    drives = _drives(robot)
-    return {drives[rng.integers(len(drives))].name: 5e-5}
-
-
-def _turned(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
-    return {"gain": rng.uniform(0.7, 1.3)}
-
-
-def _nothing() -> Parameters:
-    raise NotApplicable("the robot has no revolute drive")
-
-
-def _stand(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
-    c = 1e-5 * rng.uniform(-1, 1, 6)
-    return {f"c.{k}": v for k, v in zip(SCREW, c.tolist(), strict=True)}
-
-
-def _sagging(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
-    return {"rate": 1e-6}
-
-
-_DRAWS: dict[str, Callable[[Robot, float, np.random.Generator], Parameters]] = {
+# functions of the robot, the random number generator and the duration [s]
+_DRAWS: dict[str, Callable[[Robot, np.random.Generator, float], Parameters]] = {
     "self_weight": _weight,
-    "thermal_expansion": _expansion,
+    "thermal_expansion": lambda r, rng, _: dict.fromkeys(_some(_bodies(r), rng), 2e-5),
     "delayed_expansion": _delayed,
-    "drive_compliance": _drive_springs,
+    "drive_compliance": lambda robot, rng, _: {
+        name: 1e5 * rng.uniform(0.6, 1.6) for name in _some(_drives(robot), rng)
+    },
     "base_compliance": _foundation,
-    "encoder_offset": _offsets,
+    "encoder_offset": lambda robot, rng, _: _errors(_drives(robot), rng),
     "encoder_eccentricity": _eccentric,
-    "link_length": _lengths,
+    "link_length": lambda robot, rng, _: _errors(_bodies(robot), rng),
     "registration": _registered,
-    "modulus_scale": _softer,
+    "modulus_scale": lambda r, rng, _: dict.fromkeys(_some(_beams(r), rng), 0.8),
     "joint_clearance": _clearances,
     "friction_hysteresis": _friction,
     "contact_stiffening": _contacts,
     "load_gain": _gain,
     "body_mass": _heavier,
-    "device_scale": _measuring,
-    "geometric_stiffening": _stiffening,
+    "device_scale": lambda _, rng, __: {"factor": 1.0 + rng.choice([-1e-4, 1e-4])},
+    "geometric_stiffening": lambda *_: {},
     "drift": _drifting,
     "_pose_stiffness": _mesh,
-    "_humidity": _swelling,
-    "_quadratic_temperature": _swelling,
+    "_humidity": lambda r, rng, _: dict.fromkeys(_some(_beams(r), rng), 1e-5),
+    "_quadratic_temperature": lambda r, rng, _: dict.fromkeys(
+        _some(_beams(r), rng), 1e-5
+    ),
     "_second_harmonic": _eccentric,
-    "_growth": _growing,
+    "_growth": lambda r, rng, duration: dict.fromkeys(
+        _some(_beams(r), rng), 1e-4 / duration
+    ),
     "_gear": _geared,
     "_uneven_backlash": _eccentric,
-    "_load_friction": _pressed,
-    "_cable": _pulling,
+    "_load_friction": lambda robot, rng, _: {
+        name: 1e-4 * rng.uniform(0.5, 1.0) for name in _some(_drives(robot), rng)
+    },
+    "_cable": lambda robot, rng, _: {_one(_drives(robot), rng): 5.0},
     "_slipped": _slipping,
     "_lead": _screws,
     "_lead_backlash": _screws,
     "_two_steps": _stepped,
-    "_torque_backlash": _pushed,
-    "_tilting": _turned,
-    "_stand": _stand,
-    "_sag": _sagging,
+    "_torque_backlash": lambda robot, rng, _: {_one(_drives(robot), rng): 5e-5},
+    "_tilting": lambda _, rng, __: {"gain": rng.uniform(0.7, 1.3)},
+    "_stand": lambda _, rng, __: _vector("c", SCREW, 1e-5 * rng.uniform(-1, 1, 6)),
+    "_sag": lambda *_: {"rate": 1e-6},
 }

@@ -24,11 +24,7 @@ from numpy.typing import NDArray
 from forcefit.assembly.model.robot import BASE, BeamLink, Clearance, Frame, Robot
 from forcefit.validation.multibody.beams import beam_span
 from forcefit.validation.multibody.motion import placement, turned
-from forcefit.validation.synthetic.laws import (
-    ClearanceLaw,
-    PowerLawSpring,
-    TwoStepSpring,
-)
+from forcefit.validation.synthetic.laws import PowerLawSpring, TwoStepSpring
 
 SCREW = ("rx", "ry", "rz", "tx", "ty", "tz")
 WRENCH = ("mx", "my", "mz", "fx", "fy", "fz")
@@ -65,15 +61,16 @@ class Machine:
             are at 0.
         load: (6,) [N m, N] applied load.
         gravity: (3,) [m/s^2] gravity in base axes.
-        laws: mapping from frame to the nonlinear law of its joint; see
-            :mod:`forcefit.validation.synthetic.rest`.
+        laws: mapping from frame to the nonlinear spring of its joint, or to the
+            clearance of a joint on an open chain, where the load determines the
+            position; see :mod:`forcefit.validation.synthetic.rest`.
     """
 
     robot: Robot
     coordinates: Mapping[str, float]
     load: NDArray
     gravity: NDArray = field(default_factory=lambda: np.zeros(3))
-    laws: Mapping[str, PowerLawSpring | TwoStepSpring | ClearanceLaw] = field(
+    laws: Mapping[str, PowerLawSpring | TwoStepSpring | Clearance] = field(
         default_factory=dict
     )
 
@@ -152,6 +149,31 @@ def misread(machine: Machine, name: str, suffix: str, change: float) -> Machine:
     return replace(machine, robot=robot)
 
 
+def displacing(
+    suffix: str, component: str, amount: Callable[[Row, Parameters, str], float]
+) -> Change:
+    """Return the change of a machine that displaces drives by an amount [rad or m].
+
+    The drives are the frames in parameters ``<frame>.<component>``, or in parameters
+    ``<frame>`` without a component.
+    """
+
+    def change(machine: Machine, row: Row, given: Parameters) -> Machine:
+        for name in named(given, component) if component else given:
+            machine = misread(machine, name, suffix, amount(row, given, name))
+        return machine
+
+    return change
+
+
+def on_ground(robot: Robot, ground: Frame) -> Robot:
+    """Return a robot with a frame inserted between the base and its children."""
+    frames = [
+        replace(f, parent=ground.name) if f.parent == BASE else f for f in robot.frames
+    ]
+    return replace(robot, frames=(ground, *frames))
+
+
 def own_compliance(frame: Frame) -> float:
     """Return the compliance of a declared joint along its motion; 0 if it is rigid."""
     K = frame.springs
@@ -200,27 +222,13 @@ def _drive_compliance(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 def _base_compliance(machine: Machine, row: Row, given: Parameters) -> Machine:
     K = np.diag([given.get(f"stiffness.{k}", math.inf) for k in SCREW])
-    new = "base~foundation"
-    frames = [
-        replace(f, parent=new) if f.parent == BASE else f for f in machine.robot.frames
-    ]
-    foundation = Frame(new, BASE, joint_stiffness=K)
-    robot = replace(machine.robot, frames=(foundation, *frames))
-    return replace(machine, robot=robot)
+    foundation = Frame("base~foundation", BASE, joint_stiffness=K)
+    return replace(machine, robot=on_ground(machine.robot, foundation))
 
 
-def _encoder_offset(machine: Machine, row: Row, given: Parameters) -> Machine:
-    for name, change in given.items():
-        machine = misread(machine, name, "offset", change)
-    return machine
-
-
-def _encoder_eccentricity(machine: Machine, row: Row, given: Parameters) -> Machine:
-    for name in named(given, "amplitude"):
-        angle = row.coordinates[name] + given[f"{name}.phase"]
-        change = given[f"{name}.amplitude"] * math.sin(angle)
-        machine = misread(machine, name, "eccentric", change)
-    return machine
+def wave(given: Parameters, name: str, angle: float) -> float:
+    """Return the displacement [rad or m] of a drive by a wave of an angle [rad]."""
+    return given[f"{name}.amplitude"] * math.sin(angle + given[f"{name}.phase"])
 
 
 def _modulus_scale(machine: Machine, row: Row, given: Parameters) -> Machine:
@@ -244,7 +252,7 @@ def _joint_clearance(machine: Machine, row: Row, given: Parameters) -> Machine:
         K = np.repeat(SENSOR, 3)
         K[robot.frame(name).own_axis] = math.inf
         robot = insert_after(robot, name, "clearance", joint_stiffness=np.diag(K))
-        laws[f"{name}~clearance"] = ClearanceLaw(clearance)
+        laws[f"{name}~clearance"] = clearance
     return replace(machine, robot=robot, laws=laws)
 
 
@@ -324,8 +332,12 @@ CHANGES: dict[str, Change] = {
     "thermal_expansion": _thermal_expansion,
     "drive_compliance": _drive_compliance,
     "base_compliance": _base_compliance,
-    "encoder_offset": _encoder_offset,
-    "encoder_eccentricity": _encoder_eccentricity,
+    "encoder_offset": displacing("offset", "", lambda row, given, name: given[name]),
+    "encoder_eccentricity": displacing(
+        "eccentric",
+        "amplitude",
+        lambda row, given, name: wave(given, name, row.coordinates[name]),
+    ),
     "delayed_expansion": _delayed_expansion,
     "link_length": _link_length,
     "modulus_scale": _modulus_scale,

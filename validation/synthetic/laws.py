@@ -1,8 +1,6 @@
-"""Define nonlinear laws of the joints of a simulated machine."""
+"""Define nonlinear springs of the joints of a simulated machine."""
 
 from dataclasses import dataclass
-
-from forcefit.assembly.model.robot import Clearance
 
 
 @dataclass(frozen=True)
@@ -21,6 +19,11 @@ class PowerLawSpring:
         """Return the spring's secant stiffness [N m/rad or N/m] at a deflection."""
         bent = max(abs(deflection), 1e-9)
         return float(self.coefficient * bent ** (self.exponent - 1.0))
+
+    def under(self, load: float) -> tuple[float, float]:
+        """Return the deflection [rad or m] and the secant stiffness under a load."""
+        deflection = (abs(load) / self.coefficient) ** (1.0 / self.exponent)
+        return deflection, self.secant(deflection)
 
 
 @dataclass(frozen=True)
@@ -43,13 +46,7 @@ class TwoStepSpring:
         more = max(size - self.knee, 0.0)
         return size / (self.below * (size - more) + self.above * more)
 
-
-@dataclass(frozen=True)
-class ClearanceLaw:
-    """Clearance of a joint on an open chain, where the load determines the position.
-
-    Attributes:
-        clearance: bounds of the motion.
-    """
-
-    clearance: Clearance
+    def under(self, load: float) -> tuple[float, float]:
+        """Return the deflection [rad or m] and the secant stiffness under a load."""
+        stiffness = self.secant(load)
+        return abs(load) / stiffness, stiffness

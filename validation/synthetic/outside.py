@@ -20,13 +20,15 @@ from forcefit.validation.synthetic.effects import (
     Parameters,
     Row,
     beam_length,
+    displacing,
     insert_after,
     lengthened,
-    misread,
     named,
+    on_ground,
     sprung,
+    wave,
 )
-from forcefit.validation.synthetic.laws import ClearanceLaw, TwoStepSpring
+from forcefit.validation.synthetic.laws import TwoStepSpring
 
 
 def _pose_stiffness(machine: Machine, row: Row, given: Parameters) -> Machine:
@@ -56,44 +58,26 @@ def _swollen(machine: Machine, given: Parameters, cause: float) -> Machine:
     return replace(machine, robot=robot)
 
 
-def _second_harmonic(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply an encoder error that repeats twice per turn, as of a tilted disc."""
-    for name in (key[: -len(".amplitude")] for key in given if "amplitude" in key):
-        angle = 2 * row.coordinates[name] + given[f"{name}.phase"]
-        change = given[f"{name}.amplitude"] * math.sin(angle)
-        machine = misread(machine, name, "wobble", change)
-    return machine
-
-
 def _growth(machine: Machine, row: Row, given: Parameters) -> Machine:
     """Apply a beam's elongation at a constant strain rate, as by wear or long creep."""
     return _swollen(machine, given, row.covariates["time"])
 
 
-def _gear(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply an angle error of a drive with several periods per turn, as of a gear."""
-    for name in (key[: -len(".order")] for key in given if key.endswith(".order")):
-        angle = given[f"{name}.order"] * row.coordinates[name] + given[f"{name}.phase"]
-        change = given[f"{name}.amplitude"] * math.sin(angle)
-        machine = misread(machine, name, "gear", change)
-    return machine
+def _backlash(row: Row, given: Parameters, name: str, angle: float) -> float:
+    """Return the displacement [rad or m] by a backlash that varies with an angle."""
+    share = 1.0 + 0.8 * math.sin(angle + given[f"{name}.phase"])
+    return given[f"{name}.amplitude"] * row.covariates["approach"] * share
 
 
-def _uneven_backlash(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply a backlash that is wider on one side of a gear than on the other."""
-    for name in (key[: -len(".phase")] for key in given if key.endswith(".phase")):
-        share = 1.0 + 0.8 * math.sin(row.coordinates[name] + given[f"{name}.phase"])
-        change = given[f"{name}.amplitude"] * row.covariates["approach"] * share
-        machine = misread(machine, name, "backlash", change)
-    return machine
+def _thread(row: Row, given: Parameters, name: str) -> float:
+    """Return the angle [rad] of a slide's screw."""
+    return 2 * math.pi * (row.coordinates[name] / given[f"{name}.period"])
 
 
-def _load_friction(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply a drive's friction that is proportional to the load: c f/100 N."""
+def _friction(row: Row, given: Parameters, name: str) -> float:
+    """Return the displacement by friction in proportion to the load: c f/100 N."""
     pressed = float(np.linalg.norm(row.load[3:])) / 100 * row.covariates["approach"]
-    for name, short in given.items():
-        machine = misread(machine, name, "friction", -short * pressed)
-    return machine
+    return -given[name] * pressed
 
 
 def _cable(machine: Machine, row: Row, given: Parameters) -> Machine:
@@ -101,34 +85,6 @@ def _cable(machine: Machine, row: Row, given: Parameters) -> Machine:
     load = machine.load.copy()
     load[5] -= sum(rate * row.coordinates[name] for name, rate in given.items())
     return replace(machine, load=load)
-
-
-def _slipped(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply a jump of a drive's zero at one point in time."""
-    for name in (key[: -len(".at")] for key in given if key.endswith(".at")):
-        late = row.covariates["time"] >= given[f"{name}.at"]
-        machine = misread(machine, name, "slip", given[f"{name}.jump"] * late)
-    return machine
-
-
-def _lead(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply a periodic position error of a slide, one period per turn of its screw."""
-    for name in named(given, "period"):
-        turns = row.coordinates[name] / given[f"{name}.period"]
-        wave = math.sin(2 * math.pi * turns + given[f"{name}.phase"])
-        change = given[f"{name}.amplitude"] * wave
-        machine = misread(machine, name, "lead", change)
-    return machine
-
-
-def _lead_backlash(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply a screw's backlash that varies over each turn."""
-    for name in named(given, "period"):
-        turns = row.coordinates[name] / given[f"{name}.period"]
-        share = 1.0 + 0.8 * math.sin(2 * math.pi * turns + given[f"{name}.phase"])
-        change = given[f"{name}.amplitude"] * row.covariates["approach"] * share
-        machine = misread(machine, name, "backlash", change)
-    return machine
 
 
 def _two_steps(machine: Machine, row: Row, given: Parameters) -> Machine:
@@ -151,20 +107,16 @@ def _torque_backlash(machine: Machine, row: Row, given: Parameters) -> Machine:
         turns = frame.joint == "revolute"
         K = sprung(frame, SENSOR[0 if turns else 1])
         robot = insert_after(robot, name, "teeth", joint_stiffness=K)
-        bound = Clearance(**{"spin" if turns else "axial": clearance})
-        laws[f"{name}~teeth"] = ClearanceLaw(bound)
+        laws[f"{name}~teeth"] = Clearance(**{"spin" if turns else "axial": clearance})
     return replace(machine, robot=robot, laws=laws)
 
 
 def _tilting(machine: Machine, row: Row, given: Parameters) -> Machine:
     """Apply a tilt of the ground that is proportional to a sensor's reading."""
-    new, screw = "base~tilt", np.zeros(6)
+    screw = np.zeros(6)
     screw[0] = given["gain"] * row.covariates["tilt"]
-    frames = [
-        replace(f, parent=new) if f.parent == BASE else f for f in machine.robot.frames
-    ]
-    ground = Frame(new, BASE, geometric_error=screw)
-    return replace(machine, robot=replace(machine.robot, frames=(ground, *frames)))
+    ground = Frame("base~tilt", BASE, geometric_error=screw)
+    return replace(machine, robot=on_ground(machine.robot, ground))
 
 
 def _stand(reading: NDArray, row: Row, given: Parameters) -> NDArray:
@@ -184,15 +136,43 @@ OUTSIDE_CHANGES: dict[str, Change] = {
     "_pose_stiffness": _pose_stiffness,
     "_humidity": _humidity,
     "_quadratic_temperature": _quadratic_temperature,
-    "_second_harmonic": _second_harmonic,
+    "_second_harmonic": displacing(
+        "wobble",
+        "amplitude",
+        lambda row, given, name: wave(given, name, 2 * row.coordinates[name]),
+    ),
     "_growth": _growth,
-    "_gear": _gear,
-    "_uneven_backlash": _uneven_backlash,
-    "_load_friction": _load_friction,
+    "_gear": displacing(
+        "gear",
+        "order",
+        lambda row, given, name: wave(
+            given, name, given[f"{name}.order"] * row.coordinates[name]
+        ),
+    ),
+    "_uneven_backlash": displacing(
+        "backlash",
+        "phase",
+        lambda row, given, name: _backlash(row, given, name, row.coordinates[name]),
+    ),
+    "_load_friction": displacing("friction", "", _friction),
     "_cable": _cable,
-    "_slipped": _slipped,
-    "_lead": _lead,
-    "_lead_backlash": _lead_backlash,
+    "_slipped": displacing(
+        "slip",
+        "at",
+        lambda row, given, name: (
+            given[f"{name}.jump"] * (row.covariates["time"] >= given[f"{name}.at"])
+        ),
+    ),
+    "_lead": displacing(
+        "lead",
+        "period",
+        lambda row, given, name: wave(given, name, _thread(row, given, name)),
+    ),
+    "_lead_backlash": displacing(
+        "backlash",
+        "period",
+        lambda row, given, name: _backlash(row, given, name, _thread(row, given, name)),
+    ),
     "_two_steps": _two_steps,
     "_torque_backlash": _torque_backlash,
     "_tilting": _tilting,

@@ -19,23 +19,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.model.robot import Clearance, Robot
 from forcefit.validation.multibody.simulation import (
     SimulationFailed,
     SimulationModel,
     simulate_assembly,
 )
-from forcefit.validation.synthetic.effects import (
-    Machine,
-    Rest,
-    sprung,
-    with_frame,
-)
-from forcefit.validation.synthetic.laws import (
-    ClearanceLaw,
-    PowerLawSpring,
-    TwoStepSpring,
-)
+from forcefit.validation.synthetic.effects import Machine, Rest, sprung, with_frame
 from forcefit.validation.synthetic.springs import rest_on_springs
 
 # Number of elements of a beam; corrected elements are accurate for these small
@@ -95,31 +85,25 @@ def _updated(machine: Machine, equilibrium: Rest) -> tuple[Machine, float]:
         i, frame = robot.index(name), robot.frame(name)
         axis = robot.frame(frame.parent).own_axis
         wrench, screw = equilibrium.joint_wrenches[i], equilibrium.joint_screws[i]
-        if isinstance(law, PowerLawSpring):
-            deflection = (abs(wrench[axis]) / law.coefficient) ** (1.0 / law.exponent)
-            largest = max(largest, abs(deflection - abs(screw[axis])) / _SETTLED)
-            K = sprung(robot.frame(frame.parent), law.secant(deflection))
-            new = replace(frame, joint_stiffness=K)
-        elif isinstance(law, TwoStepSpring):
-            stiffness = law.secant(wrench[axis])
-            change = abs(wrench[axis]) / stiffness - abs(screw[axis])
-            largest = max(largest, abs(change) / _SETTLED)
-            K = sprung(robot.frame(frame.parent), stiffness)
-            new = replace(frame, joint_stiffness=K)
-        else:
+        if isinstance(law, Clearance):
             position = _clearance_position(law, wrench)
             change = float(np.abs(position - frame.geometric_error).max())
             largest = max(largest, change / _SETTLED_CLEARANCE)
             new = replace(frame, geometric_error=position)
+        else:
+            deflection, stiffness = law.under(wrench[axis])
+            largest = max(largest, abs(deflection - abs(screw[axis])) / _SETTLED)
+            K = sprung(robot.frame(frame.parent), stiffness)
+            new = replace(frame, joint_stiffness=K)
         robot = with_frame(robot, new)
     return replace(machine, robot=robot), largest
 
 
-def _clearance_position(law: ClearanceLaw, wrench: NDArray) -> NDArray:
+def _clearance_position(clearance: Clearance, wrench: NDArray) -> NDArray:
     """Return the (6,) [rad, m] position of a joint in its clearance under a load."""
     position = np.zeros(6)
     for name, rows in _ROWS.items():
-        bound = getattr(law.clearance, name) or 0.0
+        bound = getattr(clearance, name) or 0.0
         load = float(np.linalg.norm(wrench[rows]))
         if load > 0.0:
             position[rows] = min(load / _CENTRING[name], bound) * wrench[rows] / load

@@ -78,9 +78,6 @@ def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
     Args:
         machines: machines of equal structure, without clearances.
 
-    Returns:
-        The equilibrium of each machine.
-
     Raises:
         SimulationFailed: a joint has clearance, or there is no equilibrium.
     """

@@ -45,7 +45,6 @@ def truth_of(
     campaign: Synthetic,
     verdict: str | None = None,
     accept: list[list[str]] | None = None,
-    note: str = "",
 ) -> dict[str, Any]:
     """Return the hidden effects of a campaign and the correct verdict (the truth).
 
@@ -54,7 +53,6 @@ def truth_of(
         verdict: verdict of a correct diagnosis.  The default applies to a design that
             distinguishes the effects.
         accept: other sets of effects that explain the data equally well.
-        note: explanation for the reader of the file.
 
     Returns:
         Plain values with the keys of the practice campaigns' truth.
@@ -75,7 +73,7 @@ def truth_of(
         "accept_verdicts": sorted({verdict, *([AMBIGUOUS] if accept else [])}),
         "effects": [_effect(campaign, effect) for effect in campaign.effects],
         "outside": "; ".join(outside) or None,
-        "note": note,
+        "note": "",
         "contribution_rms": dict(campaign.strength),
         "total_contribution_rms": _rms(added),
         "noise_rms": 1.0,

@@ -18,56 +18,20 @@ from forcefit.validation.diagnosis.responses import responses
 from forcefit.validation.diagnosis.sensitivities import Sensitivities
 from forcefit.validation.diagnosis.signatures import conditions_of
 from tests.bar_for_tests import BEAM, LENGTH, along, bar
-from tests.campaigns_for_tests import ARM
 
 LINE = CandidateShape("powers", ("0", "1"))
 
 
-def arm_sensitivities(folder, bend):
-    """Sensitivities of the planar arm at twelve angles q of the first drive."""
-    table = folder / "commands.csv"
-    q = np.linspace(0.2, 1.7, 12).round(6)
-    lines = [f"m{i},{a:.6f},{bend * a * a:.6f}" for i, a in enumerate(q)]
-    table.write_text("\n".join(["id,q.one,q.two", *lines]) + "\n")
-    (folder / "arm.toml").write_text(ARM)
-    campaign = read_commands(table, read_robot(folder / "arm.toml"))
-    conditions = conditions_of(campaign)
-    return Sensitivities(conditions, responses(conditions)), q
+def one_at(components):
+    part = CandidatePart("reading", components, "q.drive")
+    return Candidate((part,), "screw", LINE)
 
 
-@pytest.fixture
-def sensitivities(tmp_path):
-    """The second drive at rest."""
-    return arm_sensitivities(tmp_path, bend=0.0)
-
-
-def one_at(components, shape=LINE):
-    part = CandidatePart("reading", components, "q.one")
-    return Candidate((part,), "screw", shape)
-
-
-@pytest.mark.parametrize("units", [1.0, 1e-12])
-def test_function_parameters_are_named_by_component(sensitivities, units):
-    """T x and its standard deviations, for units of any size."""
-    s, _ = sensitivities
-    _, mixed = s.basis(("q.one",), LINE)
-    x, std = units * np.array([1.0, -2.0, 0.5, 3.0]), units * np.full(4, 0.1)
-    (function,) = s.fitted(one_at(("tx", "rz")), x, std)
-    assert function.components == ("tx", "rz")
-    expected = dict(zip(("tx.0", "tx.1"), mixed @ x[:2], strict=True)) | dict(
-        zip(("rz.0", "rz.1"), mixed @ x[2:], strict=True)
-    )
-    assert function.parameters == pytest.approx(expected, rel=1e-9, abs=0)
-    spread = 0.1 * units * np.linalg.norm(mixed, axis=1)
-    assert [function.std[f"rz.{k}"] for k in "01"] == pytest.approx(
-        spread, rel=1e-9, abs=0
-    )
-
-
-def test_components_below_their_deviation_are_omitted(sensitivities):
+def test_components_below_their_deviation_are_omitted():
     """Parameters of a single component have no prefix."""
-    s, _ = sensitivities
-    _, mixed = s.basis(("q.one",), LINE)
+    conditions = conditions_of(bar())
+    s = Sensitivities(conditions, responses(conditions))
+    _, mixed = s.basis(("q.drive",), LINE)
     x = np.array([1e-12, 0.0, 1e-3, 2e-3])
     (function,) = s.fitted(one_at(("tx", "rz")), x, np.full(4, 1e-4))
     assert function.components == ("rz",)

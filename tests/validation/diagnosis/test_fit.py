@@ -79,41 +79,33 @@ def test_intervals_cover_the_true_value_at_the_stated_rate():
     assert 1e-3 < binom.cdf(inside, 60, 0.6827) < 1 - 1e-3
 
 
-def test_fitted_offset_is_exact_for_a_large_deflection():
-    """The drive turns by a where K (a - e) = F L cos(q + a)."""
-    K, F, e = 2e3, 150.0, 4e-3
+def deflected(e, noise):
+    """A bar under a force F, whose drive turns by a: K (a - e) = F L cos(q + a)."""
+    K, F, rows = 2e3, 150.0, len(noise)
     spring = np.diag([np.inf, np.inf, K, np.inf, np.inf, np.inf])
-    plain = bar([0, 0, 0, 0, F, 0], spring=spring)
-    q = plain.coordinates[:, 0]
+    q = bar(rows=rows).coordinates[:, 0]
     turn = np.array([
         brentq(lambda a, b=b: K * (a - e) - F * LENGTH * np.cos(b + a), -1, 1)
         for b in q
     ])
-    seen = np.zeros((8, 6))
-    seen[:, 2] = turn
-    seen[:, 3] = LENGTH * (np.cos(q + turn) - np.cos(q))
-    seen[:, 4] = LENGTH * (np.sin(q + turn) - np.sin(q))
-    campaign = bar([0, 0, 0, 0, F, 0], seen, spring=spring)
-    fit = machine(campaign, TURNED)
+    seen = noise.copy()
+    seen[:, 2] += turn
+    seen[:, 3] += LENGTH * (np.cos(q + turn) - np.cos(q))
+    seen[:, 4] += LENGTH * (np.sin(q + turn) - np.sin(q))
+    return bar([0, 0, 0, 0, F, 0], seen, rows=rows, spring=spring)
+
+
+def test_fitted_offset_is_exact_for_a_large_deflection():
+    e = 4e-3
+    fit = machine(deflected(e, np.zeros((8, 6))), TURNED)
     assert fit.x == pytest.approx([e], rel=1e-4)
     assert np.abs(fit.residual).max() < 0.5  # sigma
 
 
 def test_finite_model_needs_no_geometric_stiffening():
-    """K a = F L cos(q + a):
-    the load's arm turns so far that first order is not enough."""
-    K, F, rows = 2e3, 150.0, 20
-    spring = np.diag([np.inf, np.inf, K, np.inf, np.inf, np.inf])
-    plain = bar([0, 0, 0, 0, F, 0], rows=rows, spring=spring)
-    q = plain.coordinates[:, 0]
-    turn = np.array([
-        brentq(lambda a, b=b: K * a - F * LENGTH * np.cos(b + a), -1, 1) for b in q
-    ])
-    seen = np.random.default_rng(5).normal(size=(rows, 6)) * SIGMA
-    seen[:, 2] += turn
-    seen[:, 3] += LENGTH * (np.cos(q + turn) - np.cos(q))
-    seen[:, 4] += LENGTH * (np.sin(q + turn) - np.sin(q))
-    campaign = bar([0, 0, 0, 0, F, 0], seen, rows=rows, spring=spring)
+    """The arm of the load turns so far that the first order is not sufficient."""
+    noise = np.random.default_rng(5).normal(size=(20, 6)) * SIGMA
+    campaign = deflected(0.0, noise)
     linear, finite = diagnose(campaign), diagnose(campaign, finite=True)
     assert (linear.verdict, linear.claimed) == ("explained", ("geometric_stiffening",))
     assert finite.verdict == "none_needed"

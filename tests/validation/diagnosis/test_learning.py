@@ -6,13 +6,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from forcefit.assembly.files.robot_file import read_robot
 from forcefit.assembly.model.robot import Frame, Robot
 from forcefit.validation.campaign.campaign_file import read_campaign
-from forcefit.validation.correction.prediction import predict
 from forcefit.validation.diagnosis.diagnose import diagnose
 from forcefit.validation.diagnosis.results import table
-from forcefit.validation.diagnosis.saving import save
 from forcefit.validation.diagnosis.sentence import sentence
 from forcefit.validation.synthetic.design import CampaignDesign
 from forcefit.validation.synthetic.generator import generate_campaign, write_campaign
@@ -62,14 +59,6 @@ def test_geometric_errors_are_not_reported_as_effects(inaccurate):
     assert only["combinations"] == pytest.approx(told["identifiable"])
 
 
-def assert_saved_predicts(found, tmp_path):
-    """The file read again and predicted with leaves the errors that were printed."""
-    save(found, tmp_path / "robot.toml")
-    robot = read_robot(tmp_path / "robot.toml")
-    told = predict(replace(found.campaign, robot=robot).take(~found.outliers))
-    assert told.error.normalised == pytest.approx(found.saved.normalised, rel=1e-6)
-
-
 @pytest.fixture(scope="module")
 def diagnosed(tmp_path_factory):
     """The planar arm, with changes to what was read; each once."""
@@ -89,25 +78,22 @@ def diagnosed(tmp_path_factory):
     return find
 
 
-def test_effect_outside_the_library_is_learned_as_a_function(diagnosed, tmp_path):
+def test_effect_outside_the_library_is_learned_as_a_function(diagnosed):
     """The stand deforms with the square of the load: 6 sigma at 30 N.
 
     Bodies of a planar arm that move with the load are equivalent.
     """
     found = diagnosed("stand")
-    assert found.verdict == "learned"
+    assert (found.verdict, found.claimed) == ("learned", ())
+    assert "with learned functions" in sentence(found)
     told = table(found)["learned"]
     assert {(one["form"], *one["variables"]) for one in told} == {
         ("powers", "load.force")
     }
-    names = [c for one in told for c in one["components"]]
-    assert sorted(names) == ["rx", "ry", "rz", "tx", "ty", "tz"]
-    signs = dict(
-        zip(("rx", "ry", "rz", "tx", "ty", "tz"), (1, -1, 1, -1, 1, 1), strict=True)
-    )
+    signs = {"rx": 1, "ry": -1, "rz": 1, "tx": -1, "ty": 1, "tz": 1}
+    assert sorted(c for one in told for c in one["components"]) == [*signs]
     sizes = dict(zip(signs, SIGMA, strict=True))
     for one in told:
-        assert {"label", "formula", "equivalent_places", "parts_of_range"} <= one.keys()
         for name in one["components"]:
             key = "2" if len(one["components"]) == 1 else f"{name}.2"
             if one["where"] in ("reading", "base"):
@@ -116,7 +102,6 @@ def test_effect_outside_the_library_is_learned_as_a_function(diagnosed, tmp_path
                 assert abs(value - truth) < 3 * std < abs(truth) / 3
     assert told[-1]["after"]["normalised"] == found.after.normalised < 1.2
     assert found.before.normalised > 4
-    assert_saved_predicts(found, tmp_path)
 
 
 @pytest.mark.slow

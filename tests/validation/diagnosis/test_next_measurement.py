@@ -45,29 +45,6 @@ def test_measurement_at_another_temperature_separates_expansion_from_length():
     assert "link_length and thermal_expansion" in found.why
 
 
-@pytest.mark.parametrize(("power", "worth"), [(1.5, True), (0.9, False)])
-def test_next_measurement_is_suggested_if_its_non_centrality_is_at_least_one(
-    power, worth
-):
-    """Expansion against length, for an expansion of given power."""
-    R, T = 8, 5.0
-    heat = {"temperature": np.full(R, T)}
-    plain = bar(link=BEAM, **heat)
-    alpha = np.sqrt(power * (1 + ((T + 10) / T) ** 2 / R)) * SIGMA[3] / (LENGTH * 10)
-    campaign = bar(link=BEAM, measured=fit_of(plain, alpha * LENGTH * T), **heat)
-    here = conditions_of(campaign)
-    longer, warmer = machine(campaign, LONGER), machine(campaign, WARMER)
-    found = next_measurement(campaign, here, longer, [warmer])
-    assert (found is not None) == worth
-
-
-def test_equal_models_have_no_next_measurement():
-    campaign = bar(link=BEAM)
-    here = conditions_of(campaign)
-    fit = machine(campaign, LONGER)
-    assert next_measurement(campaign, here, fit, [fit]) is None
-
-
 def test_next_configuration_lies_between_the_measured_ones():
     """An encoder offset and an eccentricity are equal at 0 and at 2 pi: e = e cos q.
 

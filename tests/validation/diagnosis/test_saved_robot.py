@@ -14,7 +14,6 @@ from forcefit.validation.diagnosis.diagnose import diagnose
 from forcefit.validation.diagnosis.fit import fit_machine
 from forcefit.validation.diagnosis.prediction import predicted, residual_of
 from forcefit.validation.diagnosis.results import table
-from forcefit.validation.diagnosis.saved_covariance import read_covariance
 from forcefit.validation.diagnosis.saving import save
 from forcefit.validation.diagnosis.sequence import errors_of
 from tests.elastic_arm_for_tests import arm, commanded
@@ -44,7 +43,7 @@ def found():
 @pytest.fixture(scope="module")
 def saved(found, tmp_path_factory):
     path = tmp_path_factory.mktemp("saved") / "robot.toml"
-    save(found, path)
+    found.save(path)
     return read_robot(path)
 
 
@@ -66,15 +65,6 @@ def test_table_of_a_diagnosis_has_the_printed_errors(found):
     rms = np.sqrt(np.nanmean(shift**2))
     assert rms == pytest.approx(found.saved.position, rel=1e-9)
     assert table["held_out", ""].sum() == found.held.rows.sum()
-
-
-def test_method_save_writes_the_same_files_as_the_command(found, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    save(found, "robot.toml")
-    files = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    found.save(tmp_path / "robot.toml")
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == files
-    assert sorted(files) == ["robot.npz", "robot.toml"]
 
 
 def test_error_after_comes_from_a_fit_without_the_held_out_rows(found):
@@ -176,15 +166,6 @@ def test_predicted_intervals_cover_nine_readings_in_ten(found, saved):
     inside = np.mean(np.abs(left) < 1.645 * total)
     assert 0.845 < inside < 0.955
     assert told.spread.max() > 0.1 * SIGMA.min()
-
-
-def test_saved_robot_has_the_covariance_of_its_parameters(found, saved):
-    """The covariance includes every fitted parameter."""
-    known = read_covariance(saved)
-    assert len(known.numbers) == len(found.fit.x)
-    assert np.linalg.eigvalsh(known.covariance).min() > -1e-20
-    names = {(n.kind, n.owner) for n in known.numbers}
-    assert any(kind == "geometric_error" for kind, _ in names)
 
 
 def test_unmeasured_components_are_reported_as_uncertain(tmp_path):
