@@ -281,13 +281,6 @@ def test_peak_stress_of_a_heavy_beam_equals_textbook_values(name):
 
 
 @pytest.mark.parametrize("section", SECTIONS)
-def test_hanging_beam_has_its_peak_stress_at_the_top(section):
-    stress, where = peak_beam_stress(section, LENGTH, np.zeros(6), [W, 0, 0])
-    assert stress == pytest.approx(W / constants(section).area, rel=1e-14)
-    assert where[0] == 0.0
-
-
-@pytest.mark.parametrize("section", SECTIONS)
 def test_peak_stress_of_a_heavy_beam_equals_the_largest_of_its_two_parts(section, rng):
     """The wrench of the outer part at any cut loads the inner part's tip."""
     for _ in range(20):

@@ -81,20 +81,6 @@ def test_section_size_equals_the_radius_of_a_round_bar_in_any_unit():
             assert size == pytest.approx(3 * unit / math.sqrt(3), rel=1e-14)
 
 
-@pytest.mark.parametrize("section", [
-    lambda nu: round_section(1.0, nu),
-    lambda nu: rectangular_section(1.0, 2.0, nu),
-    lambda nu: box_section(1.0, 2.0, 0.1, nu),
-    lambda nu: i_section(1.0, 2.0, 0.1, 0.1, nu),
-])  # fmt: skip
-def test_poissons_ratio_outside_minus_one_to_one_half_is_refused(section):
-    for nu in (-0.999, 0.499):
-        assert section(nu).area > 0
-    for nu in (-1.0, -1.5, 0.5, math.nan):
-        with pytest.raises(BadInput, match="must lie between"):
-            section(nu)
-
-
 def test_section_check_accepts_inner_radius_zero_and_refuses_absurd_sizes():
     check_section("link", {"radius": 1.0, "inner_radius": 0.0})
     for size in (1e-41, 1e41, math.nan):

@@ -120,14 +120,6 @@ def test_volume_of_a_sphere_converges_with_the_sixth_power():
     assert error[2] < 1e-6
 
 
-def test_nodes_on_plane_faces_of_a_sphere_sector_remain_on_the_planes():
-    mesh = isoparametric(shell((2, 2, 2), 0.6, 1.0))
-    for number in range(2, 6):
-        solid = shell((1, 1, 1), 0.6, 1.0)
-        nodes = mesh.nodes[np.unique(mesh.faces[mesh.patch == number])]
-        assert np.abs(solid.shapes[number].signed(nodes)[0]).max() < 1e-12
-
-
 @pytest.mark.parametrize(("number", "sign"), [(0, 1), (1, -1)])
 def test_geometry_error_equals_energy_density_times_missing_volume(number, sign):
     """A constant strain: a hollow radius larger by 1e-4 takes volume from the shape, a

@@ -31,7 +31,7 @@ from forcefit.stiffness.report.library_build import (
     entry_key,
     read_spec,
 )
-from forcefit.stiffness.surface.beam_surfaces import SHAPES, shape_beam, shape_surface
+from forcefit.stiffness.surface.beam_surfaces import SHAPES, shape_beam
 from tests.libraries_for_tests import GRID, MATERIAL, SPEC, exact
 from tests.solids_for_tests import bar_solid
 
@@ -106,14 +106,6 @@ def test_estimated_error_between_grid_points_covers_the_true_error(spec, rng):
         gap = np.abs(scaled(K - truth, truth)).max()
         assert gap <= scaled(error, K).max() + 1e-9
         assert gap < 0.02
-
-
-def test_look_up_at_a_grid_point_returns_its_entry(spec):
-    build_library(spec)
-    wanted = {"length": 0.3, "radius": 0.04, "young": 6e10, "poisson": 0.3}
-    K, error = look_up(read_library(spec.folder), wanted)
-    assert np.abs(scaled(K - exact(0.3, 0.04), K)).max() < 1e-9
-    assert scaled(error, K).max() < 1e-9
 
 
 @pytest.mark.parametrize(
@@ -274,26 +266,6 @@ def test_stiffness_for_other_programs_has_translations_first():
         stiffness_for("adam", K)
 
 
-@pytest.mark.parametrize("shape", SHAPES)
-def test_surfaces_of_shapes_enclose_the_volume_of_the_shape(shape):
-    """Polygons of 64 corners lack 0.16 % of a circle's area."""
-    lengths = {
-        "length": 0.3, "radius": 0.03, "inner_radius": 0.02, "tip_radius": 0.02,
-        "width": 0.02, "height": 0.05, "wall": 0.003,
-    }  # fmt: skip
-    r = 0.03**2
-    volumes = {
-        "round": np.pi * r,
-        "tube": np.pi * (r - 0.02**2),
-        "cone": np.pi * (r + 0.03 * 0.02 + 0.02**2) / 3,
-        "rectangle": 0.02 * 0.05,
-        "box": 0.02 * 0.05 - 0.014 * 0.044,
-    }
-    surface = shape_surface(shape, {k: lengths[k] for k in SHAPES[shape]})
-    assert surface.volume == pytest.approx(0.3 * volumes[shape], rel=2e-3)
-    assert surface.repairs == ()
-
-
 @pytest.mark.slow
 def test_library_of_finite_elements_has_stiffness_and_mass_of_the_bar(tmp_path):
     grid = {"length": (0.2,), "radius": (0.03,), "young": (6e10,), "poisson": (0.3,)}
@@ -389,26 +361,3 @@ def test_shipped_square_links_are_slightly_stiffer_than_their_beams(shape):
     ratio = np.diag(K) / np.diag(beam)
     assert ((ratio[[0, 1, 3, 4, 5]] > 1) & (ratio[[0, 1, 3, 4, 5]] < 1.05)).all()
     assert 1 < ratio[2] < 1.06
-
-
-@pytest.mark.parametrize("length", [0.19, 0.46])
-def test_shipped_library_refuses_a_length_outside_its_grid(length):
-    result = CliRunner().invoke(
-        app, ["library", "read", str(SHIPPED / "tube"), "--at", f"length={length}"]
-    )
-    assert isinstance(result.exception, BadInput)
-    assert "outside the grid, expected 0.2 .. 0.45" in str(result.exception)
-
-
-def test_failed_library_build_leaves_no_folder(tmp_path, monkeypatch):
-    path = tmp_path / "spec.toml"
-    path.write_text(SPEC)
-    spec = read_spec(path)
-
-    def fail(*_):
-        raise BadInput("no link")
-
-    monkeypatch.setattr("forcefit.stiffness.report.library_build._solve_point", fail)
-    with pytest.raises(BadInput, match="no link"):
-        build_library(spec)
-    assert not spec.folder.exists()

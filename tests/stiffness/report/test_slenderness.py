@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from forcefit.commands.options import parse_load, parse_sizes
 from forcefit.commands.stiffness import app
 from forcefit.inputs.table import BadInput
 from forcefit.stiffness.beam.beam import beam_compliance
@@ -17,8 +16,7 @@ from forcefit.stiffness.beam.curve_file import read_curve
 from forcefit.stiffness.beam.sections import rectangular_section, round_section
 from forcefit.stiffness.link import LinkStiffness
 from forcefit.stiffness.report.compare import compare_link
-from forcefit.stiffness.report.plot import plot_slenderness
-from forcefit.stiffness.report.results import comparison_results, sweep_text
+from forcefit.stiffness.report.results import comparison_results
 from forcefit.stiffness.report.slenderness import fit_end_effect, sweep_slenderness
 
 MATERIAL = ["--young", "6e10", "--poisson", "0.3"]
@@ -70,17 +68,6 @@ def test_end_effect_error_follows_from_the_errors_of_the_meshes():
     sweep = fit_end_effect([made_up(r, 0.2, 0.7, error=1e-3) for r in (10, 20)])
     expected = 1e-3 * (40 / (1 + 0.01 + 0.7 / 400) + 10 / (1 + 0.02 + 0.7 / 100))
     assert np.diag(sweep.end_effect_error) == pytest.approx(expected, rel=1e-9)
-
-
-def test_slenderness_table_and_figure_show_every_entry():
-    sweep = fit_end_effect([made_up(r, 0.2, 0.7) for r in (5, 10, 20)])
-    text = sweep_text(sweep)
-    assert "RX" in text
-    assert "RY TZ" in text
-    assert text.count("\n") >= 7
-    axes = plot_slenderness(sweep).axes[0]
-    assert "L / r" in axes.get_xlabel()
-    assert axes.get_legend() is not None
 
 
 # K / K_beam - 1 of RX, TX and TZ, nu = 0.3, by Fourier modes in the half section, good
@@ -155,13 +142,6 @@ def test_comparison_of_a_beam_with_another_tip_is_refused():
     other = LinkStiffness("fea", C, tip=[0.41, 0, 0], base=[0, 0, 0])
     with pytest.raises(BadInput, match="the tip of the surface is at"):
         compare_link(one, other, 0.02)
-
-
-def test_wrench_and_ratio_options_are_parsed():
-    np.testing.assert_array_equal(parse_load(["fx=1,mz=-2"], "-w"), [0, 0, -2, 1, 0, 0])
-    with pytest.raises(BadInput, match='unknown component "fq"; valid: fx'):
-        parse_load(["fq=1"], "--wrench")
-    assert parse_sizes("--ratios", "20,5", "1") == [5.0, 20.0]
 
 
 # --- curves from files ---------------------------------------------------------------

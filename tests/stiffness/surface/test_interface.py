@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from forcefit.stiffness.surface.interface import Interface, parse_interface
+from forcefit.stiffness.surface.interface import parse_interface
 from forcefit.stiffness.surface.patches import refuse_common_edges
 from forcefit.stiffness.surface.surface import check_surface
 from tests.solids_for_tests import CUBE, CUBE_TRIANGLES
@@ -96,13 +96,6 @@ def test_interface_distance_is_measured_from_the_plane_or_the_cylinder(rng):
     distance = parse_interface("bore=1,2,3/0,3,4/0.5").distance(places)
     np.testing.assert_allclose(distance, np.abs(np.abs(b) - 0.5), atol=1e-14)
     assert parse_interface("bore=1,2,3/0,3,4/0.5").distance(point) == pytest.approx(0.5)
-
-
-@pytest.mark.parametrize("point", [[0.0, 0.0], [0.0, np.nan, 0.0], [np.inf, 0, 0]])
-def test_interface_point_that_is_not_three_finite_numbers_is_refused(point):
-    words = r"disc: the point must be 3 finite numbers \[m\]"
-    with pytest.raises(BadInput, match=words):
-        Interface("disc", point, [0, 0, 1], 1.0)
 
 
 @pytest.mark.parametrize("radius", [0, -1.0, np.inf, np.nan, "wide", None])

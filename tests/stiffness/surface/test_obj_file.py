@@ -49,13 +49,6 @@ def test_obj_corners_in_every_notation_describe_the_same_cube(tmp_path, content)
     assert faces == [[k - 1 for k in side] for side in SIDES]
 
 
-def test_obj_faces_with_absent_texture_coordinates_are_read(tmp_path):
-    """VTK's reader crashes on such files; the cube has 1e-3 m^3."""
-    path = tmp_path / "cube.obj"
-    path.write_text(cube("{k}/{k}"))
-    assert read_surface(path).volume == pytest.approx(1e-3, rel=1e-12)
-
-
 def test_a_concave_polygon_is_cut_into_triangles_inside_it(tmp_path):
     """An L shape of 0.1 m with arms 0.04 m wide, 0.02 m thick: 0.0064 m^2 x 0.02 m."""
     outline = [(0, 0), (0.1, 0), (0.1, 0.04), (0.04, 0.04), (0.04, 0.1), (0, 0.1)]
@@ -77,16 +70,10 @@ def test_a_concave_polygon_is_cut_into_triangles_inside_it(tmp_path):
     ("v 1 2", r"cube.obj:9: found 'v 1 2', expected v X Y Z"),
     ("v 1 2 z", r"cube.obj:9: found 'v 1 2 z', expected v X Y Z"),
     ("f 1 2 400000000", r"found point 400000000 in a face, expected points 1 to 8"),
+    ("", "contains no triangles, or is not OBJ"),
 ])  # fmt: skip
 def test_wrong_obj_line_is_refused_with_its_number(tmp_path, line, message):
     path = tmp_path / "cube.obj"
     path.write_text(POINTS + line + "\n")
     with pytest.raises(BadInput, match=message):
-        read_surface(path)
-
-
-def test_obj_file_without_faces_is_refused(tmp_path):
-    path = tmp_path / "points.obj"
-    path.write_text(POINTS)
-    with pytest.raises(BadInput, match="contains no triangles, or is not OBJ"):
         read_surface(path)

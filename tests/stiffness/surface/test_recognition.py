@@ -8,7 +8,7 @@ from forcefit.stiffness.surface.patches import find_patches
 from forcefit.stiffness.surface.primitives import Cone, Plane, Torus
 from forcefit.stiffness.surface.surface import check_surface
 from forcefit.stiffness.surface.true_surface import TrueSurface
-from tests.solids_for_tests import cylinder, fillet_profile, rounded_block
+from tests.solids_for_tests import fillet_profile, rounded_block
 
 ENDS = parse_interface("x=-0.1"), parse_interface("x=0.1")
 
@@ -52,13 +52,6 @@ def test_volume_of_a_filleted_plate_is_that_of_its_recognised_shapes():
     assert surface.volume < 0.9995 * volume_of()
     assert true.volume == pytest.approx(volume_of(), rel=2e-6)
     assert true.unsure_volume == 0.0
-
-
-def test_faceted_cylinder_has_the_volume_of_the_true_cylinder():
-    surface = check_surface(*cylinder(0.02, 0.1, 32), "bar")
-    faces = parse_interface("z=0"), parse_interface("z=0.1")
-    true = TrueSurface(surface, find_patches(surface, *faces))
-    assert true.volume == pytest.approx(np.pi * 0.02**2 * 0.1, rel=5e-5)
 
 
 def chamfered(width, flat, drop):

@@ -89,13 +89,6 @@ def test_campaign_of_a_machine_without_drives_has_one_configuration(tmp_path):
     np.testing.assert_array_equal(campaign.repeat, [0, 0])
 
 
-def test_campaign_reads_a_built_in_robot(tmp_path):
-    folder = write_campaign(tmp_path, head="id,pose.tx,pose.tz,meas.tx",
-                            rows=["a,0.05,-0.5,1e-5"],
-                            toml={"robot": '"irsbot2"'})  # fmt: skip
-    assert read_campaign(folder).robot.name == load_robot("irsbot2").name
-
-
 def test_labels_with_spaces_and_letters_of_any_script_are_read(tmp_path):
     """Only control characters are refused."""
     rows = [r.replace(f"m{k}", f"Übung\u00a0{k} é٣") for k, r in enumerate(ROWS, 1)]

@@ -9,8 +9,6 @@ import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from forcefit.assembly.files.robot_file import read_robot
-from forcefit.assembly.model.error_distributions import read_sources
 from forcefit.inputs.table import BadInput
 from forcefit.validation.campaign.campaign_file import read_campaign
 from forcefit.validation.study.study_file import read_study
@@ -139,38 +137,6 @@ def test_garbled_bytes_of_a_campaign_are_read_or_refused_in_one_line(
     assert_read_or_says_why(folder)
 
 
-@QUICK
-@given(
-    bom=st.booleans(), end=st.sampled_from(["\n", "\r\n", "\r", "\n\n"]),
-    delimiter=st.sampled_from([",", ";", "\t", "|"]), quote=st.booleans(),
-    decimal=st.sampled_from([".", ","]), encoding=st.sampled_from(
-        ["utf-8", "latin-1", "utf-16", "utf-32"]),
-    declared=st.sampled_from(["", 'delimiter = ";"\n', 'delimiter = "tab"\n']),
-    comma=st.booleans(), columns=st.lists(st.integers(0, 10), max_size=2),
-    cut=st.integers(0, 12),
-)  # fmt: skip
-def test_table_of_any_dialect_is_read_or_refused_in_one_line(
-    bom, end, delimiter, quote, decimal, encoding, declared, comma, columns, cut,
-    tmp_path,
-):  # fmt: skip
-    """Line endings, byte order marks, encodings,
-    repeated columns, a truncated last row."""
-    table = [line.split(",") for line in TEXT.splitlines()]
-    table = [[*row, *(row[k] for k in columns)] for row in table]
-    table[1][0] = "é1"
-    table[-1] = table[-1][: len(table[-1]) - cut]
-    cells = [[c.replace(".", decimal) if r else c for c in row]
-             for r, row in enumerate(table)]  # fmt: skip
-    if quote:
-        cells = [[f'"{c}"' for c in row] for row in cells]
-    text = end.join(delimiter.join(row) for row in cells) + end
-    said = f"[table]\n{declared}" + ('decimal = ","\n' if comma else "")
-    folder = write_campaign(tmp_path, extra=said)
-    content = ("\ufeff" * bom + text).encode(encoding, "replace")
-    (folder / "measurements.csv").write_bytes(content)
-    assert_read_or_says_why(folder)
-
-
 STUDY = """
 robot = "robot.toml"
 title = "a study"
@@ -194,17 +160,6 @@ tx = 0.0
 [checks]
 maps = true
 reference = false
-"""
-SOURCES = """
-[[errors]]
-frames = ["one", "tool"]
-distribution = "truncated"
-deviation = [0, 0, 0, 1e-5, 1e-5, 1e-5]
-most = [0, 0, 0, 3e-5, 3e-5, 3e-5]
-[[errors]]
-frames = ["two"]
-distribution = "uniform"
-most = [0, 0, 0, 0, 0, 2e-5]
 """
 
 
@@ -236,30 +191,6 @@ def test_unusual_values_of_a_study_are_read_or_refused_in_one_line(
     line = f"{key} = {value}"
     text = re.sub(rf"(?m)^{re.escape(key)} = .*$", lambda _: line, STUDY, count=1)
     assert_study_is_read_or_refused(text.encode(), tmp_path)
-
-
-@QUICK
-@given(content=garbled(SOURCES))
-def test_garbled_bytes_of_error_sources_are_read_or_refused_in_one_line(
-    content, tmp_path
-):
-    folder = write_campaign(tmp_path)
-    path = tmp_path / "errors.toml"
-    path.write_bytes(content)
-    robot = read_robot(folder / "robot.toml")
-    try:
-        sources = read_sources(path, robot)
-    except BadInput as error:
-        assert_one_line(error, tmp_path)
-        return
-    assert np.isfinite(sources.errors(sources.draw(0, 1, 1)[0])).all()
-
-
-@LIGHT
-@given(rows=st.lists(st.lists(st.floats(-1e3, 1e3), min_size=10, max_size=10)))
-def test_arbitrary_numbers_are_read_or_refused_in_one_line(rows, tmp_path):
-    lines = [",".join([f"r{i}", *map(repr, row)]) for i, row in enumerate(rows)]
-    assert_read_or_says_why(write_campaign(tmp_path, HEAD, lines))
 
 
 def test_undamaged_campaign_is_read(tmp_path):

@@ -9,7 +9,6 @@ from forcefit.assembly.model.function import Function
 from forcefit.assembly.robots import load_robot
 from forcefit.validation.correction.session_unknowns import (
     session_unknowns,
-    without_session,
 )
 
 DRIFT = {"amplitude.tx": 3e-5, "amplitude.tz": -4e-5, "time_constant": 900.0}
@@ -26,13 +25,6 @@ def saved():
         effects={"drift": DRIFT, "registration": {"base.tx": 0.1, "tool.tx": 0.02}},
         functions=(STEP, SPRING, FORMULA, OTHER_DAY),
     )
-
-
-def test_without_session_drops_registration_and_functions_of_time(saved):
-    """The robot keeps its tool; functions of a session stay in that session."""
-    alone = without_session(saved)
-    assert alone.effects == {"registration": {"tool.tx": 0.02}}
-    assert alone.functions == (SPRING, OTHER_DAY)
 
 
 def test_session_drift_starts_at_its_saved_value_and_a_step_at_zero(saved):
@@ -62,11 +54,3 @@ def test_prior_size_of_each_power_of_time_is_its_saved_value(saved):
     robot = replace(saved, effects={}, functions=(cubic,))
     unknowns = session_unknowns(robot, (), clock=True)
     assert unknowns.prior**-0.5 == pytest.approx([1e-4, 2e-8, 1e-12])
-
-
-def test_without_a_clock_only_requested_unknowns_are_fitted(saved):
-    unknowns = session_unknowns(saved, ("registration", "zeros"), clock=False)
-    owners = {owner for owner, _ in unknowns.names}
-    assert owners == {"registration", "encoder_offset"}
-    assert len(unknowns) == 12
-    assert unknowns.prior == pytest.approx([0.0] * 6 + [1e6] * 6)

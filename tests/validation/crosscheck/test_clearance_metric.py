@@ -16,7 +16,6 @@ from forcefit.validation.crosscheck.crosscheck import crosscheck
 from forcefit.validation.crosscheck.verdict import verdict
 from forcefit.validation.multibody.contact import (
     ClearanceCone,
-    JointClearance,
     cone_energy,
     cone_forces,
     joint_clearance,
@@ -91,23 +90,6 @@ def test_pin_in_two_bushes_touches_where_its_axis_reaches_the_radius():
     both = push(far, [0, 7.5e-4, 0, 3e-5, 0, 0], 1e-4)
     assert both[3] > 0
     assert both[1] == pytest.approx(0.04 * both[3])
-
-
-def test_joint_clearance_follows_the_robot_file():
-    """An absent bound is zero;
-    the own motion of a passive joint is free or bounded by spin."""
-    clearance = Clearance(radial=1e-5, tilt=2e-4, spin=0.01)
-    fixed = joint_clearance(Frame("f", clearance=clearance), scale=0.5)
-    assert [(c.rows, c.size) for c in fixed.cones] == [
-        ((0, 1), 1e-4), ((2,), 5e-3), ((3, 4), 5e-6)
-    ]  # fmt: skip
-    assert fixed.free == ()
-    pin = Frame("p", joint="revolute", clearance=replace(clearance, spin=None))
-    assert joint_clearance(pin).free == (2,)
-    assert sorted(joint_clearance(pin).unlocked) == [0, 1, 2, 3, 4]
-    slide = Frame("s", joint="prismatic", clearance=Clearance(axial=0.02, radial=1e-5))
-    assert [c.rows for c in joint_clearance(slide).cones] == [(3, 4), (5,)]
-    assert joint_clearance(Frame("none")) == JointClearance((), ())
 
 
 @pytest.mark.parametrize("misfit", [5e-5, 1e-4])

@@ -152,14 +152,7 @@ def test_crosscheck_of_stiffness_reports_both_compliances(run):
     assert status == 0
     assert answer["passed"]
     assert np.array(answer["compliance"]["multibody"]).shape == (6, 6)
-    status, _, err = run(
-        "validation",
-        "crosscheck",
-        "four_bar",
-        "--state",
-        "exact",
-        "--figure",
-        "x.png",
-    )
+    words = ["validation", "crosscheck", "four_bar", "--state", "exact"]
+    status, _, err = run(*words, "--figure", "x.png")
     assert status == 2
     assert "--state: found together with" in err

@@ -118,15 +118,6 @@ def test_check_of_zero_against_a_signal_fails():
     assert verdict(comparison) == "failed"
 
 
-def test_comparison_without_checks_has_the_verdict_no_signal():
-    class Empty(Found):
-        def __post_init__(self):
-            self.checks = {}
-
-    comparison = compare_scales((1.0, 0.5), lambda s: Scale(s, s, s), Empty)
-    assert verdict(comparison) == "no signal"
-
-
 @pytest.mark.parametrize(("check", "expected"), [
     (Check(0.5, 1.0), "ok"),
     (Check(1.5, 1.0), "fails"),

@@ -500,17 +500,6 @@ def test_orientation_of_one_target_is_that_of_the_platform(lab, run):
 # -- cells and clocks ---------------------------------------------------------------
 
 
-def test_delimiter_is_the_one_of_most_lines(tmp_path):
-    """A preamble with other delimiters and quoted delimiters do not count."""
-    path = tmp_path / "a.txt"
-    path.write_text('a title, of a file\n"p, 1";2;3\n"p, 2";4;5\n"p, 3";6;7\n')
-    cells = [cells for _, cells in read_sheet(path).rows]
-    assert cells[1:] == [["p, 1", "2", "3"], ["p, 2", "4", "5"], ["p, 3", "6", "7"]]
-    path.write_text("p1 1,5 2,5 3,5\np2 1,5 2,5 4,5\n")
-    sheet = read_sheet(path, ",")
-    assert (sheet.decimal, sheet.rows[0][1]) == (",", ["p1", "1,5", "2,5", "3,5"])
-
-
 def test_binary_file_is_refused(tmp_path):
     path = tmp_path / "a.txt"
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(40) + b"name,x,y,z")

@@ -24,7 +24,6 @@ from forcefit.validation.multibody.simulation import (
     SimulationModel,
     closing_sequence,
     simulate_assembly,
-    without_clearance,
 )
 from tests.multibody_for_tests import (
     FLAT,
@@ -164,13 +163,6 @@ def test_spring_link_without_matrix_is_refused():
         simulate_assembly(coaxial(np.zeros(6)), model=SimulationModel("shell"))
 
 
-def test_removing_clearances_keeps_passive_joints_free():
-    clearance = Clearance(radial=1e-5, spin=0.1)
-    robot = Robot("pin", "pin", (Frame("pin", joint="revolute", clearance=clearance),))
-    assert without_clearance(robot).frames[0].clearance is None
-    assert without_clearance(robot).frames[0].passive
-
-
 def test_logarithm_inverts_the_exponential_map(rng):
     """Also near the angle 1e-3, below which the series is used."""
     for size in (0.0, 1e-9, 0.999e-3, 1.001e-3, 0.1, 3.0):
@@ -208,19 +200,6 @@ def resident():
     status = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
     (line,) = (line for line in status if line.startswith("VmRSS"))
     return int(line.split()[1]) / 1024
-
-
-@pytest.mark.slow
-def test_repeated_simulations_do_not_leak_memory(rng):
-    """Resident memory in MiB after the first fifty simulations;
-    a leaked model takes half a MiB."""
-    posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
-    for _ in range(50):
-        simulate_assembly(posture)
-    before = resident()
-    for _ in range(500):
-        simulate_assembly(posture)
-    assert resident() - before < 10
 
 
 @pytest.mark.slow

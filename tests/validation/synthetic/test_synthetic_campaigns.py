@@ -30,7 +30,6 @@ from forcefit.validation.synthetic.draws import (
     SLIDING,
     NotApplicable,
     draw_effect,
-    strengthened,
 )
 from forcefit.validation.synthetic.effects import LIBRARY, Row
 from forcefit.validation.synthetic.equivalents import alternatives
@@ -326,21 +325,6 @@ def test_effect_that_the_robot_cannot_have_is_refused():
         CampaignDesign(configurations=5, rows=4)
     with pytest.raises(BadInput, match="temperature"):
         CampaignDesign(temperature="warm")
-
-
-def test_strengthened_effects_keep_shape_parameters():
-    """Springs become softer and errors larger;
-    phases, exponents and time constants stay."""
-    given = {"a.coefficient": 1e6, "a.exponent": 1.5}
-    stronger = strengthened(Hidden("contact_stiffening", given), 4.0).parameters
-    assert stronger == {"a.coefficient": 1e6 / 8, "a.exponent": 1.5}
-    given = {"a.amplitude": 1e-4, "a.phase": 1.0}
-    eccentric = strengthened(Hidden("encoder_eccentricity", given), 2.0).parameters
-    assert eccentric == {"a.amplitude": 2e-4, "a.phase": 1.0}
-    gain = strengthened(Hidden("load_gain", {"factor": 0.9, "offset.fz": 1.0}), 2.0)
-    assert gain.parameters == pytest.approx({"factor": 0.8, "offset.fz": 2.0})
-    softer = strengthened(Hidden("modulus_scale", {"a": 0.8}), 2.0).parameters
-    assert softer == pytest.approx({"a": 1 / 1.5})
 
 
 @pytest.mark.slow
