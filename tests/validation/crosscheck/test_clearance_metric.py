@@ -160,19 +160,6 @@ def test_crosscheck_of_a_joint_with_a_ball_passes():
     assert check.passed, check.checks
 
 
-@pytest.fixture(scope="module")
-def irsbot2():
-    """Errors of the paper's size, all positive."""
-    robot = load_robot("irsbot2")
-    rng = np.random.default_rng(3)
-    errors = np.zeros((len(robot.frames), 6))
-    erring = ("elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip")
-    for i, frame in enumerate(robot.frames):
-        if frame.name.split(".")[-1] in erring:
-            errors[i] = rng.uniform(0, 1, 6) * ([2e-2] * 3 + [2e-4] * 3)
-    return robot.with_errors(errors)
-
-
 @pytest.mark.slow
 def test_crosscheck_of_the_papers_robot_with_clearances_passes(irsbot2):
     """The models agree within 2 % as errors vanish;

@@ -209,17 +209,6 @@ def test_smaller_scales_are_added_until_the_limit_at_scale_zero_is_determined(ir
     assert table["verdict"] == "passed"
 
 
-@pytest.mark.parametrize("name", [
-    "lever arm one per cent short",
-    pytest.param("links half a per cent stiff", marks=pytest.mark.slow),
-])  # fmt: skip
-def test_crosscheck_on_two_scales_fails_for_a_broken_term(irsbot2, name, broken):
-    broken(MUTATIONS[name])
-    at = place_robot(irsbot2, {"tx": 0.1, "tz": -0.45})
-    check, _ = attempt("irsbot2", lambda: crosscheck(at, (1.0, 0.5), LOAD))
-    assert check is None or check.table()["verdict"] == "failed"
-
-
 def test_crosscheck_without_clearances_removes_them_from_both_models():
     """With its clearance of 10 um, the error of 8 um would store no energy."""
     check = crosscheck(triangle([0, 0, 0, 8e-6, 0, 0]))

@@ -186,23 +186,6 @@ def test_couple_of_dead_forces_acts_with_the_cosine_of_the_angle():
     assert 2 * turn == pytest.approx(np.cos(turn), rel=1e-9)
 
 
-def test_infinite_joint_stiffness_locks_its_axis():
-    """A drive that is compliant only about z turns by M / k."""
-    K = np.diag([np.inf, np.inf, 2e3, np.inf, np.inf, np.inf])
-    frames = (
-        Frame(
-            "drive", joint="revolute", actuated=True, position=0.5, joint_stiffness=K
-        ),
-        Frame("tip", "drive", translation=[0.3, 0, 0]),
-    )
-    posture = home_posture(Robot("drive", "tip", frames))
-    assembly = simulate_assembly(posture, load=[5.0, 7.0, 2e-3, 0, 0, 11.0])
-    np.testing.assert_allclose(assembly.platform_screw[:3], [0, 0, 1e-6], atol=1e-14)
-    np.testing.assert_allclose(
-        assembly.joint_screws[0], 1e-6 * np.eye(6)[2], atol=1e-14
-    )
-
-
 @pytest.mark.parametrize("clearance", [None, Clearance(radial=1e-5)])
 def test_bearing_is_free_about_its_axis_and_elastic_in_other_directions(clearance):
     """A bar between a bearing and a wall that is misaligned by up to 3e-3 rad and 0.2

@@ -30,7 +30,6 @@ from tests.multibody_for_tests import (
     ROUND,
     coaxial,
     random_stiffness,
-    tip_stiffness,
 )
 
 pytestmark = pytest.mark.exudyn
@@ -101,25 +100,6 @@ def test_turning_the_whole_robot_turns_its_results(rng):
         R.T @ there.platform_screw[3:],
     ])
     np.testing.assert_allclose(screw, placed.platform_screw, rtol=0, atol=1e-10)
-
-
-def test_spring_links_agree_with_beam_links_to_first_order(rng):
-    """At a tenth of the errors, the difference is a hundredth."""
-    errors = rng.uniform(-2e-3, 2e-3, (3, 6))
-    posture = overconstrained(rng, errors)
-    K = {
-        frame.name: tip_stiffness(frame)
-        for frame in posture.robot.frames
-        if frame.link is not None
-    }
-    difference = []
-    for scale in (1.0, 0.1):
-        beams = simulate_assembly(posture, scale)
-        springs = simulate_assembly(posture, scale, SimulationModel("spring", K))
-        difference.append(np.abs(beams.platform_screw - springs.platform_screw).max())
-    slope = math.log10(difference[0] / difference[1])
-    assert difference[0] > 1e-9
-    assert slope > 1.8
 
 
 def test_repeated_simulations_are_bit_identical(rng):
