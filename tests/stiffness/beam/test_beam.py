@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from forcefit.stiffness.beam.beam import beam_compliance, section_axes
+from forcefit.stiffness.beam.beam import beam_compliance
 from forcefit.stiffness.beam.sections import Section, rectangular_section, round_section
 from forcefit.stiffness.link import LinkStiffness, inverted, scaled, turn_link
 from forcefit.stiffness.screws import rotation_matrix, screw_map
@@ -90,14 +90,6 @@ def test_section_height_is_along_the_up_direction():
     C = beam_compliance(1.0, plate, E, NU, axis=[1, 0, 0], up=[0, 0, 1], theory="euler")
     assert C[5, 5] == pytest.approx(1 / (3 * E * 0.01 * 0.1**3 / 12), rel=1e-13)
     assert C[4, 4] == pytest.approx(C[5, 5] * 100, rel=1e-12)
-
-
-def test_section_axes_take_y_as_up_and_z_for_a_beam_along_y():
-    np.testing.assert_array_equal(section_axes([2, 0, 0])[:, 2], [0, 1, 0])
-    np.testing.assert_array_equal(section_axes([0, -3, 0])[:, 2], [0, 0, 1])
-    axes = section_axes([1, 2, 3], [0.3, 0.1, 1.0])
-    np.testing.assert_allclose(axes.T @ axes, np.eye(3), atol=1e-15)
-    assert np.linalg.det(axes) == pytest.approx(1)
 
 
 def test_round_section_constants_equal_hand_calculation():

@@ -24,7 +24,7 @@ from forcefit.stiffness.beam.sections import (
 from forcefit.stiffness.fem.condensation import condense
 from forcefit.stiffness.fem.elements import isoparametric, lame
 from forcefit.stiffness.link import inverted, scaled
-from forcefit.stiffness.screws import rotation_matrix, screw_map
+from forcefit.stiffness.screws import screw_map
 from tests.solids_for_tests import bar_solid, masked_solid
 
 E, NU = 60e9, 0.3
@@ -88,16 +88,6 @@ def test_compliance_of_a_cone_equals_closed_forms():
         return (L - x) ** 2 / (E * s.I_y) + 1 / (G * s.area * s.shear_y)
 
     assert C[3, 3] == pytest.approx(quad(bent, 0, L, epsrel=1e-12)[0], rel=1e-9)
-
-
-def test_turning_the_curve_turns_its_compliance(rng):
-    R = rotation_matrix(rng.normal(size=3))
-    turn = np.array([0.3, -0.4, 0.2])
-    spoke = np.cross(turn, [1, 2, 3.0]) / 5
-    plain = curve_compliance([arc_piece(spoke, [0, 0, 0], turn, CROOKED)], E, NU)
-    turned = arc_piece(R @ spoke, [0, 0, 0], R @ turn, CROOKED)
-    A = np.kron(np.eye(2), R)
-    assert_same(curve_compliance([turned], E, NU), A @ plain @ A.T, 1e-12)
 
 
 def line(start=0.0, section=BAR):

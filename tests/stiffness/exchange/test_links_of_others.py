@@ -121,7 +121,7 @@ def test_textbook_beam_from_every_program_has_its_stiffness(name, write, tmp_pat
     write(path, textbook_beam())
     link = import_link(path, unit="mm")
     assert_same(link.stiffness, expected_stiffness())
-    if name != "six.npy":  # six rows do not tell the base
+    if name != "six.npy":  # six rows do not contain the base
         assert link.base - link.tip == pytest.approx([-0.5, 0, 0], abs=1e-9)
 
 

@@ -73,6 +73,17 @@ def test_estimated_error_between_family_sizes_covers_the_closed_form(parts, leng
     assert np.abs(scaled(error, truth)).max() < 0.02
 
 
+def test_estimated_error_covers_an_entry_that_is_left_out(parts):
+    folder, _ = parts
+    build_library(read_spec(folder / "spec.toml"))
+    entries = read_library(folder / "links")
+    for left in entries[1:-1]:  # those between others
+        others = [one for one in entries if one is not left]
+        K, error = look_up(others, {"length": left.parameters["length"]})
+        gap = np.abs(scaled(K - left.stiffness, left.stiffness))
+        assert gap.max() <= scaled(error, left.stiffness).max()
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [

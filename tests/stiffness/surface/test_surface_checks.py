@@ -64,21 +64,6 @@ def test_unit_option_is_ignored_for_a_step_file(tmp_path, monkeypatch):
     assert tenth == pytest.approx(0.1 * read_surface("bar.stp", "dm").diagonal)
 
 
-@pytest.mark.parametrize(("size", "unit"), [(1e-4, "m"), (100.0, "mm")])
-def test_step_file_with_a_wrong_unit_is_refused_with_the_likely_unit(
-    size, unit, monkeypatch
-):
-    """A part of 0.1 m whose numbers are metres, in a file that states millimetres."""
-    points, triangles = cylinder(0.2 * size, size)
-    monkeypatch.setattr(
-        surface_module, "_read_triangles", lambda *_: (points, triangles, None)
-    )
-    with pytest.raises(
-        BadInput, match=f'"stated in the file"; is the file in "{unit}"'
-    ):
-        read_surface("bar.step", "inch")
-
-
 def test_points_that_belong_to_no_triangle_are_ignored():
     """Such a point may be NaN or far away."""
     points = np.concatenate([[[np.nan] * 3, [1e6, 0, 0]], CUBE])

@@ -2,11 +2,10 @@
 
 import pytest
 
-from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.robots import load_robot
 from forcefit.page.page import Provenance
 from forcefit.validation.assumptions.costs_page import costs_page
-from forcefit.validation.assumptions.over_poses import CostsOverPoses, costs_at
+from forcefit.validation.assumptions.over_poses import CostsOverPoses
 from forcefit.validation.assumptions.validity import Cost
 from tests.pages_for_tests import parse, tiles
 
@@ -44,11 +43,3 @@ def test_report_page_shows_the_largest_error_over_the_poses():
     assert [cell.value for cell in row[1:4]] == [2e-3, 30e-6, 0.001]
     assert row[4].text == "1 of 2 poses"
     assert tiles(text)["Largest error of position"] == ("30 µm", "linear closures.")
-
-
-def test_verdict_of_a_page_without_a_known_error_is_red():
-    """Without errors and a load no model deforms."""
-    costs = costs_at(home_posture(load_robot("four_bar")))
-    text = costs_page(costs, {}, Provenance())
-    assert "<p class='verdict bad'>" in text
-    assert "there is nothing to compare" in text

@@ -178,12 +178,6 @@ def assert_study_is_read_or_refused(content, folder):
 
 
 @QUICK
-@given(content=garbled(STUDY))
-def test_garbled_bytes_of_a_study_are_read_or_refused_in_one_line(content, tmp_path):
-    assert_study_is_read_or_refused(content, tmp_path)
-
-
-@QUICK
 @given(key=st.sampled_from(STUDY_KEYS), value=st.sampled_from(ODD_VALUES))
 def test_unusual_values_of_a_study_are_read_or_refused_in_one_line(
     key, value, tmp_path

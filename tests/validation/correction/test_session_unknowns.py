@@ -1,4 +1,4 @@
-"""Unknowns of a session, their prior sizes, and the robot without a session."""
+"""Unknowns of a session and their prior sizes."""
 
 from dataclasses import replace
 
@@ -15,7 +15,6 @@ DRIFT = {"amplitude.tx": 3e-5, "amplitude.tz": -4e-5, "time_constant": 900.0}
 STEP = Function("reading", ("tx",), ("cov.time",), "step", {"size": 2e-5, "at": 600.0})
 SPRING = Function("base", ("rz",), ("load.mz",), "powers", {"1": 1e-6})
 FORMULA = replace(STEP, form="formula", formula="a*time", parameters={"a": 1e-9})
-OTHER_DAY = replace(STEP, session="monday")
 
 
 @pytest.fixture
@@ -23,7 +22,7 @@ def saved():
     return replace(
         load_robot("arm6"),
         effects={"drift": DRIFT, "registration": {"base.tx": 0.1, "tool.tx": 0.02}},
-        functions=(STEP, SPRING, FORMULA, OTHER_DAY),
+        functions=(STEP, SPRING, FORMULA),
     )
 
 

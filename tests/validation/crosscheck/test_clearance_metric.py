@@ -9,11 +9,13 @@ import pytest
 
 from forcefit.assembly.exact.exact import solve_exact
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.linear import assembled
 from forcefit.assembly.model.error_distributions import tolerance_sources
 from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, Robot
 from forcefit.assembly.robots import load_robot
 from forcefit.validation.crosscheck.crosscheck import crosscheck
 from forcefit.validation.crosscheck.verdict import verdict
+from forcefit.validation.multibody import exudyn_model
 from forcefit.validation.multibody.contact import (
     ClearanceCone,
     cone_energy,
@@ -119,9 +121,9 @@ def test_time_limit_of_a_simulation_does_not_end_other_simulations(pause, monkey
     posture = coaxial([0, 0, 0, 0, 0, 1e-4], Clearance(axial=3e-5))
     with monkeypatch.context() as patch:
         patch.setattr(
-            "forcefit.validation.multibody.exudyn_model.cone_forces",
+            exudyn_model, "cone_forces",
             lambda *args: time.sleep(pause) or cone_forces(*args),
-        )
+        )  # fmt: skip
         with pytest.raises(OutOfTime, match="time limit was reached while") as error:
             simulate_assembly(posture, model=contacts, time_limit=max(pause, 1e-3))
     assert error.value.robot == "coaxial"
@@ -130,14 +132,11 @@ def test_time_limit_of_a_simulation_does_not_end_other_simulations(pause, monkey
 
 def test_interruption_inside_the_solver_is_raised(monkeypatch):
     """Exudyn turns Ctrl-C into an error of its own."""
-    import forcefit.validation.multibody.exudyn_model
 
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(
-        forcefit.validation.multibody.exudyn_model, "cone_forces", interrupted
-    )
+    monkeypatch.setattr(exudyn_model, "cone_forces", interrupted)
     posture = coaxial([0, 0, 0, 0, 0, 1e-4], Clearance(axial=3e-5))
     with pytest.raises(KeyboardInterrupt):
         simulate_assembly(posture, model=SimulationModel(clearances=True))
@@ -221,13 +220,9 @@ def test_crosscheck_passes_for_weight_together_with_clearance(links):
 
 def test_crosscheck_with_clearances_fails_for_a_wrong_weight(monkeypatch):
     """The weight in the linear model is 5 % too large."""
-    import forcefit.assembly.linear.assembled
-
-    right = forcefit.assembly.linear.assembled.weights
+    right = assembled.weights
     monkeypatch.setattr(
-        forcefit.assembly.linear.assembled,
-        "weights",
-        lambda at, g: right(at, 1.05 * np.asarray(g)),
+        assembled, "weights", lambda at, g: right(at, 1.05 * np.asarray(g))
     )
     check = crosscheck(heavy(), (1.0, 0.5), gravity=[0, 300.0, -900.0], clearances=True)
     assert not check.passed

@@ -13,8 +13,6 @@ from scipy.spatial.transform import Rotation
 from forcefit.inputs.errors import BadInput
 from forcefit.validation.campaign.campaign_file import read_campaign
 from forcefit.validation.exchange.cells import read_sheet
-from forcefit.validation.exchange.clock import parse_time
-from forcefit.validation.exchange.reading import Writing
 from tests.validation.exchange.test_tracker import (
     ANGLES,
     SHIFT,
@@ -183,11 +181,6 @@ def test_rows_without_names_are_assigned_to_targets_in_order(lab, run, before):
     assert_exact(lab, 39)
 
 
-def test_rows_without_readings_are_refused(lab, run):
-    line = refused(lab, run, "\n".join(["NaN " * 9] * 13))
-    assert "found no" in line
-
-
 def test_motive_rigid_body_is_read_without_its_markers(lab, run):
     """Its rotation is a quaternion x, y, z, w; its markers also have its name."""
     lab.targets("A", unit=None, noise_rotation=1e-4)
@@ -207,11 +200,6 @@ def test_motive_rigid_body_is_read_without_its_markers(lab, run):
     table = imported(lab, run, "\n".join([*head, *body]))
     assert table["mounts"]["A"] == pytest.approx(MOUNT.as_rotvec(), abs=1e-9)
     assert_exact(lab, 13)
-
-
-def test_declared_unit_that_contradicts_the_file_is_refused(lab, run):
-    line = refused(lab, run, "Units: Inches\nname;x;y;z\nA;1;2;3")
-    assert 'line 1: found the unit "in", expected "mm" as declared' in line
 
 
 def test_decimal_separator_is_declared_for_each_table(lab, run):
@@ -505,14 +493,3 @@ def test_binary_file_is_refused(tmp_path):
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(40) + b"name,x,y,z")
     with pytest.raises(BadInput, match="found the character NUL"):
         read_sheet(path)
-
-
-@pytest.mark.parametrize(
-    ("text", "seconds"),
-    [
-        ("10:30:00", 37800.0), ("9:30:00 PM", 77400.0), ("10:30:00,25", 37800.25),
-        ("1.1.1970 00:01:00.123456789", 60.123456),
-    ],
-)  # fmt: skip
-def test_times_of_day_and_fractions_are_read(text, seconds):
-    assert parse_time("", text, Writing()) == seconds

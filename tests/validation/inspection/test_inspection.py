@@ -262,14 +262,6 @@ def test_inspect_writes_every_section(tmp_path, rng, run):
     assert "This campaign cannot determine:" in out
 
 
-def test_inspect_refuses_a_folder_without_campaign(tmp_path, run):
-    status, out, err = run("validation", "inspect", tmp_path, "--json", "-")
-    assert status == 2
-    assert out == ""
-    assert "campaign.toml: cannot be read" in err
-    assert "Traceback" not in err
-
-
 def test_dh_table_without_alpha_is_remarked(tmp_path):
     flat = ARM.replace("translation = [1.0, 0, 0]\n", "dh = { a = 1.0 }\n")
     assert flat != ARM

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import forcefit.validation.multibody.exudyn_solver
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from forcefit.assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
+from forcefit.validation.multibody import exudyn_solver
 from forcefit.validation.multibody.exudyn_parts import OutOfTime
 from forcefit.validation.multibody.motion import (
     exponential,
@@ -183,6 +183,19 @@ def resident():
 
 
 @pytest.mark.slow
+def test_repeated_simulations_do_not_leak_memory(rng):
+    """Resident memory in MiB after the first fifty simulations;
+    a leaked model takes half a MiB."""
+    posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
+    for _ in range(50):
+        simulate_assembly(posture)
+    before = resident()
+    for _ in range(500):
+        simulate_assembly(posture)
+    assert resident() - before < 10
+
+
+@pytest.mark.slow
 def test_simulations_with_contacts_and_failures_do_not_leak_memory():
     """User functions of Exudyn hold their model until it is released.
 
@@ -241,9 +254,7 @@ def test_dynamic_relaxation_reaches_the_same_equilibrium(case, rng, monkeypatch)
     else:
         posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
     static = simulate_assembly(posture)
-    monkeypatch.setattr(
-        forcefit.validation.multibody.exudyn_solver, "equilibrate", relax
-    )
+    monkeypatch.setattr(exudyn_solver, "equilibrate", relax)
     relaxed = simulate_assembly(posture)
     assert relaxed.energy == pytest.approx(static.energy, rel=1e-8)
     np.testing.assert_allclose(

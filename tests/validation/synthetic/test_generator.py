@@ -287,21 +287,13 @@ def test_closed_loop_divides_a_misfit_by_stiffness(added):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Noise(rotation=-math.inf), "noise: rotation: found -inf"),
         (lambda: Noise(position=0.0), "noise: position: found 0"),
-        (lambda: Noise(missing=math.nan), "noise: missing: found nan"),
         (lambda: Noise(missing=1.0), "noise: missing: found 1"),
-        (lambda: Noise(outliers=-1), "noise: outliers: found -1"),
         (lambda: Noise(hidden_frame=math.inf), "noise: hidden_frame: found inf"),
-        (lambda: CampaignDesign(reach=-math.inf), "design: reach: found -inf"),
         (lambda: CampaignDesign(size=math.nan), "design: size: found nan"),
         (lambda: CampaignDesign(load=-1.0), "design: load: found -1"),
         (lambda: CampaignDesign(reference_point=(0.0, math.inf, 0.0)),
          "design: reference_point: found inf"),
-        (lambda: generate_campaign(
-            one_link(), {}, CampaignDesign(configurations=2, rows=4),
-            Noise(outliers=5)),
-         "outliers: found 5, expected at most the 4 rows"),
     ],
 )  # fmt: skip
 def test_impossible_noise_or_design_is_refused(make, message):
