@@ -3,15 +3,12 @@
 The same hundred cases of each kind in every run; thousands: ``benchmarks/fuzz.py``.
 """
 
-import re
-
 import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from forcefit.inputs.table import BadInput
 from forcefit.validation.campaign.campaign_file import read_campaign
-from forcefit.validation.study.study_file import read_study
 from tests.campaigns_for_tests import HEAD, NOISE, ROWS, write_campaign
 
 LIGHT = settings(
@@ -19,7 +16,6 @@ LIGHT = settings(
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
-QUICK = settings(LIGHT, max_examples=60)
 TEXT = "\n".join([HEAD, *ROWS, ""])
 ODD_CELLS = st.one_of(
     st.sampled_from([
@@ -41,21 +37,6 @@ PIECES = st.sampled_from([
     b"\xff\xfei\x00d\x00", b"\xe9", b"\xed\xa0\x80", b'"0,5"', b"1e400", b"9" * 400,
     b"\x1a", b"# ", b"id,id,", b"m1,", b"[[", b"]]", b"inf", b"nan", b"-0.0",
 ])  # fmt: skip
-STUDY_KEYS = (
-    "robot", "title", "output", "grid", "scales", "frames", "least", "most", "seed",
-    "signs", "source", "surface", "accuracy", "tx", "maps",
-)  # fmt: skip
-ODD_VALUES = (
-    "true", "-1", "0", "1", "1e308", "1e-320", "nan", "inf", "''", "' '", "'.'", "'/'",
-    "[]", "[1, 'a']", "[[1]]", "[[1], [2, 3]]", "[1, true]", "[nan]", "[1, 1]", "{}",
-    "[{}]", "{a = 1}", "[1e308, 1e-308]", "'tx=1:2:1e-300'", "'tx=nan'", "'tx=1,tx=2'",
-    "'=,='", "'tx'", "'tx=0:1e300:1'", "'tx=0,ty=0,tz=0,rx=0,ry=0,rz=0,q=0'",
-    "[-1, 2, 3, 4, 5, 6]", "9223372036854775807", "18446744073709551616", f"{10**400}",
-    "1979-05-27", "07:32:00", "'irsbot2'", "'$x$'", "'study.toml'", "'\\u0000'",
-    '"\\u0000"', '"\\u0001"', "['one', 'one']", "['one.two']", "['']",
-    "[0, 0, 0, 0, 0, 1e400]", f"'{'x' * 300}'", f"'{'x/' * 1000}'",
-    "[0, 0, 0, 0, 0, nan]", "'\U0001f600'", f"'{'x' * 5000}'", "[1.0, 1.0e-200]",
-)  # fmt: skip
 TOML = (
     'robot = "robot.toml"\nmeasurements = "measurements.csv"\n'
     'reference_point = [0, 0, 0]\nregistration = "known"\n'
@@ -135,56 +116,6 @@ def test_garbled_bytes_of_a_campaign_are_read_or_refused_in_one_line(
     folder = write_campaign(tmp_path)
     (folder / name).write_bytes(data.draw(garbled(text)))
     assert_read_or_says_why(folder)
-
-
-STUDY = """
-robot = "robot.toml"
-title = "a study"
-output = "out"
-grid = "tx=-0.1:0.1:0.1,tz=-0.5"
-scales = [1.0, 0.5]
-[errors]
-frames = ["one", "tool"]
-least = [0, 0, 0, 0, 0, 0]
-most = [1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-4]
-seed = 1
-signs = "literal"
-[links]
-source = "beam"
-surface = "robot.toml"
-base = "z=0"
-tip = "z=1"
-accuracy = 0.005
-[pose]
-tx = 0.0
-[checks]
-maps = true
-reference = false
-"""
-
-
-def assert_study_is_read_or_refused(content, folder):
-    write_campaign(folder)
-    path = folder / "study.toml"
-    path.write_bytes(content)
-    try:
-        study = read_study(path)
-    except BadInput as error:
-        assert_one_line(error, folder)
-        return
-    assert np.isfinite(study.robot.errors).all()
-    assert set(study.asked) <= set(study.checks)
-    assert not list(folder.glob("out*"))
-
-
-@QUICK
-@given(key=st.sampled_from(STUDY_KEYS), value=st.sampled_from(ODD_VALUES))
-def test_unusual_values_of_a_study_are_read_or_refused_in_one_line(
-    key, value, tmp_path
-):
-    line = f"{key} = {value}"
-    text = re.sub(rf"(?m)^{re.escape(key)} = .*$", lambda _: line, STUDY, count=1)
-    assert_study_is_read_or_refused(text.encode(), tmp_path)
 
 
 def test_undamaged_campaign_is_read(tmp_path):
