@@ -11,7 +11,7 @@ from forcefit.stiffness.fem.stress import peak_stress, stress_influence
 from forcefit.stiffness.link import LinkStiffness, inverted
 from forcefit.stiffness.report.plot import plot_stress
 from forcefit.stiffness.report.results import stress_results, stress_text
-from tests.solids_for_tests import bar_solid, masked_solid, with_plane_sides
+from tests.solids_for_tests import bar_solid
 
 R, L = 0.04, 0.4
 AREA, SECOND = np.pi * R**2, np.pi / 4 * R**4
@@ -25,27 +25,6 @@ def solved():
     C = inverted(level.solution.stiffness)
     link = LinkStiffness("test", C, tip=centers[1], base=centers[0])
     return MeshedLink(link, level, centers)
-
-
-def notched(keep):
-    """Stresses in a column of four boxes by two by two, of which some are kept."""
-    solid = with_plane_sides(masked_solid((2, 2, 4), (0.1, 0.1, 0.4), keep))
-    centers = np.array([[0.05, 0.05, 0], [0.05, 0.05, 0.4]])
-    level = solve_level(solid, [Material(60e9, 0.3)], centers, "rigid")
-    link = LinkStiffness("test", inverted(level.solution.stiffness),
-                         tip=centers[1], base=centers[0])  # fmt: skip
-    return stress_influence(MeshedLink(link, level, centers), away=0.05)
-
-
-def test_inner_edges_without_a_fillet_are_reported():
-    """A notch in the column's middle has two; a whole column has none.  Its clamped
-    outlines are outside the region."""
-    whole = notched(lambda x: np.full(len(x), True))
-    notch = notched(lambda x: (x[:, 0] < 0.05) | (np.abs(x[:, 2] - 0.2) > 0.1))
-    assert not whole.reentrant_edges
-    assert "inner edges" not in whole.region
-    assert notch.reentrant_edges
-    assert "inner edges without a fillet" in notch.region
 
 
 @pytest.mark.parametrize(("wrench", "expected"), [

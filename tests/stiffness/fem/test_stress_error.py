@@ -51,6 +51,7 @@ def test_stress_of_a_bar_agrees_within_the_estimated_error(bar, wrench, expected
     peak = peak_stress(bar, wrench, away=4 * R)
     assert abs(peak.von_mises - expected) <= peak.error + 1e-3 * expected
     assert peak.error < 0.25 * expected
+    assert "inner edges" not in peak.region
     assert f"{peak.error / 1e6:.2g} MPa" in stress_text(peak)
     assert stress_results(peak)["error"] == peak.error
 
@@ -81,6 +82,7 @@ def test_peak_at_a_sharp_inner_edge_has_no_error_estimate():
     solid = with_plane_sides(masked_solid((2, 2, 4), (0.1, 0.1, 0.4), keep))
     peak = peak_stress(meshed(solid, [0.05, 0.05, 0.4]), [0, 0, 0, 0, 0, 1], away=0.05)
     assert np.isinf(peak.error)
+    assert "inner edges without a fillet" in peak.region
     assert "none, the peak lies on an inner edge" in stress_text(peak)
     assert stress_results(peak)["error"] is None
 

@@ -12,13 +12,10 @@ import pytest
 
 from forcefit.inputs.table import BadInput
 from forcefit.stiffness.beam.curve import curve_compliance
-from forcefit.stiffness.fem.adaptive_step import estimated_error, solve_level
-from forcefit.stiffness.fem.material import Material
 from forcefit.stiffness.link import inverted, scaled
 from forcefit.stiffness.report import library_build
 from forcefit.stiffness.report.export import stiffness_for, translations_first
 from forcefit.stiffness.report.library import (
-    Entry,
     look_up,
     read_compliance,
     read_entry,
@@ -32,7 +29,6 @@ from forcefit.stiffness.report.library_build import (
 )
 from forcefit.stiffness.surface.beam_surfaces import SHAPES, shape_beam
 from tests.libraries_for_tests import GRID, MATERIAL, SPEC, exact
-from tests.solids_for_tests import bar_solid
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "link_library.toml"
 
@@ -264,36 +260,6 @@ def test_library_of_finite_elements_has_stiffness_and_mass_of_the_bar(tmp_path):
     assert ratio == pytest.approx(1, abs=1e-5)
     assert entry.about["mass"] == pytest.approx(2700 * np.pi * 0.03**2 * 0.2, rel=1e-5)
     assert len(entry.about["geometry"]) == 64
-
-
-def meshed_bar(length):
-    """An entry by finite elements: 30 mm a layer, one element to a radius."""
-    solid = bar_solid(1, round(length / 0.03), 0.02, length)
-    tip = np.array([0, 0, length])
-    centers = np.array([0 * tip, tip])
-    level = solve_level(solid, [Material(6e10, 0.3)], centers, "rigid")
-    error, _ = estimated_error([level.totals()])
-    parameters = {"length": length, "radius": 0.02}
-    K = level.solution.stiffness
-    return Entry(f"bar{length}", K, error, tip, parameters, {})
-
-
-@pytest.mark.parametrize("length", [0.24, 0.36])
-def test_estimated_error_between_finite_element_entries_covers_a_direct_solution(
-    length,
-):
-    """The direct answer is meshed where the library has no entry, and has an estimated
-    error of its own. Between three lengths interpolation itself leaves less than 1
-    %.
-    """
-    entries = [meshed_bar(v) for v in (0.195, 0.3, 0.45)]
-    table, error = look_up(entries, {"length": length})
-    direct = meshed_bar(length)
-    gap = np.abs(table - direct.stiffness)
-    assert (gap <= error + np.abs(direct.stiffness_error) + 1e-9 * gap.max()).all()
-    assert scaled(gap, table).max() < 0.01
-    own = max(np.abs(scaled(e.stiffness_error, e.stiffness)).max() for e in entries)
-    assert scaled(error, table).max() < own + 0.01
 
 
 SHIPPED = EXAMPLE.parent / "stiffness_library"
