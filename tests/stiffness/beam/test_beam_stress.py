@@ -106,11 +106,9 @@ def test_peak_stress_of_a_twisted_rectangle_equals_timoshenkos_table(ratio, k):
 
 @pytest.mark.parametrize("section", [PLATE, {"width": 0.05, "height": 0.02}])
 def test_stresses_of_a_rectangle_integrate_to_the_forces(section):
-    """Integrals over the section by Simpson's rule.
-
-    The tolerance for torsion is 5e-4, since its stress has a kink at the short sides.
-    Outer faces have no shear normal to them.
-    """
+    """Integrals over the section by Simpson's rule. The tolerance for torsion is 5e-4,
+    since its stress has a kink at the short sides. Outer faces have no shear normal to
+    them."""
     fibres, influence = section_stress(section)
     y, z = fibres.reshape(33, 33, 2).transpose(2, 0, 1)
     sigma, tau_y, tau_z = influence.reshape(33, 33, 3, 6).transpose(2, 3, 0, 1)

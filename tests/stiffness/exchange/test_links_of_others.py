@@ -23,9 +23,8 @@ E, NU, RADIUS, LENGTH, RHO = 2.1e5, 0.3, 10.0, 500.0, 7.85e-9
 
 def textbook_beam(length=LENGTH):
     """(12, 12) Euler-Bernoulli beam along x, X Y Z RX RY RZ of node 1, then node 2.
-
-    Przemieniecki (1968), Theory of Matrix Structural Analysis, eq. (5.116), no shear.
-    """
+    Przemieniecki (1968), Theory of Matrix Structural Analysis, eq. (5.116), no
+    shear."""
     A, I = np.pi * RADIUS**2, np.pi * RADIUS**4 / 4
     J, G, L = 2 * I, E / (2 + 2 * NU), length
     K = np.zeros((12, 12))

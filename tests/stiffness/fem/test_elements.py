@@ -208,9 +208,8 @@ def test_distributing_interfaces_reproduce_the_compliance_of_a_round_beam(
     order, rings, layers, rel
 ):
     """Tractions are linear over the face: for moments, tension and torsion of a round
-    bar the exact solution is the beam's, without an end effect. The remaining error
-    is the circle's: h^4 for quadratic elements and h^6 for cubic ones.
-    """
+    bar the exact solution is the beam's, without an end effect. The remaining error is
+    the circle's: h^4 for quadratic elements and h^6 for cubic ones."""
     solid = bar_solid(rings, layers, 0.04, 0.2)
     _, solution = solved(solid, order, "distributing-both")
     C = inverted(solution.stiffness)
@@ -283,11 +282,9 @@ def harmonic_slope(x):
     ("order", "counts"), [(2, (6, 12)), pytest.param(3, (4, 8), marks=pytest.mark.slow)]
 )
 def test_strain_energy_error_converges_with_the_order_of_the_elements(order, counts):
-    """The gradient of a harmonic function is in equilibrium without body force.
-
-    It is prescribed on the surface of a cube; quadratic elements leave an error of h^2
-    in the energy norm, h^4 in the energy: slope 2 within 0.1; cubic ones h^3.
-    """
+    """The gradient of a harmonic function is in equilibrium without body force. It is
+    prescribed on the surface of a cube; quadratic elements leave an error of h^2 in the
+    energy norm, h^4 in the energy: slope 2 within 0.1; cubic ones h^3."""
     errors = []
     for n in counts:
         mesh = isoparametric(box_solid((n, n, n), (0.5, 0.5, 0.5)), order)

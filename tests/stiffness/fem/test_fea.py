@@ -41,10 +41,8 @@ PLANES = (parse_interface("z=0"), parse_interface("z=0.452"))
 @pytest.mark.slow
 def test_papers_bar_from_its_surface_agrees_within_its_estimated_error(cache):
     """The converged bending stiffness is 1 032 277 N m/rad, that of torsion G J / L.
-
     The requested accuracy is 0.5 %, and the estimate must cover the true error. The
-    mesh's own stiffness is above the true one, by no more than twice the estimate.
-    """
+    mesh's own stiffness is above the true one, by no more than twice the estimate."""
     solution = solve_link(
         bar_surface(),
         *PLANES,

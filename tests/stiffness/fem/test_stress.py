@@ -33,11 +33,9 @@ def solved():
     ([0, 0, 1e3, 0, 0, 0], np.sqrt(3) * 1e3 * R / (2 * SECOND)),
 ])  # fmt: skip
 def test_stress_in_the_middle_of_a_bar_equals_textbook_values(solved, wrench, expected):
-    """Four radii from both ends the end effects have decayed (e^-4 a radius).
-
-    The tolerance of 0.3 % is the mesh's (averaged at nodes, elements of half the
-    radius).
-    """
+    """Four radii from both ends the end effects have decayed (e^-4 a radius). The
+    tolerance of 0.3 % is the mesh's (averaged at nodes, elements of half the
+    radius)."""
     stress = stress_influence(solved, away=4 * R)
     assert stress.peak(wrench)[0] == pytest.approx(expected, rel=3e-3)
 

@@ -89,12 +89,10 @@ def test_peak_at_a_sharp_inner_edge_has_no_error_estimate():
 
 @pytest.mark.slow
 def test_peak_stress_of_a_stepped_shaft_agrees_within_the_estimated_error():
-    """D 30, d 20, r 2 mm in tension, torsion and bending, 15 mm from the ends.
-
-    The expected values per N and N m come from another program: quadratic axisymmetric
+    """D 30, d 20, r 2 mm in tension, torsion and bending, 15 mm from the ends. The
+    expected values per N and N m come from another program: quadratic axisymmetric
     elements, with the first harmonic in bending, on meshes of 0.1 and 0.05 mm in the
-    fillet that agree to 0.3 %.  Peterson's charts have 5.94 (3 % below) in tension.
-    """
+    fillet that agree to 0.3 %. Peterson's charts have 5.94 (3 % below) in tension."""
     points, triangles = shouldered_shaft(0.015, 0.010, 0.002, 48, 8)
     surface = check_surface(points, triangles, "shaft")
     ends = map(parse_interface, ("z=0", "z=0.12"))

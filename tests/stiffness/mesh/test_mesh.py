@@ -135,9 +135,7 @@ def test_mesh_with_a_missing_column_is_refused(tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", ["distal_plain", "delta_forearm", "l_bracket"])
 def test_coarser_surface_has_fewer_triangles_and_the_same_volume(name):
     """The coarse surface is near the part, has as many holes, and its volume to 1 %.
-
-    The bracket needs all of its triangles.
-    """
+    The bracket needs all of its triangles."""
     import pyvista as pv
 
     surface = read_surface(Path(__file__).parents[3] / "meshes" / f"{name}.stl")

@@ -50,11 +50,8 @@ def ends(length):
 def test_stiffness_of_a_rod_and_a_thin_tube_agrees_with_closed_forms(
     surface, length, J, A, tmp_path
 ):
-    """Torsion is exact between rigid ends.
-
-    In tension the ends cannot contract: K is at least E A / L, and at most one width
-    over the length above it.
-    """
+    """Torsion is exact between rigid ends. In tension the ends cannot contract: K is at
+    least E A / L, and at most one width over the length above it."""
     options = FemOptions(0.01, cache=tmp_path)
     link = solve_link(surface, *ends(length), [Material(E, NU)], options=options).link
     error = link.relative_error_estimate

@@ -302,11 +302,8 @@ def test_interpolation_error_estimate_bounds_the_error_against_another_stiffness
 
 @pytest.mark.parametrize("shape", ["rectangle", "box"])
 def test_shipped_square_links_are_slightly_stiffer_than_their_beams(shape):
-    """Held ends add up to 0.3 b / L in bending.
-
-    No entry is softer than Timoshenko's beam but a box in torsion, whose corners
-    Bredt's formula leaves out.
-    """
+    """Held ends add up to 0.3 b / L in bending. No entry is softer than Timoshenko's
+    beam but a box in torsion, whose corners Bredt's formula leaves out."""
     K, _ = look_up(read_library(SHIPPED / shape), {"length": 0.37})
     lengths = read_spec(SHIPPED / f"{shape}.toml").grid
     lengths = {k: lengths[k][0] for k in SHAPES[shape]} | {"length": 0.37}

@@ -79,10 +79,8 @@ ENDS = {
 
 @pytest.mark.slow
 def test_end_effect_of_a_round_bar_agrees_with_an_independent_solution():
-    """Each mesh is stiffer than that solution, by no more than its stated error.
-
-    The same fit of the exact values has c = 0.212, 0.254, 0.102 and zero in torsion.
-    """
+    """Each mesh is stiffer than that solution, by no more than its stated error. The
+    same fit of the exact values has c = 0.212, 0.254, 0.102 and zero in torsion."""
     sweep = sweep_slenderness({"radius": 0.02}, 6e10, 0.3, list(ENDS), accuracy=0.004)
     for comparison, exact in zip(sweep.comparisons, ENDS.values(), strict=True):
         comparisons = np.diag(comparison.difference)
@@ -161,11 +159,8 @@ def curve_file(tmp_path: Path, content: str) -> Path:
 def test_compliance_of_an_l_shape_from_a_curve_file_equals_hand_calculation(
     run, tmp_path
 ):
-    """The command prints the result of the function; the length is 0.35 m.
-
-    Castigliano by hand for a force along y at the tip: both legs bend, the first
-    twists.
-    """
+    """The command prints the result of the function; the length is 0.35 m. Castigliano
+    by hand for a force along y at the tip: both legs bend, the first twists."""
     path = curve_file(tmp_path, L_BRACKET)
     command = ["stiffness", "beam", path, *MATERIAL, "--theory", "euler"]
     C = np.array(json.loads(run(*command, "--json", "-")[1])["compliance"])

@@ -75,10 +75,8 @@ def test_slot_is_recognised_as_planes_and_half_cylinders():
 
 @pytest.mark.slow
 def test_mesh_of_a_barrel_has_the_volume_of_the_smooth_shape(tmp_path):
-    """The radius is 20 + 6 sin mm, which is no cone, sphere or torus.
-
-    Its facets lack more than 0.6 % of the volume, the curved mesh less than 0.03 %.
-    """
+    """The radius is 20 + 6 sin mm, which is no cone, sphere or torus. Its facets lack
+    more than 0.6 % of the volume, the curved mesh less than 0.03 %."""
 
     def radius(share):
         return 0.02 + 0.006 * np.sin(np.pi * share)

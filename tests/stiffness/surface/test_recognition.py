@@ -32,10 +32,8 @@ def volume_of(fillet=0.006, corner=0.025):
 
 
 def revolved(radius, height, facets, closed=False):
-    """A surface of revolution about z through rings of these radii and heights.
-
-    It ends in flat faces, or its last ring is joined to the first one.
-    """
+    """A surface of revolution about z through rings of these radii and heights. It ends
+    in flat faces, or its last ring is joined to the first one."""
     angle = 2 * np.pi * np.arange(facets) / facets
     circle = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
     rings = [r * circle + [0, 0, z] for r, z in zip(radius, height, strict=True)]
@@ -116,11 +114,9 @@ def test_flat_side_between_fillets_remains_flat():
 
 @pytest.mark.slow
 def test_cylinders_next_to_a_hump_are_recognised_separately():
-    """A bar with a hump r = 10 + 4 sin^2 mm over z = 30 .. 70 mm.
-
-    The facets lack 0.44 % of the integral of pi r^2.  The smoothed surface lacks less
-    than its stated uncertainty, and the long cylinders are no part of the hump.
-    """
+    """A bar with a hump r = 10 + 4 sin^2 mm over z = 30 .. 70 mm. The facets lack 0.44
+    % of the integral of pi r^2. The smoothed surface lacks less than its stated
+    uncertainty, and the long cylinders are no part of the hump."""
     share = np.linspace(0, 1, 13)
     r = np.r_[0.01, 0.01 + 0.004 * np.sin(np.pi * share) ** 2, 0.01]
     surface = revolved(r, np.r_[0.0, 0.03 + 0.04 * share, 0.1], 40)

@@ -60,9 +60,7 @@ def posture():
 )
 def test_margin_of_two_bushes_is_the_sum_of_the_shares_of_disc_and_cone(shift, tilt):
     """Margins by hand: disc and cone max(r / c, theta / t), bushes r / c + theta / t.
-
-    Whether shift and tilt lie in one plane or not: the worse bush has the sum.
-    """
+    Whether shift and tilt lie in one plane or not: the worse bush has the sum."""
     at = pin([*tilt, 0, *shift, 0])
     r, theta = np.hypot(*shift) / 3e-5, np.hypot(*tilt) / 7.5e-4
     assert zone_margin(at).margin == pytest.approx(max(r, theta), rel=1e-9)
@@ -95,11 +93,9 @@ def test_bushes_do_not_change_joints_without_tilt_clearance():
 @pytest.mark.exudyn
 @pytest.mark.slow
 def test_simulation_with_two_bushes_has_the_same_energy_ratio(posture):
-    """Energy of bushes over that of disc and cone, in the limit of small errors.
-
-    At a sixteenth both models of contact differ from finite rotations by 0.2 per cent,
-    their ratio by what separates linear from finite, some 1e-4.
-    """
+    """Energy of bushes over that of disc and cone, in the limit of small errors. At a
+    sixteenth both models of contact differ from finite rotations by 0.2 per cent, their
+    ratio by what separates linear from finite, some 1e-4."""
     expected = solve_bushes(posture).energy / solve_assembly(posture).energy
     scale = 1 / 16
     disc, bushes = (
@@ -145,11 +141,8 @@ def test_energy_of_a_heavy_cantilever_is_that_of_end_loads_plus_the_inner_load()
 def test_energy_of_simulated_elements_is_that_of_end_loads_plus_the_inner_load(
     elements,
 ):
-    """In all directions, with shear.
-
-    Exudyn has no energy within an element. The weight is scaled down to 1e-3 m/s^2,
-    where bending is linear to 1e-8.
-    """
+    """In all directions, with shear. Exudyn has no energy within an element. The weight
+    is scaled down to 1e-3 m/s^2, where bending is linear to 1e-8."""
     at, g = cantilever(), 1e-3 * np.array([3.0, -5.0, 8.0])
     model = SimulationModel(elements=elements)
     energy = simulate_assembly(at, model=model, gravity=g).energy
@@ -186,9 +179,7 @@ def test_error_from_linear_closures_grows_with_the_square_of_the_geometric_error
 @pytest.mark.usefixtures("coarse_solids")
 def test_thick_bar_with_held_ends_is_stiffer_than_its_beam_in_bending_only(posture):
     """Bending by 1 + c r / L, c about 0.2 (an end held flat cannot warp); torsion not.
-
-    At L / r = 5 that is 4 per cent; a mesh good to 1 per cent lets it be seen.
-    """
+    At L / r = 5 that is 4 per cent; a mesh good to 1 per cent lets it be seen."""
     thick = with_bars(posture.robot, 5.0).frame("leg1.link_a")
     assert isinstance(thick.link, BeamLink)
     thick = replace(thick, link=replace(thick.link, theory="timoshenko"))
@@ -248,11 +239,9 @@ def test_validity_command_marks_assumptions_with_errors_above_the_limits(run, tm
 
 
 def test_suggested_pieces_of_a_beam_leave_an_error_below_20_um():
-    """A moment M rolls a beam up to a circle: what one spring is off is known.
-
-    Its tip at L (sin a / a - 1, (1 - cos a) / a), a = M L / EI; one spring turns by a
-    too, but lies on its chord.  Pieces asked for leave less, half of them more.
-    """
+    """A moment M rolls a beam up to a circle: what one spring is off is known. Its tip
+    at L (sin a / a - 1, (1 - cos a) / a), a = M L / EI; one spring turns by a too, but
+    lies on its chord. Pieces asked for leave less, half of them more."""
     length, stiffness, angle = 1.0, 1e3, 0.2
     link = BeamLink({"width": 0.1, "height": 0.1}, 1.2e5 * stiffness, 0.0,
                     theory="euler")  # fmt: skip

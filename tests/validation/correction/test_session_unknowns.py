@@ -27,10 +27,8 @@ def saved():
 
 
 def test_session_drift_starts_at_its_saved_value_and_a_step_at_zero(saved):
-    """The rms of 3 and 4 is 5 / sqrt 2.
-
-    Shape parameters are kept, and a formula is not fitted.
-    """
+    """The rms of 3 and 4 is 5 / sqrt 2. Shape parameters are kept, and a formula is not
+    fitted."""
     unknowns = session_unknowns(saved, (), clock=True)
     names = [name for _, name in unknowns.names]
     assert names == ["amplitude.tx", "amplitude.tz", "size"]

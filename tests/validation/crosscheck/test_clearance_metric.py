@@ -55,10 +55,8 @@ def push(cone, screw, width):
 
 @pytest.mark.parametrize("arm", [0.0, 0.04, -0.04])
 def test_contact_force_is_the_gradient_of_its_energy(arm):
-    """Central differences of half a nanometre inside, at and outside the bound.
-
-    With an arm of 40 mm, a pin tilted by r / arm touches like one shifted by r.
-    """
+    """Central differences of half a nanometre inside, at and outside the bound. With an
+    arm of 40 mm, a pin tilted by r / arm touches like one shifted by r."""
     disc = replace(DISC, arm=arm)
     unit = np.array([0.04, 0.04, 1, 1, 1, 1])  # [m] for a rad
     for r in (0.0, 1e-5, 2.999e-5, 3.001e-5, 3.3e-5):
@@ -75,10 +73,8 @@ def test_contact_force_is_the_gradient_of_its_energy(arm):
 
 
 def test_pin_in_two_bushes_touches_where_its_axis_reaches_the_radius():
-    """A tilt by c / h, or a shift by c, just touches; both together press.
-
-    At z = h the axis is at (TX + h RY, TY - h RX).
-    """
+    """A tilt by c / h, or a shift by c, just touches; both together press. At z = h the
+    axis is at (TX + h RY, TY - h RX)."""
     clearance = Clearance(radial=3e-5, tilt=7.5e-4, axial=1e-5)
     bushes = joint_clearance(Frame("f", clearance=clearance), bushes=True)
     assert [(c.rows, c.size, c.arm) for c in bushes.cones] == [
@@ -96,11 +92,9 @@ def test_pin_in_two_bushes_touches_where_its_axis_reaches_the_radius():
 
 @pytest.mark.parametrize("misfit", [5e-5, 1e-4])
 def test_axial_clearance_reduces_the_misfit(misfit):
-    """E = (g - c)^2 EA / 2(2L), c = 30 um; clearance is along the joint's z.
-
-    A contact of 1e12 N/m in series with 3.8e8 N/m takes 4e-4 of the energy, which the
-    correction for its yield gives back; the smoothing 3e-4 of c, 9 nm, is left.
-    """
+    """E = (g - c)^2 EA / 2(2L), c = 30 um; clearance is along the joint's z. A contact
+    of 1e12 N/m in series with 3.8e8 N/m takes 4e-4 of the energy, which the correction
+    for its yield gives back; the smoothing 3e-4 of c, 9 nm, is left."""
     stiffness = E * AREA / 0.8
     check = simulate_assembly(
         coaxial([0, 0, 0, 0, 0, misfit], Clearance(axial=3e-5)),
@@ -113,10 +107,8 @@ def test_axial_clearance_reduces_the_misfit(misfit):
 
 @pytest.mark.parametrize("pause", [0.0, 0.05])
 def test_time_limit_of_a_simulation_does_not_end_other_simulations(pause, monkeypatch):
-    """Also where the processor sleeps; Exudyn's timer is one for all models.
-
-    Without a limit 0.05 s at each of some 3000 calls of the contact are minutes.
-    """
+    """Also where the processor sleeps; Exudyn's timer is one for all models. Without a
+    limit 0.05 s at each of some 3000 calls of the contact are minutes."""
     contacts = SimulationModel(clearances=True)
     posture = coaxial([0, 0, 0, 0, 0, 1e-4], Clearance(axial=3e-5))
     with monkeypatch.context() as patch:
@@ -174,10 +166,8 @@ def test_crosscheck_of_the_papers_robot_with_clearances_passes(irsbot2):
 
 @pytest.mark.slow
 def test_energy_with_clearances_agrees_with_the_exact_model(irsbot2):
-    """Contacts against cones, springs as links, at the paper's full errors.
-
-    Contacts differ by at most 0.3 %; the linear energy differs by more than 1 %.
-    """
+    """Contacts against cones, springs as links, at the paper's full errors. Contacts
+    differ by at most 0.3 %; the linear energy differs by more than 1 %."""
     posture = place_robot(irsbot2, {"tx": 0.1, "tz": -0.15})
     check = crosscheck(posture, (1.0, 0.5), links="spring", clearances=True)
     assert check.passed, check.checks
@@ -202,11 +192,9 @@ def heavy(length=0.4):
 
 @pytest.mark.parametrize("links", ["beam", "spring"])
 def test_crosscheck_passes_for_weight_together_with_clearance(links):
-    """A hundredfold weight exceeds the clearance:
-    checks of energy, springs and gap pass.
-
-    With beams the simulation also stores q^2 L^5 / 1440 EI each between their ends.
-    """
+    """A hundredfold weight exceeds the clearance: checks of energy, springs and gap
+    pass. With beams the simulation also stores q^2 L^5 / 1440 EI each between their
+    ends."""
     check = crosscheck(
         heavy(), (1.0, 0.5), links=links, gravity=[0, 300.0, -900.0], clearances=True
     )
@@ -247,11 +235,8 @@ def drawn(name, size, pose=None):
                   marks=pytest.mark.slow)],
 )  # fmt: skip
 def test_errors_within_the_clearance_store_no_energy(name, size, pose, said):
-    """There is no load.
-
-    This is a check of overconstrained robots only: the others close without energy
-    whatever their clearance.
-    """
+    """There is no load. This is a check of overconstrained robots only: the others
+    close without energy whatever their clearance."""
     check = crosscheck(drawn(name, size, pose), (1.0, 0.5), clearances=True)
     assert check.pairs[0].linear.energy == pytest.approx(0.0, abs=1e-20)
     assert check.pairs[0].simulated.energy < 1e-8
@@ -265,10 +250,8 @@ def test_errors_within_the_clearance_store_no_energy(name, size, pose, said):
      ("five_bar", [0, 0, 0, 0, -20, 0])],
 )  # fmt: skip
 def test_optimality_gap_under_a_load_is_relative_to_the_stored_energy(name, load):
-    """Without errors closing needs no energy: the reference is the load's energy.
-
-    Parts of the five-bar stay free under its load.
-    """
+    """Without errors closing needs no energy: the reference is the load's energy. Parts
+    of the five-bar stay free under its load."""
     check = crosscheck(
         home_posture(load_robot(name)), (1.0, 0.5), load=load, clearances=True
     )

@@ -131,12 +131,10 @@ def erring(name, density):
 
 @pytest.mark.parametrize("name", ["3rrr", "arm6"])
 def test_exact_model_and_simulation_agree_under_weight_and_moment(name):
-    """Weight on beams with errors,
-    and a couple of dead forces together with a force.
-
+    """Weight on beams with errors, and a couple of dead forces together with a force.
     The bound is relative to the difference from the linear model. A weight that starts
-    at its nominal place would leave 7e-3, a moment of constant direction 58 per cent.
-    """
+    at its nominal place would leave 7e-3, a moment of constant direction 58 per
+    cent."""
     posture = erring(name, 2700.0)
     load = [1, 2, 3, 50, 20, -30]
     check = crosscheck(posture, links="spring", load=load, gravity=[2, -3, -9.81])

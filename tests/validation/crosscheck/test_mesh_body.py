@@ -89,11 +89,9 @@ def test_solid_between_two_walls_agrees_with_its_spring_to_first_order(block):
 
 @pytest.mark.slow
 def test_crosscheck_of_a_robot_with_meshed_links_passes_with_solids():
-    """From the surface file: K_E in the linear model, the solid in the simulation.
-
-    Both come from one mesh. They differ by the sparse solver's rounding, and a floating
-    frame bends linearly about its base.
-    """
+    """From the surface file: K_E in the linear model, the solid in the simulation. Both
+    come from one mesh. They differ by the sparse solver's rounding, and a floating
+    frame bends linearly about its base."""
     link = MeshLink(SURFACE, "z=0", "z=0.452", 60e9, 0.3)
     error = [1e-3, -2e-3, 1e-3, 1e-4, 2e-4, -1e-4]
     frames = (

@@ -28,9 +28,8 @@ HEAD = ",".join([
 
 def elastic_campaign(folder, rng, temperature=None, heat=0.0, device=None, **more):
     """Twelve configurations of an elastic arm under two loads, each twice, with noise.
-
-    ``heat`` [1/K] lengthens both arms; ``device`` is where the measuring device stands.
-    """
+    ``heat`` [1/K] lengthens both arms; ``device`` is where the measuring device
+    stands."""
     q = rng.uniform(-1, 1, (12, 2)) + [0.0, 1.2]
     lines = []
     for i, kind in enumerate(np.concatenate([rng.permutation(24) for _ in range(2)])):
@@ -159,10 +158,8 @@ def test_consecutive_outliers_are_remarked(rng):
 
 
 def test_constant_temperature_does_not_separate_expansion_from_length(tmp_path, rng):
-    """Both lengthen the same beams; a varying temperature separates them.
-
-    A body with delay has the constant temperature too.
-    """
+    """Both lengthen the same beams; a varying temperature separates them. A body with
+    delay has the constant temperature too."""
     constant = inspect_campaign(elastic_campaign(tmp_path / "a", rng, temperature=6.0))
     assert (
         "thermal_expansion",

@@ -197,10 +197,8 @@ def test_repeated_simulations_do_not_leak_memory(rng):
 
 @pytest.mark.slow
 def test_simulations_with_contacts_and_failures_do_not_leak_memory():
-    """User functions of Exudyn hold their model until it is released.
-
-    Every other one runs out of time; a leaked model is half a MiB.
-    """
+    """User functions of Exudyn hold their model until it is released. Every other one
+    runs out of time; a leaked model is half a MiB."""
     clearance = Clearance(axial=3e-5, radial=1e-5)
     frames = list(coaxial([0, 0, 0, 1e-5, 0, 1e-4]).robot.frames)
     frames[0] = replace(frames[0], clearance=clearance)

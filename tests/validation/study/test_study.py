@@ -339,8 +339,7 @@ def test_study_pose_out_of_reach_is_refused_before_computation(tmp_path):
 @pytest.mark.exudyn
 def test_example_study_with_finite_elements_has_the_converged_stiffness(tmp_path):
     """K_RX of the solid cylinder by finite elements is 1 032 277 N m/rad, converged;
-    its beam, without shear, 1 067 585.
-    """
+    its beam, without shear, 1 067 585."""
     study = read_study(EXAMPLE, tmp_path / "out")
     results = run_study(study)
     write_study(results)

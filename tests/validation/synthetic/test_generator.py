@@ -84,10 +84,8 @@ def test_declared_error_is_read_exactly():
 
 @pytest.mark.parametrize("g", [9.81, 3.0])
 def test_deflection_of_a_heavy_beam_with_a_tip_mass_equals_its_closed_form(added, g):
-    """w L^4/8EI + w L^2/2kGA for the beam, m g L^3/3EI + m g L/kGA for the body.
-
-    A bent beam is also shorter, by less than s^2/L = 2.4e-8 m: second order.
-    """
+    """w L^4/8EI + w L^2/2kGA for the beam, m g L^3/3EI + m g L/kGA for the body. A bent
+    beam is also shorter, by less than s^2/L = 2.4e-8 m: second order."""
     w, m = RHO * AREA * g, 1.3
     sag = w * L**4 / (8 * E * SECOND) + w * L**2 / (2 * SHEAR)
     sag += m * g * (L**3 / (3 * E * SECOND) + L / SHEAR)
@@ -307,6 +305,10 @@ def test_impossible_noise_or_design_is_refused(make, message):
     (["--error-size", "nan"], "--error-size: found nan"),
     (["--outliers", "200"], "found 200, expected at most the 116 rows"),
     (["--seed", "-1"], "--seed"),
+    (["--effect", "foo"], 'found "foo"'),
+    (["--program", "x"], "multibody | springs"),
+    (["--at", "1,2"], "three numbers"),
+    (["--truth", "no/t.json"], "no folder no"),
 ])  # fmt: skip
 def test_generate_refuses_wrong_options_and_writes_nothing(
     run, tmp_path, words, message
