@@ -19,31 +19,22 @@ def cube(corner="{k}", line="f {corners}\n"):
     return POINTS + "".join(line.format(corners=corners) for corners in faces)
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        cube(),
-        cube("{k}/{k}"),
-        cube("{k}//"),
-        cube("{k}/"),
-        cube("{k}//{k}"),
-        cube("{k}/7/99"),
-        cube("{n}"),
-        cube().replace("f ", "f \\\n"),
-        cube().replace("\n", "\r\n"),
+CUBES = {
+    "plain": cube(), "absent texture": cube("{k}/{k}"), "double slash": cube("{k}//"),
+    "slash": cube("{k}/"), "absent normals": cube("{k}//{k}"),
+    "absent both": cube("{k}/7/99"), "from the end": cube("{n}"),
+    "continued": cube().replace("f ", "f \\\n"), "CRLF": cube().replace("\n", "\r\n"),
+    "comments":
         "# made by hand\nmtllib none.mtl\n" + cube(line="s 1\nf {corners} # f\n"),
-        cube().replace("v ", "V ").replace("f ", "F "),
-        cube()[:-1],
-    ],
-    ids=[
-        "plain", "absent texture", "double slash", "slash", "absent normals",
-        "absent both", "from the end", "continued", "CRLF", "comments", "capitals",
-        "no last line end",
-    ],
-)  # fmt: skip
-def test_obj_corners_in_every_notation_describe_the_same_cube(tmp_path, content):
+    "capitals": cube().replace("v ", "V ").replace("f ", "F "),
+    "no last line end": cube()[:-1],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CUBES)
+def test_obj_corners_in_every_notation_describe_the_same_cube(tmp_path, case):
     path = tmp_path / "cube.obj"
-    path.write_bytes(content.encode())
+    path.write_bytes(CUBES[case].encode())
     points, faces = read_obj(path)
     np.testing.assert_array_equal(points, CORNERS)
     assert faces == [[k - 1 for k in side] for side in SIDES]

@@ -39,14 +39,6 @@ def test_page_shows_the_platform_by_both_models_and_a_slope_of_two(run, tmp_path
     assert seen.results == results
 
 
-def test_page_of_a_robot_without_errors_is_amber(run, tmp_path):
-    status, text, _ = shown(run, tmp_path, *PLACE)
-    assert status == 1
-    assert "<p class='verdict mixed'>" in text
-    assert "not checked" in text
-    assert not parse(text).figures  # differences that are rounding have no slope
-
-
 def test_page_of_a_stiffness_check_shows_equal_compliances(run, tmp_path):
     """Without errors and loads the exact and the linear model are the same."""
     status, text, _ = shown(run, tmp_path, "four_bar", "--state", "exact")

@@ -295,7 +295,6 @@ def test_message_about_a_robot_file_given_as_a_study_states_the_missing_line(tmp
         ("[pose]", "[poze]", 'unknown key "poze"; did you mean "pose"?'),
         ('"link_a"', '"link_q"', 'no frame "link_q"'),
         ("least = [1e-4,", "least = [1e-1,", "least: expected 0 <= least <= most"),
-        ("least = [1e-4,", "least = [-1e308,", "errors.least: expected 0 <= least"),
         ("least = [1e-4,", "least = [", "errors.least: found"),
         ("[pose]", "[links]\nsource = 'fea'\n[pose]", "links.surface: missing"),
         ("[pose]", "[links]\nsurface = 'no.stl'\n[pose]", "surface: no such file"),
@@ -303,9 +302,7 @@ def test_message_about_a_robot_file_given_as_a_study_states_the_missing_line(tmp
         ("[pose]", "[checks]\nmaps = 1\n[pose]", "checks.maps: found 1, expected true"),
         ("title", "scales = 3\ntitle", "scales: expected a list of factors"),
         ("title", "scales = ['a']\ntitle", "scales: found 'a' as number 1, expected"),
-        ("title", "scales = [1.0]\ntitle", "expected at least two different factors"),
         ("title", "scales = [1, -1]\ntitle", "expected at least two different fact"),
-        ("title", "scales = [[1]]\ntitle", "scales: found [1] as number 1, expected"),
         ("title", "title = 1 #", "title: found 1, expected a string"),
     ],
 )  # fmt: skip
