@@ -104,27 +104,24 @@ def test_round_section_constants_equal_hand_calculation():
     assert tube.shear_z == pytest.approx(11.71875 / 19.03125)
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda: round_section(-1, NU), "radius = -1 must be finite and > 0"),
-        (lambda: round_section(1, NU, 1), "inner_radius = 1 must lie between 0"),
-        (lambda: round_section(1, 0.5), "nu = 0.5 must lie between -1.0 and 0.5"),
-        (lambda: beam_compliance(math.nan, SECTION, E, NU), "length = nan"),
-        (lambda: beam_compliance(1, SECTION, -E, NU), "E = -6e+10"),
-        (lambda: beam_compliance(1, SECTION, E, NU, theory="eular"), '"euler"?'),
-        (lambda: beam_compliance(1, SECTION, E, NU, axis=[0, 0, 0]), "axis is zero"),
-        (
-            lambda: beam_compliance(1, SECTION, E, NU, axis=[1, math.nan, 0]),
-            "expected 3 finite numbers",
-        ),
-        (
-            lambda: beam_compliance(1, SECTION, E, NU, axis=[0, 0, 1], up=[0, 0, 2]),
-            "lies along the axis",
-        ),
-        (lambda: Section(1, 1, 1, 0, 1, 1), "section: J = 0 must be finite and > 0"),
-    ],
-)
+@pytest.mark.parametrize(("call", "message"), [
+    (lambda: round_section(-1, NU), "radius = -1 must be finite and > 0"),
+    (lambda: round_section(1, NU, 1), "inner_radius = 1 must lie between 0"),
+    (lambda: round_section(1, 0.5), "nu = 0.5 must lie between -1.0 and 0.5"),
+    (lambda: beam_compliance(math.nan, SECTION, E, NU), "length = nan"),
+    (lambda: beam_compliance(1, SECTION, -E, NU), "E = -6e+10"),
+    (lambda: beam_compliance(1, SECTION, E, NU, theory="eular"), '"euler"?'),
+    (lambda: beam_compliance(1, SECTION, E, NU, axis=[0, 0, 0]), "axis is zero"),
+    (
+        lambda: beam_compliance(1, SECTION, E, NU, axis=[1, math.nan, 0]),
+        "expected 3 finite numbers",
+    ),
+    (
+        lambda: beam_compliance(1, SECTION, E, NU, axis=[0, 0, 1], up=[0, 0, 2]),
+        "lies along the axis",
+    ),
+    (lambda: Section(1, 1, 1, 0, 1, 1), "section: J = 0 must be finite and > 0"),
+])  # fmt: skip
 def test_invalid_beam_is_refused(call, message):
     with pytest.raises(BadInput) as caught:
         call()
@@ -153,18 +150,15 @@ PARALLEL = np.eye(6)
 PARALLEL[[0, 1], [1, 0]] = np.nextafter(1.0, 0.0)
 
 
-@pytest.mark.parametrize(
-    ("C", "message"),
-    [
-        (np.eye(5), "compliance has shape (5, 5), expected (6, 6)"),
-        (np.eye(6) + np.eye(6, k=1), "not symmetric: [0, 1] = 1.000000e+00 but"),
-        (-np.eye(6), "not positive definite"),
-        (np.ones((6, 6)), "not positive definite"),
-        # least eigenvalue 1.1e-16: rounding alone keeps it above zero
-        (1e-9 * PARALLEL, "not positive definite"),
-        (np.full((6, 6), math.nan), "expected (6, 6) of finite numbers"),
-    ],
-)
+@pytest.mark.parametrize(("C", "message"), [
+    (np.eye(5), "compliance has shape (5, 5), expected (6, 6)"),
+    (np.eye(6) + np.eye(6, k=1), "not symmetric: [0, 1] = 1.000000e+00 but"),
+    (-np.eye(6), "not positive definite"),
+    (np.ones((6, 6)), "not positive definite"),
+    # least eigenvalue 1.1e-16: rounding alone keeps it above zero
+    (1e-9 * PARALLEL, "not positive definite"),
+    (np.full((6, 6), math.nan), "expected (6, 6) of finite numbers"),
+])  # fmt: skip
 def test_invalid_compliance_is_refused(C, message):
     with pytest.raises(BadInput) as caught:
         LinkStiffness("test", C, tip=[0, 0, 0], base=[0, 0, 0])

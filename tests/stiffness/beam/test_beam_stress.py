@@ -26,19 +26,16 @@ def test_stress_of_a_beam_in_tension_is_force_over_area(section):
     assert stress == pytest.approx(500 / constants(section).area, rel=1e-14)
 
 
-@pytest.mark.parametrize(
-    ("section", "modulus_y", "modulus_z"),
-    [
-        (BAR, np.pi * 0.04**3 / 4, np.pi * 0.04**3 / 4),
-        (TUBE, *[np.pi * (0.04**4 - 0.034**4) / (4 * 0.04)] * 2),
-        (PLATE, 0.02 * 0.05**2 / 6, 0.05 * 0.02**2 / 6),
-        (
-            BOX,
-            (0.06 * 0.04**3 - 0.052 * 0.032**3) / (6 * 0.04),
-            (0.04 * 0.06**3 - 0.032 * 0.052**3) / (6 * 0.06),
-        ),
-    ],
-)
+@pytest.mark.parametrize(("section", "modulus_y", "modulus_z"), [
+    (BAR, np.pi * 0.04**3 / 4, np.pi * 0.04**3 / 4),
+    (TUBE, *[np.pi * (0.04**4 - 0.034**4) / (4 * 0.04)] * 2),
+    (PLATE, 0.02 * 0.05**2 / 6, 0.05 * 0.02**2 / 6),
+    (
+        BOX,
+        (0.06 * 0.04**3 - 0.052 * 0.032**3) / (6 * 0.04),
+        (0.04 * 0.06**3 - 0.032 * 0.052**3) / (6 * 0.06),
+    ),
+])  # fmt: skip
 def test_stress_of_a_bent_beam_is_moment_over_section_modulus(
     section, modulus_y, modulus_z
 ):
@@ -52,15 +49,12 @@ def test_stress_of_a_bent_beam_is_moment_over_section_modulus(
         assert where[0] == 0.0
 
 
-@pytest.mark.parametrize(
-    ("section", "shape"),
-    [
-        (BAR, 4 / 3),  # Gere: 4 V / 3 A
-        (TUBE, 4 / 3 * (0.04**2 + 0.04 * 0.034 + 0.034**2) / (0.04**2 + 0.034**2)),
-        ({"radius": 0.04, "inner_radius": 0.03999}, 2.0),  # thin tube: 2 V / A
-        (PLATE, 1.5),  # 3 V / 2 A
-    ],
-)
+@pytest.mark.parametrize(("section", "shape"), [
+    (BAR, 4 / 3),  # Gere: 4 V / 3 A
+    (TUBE, 4 / 3 * (0.04**2 + 0.04 * 0.034 + 0.034**2) / (0.04**2 + 0.034**2)),
+    ({"radius": 0.04, "inner_radius": 0.03999}, 2.0),  # thin tube: 2 V / A
+    (PLATE, 1.5),  # 3 V / 2 A
+])  # fmt: skip
 def test_peak_stress_under_shear_alone_equals_textbook_values(section, shape):
     """Along both section axes, at the neutral fibre; for a thin tube to 2.5e-4."""
     thin = 3e-4 if shape == 2.0 else 1e-12
@@ -200,29 +194,18 @@ def test_peak_stress_is_at_the_tip_when_a_force_cancels_the_base_moment():
     assert stress == pytest.approx(50 / (np.pi * 0.04**3 / 4), rel=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("section", "length", "wrench", "message"),
-    [
-        (
-            {"area": 1e-3, "I_y": 1e-8, "I_z": 1e-8, "J": 1e-8},
-            0.1,
-            np.zeros(6),
-            "whose outline is unknown",
-        ),
-        (
-            PLATE | {"web": 0.002, "flange": 0.002},
-            0.1,
-            np.zeros(6),
-            "found a section of width, height, web, flange",
-        ),
-        ({}, 0.1, np.zeros(6), "found a section of nothing"),
-        ({"radius": -1.0}, 0.1, np.zeros(6), "radius = -1"),
-        (BOX | {"wall": 0.02}, 0.1, np.zeros(6), "expected less than half"),
-        (BAR, -1.0, np.zeros(6), "length = -1 must be >= 0"),
-        (BAR, 0.1, np.zeros(5), r"wrench has shape \(5,\)"),
-        (BAR, 0.1, np.full(6, np.nan), "finite numbers"),
-    ],
-)
+@pytest.mark.parametrize(("section", "length", "wrench", "message"), [
+    ({"area": 1e-3, "I_y": 1e-8, "I_z": 1e-8, "J": 1e-8}, 0.1, np.zeros(6),
+     "whose outline is unknown"),
+    (PLATE | {"web": 0.002, "flange": 0.002}, 0.1, np.zeros(6),
+     "found a section of width, height, web, flange"),
+    ({}, 0.1, np.zeros(6), "found a section of nothing"),
+    ({"radius": -1.0}, 0.1, np.zeros(6), "radius = -1"),
+    (BOX | {"wall": 0.02}, 0.1, np.zeros(6), "expected less than half"),
+    (BAR, -1.0, np.zeros(6), "length = -1 must be >= 0"),
+    (BAR, 0.1, np.zeros(5), r"wrench has shape \(5,\)"),
+    (BAR, 0.1, np.full(6, np.nan), "finite numbers"),
+])  # fmt: skip
 def test_invalid_stress_input_is_refused(section, length, wrench, message):
     with pytest.raises(BadInput, match=message):
         peak_beam_stress(section, length, wrench)

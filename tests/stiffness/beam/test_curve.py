@@ -100,23 +100,20 @@ def stepped(t):
     return BAR if t < 1 / 3 else CROOKED
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda: curve_compliance([], E, NU), "no pieces"),
-        (lambda: curve_compliance([line(), line(1.1)], E, NU), "begins 0.1 m away"),
-        (lambda: straight_piece([0, 0, 0], [0, 0, 0], BAR), "is zero"),
-        (lambda: arc_piece([1, 0, 0], [0, 0, 0], [1, 0, 0], BAR), "not normal to the"),
-        (lambda: curve_compliance([line()], E, NU, theory="eulr"), '"euler"?'),
-        (
-            lambda: curve_compliance([line(section=stepped)], E, NU),
-            "split pieces where the section changes abruptly",
-        ),
-        (lambda: box_section(0.1, 0.1, 0.05, NU), "expected less than half"),
-        (lambda: i_section(0.1, 0.1, 0.2, 0.01, NU), "expected web < width"),
-        (lambda: i_section(0.1, math.nan, 0.01, 0.01, NU), "height = nan"),
-    ],
-)
+@pytest.mark.parametrize(("call", "message"), [
+    (lambda: curve_compliance([], E, NU), "no pieces"),
+    (lambda: curve_compliance([line(), line(1.1)], E, NU), "begins 0.1 m away"),
+    (lambda: straight_piece([0, 0, 0], [0, 0, 0], BAR), "is zero"),
+    (lambda: arc_piece([1, 0, 0], [0, 0, 0], [1, 0, 0], BAR), "not normal to the"),
+    (lambda: curve_compliance([line()], E, NU, theory="eulr"), '"euler"?'),
+    (
+        lambda: curve_compliance([line(section=stepped)], E, NU),
+        "split pieces where the section changes abruptly",
+    ),
+    (lambda: box_section(0.1, 0.1, 0.05, NU), "expected less than half"),
+    (lambda: i_section(0.1, 0.1, 0.2, 0.01, NU), "expected web < width"),
+    (lambda: i_section(0.1, math.nan, 0.01, 0.01, NU), "height = nan"),
+])  # fmt: skip
 def test_invalid_curve_or_section_is_refused(call, message):
     with pytest.raises(BadInput) as caught:
         call()

@@ -145,16 +145,13 @@ def test_wrong_mapping_is_refused_in_one_line(text, message, tmp_path):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (lambda t: t.replace("RSA", "CSA"), "expected RSA or RUA"),
-        (lambda t: "\n".join(t.split("\n")[:3]), "found an incomplete header"),
-        (lambda t: "\n".join(t.split("\n")[:20]), "expected 12"),
-        (lambda t: t.replace("1.000000000000000D+00", "1.0000x0000000000D+00", 1),
-         "expected a number"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("change", "message"), [
+    (lambda t: t.replace("RSA", "CSA"), "expected RSA or RUA"),
+    (lambda t: "\n".join(t.split("\n")[:3]), "found an incomplete header"),
+    (lambda t: "\n".join(t.split("\n")[:20]), "expected 12"),
+    (lambda t: t.replace("1.000000000000000D+00", "1.0000x0000000000D+00", 1),
+     "expected a number"),
+])  # fmt: skip
 def test_wrong_harwell_boeing_file_is_refused(change, message, tmp_path):
     text = harwell_boeing(csc_array(np.eye(12)), right_side=False)
     (tmp_path / "k.matrix").write_text(change(text))

@@ -38,15 +38,12 @@ def ends(length):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("surface", "length", "J", "A"),
-    [
-        (check_surface(*cylinder(0.75e-3, 1.0, 32), "rod"), 1.0,
-         np.pi / 2 * 0.75e-3**4, np.pi * 0.75e-3**2),
-        (tube(0.01, 0.0097, 0.2), 0.2,
-         np.pi / 2 * (0.01**4 - 0.0097**4), np.pi * (0.01**2 - 0.0097**2)),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("surface", "length", "J", "A"), [
+    (check_surface(*cylinder(0.75e-3, 1.0, 32), "rod"), 1.0,
+     np.pi / 2 * 0.75e-3**4, np.pi * 0.75e-3**2),
+    (tube(0.01, 0.0097, 0.2), 0.2,
+     np.pi / 2 * (0.01**4 - 0.0097**4), np.pi * (0.01**2 - 0.0097**2)),
+])  # fmt: skip
 def test_stiffness_of_a_rod_and_a_thin_tube_agrees_with_closed_forms(
     surface, length, J, A, tmp_path
 ):

@@ -99,14 +99,11 @@ def test_estimated_error_between_grid_points_covers_the_true_error(spec, rng):
         assert gap < 0.02
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"radius": 0.05}, "radius = 0.05 is outside the grid, expected 0.01 .. 0.04"),
-        ({"radios": 0.02}, 'unknown parameter "radios"; did you mean "radius"?'),
-        ({"radius": None}, "radius: missing; expected a value"),
-    ],
-)
+@pytest.mark.parametrize(("change", "message"), [
+    ({"radius": 0.05}, "radius = 0.05 is outside the grid, expected 0.01 .. 0.04"),
+    ({"radios": 0.02}, 'unknown parameter "radios"; did you mean "radius"?'),
+    ({"radius": None}, "radius: missing; expected a value"),
+])  # fmt: skip
 def test_look_up_outside_the_grid_or_with_other_parameters_is_refused(
     spec, change, message
 ):
@@ -149,24 +146,19 @@ def changed(change):
 
 
 FORCES_FIRST = ["FX", "FY", "FZ", "MX", "MY", "MZ"]
-WRONG_ENTRIES = [
+
+
+@pytest.mark.parametrize(("text", "message"), [
     (lambda _: "rubbish", "damaged entry"),
     (lambda _: "[]", "damaged entry"),
     (lambda _: "[" * 100_000, "damaged entry"),
     (lambda _: "{}", 'found no entry of a library; expected format "forcefit link 1"'),
     (lambda _: '{"format": "forcefit link 1"}', "damaged entry (KeyError)"),
-    (
-        changed(lambda entry: entry.update(wrench=FORCES_FIRST)),
-        "the components in another order, expected RX",
-    ),
-    (
-        changed(lambda entry: entry["stiffness"][0].__setitem__(0, -1.0)),
-        "not positive definite",
-    ),
-]
-
-
-@pytest.mark.parametrize(("text", "message"), WRONG_ENTRIES)
+    (changed(lambda entry: entry.update(wrench=FORCES_FIRST)),
+     "the components in another order, expected RX"),
+    (changed(lambda entry: entry["stiffness"][0].__setitem__(0, -1.0)),
+     "not positive definite"),
+])  # fmt: skip
 def test_wrong_entry_is_refused(spec, text, message):
     (file, *_) = build_library(spec)
     file.write_text(text(file.read_text()))
@@ -185,20 +177,17 @@ def test_missing_entry_or_library_is_refused_by_name(spec, tmp_path):
         read_entry(tmp_path / "absent", "x")
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (("round", "rond"), 'unknown "rond"; did you mean "round"?'),
-        (("radius", "radios"), 'unknown length "radios"'),
-        (("0.01", "-0.01"), "radius: found -0.01, expected a length > 0"),
-        (("0.01", '"a"'), "expected a finite number, or a list"),
-        (("[0.2, 0.3]", "[0.2, 0.2]"), "found a value twice"),
-        (("young = 6e10", ""), "young: missing"),
-        (('"beam"', '"bem"'), '"beam"'),
-        (('shape = "round"', 'shape = "tube"'), "inner_radius: missing"),
-        (('method = "beam"', 'method = "beam"\nfoo = 1'), 'unknown key "foo"'),
-    ],
-)
+@pytest.mark.parametrize(("change", "message"), [
+    (("round", "rond"), 'unknown "rond"; did you mean "round"?'),
+    (("radius", "radios"), 'unknown length "radios"'),
+    (("0.01", "-0.01"), "radius: found -0.01, expected a length > 0"),
+    (("0.01", '"a"'), "expected a finite number, or a list"),
+    (("[0.2, 0.3]", "[0.2, 0.2]"), "found a value twice"),
+    (("young = 6e10", ""), "young: missing"),
+    (('"beam"', '"bem"'), '"beam"'),
+    (('shape = "round"', 'shape = "tube"'), "inner_radius: missing"),
+    (('method = "beam"', 'method = "beam"\nfoo = 1'), 'unknown key "foo"'),
+])  # fmt: skip
 def test_wrong_build_file_is_refused(tmp_path, change, message):
     path = tmp_path / "spec.toml"
     path.write_text(SPEC.replace(*change))

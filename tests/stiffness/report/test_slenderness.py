@@ -106,22 +106,19 @@ def test_axial_stiffness_at_zero_poissons_ratio_has_no_end_effect():
         assert volume == pytest.approx(np.pi * 0.02**2 * length, rel=5e-5)
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["--radius", "0.02", "--ratios", "5"], "found one length"),
-        (["--radius", "0.02", "--ratios", "5,x"], "--ratios: found '5,x'"),
-        (["--radius", "0.02", "--ratios", "5,5"], "5 is given twice"),
-        (["--radius", "0.02", "--ratios", "0,5"], "--ratios: found 0"),
-        (["--section", "width=1,height=1,web=.1,flange=.1"], "found a section of"),
-        (["--section", "radius=1,rdius=2"], 'unknown "rdius"; did you mean "radius"'),
-        (
-            ["--section", "radius=1", "--radius", "1"],
-            "found together with --radius",
-        ),
-        (["--section", "width=1"], "--section: found width, expected one of"),
-    ],
-)
+@pytest.mark.parametrize(("options", "message"), [
+    (["--radius", "0.02", "--ratios", "5"], "found one length"),
+    (["--radius", "0.02", "--ratios", "5,x"], "--ratios: found '5,x'"),
+    (["--radius", "0.02", "--ratios", "5,5"], "5 is given twice"),
+    (["--radius", "0.02", "--ratios", "0,5"], "--ratios: found 0"),
+    (["--section", "width=1,height=1,web=.1,flange=.1"], "found a section of"),
+    (["--section", "radius=1,rdius=2"], 'unknown "rdius"; did you mean "radius"'),
+    (
+        ["--section", "radius=1", "--radius", "1"],
+        "found together with --radius",
+    ),
+    (["--section", "width=1"], "--section: found width, expected one of"),
+])  # fmt: skip
 def test_slenderness_refuses_wrong_options_before_meshing(run, options, message):
     command = ["stiffness", "compare", "--ratios", "5,10", *MATERIAL]
     status, _, err = run(*command, *options)
@@ -198,22 +195,17 @@ section = { width = 0.01, height = 0.02, wall = 0.001 }
     assert curve_length([piece]) == pytest.approx(np.pi * 0.05, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (("[[piece]]", "[[pieces]]"), 'unknown key "pieces"; did you'),
-        (("section =", "sektion ="), "piece[1].section: missing"),
-        (("width", "widht"), 'piece[1].section: unknown "widht"; did you mean'),
-        (("height = 0.05", "height = -1"), "piece[1]: rectangular_section: height"),
-        (("end = [0, 0, 0.2]", "end = [0, 0, 0]"), "piece[1]: piece from start to end"),
-        (("end = [0, 0, 0.2]", "end = [0, 0]"), "piece[1].end: found"),
-        (("up = [0, 1, 0]", "upp = [0, 1, 0]"), 'unknown key "upp"'),
-        (
-            ("up = [0, 1, 0]", "tip_section = { radius = 0.1 }"),
-            "found different lengths at both ends of a tapered piece",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("change", "message"), [
+    (("[[piece]]", "[[pieces]]"), 'unknown key "pieces"; did you'),
+    (("section =", "sektion ="), "piece[1].section: missing"),
+    (("width", "widht"), 'piece[1].section: unknown "widht"; did you mean'),
+    (("height = 0.05", "height = -1"), "piece[1]: rectangular_section: height"),
+    (("end = [0, 0, 0.2]", "end = [0, 0, 0]"), "piece[1]: piece from start to end"),
+    (("end = [0, 0, 0.2]", "end = [0, 0]"), "piece[1].end: found"),
+    (("up = [0, 1, 0]", "upp = [0, 1, 0]"), 'unknown key "upp"'),
+    (("up = [0, 1, 0]", "tip_section = { radius = 0.1 }"),
+     "found different lengths at both ends of a tapered piece"),
+])  # fmt: skip
 def test_wrong_curve_file_is_refused_by_its_path(tmp_path, change, message):
     path = curve_file(tmp_path, L_BRACKET.replace(*change, 1))
     with pytest.raises(BadInput) as caught:

@@ -13,20 +13,17 @@ POINT, UNIT = [1.0, 2.0, 3.0], [0, 0.6, 0.8]
 FLAT = {"point": POINT, "normal": [0, 3, 4]}
 
 
-@pytest.mark.parametrize(
-    ("text", "kind", "point", "direction", "radius"),
-    [
-        ("z=0.452", "plane", [0, 0, 0.452], [0, 0, 1], np.inf),
-        (" x = -1e-3 ", "plane", [-1e-3, 0, 0], [1, 0, 0], np.inf),
-        ("plane=1,2,3/0,3,4", "plane", POINT, UNIT, np.inf),
-        ("bore=1,2,3/0,3,4/5", "bore", POINT, UNIT, 5.0),
-        ("disc=1,2,3/0,3,4/0.02", "disc", POINT, UNIT, 0.02),
-        ({"plane": FLAT}, "plane", POINT, UNIT, np.inf),
-        ({"plane": FLAT, "radius": 1}, "disc", POINT, UNIT, 1.0),
-        ({"bore": {"point": POINT, "axis": np.array([0, 3, 4]), "radius": 1e-9}},
-         "bore", POINT, UNIT, 1e-9),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("text", "kind", "point", "direction", "radius"), [
+    ("z=0.452", "plane", [0, 0, 0.452], [0, 0, 1], np.inf),
+    (" x = -1e-3 ", "plane", [-1e-3, 0, 0], [1, 0, 0], np.inf),
+    ("plane=1,2,3/0,3,4", "plane", POINT, UNIT, np.inf),
+    ("bore=1,2,3/0,3,4/5", "bore", POINT, UNIT, 5.0),
+    ("disc=1,2,3/0,3,4/0.02", "disc", POINT, UNIT, 0.02),
+    ({"plane": FLAT}, "plane", POINT, UNIT, np.inf),
+    ({"plane": FLAT, "radius": 1}, "disc", POINT, UNIT, 1.0),
+    ({"bore": {"point": POINT, "axis": np.array([0, 3, 4]), "radius": 1e-9}},
+     "bore", POINT, UNIT, 1e-9),
+])  # fmt: skip
 def test_interface_has_the_kind_point_and_direction_of_its_text(
     text, kind, point, direction, radius
 ):

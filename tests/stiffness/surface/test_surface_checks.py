@@ -32,13 +32,10 @@ def test_surface_digest_depends_on_the_geometry_only():
                 Surface(CUBE, turned, "one").digest()}) == 3  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("size", "unit", "hint"),
-    [
-        (19.99, "m", None), (20.01, "m", "mm"), (20.01, "mm", "m"),
-        (1.001e-3, "mm", None), (0.999e-3, "mm", "m"), (0.999e-3, "m", "m"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("size", "unit", "hint"), [
+    (19.99, "m", None), (20.01, "m", "mm"), (20.01, "mm", "m"),
+    (1.001e-3, "mm", None), (0.999e-3, "mm", "m"), (0.999e-3, "m", "m"),
+])  # fmt: skip
 def test_part_of_implausible_size_is_refused_with_a_likely_unit(size, unit, hint):
     """Plausible sizes are from a millimetre to twenty metres."""
     points = CUBE * size / (0.1 * np.sqrt(3))

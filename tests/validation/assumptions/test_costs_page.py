@@ -23,14 +23,11 @@ def shown(*errors):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("second", "kind"),
-    [
-        (Cost(1e-3, 19e-6, 0.009), "good"),
-        (Cost(1e-3, 21e-6, 0.0), "mixed"),
-        (Cost(1e-3, 1e-6, 0.011), "mixed"),
-    ],
-)
+@pytest.mark.parametrize(("second", "kind"), [
+    (Cost(1e-3, 19e-6, 0.009), "good"),
+    (Cost(1e-3, 21e-6, 0.0), "mixed"),
+    (Cost(1e-3, 1e-6, 0.011), "mixed"),
+])  # fmt: skip
 def test_error_above_20_um_or_1_per_cent_makes_the_verdict_amber(second, kind):
     text = shown(Cost(2e-3, 1e-6, 0.0), second)
     assert f"<p class='verdict {kind}'>" in text

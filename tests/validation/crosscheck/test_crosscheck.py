@@ -281,15 +281,12 @@ BY_DEFAULT = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "mutation",
-    [
-        pytest.param(
-            mutation, id=name, marks=[pytest.mark.slow] * (name not in BY_DEFAULT)
-        )
-        for name, mutation in MUTATIONS.items()
-    ],
-)
+@pytest.mark.parametrize("mutation", [
+    pytest.param(
+        mutation, id=name, marks=[pytest.mark.slow] * (name not in BY_DEFAULT)
+    )
+    for name, mutation in MUTATIONS.items()
+])  # fmt: skip
 def test_crosscheck_fails_for_a_broken_term_of_the_linear_model(
     irsbot2, mutation, broken
 ):

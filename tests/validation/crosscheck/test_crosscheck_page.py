@@ -55,15 +55,12 @@ def pose(passed, verdict, status="ok"):
             "status": status}  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("rows", "kind"),
-    [
-        ([pose(True, "passed")] * 2, "good"),
-        ([pose(True, "passed"), pose(False, "not decided")], "mixed"),
-        ([pose(True, "passed"), pose(False, "failed")], "bad"),
-        ([pose(None, "", "out of reach")], "bad"),
-    ],
-)
+@pytest.mark.parametrize(("rows", "kind"), [
+    ([pose(True, "passed")] * 2, "good"),
+    ([pose(True, "passed"), pose(False, "not decided")], "mixed"),
+    ([pose(True, "passed"), pose(False, "failed")], "bad"),
+    ([pose(None, "", "out of reach")], "bad"),
+])  # fmt: skip
 def test_page_of_many_poses_is_red_if_one_fails_and_amber_if_undecided(rows, kind):
     text = poses_page("a robot", rows, Provenance())
     assert f"<p class='verdict {kind}'>" in text

@@ -442,20 +442,17 @@ def test_rotations_relative_to_a_declared_mount_are_unchanged(lab, run, rng):
     assert rotations == pytest.approx(errors, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("head", "values", "keys", "message"),
-    [
-        ("rx [deg],ry [deg],rz [deg]", lambda R: [1, 2, 3], {},
-         "found three angles, expected their order in the targets file"),
-        ("rx,ry,rz", lambda R: [1, 2, 3], {"orientation": '"ZYX"'},
-         "found no unit of angles"),
-        ("qw,qx,qy,qz", lambda R: [1, 2, 3, 4], {}, "found a quaternion of norm 5.477"),
-        ("qw,qx,qy,qz", lambda R: np.roll(R.inv().as_quat(), 1), {},
-         "found inverted orientations"),
-        ("rx,ry,rz", lambda R: [1, 2, 3], {"orientation": '"zzx"'},
-         "orientation: found"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("head", "values", "keys", "message"), [
+    ("rx [deg],ry [deg],rz [deg]", lambda R: [1, 2, 3], {},
+     "found three angles, expected their order in the targets file"),
+    ("rx,ry,rz", lambda R: [1, 2, 3], {"orientation": '"ZYX"'},
+     "found no unit of angles"),
+    ("qw,qx,qy,qz", lambda R: [1, 2, 3, 4], {}, "found a quaternion of norm 5.477"),
+    ("qw,qx,qy,qz", lambda R: np.roll(R.inv().as_quat(), 1), {},
+     "found inverted orientations"),
+    ("rx,ry,rz", lambda R: [1, 2, 3], {"orientation": '"zzx"'},
+     "orientation: found"),
+])  # fmt: skip
 def test_ambiguous_orientations_are_refused(lab, run, head, values, keys, message):
     lab.targets("A", noise_rotation=1e-4, **keys)
     text = "\n".join(["X,Y,Z," + head, *oriented_rows(values)])

@@ -290,19 +290,16 @@ def test_readings_far_from_any_command_are_reported(lab, run):
     assert "no command is near it in time" in table["left_out"][0]
 
 
-@pytest.mark.parametrize(
-    ("text", "seconds", "dates"),
-    [
-        *((text, 1795343400.0, None) for text in (
-            "2026-11-22T10:30:00", "2026-11-22 10:30:00.000", "20261122103000",
-            "22.11.2026 10:30:00", "2026-11-22T11:30:00+01:00", "1795343400",
-        )),
-        ("11/22/2026 10:30:00 AM", 1795343400.0, "month_first"),
-        ("22/11/2026 10:30:00", 1795343400.0, "day_first"),
-        ("10:30:00", 37800.0, None), ("9:30:00 PM", 77400.0, None),
-        ("10:30:00,25", 37800.25, None),
-        ("1.1.1970 00:01:00.123456789", 60.123456, None),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("text", "seconds", "dates"), [
+    *((text, 1795343400.0, None) for text in (
+        "2026-11-22T10:30:00", "2026-11-22 10:30:00.000", "20261122103000",
+        "22.11.2026 10:30:00", "2026-11-22T11:30:00+01:00", "1795343400",
+    )),
+    ("11/22/2026 10:30:00 AM", 1795343400.0, "month_first"),
+    ("22/11/2026 10:30:00", 1795343400.0, "day_first"),
+    ("10:30:00", 37800.0, None), ("9:30:00 PM", 77400.0, None),
+    ("10:30:00,25", 37800.25, None),
+    ("1.1.1970 00:01:00.123456789", 60.123456, None),
+])  # fmt: skip
 def test_times_of_every_notation_are_read(text, seconds, dates):
     assert parse_time("", text, Writing(dates=dates)) == seconds

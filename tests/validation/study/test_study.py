@@ -152,13 +152,10 @@ QUIET = "[checks]\npicture = false\n"
 
 
 @pytest.mark.exudyn
-@pytest.mark.parametrize(
-    "name",
-    [
-        name if name == "four_bar" else pytest.param(name, marks=SLOW)
-        for name in BUILT_IN
-    ],
-)
+@pytest.mark.parametrize("name", [
+    name if name == "four_bar" else pytest.param(name, marks=SLOW)
+    for name in BUILT_IN
+])  # fmt: skip
 def test_study_of_a_robot_without_errors_reports_that_nothing_was_checked(
     tmp_path, name
 ):
@@ -281,31 +278,28 @@ def test_message_about_a_robot_file_given_as_a_study_states_the_missing_line(tmp
     assert read_study(tmp_path / "study.toml").robot == robot
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ('robot = "irsbot2"', 'robot = "nowhere.toml"', "nowhere.toml\", neither a"),
-        ('robot = "irsbot2"', "", "robot: missing; expected a built-in robot or a"),
-        ("seed = 1", "", "errors.seed: missing; expected a whole number >= 0"),
-        ("seed = 1", "seed = -1", "errors.seed: found -1, expected a whole number"),
-        ("seed = 1", "seed = 1\nsigns = 'up'", "errors.signs: found 'up', expected"),
-        ("[pose]", "[pose]\nx = 1", 'pose: unknown key "x"'),
-        ("tx = 0.0", "tx = nan", "pose.tx: found nan, expected a finite number"),
-        ("tz=-0.5:-0.4:0.1", "tz=-0.5:-0.4", 'grid tz: found "-0.5:-0.4", expected'),
-        ("[pose]", "[poze]", 'unknown key "poze"; did you mean "pose"?'),
-        ('"link_a"', '"link_q"', 'no frame "link_q"'),
-        ("least = [1e-4,", "least = [1e-1,", "least: expected 0 <= least <= most"),
-        ("least = [1e-4,", "least = [", "errors.least: found"),
-        ("[pose]", "[links]\nsource = 'fea'\n[pose]", "links.surface: missing"),
-        ("[pose]", "[links]\nsurface = 'no.stl'\n[pose]", "surface: no such file"),
-        ("[pose]", "[checks]\nstiffness = true\n[pose]", "stiffness: found true"),
-        ("[pose]", "[checks]\nmaps = 1\n[pose]", "checks.maps: found 1, expected true"),
-        ("title", "scales = 3\ntitle", "scales: expected a list of factors"),
-        ("title", "scales = ['a']\ntitle", "scales: found 'a' as number 1, expected"),
-        ("title", "scales = [1, -1]\ntitle", "expected at least two different fact"),
-        ("title", "title = 1 #", "title: found 1, expected a string"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("old", "new", "message"), [
+    ('robot = "irsbot2"', 'robot = "nowhere.toml"', "nowhere.toml\", neither a"),
+    ('robot = "irsbot2"', "", "robot: missing; expected a built-in robot or a"),
+    ("seed = 1", "", "errors.seed: missing; expected a whole number >= 0"),
+    ("seed = 1", "seed = -1", "errors.seed: found -1, expected a whole number"),
+    ("seed = 1", "seed = 1\nsigns = 'up'", "errors.signs: found 'up', expected"),
+    ("[pose]", "[pose]\nx = 1", 'pose: unknown key "x"'),
+    ("tx = 0.0", "tx = nan", "pose.tx: found nan, expected a finite number"),
+    ("tz=-0.5:-0.4:0.1", "tz=-0.5:-0.4", 'grid tz: found "-0.5:-0.4", expected'),
+    ("[pose]", "[poze]", 'unknown key "poze"; did you mean "pose"?'),
+    ('"link_a"', '"link_q"', 'no frame "link_q"'),
+    ("least = [1e-4,", "least = [1e-1,", "least: expected 0 <= least <= most"),
+    ("least = [1e-4,", "least = [", "errors.least: found"),
+    ("[pose]", "[links]\nsource = 'fea'\n[pose]", "links.surface: missing"),
+    ("[pose]", "[links]\nsurface = 'no.stl'\n[pose]", "surface: no such file"),
+    ("[pose]", "[checks]\nstiffness = true\n[pose]", "stiffness: found true"),
+    ("[pose]", "[checks]\nmaps = 1\n[pose]", "checks.maps: found 1, expected true"),
+    ("title", "scales = 3\ntitle", "scales: expected a list of factors"),
+    ("title", "scales = ['a']\ntitle", "scales: found 'a' as number 1, expected"),
+    ("title", "scales = [1, -1]\ntitle", "expected at least two different fact"),
+    ("title", "title = 1 #", "title: found 1, expected a string"),
+])  # fmt: skip
 def test_wrong_study_file_is_refused_in_one_line(tmp_path, old, new, message):
     path = study_file(tmp_path, SMALL.replace(old, new, 1))
     with pytest.raises(BadInput) as error:

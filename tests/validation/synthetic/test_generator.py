@@ -282,18 +282,15 @@ def test_closed_loop_divides_a_misfit_by_stiffness(added):
     assert soft[3] == pytest.approx(F / (2 * k), rel=1e-5)
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: Noise(position=0.0), "noise: position: found 0"),
-        (lambda: Noise(missing=1.0), "noise: missing: found 1"),
-        (lambda: Noise(hidden_frame=math.inf), "noise: hidden_frame: found inf"),
-        (lambda: CampaignDesign(size=math.nan), "design: size: found nan"),
-        (lambda: CampaignDesign(load=-1.0), "design: load: found -1"),
-        (lambda: CampaignDesign(reference_point=(0.0, math.inf, 0.0)),
-         "design: reference_point: found inf"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("make", "message"), [
+    (lambda: Noise(position=0.0), "noise: position: found 0"),
+    (lambda: Noise(missing=1.0), "noise: missing: found 1"),
+    (lambda: Noise(hidden_frame=math.inf), "noise: hidden_frame: found inf"),
+    (lambda: CampaignDesign(size=math.nan), "design: size: found nan"),
+    (lambda: CampaignDesign(load=-1.0), "design: load: found -1"),
+    (lambda: CampaignDesign(reference_point=(0.0, math.inf, 0.0)),
+     "design: reference_point: found inf"),
+])  # fmt: skip
 def test_impossible_noise_or_design_is_refused(make, message):
     with pytest.raises(BadInput) as caught:
         make()
