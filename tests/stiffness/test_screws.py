@@ -8,16 +8,7 @@ from forcefit.stiffness.screws import (
     rotation_matrix,
     rotation_vector,
     screw_map,
-    skew,
-    transform,
 )
-
-
-def test_skew_matrix_times_a_vector_is_the_cross_product(rng):
-    a, b = rng.normal(size=(2, 7, 3))
-    np.testing.assert_allclose(
-        np.einsum("nij,nj->ni", skew(a), b), np.cross(a, b), atol=1e-15
-    )
 
 
 def test_rotation_about_z_moves_a_point_on_the_x_axis_along_y():
@@ -75,17 +66,3 @@ def test_rotation_vector_is_exact_for_half_turns_and_the_identity():
         turn = 2 * np.outer(axis, axis) - np.eye(3)
         np.testing.assert_allclose(abs(rotation_vector(turn)), np.pi * abs(axis))
     assert not rotation_vector(np.eye(3)).any()
-
-
-@pytest.mark.parametrize("shape", [(), (0,), (2, 5)])
-def test_rotation_functions_preserve_leading_axes(shape):
-    matrices = rotation_matrix(np.zeros((*shape, 3)))
-    assert matrices.shape == (*shape, 3, 3)
-    assert rotation_vector(matrices).shape == (*shape, 3)
-
-
-def test_product_of_two_transforms_is_the_transform_of_the_composed_motion(rng):
-    R, S = rotation_matrix(rng.normal(size=(2, 3)))
-    p, q = rng.normal(size=(2, 3))
-    chained = transform(p, R) @ transform(q, S)
-    np.testing.assert_allclose(chained, transform(p + R @ q, R @ S), atol=1e-14)

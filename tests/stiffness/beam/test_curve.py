@@ -19,14 +19,13 @@ from forcefit.stiffness.beam.sections import (
     Section,
     box_section,
     i_section,
-    rectangular_section,
     round_section,
 )
 from forcefit.stiffness.fem.condensation import condense
 from forcefit.stiffness.fem.elements import isoparametric, lame
 from forcefit.stiffness.link import inverted, scaled
-from forcefit.stiffness.screws import rotation_matrix, screw_map
-from tests.solids_for_tests import bar_solid, box_solid, masked_solid
+from forcefit.stiffness.screws import screw_map
+from tests.solids_for_tests import bar_solid
 
 E, NU = 60e9, 0.3
 G = E / (2 * (1 + NU))
@@ -91,67 +90,38 @@ def test_compliance_of_a_cone_equals_closed_forms():
     assert C[3, 3] == pytest.approx(quad(bent, 0, L, epsrel=1e-12)[0], rel=1e-9)
 
 
-def test_turning_the_curve_turns_its_compliance(rng):
-    R = rotation_matrix(rng.normal(size=3))
-    turn = np.array([0.3, -0.4, 0.2])
-    spoke = np.cross(turn, [1, 2, 3.0]) / 5
-    plain = curve_compliance([arc_piece(spoke, [0, 0, 0], turn, CROOKED)], E, NU)
-    turned = arc_piece(R @ spoke, [0, 0, 0], R @ turn, CROOKED)
-    A = np.kron(np.eye(2), R)
-    assert_same(curve_compliance([turned], E, NU), A @ plain @ A.T, 1e-12)
+def line(start=0.0, section=BAR):
+    """A straight piece of 1 m along x."""
+    return straight_piece([start, 0, 0], [start + 1, 0, 0], section)
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda: curve_compliance([], E, NU), "no pieces"),
-        (
-            lambda: curve_compliance(
-                [
-                    straight_piece([0, 0, 0], [1, 0, 0], BAR),
-                    straight_piece([1, 0.1, 0], [2, 0, 0], BAR),
-                ],
-                E,
-                NU,
-            ),
-            "piece 2 begins 0.1 m away",
-        ),
-        (lambda: straight_piece([0, 0, 0], [0, 0, 0], BAR), "is zero"),
-        (
-            lambda: arc_piece([1, 0, 0], [0, 0, 0], [1, 0, 0], BAR),
-            "not normal to the radius",
-        ),
-        (
-            lambda: curve_compliance(
-                [straight_piece([0, 0, 0], [1, 0, 0], BAR)], E, NU, theory="eulr"
-            ),
-            '"euler"?',
-        ),
-        (
-            lambda: curve_compliance(
-                [
-                    straight_piece(
-                        [0, 0, 0], [1, 0, 0], lambda t: BAR if t < 1 / 3 else CROOKED
-                    )
-                ],
-                E,
-                NU,
-            ),
-            "split pieces where the section changes abruptly",
-        ),
-        (lambda: box_section(0.1, 0.1, 0.05, NU), "expected less than half"),
-        (lambda: i_section(0.1, 0.1, 0.2, 0.01, NU), "expected web < width"),
-        (lambda: i_section(0.1, math.nan, 0.01, 0.01, NU), "height = nan"),
-    ],
-)
+def stepped(t):
+    """A section that changes abruptly at a third of the length."""
+    return BAR if t < 1 / 3 else CROOKED
+
+
+@pytest.mark.parametrize(("call", "message"), [
+    (lambda: curve_compliance([], E, NU), "no pieces"),
+    (lambda: curve_compliance([line(), line(1.1)], E, NU), "begins 0.1 m away"),
+    (lambda: straight_piece([0, 0, 0], [0, 0, 0], BAR), "is zero"),
+    (lambda: arc_piece([1, 0, 0], [0, 0, 0], [1, 0, 0], BAR), "not normal to the"),
+    (lambda: curve_compliance([line()], E, NU, theory="eulr"), '"euler"?'),
+    (
+        lambda: curve_compliance([line(section=stepped)], E, NU),
+        "split pieces where the section changes abruptly",
+    ),
+    (lambda: box_section(0.1, 0.1, 0.05, NU), "expected less than half"),
+    (lambda: i_section(0.1, 0.1, 0.2, 0.01, NU), "expected web < width"),
+    (lambda: i_section(0.1, math.nan, 0.01, 0.01, NU), "height = nan"),
+])  # fmt: skip
 def test_invalid_curve_or_section_is_refused(call, message):
     with pytest.raises(BadInput) as caught:
         call()
     assert message in str(caught.value)
 
 
-def measured_section(solid, center, lengths=(0.15, 0.25)):
-    """Section constants that finite elements show between two lengths.
+def measured_section(solid, lengths=(0.15, 0.25)):
+    """Torsion constant and shear area that finite elements show between two lengths.
 
     Distributing ends: their effect is the same for both lengths and drops out.
     """
@@ -159,30 +129,13 @@ def measured_section(solid, center, lengths=(0.15, 0.25)):
     for length in lengths:
         mesh = isoparametric(solid(length))
         lam, mu = (np.full(len(mesh.cells), v) for v in lame(E, NU))
-        centers = np.array([[*center, z] for z in (0, length)])
-        C.append(
-            inverted(condense(mesh, lam, mu, centers, "distributing-both").stiffness)
-        )
+        centers = np.array([[0, 0, 0], [0, 0, length]])
+        K = condense(mesh, lam, mu, centers, "distributing-both").stiffness
+        C.append(np.diag(inverted(K)))
     step, cubes = lengths[1] - lengths[0], lengths[1] ** 3 - lengths[0] ** 3
-    grown = np.diag(C[1] - C[0])
-    I_x = step / (E * grown[0])
-    return {
-        "area": step / (E * grown[5]),
-        "I_x": I_x,
-        "J": step / (G * grown[2]),
-        "shear_area_y": step / (G * (grown[4] - cubes / (3 * E * I_x))),
-    }
-
-
-def test_section_constants_of_a_rectangle_agree_with_finite_elements():
-    """Saint-Venant's torsion series against elements of a quarter of the width."""
-    measured = measured_section(
-        lambda L: box_solid((4, 4, round(40 * L)), (0.04, 0.04, L)), (0.02, 0.02)
-    )
-    section = rectangular_section(0.04, 0.04, NU)
-    assert measured["area"] == pytest.approx(section.area, rel=1e-9)
-    assert measured["I_x"] == pytest.approx(section.I_y, rel=1e-9)
-    assert measured["J"] == pytest.approx(section.J, rel=2e-4)
+    grown = C[1] - C[0]
+    bending = cubes / (3 * step) * grown[0]
+    return step / (G * grown[2]), step / (G * (grown[4] - bending))
 
 
 def test_shear_energy_of_a_round_bar_has_hutchinsons_factor_instead_of_cowpers():
@@ -191,29 +144,12 @@ def test_shear_energy_of_a_round_bar_has_hutchinsons_factor_instead_of_cowpers()
     Cowper's 0.8864, which the public format asks of beams, is 4 % lower: a known
     difference of theories, and 0.2 % of the paper's link.
     """
-    measured = measured_section(lambda L: bar_solid(2, round(40 * L), 0.04, L), (0, 0))
+    J, shear_area = measured_section(lambda L: bar_solid(2, round(40 * L), 0.04, L))
     factor = 6 * (1 + NU) ** 2 / (7 + 12 * NU + 4 * NU**2)
     section = round_section(0.04, NU)
-    assert measured["shear_area_y"] / section.area == pytest.approx(factor, rel=1e-4)
-    assert measured["J"] == pytest.approx(section.J, rel=1e-5)
+    assert shear_area / section.area == pytest.approx(factor, rel=1e-4)
+    assert J == pytest.approx(section.J, rel=1e-5)
     assert section.shear_y == pytest.approx(0.8864, abs=1e-4)
-
-
-def test_section_constants_of_a_thin_box_agree_with_finite_elements():
-    """Bredt's formula neglects the corners: 3.5 % of J at wall / width = 1 / 12."""
-    wall = 0.06 / 12
-    measured = measured_section(
-        lambda L: masked_solid(
-            (12, 12, round(20 * L)),
-            (0.06, 0.06, L),
-            lambda c: (np.abs(c[:, :2] - 0.03) > 0.03 - wall).any(axis=1),
-        ),
-        (0.03, 0.03),
-    )
-    section = box_section(0.06, 0.06, wall, NU)
-    assert measured["area"] == pytest.approx(section.area, rel=1e-9)
-    assert measured["I_x"] == pytest.approx(section.I_y, rel=1e-9)
-    assert measured["J"] / section.J == pytest.approx(1.035, abs=0.002)
 
 
 @pytest.mark.parametrize("away", [(0.0, 0.0, 0.0), (0.7, -0.3, 0.5)])
@@ -241,10 +177,6 @@ def test_cutting_a_curve_in_two_at_any_point_does_not_change_compliance_and_leng
     assert_same(curve_compliance(cut, E, NU), curve_compliance(one, E, NU), 1e-9)
     for pieces in (one, cut):
         assert curve_length(pieces) == pytest.approx((0.3 + 0.2 * 0.6) * size)
-    with pytest.raises(BadInput, match="piece 2 begins"):
-        curve_compliance([one[1], one[0]], E, NU)
-    with pytest.raises(BadInput, match="not normal to the radius"):
-        arc_piece(o, centre + [0, 1e-3 * size, 0], turn, CROOKED)
 
 
 def test_curve_length_of_a_parabola_equals_its_closed_form():
@@ -258,16 +190,3 @@ def test_curve_length_of_a_parabola_equals_its_closed_form():
     assert curve_length([parabola]) == pytest.approx(expected, rel=1e-8)
     line = straight_piece([1, 1, 0], [1, 1, 3], BAR)
     assert curve_length([parabola, line]) == pytest.approx(expected + 3, rel=1e-8)
-
-
-def test_curve_tolerance_is_relative_at_any_size():
-    """A cone of 60 to 1, short or long: its axial compliance is L / (E pi r0 r1)."""
-    for unit in (1e-3, 1e3):
-        thick, thin = 0.06 * unit, 1e-3 * unit
-        needle = straight_piece(
-            [0, 0, 0], [0.4 * unit, 0, 0],
-            lambda t, a=thick, b=thin: round_section(a + t * (b - a), NU),
-        )  # fmt: skip
-        C = curve_compliance([needle], E, NU, theory="euler", tolerance=1e-8)
-        expected = 0.4 * unit / (E * math.pi * thick * thin)
-        assert C[3, 3] == pytest.approx(expected, rel=1e-7)

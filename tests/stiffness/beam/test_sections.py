@@ -12,7 +12,6 @@ from forcefit.stiffness.beam.sections import (
     declared_section,
     i_section,
     rectangular_section,
-    round_section,
 )
 
 NU = 0.3
@@ -70,29 +69,6 @@ def test_torsion_constant_of_a_rectangle_equals_saint_venants_series(width, heig
     assert (rectangle.area, rectangle.I_y, rectangle.I_z) == pytest.approx(
         (area, I_y, I_z), rel=1e-12
     )
-
-
-def test_section_size_equals_the_radius_of_a_round_bar_in_any_unit():
-    """The size of a rectangle is its longer side over sqrt(3): 2 sqrt(h^2 / 12)."""
-    for unit in (1e-3, 1.0, 1e3):
-        assert round_section(unit, NU).size == pytest.approx(unit, rel=1e-14)
-        for sides in ((3 * unit, unit), (unit, 3 * unit)):
-            size = rectangular_section(*sides, NU).size
-            assert size == pytest.approx(3 * unit / math.sqrt(3), rel=1e-14)
-
-
-@pytest.mark.parametrize("section", [
-    lambda nu: round_section(1.0, nu),
-    lambda nu: rectangular_section(1.0, 2.0, nu),
-    lambda nu: box_section(1.0, 2.0, 0.1, nu),
-    lambda nu: i_section(1.0, 2.0, 0.1, 0.1, nu),
-])  # fmt: skip
-def test_poissons_ratio_outside_minus_one_to_one_half_is_refused(section):
-    for nu in (-0.999, 0.499):
-        assert section(nu).area > 0
-    for nu in (-1.0, -1.5, 0.5, math.nan):
-        with pytest.raises(BadInput, match="must lie between"):
-            section(nu)
 
 
 def test_section_check_accepts_inner_radius_zero_and_refuses_absurd_sizes():

@@ -145,16 +145,13 @@ def test_wrong_mapping_is_refused_in_one_line(text, message, tmp_path):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (lambda t: t.replace("RSA", "CSA"), "expected RSA or RUA"),
-        (lambda t: "\n".join(t.split("\n")[:3]), "found an incomplete header"),
-        (lambda t: "\n".join(t.split("\n")[:20]), "expected 12"),
-        (lambda t: t.replace("1.000000000000000D+00", "1.0000x0000000000D+00", 1),
-         "expected a number"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("change", "message"), [
+    (lambda t: t.replace("RSA", "CSA"), "expected RSA or RUA"),
+    (lambda t: "\n".join(t.split("\n")[:3]), "found an incomplete header"),
+    (lambda t: "\n".join(t.split("\n")[:20]), "expected 12"),
+    (lambda t: t.replace("1.000000000000000D+00", "1.0000x0000000000D+00", 1),
+     "expected a number"),
+])  # fmt: skip
 def test_wrong_harwell_boeing_file_is_refused(change, message, tmp_path):
     text = harwell_boeing(csc_array(np.eye(12)), right_side=False)
     (tmp_path / "k.matrix").write_text(change(text))
@@ -179,11 +176,11 @@ def test_matrix_market_file_of_every_kind_is_read(head, numbers, tmp_path):
 @pytest.mark.parametrize(("text", "message"), [
     ("coordinate pattern general\n2 2 1\n1 1\n", "expected a matrix, coordinate"),
     ("coordinate real general\n2 2 3\n1 1 1\n2 2 1\n",
-     "expected the number that the file states"),
+     "of each entry that this line states"),
     ("coordinate real general\n2 2 2\n1 1 1\n3 2 1\n", "row or column outside 1 to 2"),
     ("coordinate real general\n2 2 2\n1 1 1\n2 1.5 1\n", "a row or column outside"),
     ("coordinate real general\n", "expected a square"),
-    ("coordinate real general\n2 2\n", "expected the number that the file states"),
+    ("coordinate real general\n2 2\n", "of each entry that this line states"),
     ("coordinate real general\n1e9 1e9 0\n", "expected a square"),
     ("array real general\n1000000 1000000\n1\n", "expected 1000000000000"),
     ("array real general\n2 3\n1 1 1 1 1 1\n", "found 2 by 3 numbers"),

@@ -86,23 +86,14 @@ def test_dmig_of_every_layout_has_the_textbook_stiffness_and_mass(write, tmp_pat
     assert link.mass == pytest.approx(mass, rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("name", "write"),
-    [
-        (
-            "one.mtx",
-            lambda K: user_element(K, head="** 12\n1, 2, 3, 4, 5, 6\n"),
-        ),
-        ("one.dmig", lambda K: between_blanks(K, "KAAX", first=12)),
-        (
-            "five.mtx",
-            lambda K: "".join(
-                f"7,{i + 1},7,{j + 1},{K[i, j]:.15e}\n"
-                for i in range(6) for j in range(6) if K[i, j]
-            ),
-        ),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "write"), [
+    ("one.mtx", lambda K: user_element(K, head="** 12\n1, 2, 3, 4, 5, 6\n")),
+    ("one.dmig", lambda K: between_blanks(K, "KAAX", first=12)),
+    ("five.mtx", lambda K: "".join(
+        f"7,{i + 1},7,{j + 1},{K[i, j]:.15e}\n"
+        for i in range(6) for j in range(6) if K[i, j]
+    )),
+])  # fmt: skip
 def test_dmig_of_a_single_node_is_the_stiffness_at_the_tip(name, write, tmp_path):
     path = tmp_path / name
     path.write_text(write(textbook_beam()[6:, 6:]))
@@ -112,29 +103,18 @@ def test_dmig_of_a_single_node_is_the_stiffness_at_the_tip(name, write, tmp_path
 DIAGONAL = "DMIG,KAAX,0,6,2,0\n" + "".join(
     f"DMIG,KAAX,7,{k},,7,{k},1.0E+06\n" for k in range(1, 7)
 )
-WRONG = [
-    (
-        "DMIG,KAAX,0,6,2,0\nDMIG,KAAX,1,1,,1,1,2.0,,1,2\n",
-        "'1 2' at a line's end, expected node",
-    ),
-    # of two values of one entry the last one won
-    (
-        DIAGONAL + DIAGONAL.replace("7,2,,7,2,1.0", "7,2,,7,2,9.0"),
-        r"KAAX: row 7 2, .* found 1e\+06 and 9e\+06",
-    ),
-    # an imaginary part was dropped without a word
-    (
-        DIAGONAL.replace("7,3,1.0E+06", "7,3,1.0E+06,5.0E+04"),
-        r"row 7 3: .* imaginary part '5.0E\+04'",
-    ),
-    (
-        large_fields(textbook_beam(), "K4AAX"),
-        r"K4AAX \(structural damping\), expected one",
-    ),
-]
 
 
-@pytest.mark.parametrize(("text", "message"), WRONG)
+@pytest.mark.parametrize(("text", "message"), [
+    ("DMIG,KAAX,0,6,2,0\nDMIG,KAAX,1,1,,1,1,2.0,,1,2\n",
+     "'1 2' at a line's end, expected node"),
+    (DIAGONAL + DIAGONAL.replace("7,2,,7,2,1.0", "7,2,,7,2,9.0"),
+     r"KAAX: row 7 2, .* found 1e\+06 and 9e\+06"),
+    (DIAGONAL.replace("7,3,1.0E+06", "7,3,1.0E+06,5.0E+04"),
+     r"row 7 3: .* imaginary part '5.0E\+04'"),
+    (large_fields(textbook_beam(), "K4AAX"),
+     r"K4AAX \(structural damping\), expected one"),
+])  # fmt: skip
 def test_wrong_dmig_is_refused(text, message, tmp_path):
     path = tmp_path / "k.dmig"
     path.write_text(text)

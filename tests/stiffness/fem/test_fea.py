@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from forcefit.stiffness.fem import fea
 from forcefit.stiffness.fem.fea import (
     Budget,
     FemOptions,
-    interface_center,
     mesh_link,
     solve_bar,
     solve_link,
@@ -43,10 +41,8 @@ PLANES = (parse_interface("z=0"), parse_interface("z=0.452"))
 @pytest.mark.slow
 def test_papers_bar_from_its_surface_agrees_within_its_estimated_error(cache):
     """The converged bending stiffness is 1 032 277 N m/rad, that of torsion G J / L.
-
     The requested accuracy is 0.5 %, and the estimate must cover the true error. The
-    mesh's own stiffness is above the true one, by no more than twice the estimate.
-    """
+    mesh's own stiffness is above the true one, by no more than twice the estimate."""
     solution = solve_link(
         bar_surface(),
         *PLANES,
@@ -88,17 +84,6 @@ def test_bar_of_two_materials_stretches_like_two_springs_in_series(cache):
     assert two.stiffness[5, 5] / one.stiffness[5, 5] == pytest.approx(4 / 3, rel=0.02)
 
 
-@pytest.mark.slow
-def test_exhausted_budget_is_reported(cache):
-    solution = solve_link(
-        bar_surface(), *PLANES, [Material(E, NU)],
-        options=FemOptions(accuracy=1e-5, budget=Budget(levels=2), cache=cache),
-    )  # fmt: skip
-    assert not solution.link.mesh["reached"]
-    assert solution.link.mesh["meshes"] == 2
-    assert solution.link.relative_error_estimate > 1e-5
-
-
 @pytest.mark.parametrize(("change", "message"), [
     ({"interface": "rigit"}, '"rigid"?'),
     ({"accuracy": 0.0}, "accuracy = 0 must lie between"),
@@ -110,15 +95,6 @@ def test_wrong_options_are_refused(change, message, cache):
     with pytest.raises(BadInput) as caught:
         solve_link(bar_surface(), *PLANES, materials, options=FemOptions(**given))
     assert message in str(caught.value)
-
-
-def test_interface_center_is_the_centroid_of_a_plane_and_the_point_of_a_bore():
-    surface = bar_surface()
-    np.testing.assert_allclose(
-        interface_center(surface, PLANES[1], "tip"), [0, 0, 0.452], atol=1e-15
-    )
-    bore = parse_interface("bore=0,0,0.1/0,0,1/0.04")
-    np.testing.assert_array_equal(interface_center(surface, bore, "tip"), [0, 0, 0.1])
 
 
 def test_mesh_is_refined_up_to_the_budget_of_unknowns():
@@ -141,26 +117,6 @@ def test_first_mesh_that_exceeds_the_budget_is_refused(budget):
     words = r"the coarsest mesh that follows the part has \d+ unknowns, about .* s and"
     with pytest.raises(MeshFailed, match=f"{words}.*allow more time"):
         solve_bar({"radius": 0.1}, Material(E, NU), FemOptions(budget=budget))
-
-
-def test_failed_first_mesh_is_retried_with_smaller_edges_while_time_remains(
-    monkeypatch,
-):
-    """Edges of a tenth of the diagonal, then half and a fifth of that;
-    one try without time."""
-    surface, edges = bar_surface(), []
-
-    def fail(*_, edge, **__):
-        edges.append(edge / surface.diagonal)
-        raise MeshFailed("no mesh")
-
-    monkeypatch.setattr(fea, "mesh_solid", fail)
-    out_of_time = Budget(seconds=1e-12)
-    for budget, expected in ((Budget(), [0.1, 0.05, 0.02]), (out_of_time, [0.1])):
-        edges.clear()
-        with pytest.raises(MeshFailed):
-            fea.first_mesh(surface, *PLANES, budget)
-        assert edges == pytest.approx(expected)
 
 
 def test_text_of_an_interface_that_cannot_be_read_is_named():

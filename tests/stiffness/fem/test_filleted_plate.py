@@ -16,9 +16,8 @@ def test_filleted_plate_has_its_exact_volume_and_a_stiffness_below_upper_bounds(
     tmp_path,
 ):
     """The volume agrees with the integral over the height to 0.01 %, and no element is
-    flat. K is below its upper bounds; a mesh of another shape exceeded them by 16 to
-    23 %.
-    """
+    flat. K is below its upper bounds; a mesh of another shape exceeded them by 16 to 23
+    %."""
     options = FemOptions(0.1, cache=tmp_path)
     materials = [Material(7e10, 0.3)]
     solved = solve_link(filleted_plate(), *ENDS, materials, options=options)

@@ -35,15 +35,6 @@ def test_estimated_error_covers_the_whole_interval(seed, size):
         assert (gap <= np.abs(told) * (1 + 1e-9) + 1e-12 * np.abs(K_h).max()).all()
 
 
-def test_geometry_error_increases_the_estimated_error_and_not_the_stiffness():
-    K, E = random_definite(3), random_definite(4, 1e-3)
-    geometry = 1e-4 * random_definite(5) * np.where(np.eye(6), -1, 1)
-    middle, told = middle_stiffness(K, E, geometry)
-    plain, half = middle_stiffness(K, E, NONE)
-    np.testing.assert_array_equal(middle, plain)
-    np.testing.assert_allclose(told - half, np.abs(geometry), rtol=1e-9)
-
-
 def test_middle_stiffness_does_not_depend_on_units():
     """Millimetres in place of metres,
     also where less than half of the error is subtracted."""

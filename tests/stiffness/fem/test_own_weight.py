@@ -55,17 +55,6 @@ def test_weight_along_the_bar_causes_a_linear_axial_stress(bar):
     np.testing.assert_allclose(stress, expected, atol=2e-3 * DENSITY * G)
 
 
-def test_a_wrench_and_the_weight_superpose(bar):
-    """A tip force that carries half of the weight leaves no moment at the wall."""
-    lift = DENSITY * G * SIDE**2 / 2
-    field = stress_influence(with_own_weight(bar), 0.1)
-    stress = field.stresses([0, 0, 0, 0, lift, 0, 0, -G, 0])[:, 2]
-    x, y, z = field.places.T
-    moment = DENSITY * G * SIDE**2 * ((1 - z) ** 2 - (1 - z)) / 2
-    largest = 12 * DENSITY * G * SIDE**2 / 8 * SIDE / 2 / SIDE**4
-    np.testing.assert_allclose(stress, 12 * moment * y / SIDE**4, atol=1e-2 * largest)
-
-
 def test_gravity_on_a_link_without_a_density_is_refused():
     light = solve_bar({"radius": 0.2}, Material(2e11, 0.3), FemOptions(0.3))
     with pytest.raises(BadInput, match="gravity: the link has no density"):

@@ -30,14 +30,12 @@ def test_sparse_solver_needs_only_the_upper_triangle(rng, name, columns):
     np.testing.assert_allclose(solve(csr_array(np.triu(A)), loads), x, atol=1e-10)
 
 
-def test_superlu_is_used_without_pypardiso(monkeypatch, chosen):
-    monkeypatch.setattr(sparse_solver, "find_spec", lambda _: None)
-    assert chosen() == "SuperLU"
-
-
-def test_superlu_is_used_if_pypardiso_does_not_load(monkeypatch, chosen):
-    """For example because the MKL library is of another architecture."""
-    monkeypatch.setattr(sparse_solver, "find_spec", lambda _: object())
+@pytest.mark.parametrize("spec", [None, object()], ids=["absent", "does not load"])
+def test_superlu_is_used_if_pypardiso_is_absent_or_does_not_load(
+    spec, monkeypatch, chosen
+):
+    """It does not load, for example, if the MKL library is of another architecture."""
+    monkeypatch.setattr(sparse_solver, "find_spec", lambda _: spec)
     monkeypatch.setattr(sparse_solver, "_mkl", lambda: None)
     monkeypatch.setitem(sys.modules, "pypardiso", None)
     assert chosen() == "SuperLU"

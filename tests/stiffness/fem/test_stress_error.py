@@ -8,7 +8,7 @@ import pytest
 from forcefit.stiffness.fem.adaptive_step import solve_level
 from forcefit.stiffness.fem.fea import FemOptions, MeshedLink, solve_link
 from forcefit.stiffness.fem.material import Material
-from forcefit.stiffness.fem.stress import peak_stress, stress_influence
+from forcefit.stiffness.fem.stress import peak_stress
 from forcefit.stiffness.fem.stress_error import estimated_error
 from forcefit.stiffness.link import LinkStiffness, inverted
 from forcefit.stiffness.report.results import stress_results, stress_text
@@ -51,20 +51,9 @@ def test_stress_of_a_bar_agrees_within_the_estimated_error(bar, wrench, expected
     peak = peak_stress(bar, wrench, away=4 * R)
     assert abs(peak.von_mises - expected) <= peak.error + 1e-3 * expected
     assert peak.error < 0.25 * expected
+    assert "inner edges" not in peak.region
     assert f"{peak.error / 1e6:.2g} MPa" in stress_text(peak)
     assert stress_results(peak)["error"] == peak.error
-
-
-def test_an_estimated_error_is_proportional_to_the_load(bar, rng):
-    field = stress_influence(bar)
-    wrench = rng.normal(size=6)
-    error = field.peak_error(wrench)
-    assert field.peak_error(-3 * wrench) == pytest.approx(3 * error, rel=1e-9)
-    assert error > 0
-    assert (
-        field.relative_error()
-        >= field.peak_error(np.eye(6)[5]) / (field.peak(np.eye(6)[5])[0])
-    )
 
 
 def test_estimated_stress_error_of_a_uniform_strain_is_zero(rng):
@@ -93,18 +82,17 @@ def test_peak_at_a_sharp_inner_edge_has_no_error_estimate():
     solid = with_plane_sides(masked_solid((2, 2, 4), (0.1, 0.1, 0.4), keep))
     peak = peak_stress(meshed(solid, [0.05, 0.05, 0.4]), [0, 0, 0, 0, 0, 1], away=0.05)
     assert np.isinf(peak.error)
+    assert "inner edges without a fillet" in peak.region
     assert "none, the peak lies on an inner edge" in stress_text(peak)
     assert stress_results(peak)["error"] is None
 
 
 @pytest.mark.slow
 def test_peak_stress_of_a_stepped_shaft_agrees_within_the_estimated_error():
-    """D 30, d 20, r 2 mm in tension, torsion and bending, 15 mm from the ends.
-
-    The expected values per N and N m come from another program: quadratic axisymmetric
+    """D 30, d 20, r 2 mm in tension, torsion and bending, 15 mm from the ends. The
+    expected values per N and N m come from another program: quadratic axisymmetric
     elements, with the first harmonic in bending, on meshes of 0.1 and 0.05 mm in the
-    fillet that agree to 0.3 %.  Peterson's charts have 5.94 (3 % below) in tension.
-    """
+    fillet that agree to 0.3 %. Peterson's charts have 5.94 (3 % below) in tension."""
     points, triangles = shouldered_shaft(0.015, 0.010, 0.002, 48, 8)
     surface = check_surface(points, triangles, "shaft")
     ends = map(parse_interface, ("z=0", "z=0.12"))

@@ -1,14 +1,10 @@
 """Meshes fitted to the patches of a surface, and refusals."""
 
-from collections import Counter
-from itertools import combinations
-
 import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
 from forcefit.stiffness.mesh.fit_to_patches import MeshFailed, fit_to_patches
-from forcefit.stiffness.mesh.solid import boundary_faces
 from forcefit.stiffness.surface.interface import parse_interface
 from forcefit.stiffness.surface.patches import Patches, find_patches
 from forcefit.stiffness.surface.primitives import Plane
@@ -16,17 +12,6 @@ from forcefit.stiffness.surface.surface import check_surface
 from tests.solids_for_tests import CUBE, CUBE_TRIANGLES, box_solid
 
 Z = np.array([0.0, 0, 1])
-
-
-def test_faces_of_a_single_tetrahedron_are_the_boundary():
-    """Counted directly, in a box without some of its tetrahedra."""
-    rng = np.random.default_rng(6)
-    cells = box_solid((3, 3, 2), (1.0, 1.0, 1.0)).cells
-    cells = cells[rng.random(len(cells)) < 0.7]
-    count = Counter(frozenset(f) for cell in cells for f in combinations(cell, 3))
-    faces = boundary_faces(cells)
-    assert {frozenset(face) for face in faces} == {f for f, n in count.items() if n < 2}
-    assert len(faces) == sum(n == 1 for n in count.values())
 
 
 SURFACE = check_surface(CUBE, CUBE_TRIANGLES, "cube")

@@ -10,24 +10,15 @@ from forcefit.stiffness.screws import rotation_matrix
 from forcefit.stiffness.surface.interface import Interface, parse_interface
 from forcefit.stiffness.surface.surface import check_surface
 from tests.solids_for_tests import cylinder
+from tests.stiffness.surface.test_recognition import revolved
 
 E, NU = 70e9, 0.3
 G = E / (2 + 2 * NU)
 
 
-def tube(outer, inner, length, facets=48):
+def tube(outer, inner, length):
     """A tube along z."""
-    angle = 2 * np.pi * np.arange(facets) / facets
-    circle = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
-    corners = ((outer, 0), (outer, length), (inner, length), (inner, 0))
-    points = np.concatenate([r * circle + [0, 0, z] for r, z in corners])
-    i, j = np.arange(facets), (np.arange(facets) + 1) % facets
-    triangles = []
-    for k in range(4):
-        a, b = k * facets, (k + 1) % 4 * facets
-        triangles += [np.column_stack([i + a, j + a, j + b])]
-        triangles += [np.column_stack([i + a, j + b, i + b])]
-    return check_surface(points, np.concatenate(triangles), "tube")
+    return revolved([outer, outer, inner, inner], [0, length, length, 0], 48, True)
 
 
 def box(width, height, length):
@@ -47,23 +38,17 @@ def ends(length):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("surface", "length", "J", "A"),
-    [
-        (check_surface(*cylinder(0.75e-3, 1.0, 32), "rod"), 1.0,
-         np.pi / 2 * 0.75e-3**4, np.pi * 0.75e-3**2),
-        (tube(0.01, 0.0097, 0.2), 0.2,
-         np.pi / 2 * (0.01**4 - 0.0097**4), np.pi * (0.01**2 - 0.0097**2)),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("surface", "length", "J", "A"), [
+    (check_surface(*cylinder(0.75e-3, 1.0, 32), "rod"), 1.0,
+     np.pi / 2 * 0.75e-3**4, np.pi * 0.75e-3**2),
+    (tube(0.01, 0.0097, 0.2), 0.2,
+     np.pi / 2 * (0.01**4 - 0.0097**4), np.pi * (0.01**2 - 0.0097**2)),
+])  # fmt: skip
 def test_stiffness_of_a_rod_and_a_thin_tube_agrees_with_closed_forms(
     surface, length, J, A, tmp_path
 ):
-    """Torsion is exact between rigid ends.
-
-    In tension the ends cannot contract: K is at least E A / L, and at most one width
-    over the length above it.
-    """
+    """Torsion is exact between rigid ends. In tension the ends cannot contract: K is at
+    least E A / L, and at most one width over the length above it."""
     options = FemOptions(0.01, cache=tmp_path)
     link = solve_link(surface, *ends(length), [Material(E, NU)], options=options).link
     error = link.relative_error_estimate

@@ -84,17 +84,14 @@ def test_estimated_error_covers_an_entry_that_is_left_out(parts):
         assert gap.max() <= scaled(error, left.stiffness).max()
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ("surface,length", "file,length", "rods.csv: line 1: found .*expected surface"),
-        ("rod1.stl", "gone.stl", "rods.csv: line 3: found no file .*gone.stl"),
-        ("0.3,0.02", "0.3", "rods.csv: line 3: found 2 cells, expected 3"),
-        ("0.3,0.02", "thick,0.02", "line 3, length: found 'thick', expected a length"),
-        ("0.3,0.02", "-0.3,0.02", "line 3, length: found '-0.3', expected a length"),
-        ("0.3,0.02", "0.2,0.02", '"rod-length0.2-radius0.02" twice'),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "message"), [
+    ("surface,length", "file,length", "rods.csv: line 1: found .*expected surface"),
+    ("rod1.stl", "gone.stl", "rods.csv: line 3: found no file .*gone.stl"),
+    ("0.3,0.02", "0.3", "rods.csv: line 3: found 2 cells, expected 3"),
+    ("0.3,0.02", "thick,0.02", "line 3, length: found 'thick', expected a length"),
+    ("0.3,0.02", "-0.3,0.02", "line 3, length: found '-0.3', expected a length"),
+    ("0.3,0.02", "0.2,0.02", '"rod-length0.2-radius0.02" twice'),
+])  # fmt: skip
 def test_wrong_family_table_is_refused_in_one_line(parts, old, new, message):
     folder, _ = parts
     table = folder / "rods.csv"

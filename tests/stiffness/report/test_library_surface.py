@@ -127,23 +127,20 @@ def test_surface_entry_is_rebuilt_only_if_its_input_changed(
     assert names[-1] == "bar"
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (('name = "bar"', 'name = "../bar"'),
-         "link[1].name: found '../bar', expected letters, digits"),
-        (("bar.stl", "rab.stl"), "link[1].surface: found no file "),
-        (('"z=0"', '"z=o"'), "link[1].base: found "),
-        (('tip = "z=0.08"', ""), "link[1].tip: missing"),
-        (("young = 6e10", "young = -1"), "link[1].young: found -1"),
-        (("poisson = 0.3", "poisson = 0.5"), "link[1].poisson: found 0.5"),
-        (('"mm"', '"mmm"'), "link[1].unit: found 'mmm'"),
-        (("density", "densty"), 'unknown key "densty"; did you mean "density"?'),
-        (("[[link]]", "[link]"), "expected tables [[link]]"),
-        (("density = 2700", LINKS[LINKS.index("[[link]]") :]), 'found "bar" twice'),
-        (("accuracy = 0.01", 'shape = "round"'), "grid"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("change", "message"), [
+    (('name = "bar"', 'name = "../bar"'),
+     "link[1].name: found '../bar', expected letters, digits"),
+    (("bar.stl", "rab.stl"), "link[1].surface: found no file "),
+    (('"z=0"', '"z=o"'), "link[1].base: found "),
+    (('tip = "z=0.08"', ""), "link[1].tip: missing"),
+    (("young = 6e10", "young = -1"), "link[1].young: found -1"),
+    (("poisson = 0.3", "poisson = 0.5"), "link[1].poisson: found 0.5"),
+    (('"mm"', '"mmm"'), "link[1].unit: found 'mmm'"),
+    (("density", "densty"), 'unknown key "densty"; did you mean "density"?'),
+    (("[[link]]", "[link]"), "expected tables [[link]]"),
+    (("density = 2700", LINKS[LINKS.index("[[link]]") :]), 'found "bar" twice'),
+    (("accuracy = 0.01", 'shape = "round"'), "grid"),
+])  # fmt: skip
 def test_wrong_surface_table_of_a_build_file_is_refused(
     bar_stl, tmp_path, change, message
 ):

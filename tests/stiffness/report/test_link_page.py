@@ -44,16 +44,13 @@ def test_page_of_a_bar_shows_its_stiffness_and_compliance():
     assert least == f"{YOUNG / 2.6 * polar / LENGTH * 1e-3:.4g} N m/mrad"
 
 
-@pytest.mark.parametrize(
-    ("mesh", "kind"),
-    [
-        ({}, "good"),
-        ({"repairs": ["2 facets"]}, "mixed"),
-        ({"closed": False}, "mixed"),
-        ({"flat_elements": 3}, "mixed"),
-        ({"reached": False, "closed": False}, "bad"),
-    ],
-)
+@pytest.mark.parametrize(("mesh", "kind"), [
+    ({}, "good"),
+    ({"repairs": ["2 facets"]}, "mixed"),
+    ({"closed": False}, "mixed"),
+    ({"flat_elements": 3}, "mixed"),
+    ({"reached": False, "closed": False}, "bad"),
+])  # fmt: skip
 def test_verdict_is_amber_for_a_doubtful_surface_and_red_for_a_missed_accuracy(
     mesh, kind
 ):

@@ -60,13 +60,6 @@ def test_beam_of_a_shape_has_the_ends_and_area_of_the_shape(shape):
         assert [areas[0], areas[2]] == pytest.approx(expected, rel=1e-12)
 
 
-def test_tube_or_box_without_a_hole_is_refused():
-    with pytest.raises(BadInput, match="leaves no hole"):
-        check_shape("box", {"length": L, "width": R, "height": S, "wall": S / 2})
-    with pytest.raises(BadInput, match="inner_radius >= radius"):
-        check_shape("tube", {"length": L, "radius": R, "inner_radius": R})
-
-
 @pytest.mark.parametrize(("shape", "lengths", "words"), [
     ("rund", {}, 'shape: unknown "rund"; did you mean "round"?'),
     ("round", {"length": L, "radus": R}, 'round: unknown length "radus"; did you'),

@@ -29,16 +29,3 @@ def test_lifted_facets_deviate_by_the_fourth_power_of_the_angle(radius):
         np.testing.assert_allclose(distances / radius, lift, atol=a**4)
         np.testing.assert_allclose(np.linalg.norm(gradients, axis=1), 1, rtol=1e-12)
         np.testing.assert_allclose(gradients[:, :2], points[:, :2], atol=a**2)
-
-
-@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
-def test_single_facet_has_the_normals_and_distances_of_its_plane(size):
-    """Also at narrow corners."""
-    corners = size * np.array([[0.0, 0, 2], [1, 0, 2], [0.05, 0.1, 2]])
-    facet = Facets(corners, np.array([[0, 1, 2]]))
-    np.testing.assert_allclose(facet.normals, [[0, 0, 1]] * 3, atol=1e-12)
-    inside = np.einsum("pc,ci->pi", [[0.2, 0.3, 0.5], [0.8, 0.1, 0.1]], corners)
-    for lift in (0.1, -0.1):
-        distances, gradients = facet.signed(inside + [0, 0, lift * size])
-        np.testing.assert_allclose(distances / size, lift, atol=1e-6)
-        np.testing.assert_allclose(gradients, [[0, 0, 1]] * 2, atol=1e-12)

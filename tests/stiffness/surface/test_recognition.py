@@ -8,7 +8,7 @@ from forcefit.stiffness.surface.patches import find_patches
 from forcefit.stiffness.surface.primitives import Cone, Plane, Torus
 from forcefit.stiffness.surface.surface import check_surface
 from forcefit.stiffness.surface.true_surface import TrueSurface
-from tests.solids_for_tests import cylinder, fillet_profile, rounded_block
+from tests.solids_for_tests import fillet_profile, rounded_block
 
 ENDS = parse_interface("x=-0.1"), parse_interface("x=0.1")
 
@@ -29,6 +29,40 @@ def volume_of(fillet=0.006, corner=0.025):
     z = np.linspace(0, fillet, 20001)
     inset = fillet - np.sqrt(fillet**2 - (fillet - z) ** 2)
     return float(np.trapezoid(area(inset), z) + area(0.0) * (0.012 - fillet))
+
+
+def revolved(radius, height, facets, closed=False):
+    """A surface of revolution about z through rings of these radii and heights. It ends
+    in flat faces, or its last ring is joined to the first one."""
+    angle = 2 * np.pi * np.arange(facets) / facets
+    circle = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    rings = [r * circle + [0, 0, z] for r, z in zip(radius, height, strict=True)]
+    i, j = np.arange(facets), (np.arange(facets) + 1) % facets
+    triangles = []
+    for k in range(len(rings) - (not closed)):
+        a, b = k * facets, (k + 1) % len(rings) * facets
+        triangles += [np.column_stack([i + a, j + a, j + b])]
+        triangles += [np.column_stack([i + a, j + b, i + b])]
+    if not closed:
+        count, last = len(rings) * facets, (len(rings) - 1) * facets
+        rings += [np.array([[0, 0, height[0]], [0, 0, height[-1]]])]
+        triangles += [np.column_stack([0 * i + count, j, i])]
+        triangles += [np.column_stack([0 * i + count + 1, i + last, j + last])]
+    return check_surface(np.concatenate(rings), np.concatenate(triangles), "revolved")
+
+
+def prism(outline, height):
+    """A prism along z over a convex outline."""
+    count = len(outline)
+    points = [np.insert(outline, 2, z, axis=1) for z in (0, height)]
+    points += [np.insert(outline.mean(axis=0), 2, z)[None] for z in (0, height)]
+    i, j = np.arange(count), (np.arange(count) + 1) % count
+    triangles = np.concatenate([
+        np.column_stack([i, j, j + count]), np.column_stack([i, j + count, i + count]),
+        np.column_stack([0 * i + 2 * count, j, i]),
+        np.column_stack([0 * i + 2 * count + 1, i + count, j + count]),
+    ])  # fmt: skip
+    return check_surface(np.concatenate(points), triangles, "prism")
 
 
 @pytest.mark.parametrize("fillet", [0.002, 0.006])
@@ -54,37 +88,14 @@ def test_volume_of_a_filleted_plate_is_that_of_its_recognised_shapes():
     assert true.unsure_volume == 0.0
 
 
-def test_faceted_cylinder_has_the_volume_of_the_true_cylinder():
-    surface = check_surface(*cylinder(0.02, 0.1, 32), "bar")
-    faces = parse_interface("z=0"), parse_interface("z=0.1")
-    true = TrueSurface(surface, find_patches(surface, *faces))
-    assert true.volume == pytest.approx(np.pi * 0.02**2 * 0.1, rel=5e-5)
-
-
-def chamfered(width, flat, drop):
-    """A bar along z whose top has two flat chamfers: four corners are on a circle."""
-    half = width / 2
-    outline = np.array([
-        [-half, -half], [half, -half], [half, half - drop],
-        [flat / 2, half], [-flat / 2, half], [-half, half - drop],
-    ])  # fmt: skip
-    count = len(outline)
-    points = np.concatenate([np.insert(outline, 2, z, axis=1) for z in (0, 0.1)])
-    i, j = np.arange(count), (np.arange(count) + 1) % count
-    fan = np.arange(1, count - 1)
-    triangles = np.concatenate([
-        np.column_stack([i, j, j + count]), np.column_stack([i, j + count, i + count]),
-        np.column_stack([0 * fan, fan + 1, fan]),
-        np.column_stack([0 * fan, fan, fan + 1]) + count,
-    ])  # fmt: skip
-    return check_surface(points, triangles, "chamfered bar")
-
-
 @pytest.mark.parametrize("flat", [0.02, 0.03, 0.036])
 def test_flat_chamfers_are_not_recognised_as_a_cylinder(flat):
-    """Chamfers of 20 degrees on both sides of a flat top."""
-    drop = np.tan(np.radians(20)) * (0.04 - flat) / 2
-    surface = chamfered(0.04, flat, drop)
+    """Chamfers of 20 degrees on both sides of a flat top: four corners on a circle."""
+    low = 0.02 - np.tan(np.radians(20)) * (0.04 - flat) / 2
+    surface = prism(np.array([
+        [-0.02, -0.02], [0.02, -0.02], [0.02, low],
+        [flat / 2, 0.02], [-flat / 2, 0.02], [-0.02, low],
+    ]), 0.1)  # fmt: skip
     faces = parse_interface("z=0"), parse_interface("z=0.1")
     patches = find_patches(surface, *faces)
     assert all(isinstance(shape, Plane) for shape in patches.shapes)
@@ -101,34 +112,14 @@ def test_flat_side_between_fillets_remains_flat():
     assert true.outside(middle, outward) == pytest.approx(0.0, abs=1e-12)
 
 
-def domed_bar():
-    """A bar along z with a hump r = 10 + 4 sin^2 mm over z = 30 .. 70 mm."""
-    share = np.linspace(0, 1, 13)
-    r = np.r_[0.01, 0.01 + 0.004 * np.sin(np.pi * share) ** 2, 0.01]
-    z = np.r_[0.0, 0.03 + 0.04 * share, 0.1]
-    angle = 2 * np.pi * np.arange(40) / 40
-    circle = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
-    rings = np.concatenate([a * circle + [0, 0, b] for a, b in zip(r, z, strict=True)])
-    i, j = np.arange(40), (np.arange(40) + 1) % 40
-    triangles = []
-    for a in 40 * np.arange(len(r) - 1):
-        triangles += [np.column_stack([i + a, j + a, j + a + 40])]
-        triangles += [np.column_stack([i + a, j + a + 40, i + a + 40])]
-    last = len(rings) - 40
-    triangles += [np.column_stack([0 * i + len(rings), j, i])]
-    triangles += [np.column_stack([0 * i + len(rings) + 1, i + last, j + last])]
-    points = np.concatenate([rings, [[0, 0, 0], [0, 0, 0.1]]])
-    return check_surface(points, np.concatenate(triangles), "domed bar")
-
-
 @pytest.mark.slow
 def test_cylinders_next_to_a_hump_are_recognised_separately():
-    """The facets lack 0.44 % of the integral of pi r^2.
-
-    The smoothed surface lacks less than its stated uncertainty, and the long cylinders
-    are no part of the hump.
-    """
-    surface = domed_bar()
+    """A bar with a hump r = 10 + 4 sin^2 mm over z = 30 .. 70 mm. The facets lack 0.44
+    % of the integral of pi r^2. The smoothed surface lacks less than its stated
+    uncertainty, and the long cylinders are no part of the hump."""
+    share = np.linspace(0, 1, 13)
+    r = np.r_[0.01, 0.01 + 0.004 * np.sin(np.pi * share) ** 2, 0.01]
+    surface = revolved(r, np.r_[0.0, 0.03 + 0.04 * share, 0.1], 40)
     faces = parse_interface("z=0"), parse_interface("z=0.1")
     patches = find_patches(surface, *faces)
     true = TrueSurface(surface, patches)

@@ -9,7 +9,6 @@ from forcefit.inputs.table import BadInput
 from forcefit.stiffness.surface.interface import parse_interface
 from forcefit.stiffness.surface.patches import (
     find_patches,
-    interface_shape,
     triangles_on,
 )
 from forcefit.stiffness.surface.primitives import Cone, Plane
@@ -112,17 +111,6 @@ def test_interface_off_the_part_is_refused_with_the_extent_of_the_part():
     words += "; a disc must be an outline of the surface's own triangles"
     with pytest.raises(BadInput, match=re.escape(words.format(disc)) + "$"):
         triangles_on(bar(), disc, "tip")
-
-
-def test_interface_shape_is_a_plane_or_cylinder_by_its_kind():
-    bore = interface_shape(parse_interface("bore=1,2,3/0,3,4/0.5"))
-    assert isinstance(bore, Cone)
-    assert (bore.radius, bore.slope) == (0.5, 0.0)
-    np.testing.assert_allclose([bore.point, bore.axis], [[1, 2, 3], [0, 0.6, 0.8]])
-    for text in ("plane=1,2,3/0,3,4", "disc=1,2,3/0,3,4/0.5"):
-        plane = interface_shape(parse_interface(text))
-        assert isinstance(plane, Plane)
-        np.testing.assert_allclose([plane.point, plane.normal], [bore.point, bore.axis])
 
 
 # --- shapes --------------------------------------------------------------------------

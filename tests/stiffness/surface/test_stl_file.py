@@ -41,52 +41,36 @@ def read(tmp_path, content):
     return points[triangles]
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        TEXT,
-        TEXT.upper(),
-        TEXT.replace(b"\n", b"\r\n"),
-        TEXT.replace(b"\n", b"\r"),
-        TEXT.replace(b"\n", b" "),
-        b"\xef\xbb\xbf" + TEXT,
-        TEXT[: TEXT.index(b"endsolid")],
-        TEXT[: TEXT.index(b"endsolid") + 5],
-        TEXT[: TEXT.rindex(b"endfacet") + 4],
-        TEXT[: TEXT.rindex(b"endloop")],
-        TEXT.replace(b"solid cube", b"solid vertex 1 2 3 facet"),
-        TEXT.replace(b"endsolid cube\n", b"endsolid cube\nsolid more\nendsolid more"),
-    ],
-    ids=[
-        "as described", "capitals", "CRLF", "CR", "one line", "byte order mark",
-        "no last line", "last line cut", "last facet's end cut", "last loop open",
-        "name of keywords", "several solids",
-    ],
-)  # fmt: skip
-def test_text_stl_file_is_read_without_rounding(tmp_path, content):
+TEXTS = {
+    "as described": TEXT, "capitals": TEXT.upper(),
+    "CRLF": TEXT.replace(b"\n", b"\r\n"), "CR": TEXT.replace(b"\n", b"\r"),
+    "one line": TEXT.replace(b"\n", b" "), "byte order mark": b"\xef\xbb\xbf" + TEXT,
+    "no last line": TEXT[: TEXT.index(b"endsolid")],
+    "last line cut": TEXT[: TEXT.index(b"endsolid") + 5],
+    "last facet's end cut": TEXT[: TEXT.rindex(b"endfacet") + 4],
+    "last loop open": TEXT[: TEXT.rindex(b"endloop")],
+    "name of keywords": TEXT.replace(b"solid cube", b"solid vertex 1 2 3 facet"),
+    "several solids": TEXT + b"solid more\nendsolid more",
+}  # fmt: skip
+BINARIES = {
+    "as described": BINARY, "head of text": binary_of(CORNERS, head=b"solid cube"),
+    "zeros behind": BINARY + bytes(37),
+    "text behind": BINARY + b"written by a scanner, vertex and all",
+    "no count": binary_of(CORNERS, count=0), "last tag cut": BINARY[:-2],
+    "count of -1": binary_of(CORNERS, count=2**32 - 1),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", TEXTS)
+def test_text_stl_file_is_read_without_rounding(tmp_path, case):
     """In double precision, equal to the last bit."""
-    np.testing.assert_array_equal(read(tmp_path, content), CORNERS)
+    np.testing.assert_array_equal(read(tmp_path, TEXTS[case]), CORNERS)
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        BINARY,
-        binary_of(CORNERS, head=b"solid cube"),
-        BINARY + bytes(37),
-        BINARY + b"written by a scanner, vertex and all",
-        binary_of(CORNERS, count=0),
-        binary_of(CORNERS, count=2**32 - 1),
-        BINARY[:-2],
-    ],
-    ids=[
-        "as described", "head of text", "zeros behind", "text behind", "no count",
-        "count of -1", "last tag cut",
-    ],
-)  # fmt: skip
-def test_binary_stl_file_is_read(tmp_path, content):
+@pytest.mark.parametrize("case", BINARIES)
+def test_binary_stl_file_is_read(tmp_path, case):
     """In single precision, as the format has."""
-    found = read(tmp_path, content)
+    found = read(tmp_path, BINARIES[case])
     np.testing.assert_array_equal(found, CORNERS.astype("<f4"))
 
 

@@ -48,12 +48,6 @@ def test_surface_unit_scales_the_part_and_a_wrong_unit_is_refused(tmp_path):
         read_surface(path, "mmm")
 
 
-def test_cube_has_the_volume_and_area_of_its_sides():
-    surface = check_surface(CUBE, CUBE_TRIANGLES, "cube")
-    assert surface.volume == pytest.approx(1e-3, rel=1e-14)
-    assert surface.area == pytest.approx(6e-2, rel=1e-14)
-
-
 @pytest.mark.parametrize(("name", "content", "message"), [
     ("a.stl", b"", "the file is empty"),
     ("a.stl", b"no stl at all", "STL"),

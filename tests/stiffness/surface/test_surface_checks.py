@@ -32,13 +32,10 @@ def test_surface_digest_depends_on_the_geometry_only():
                 Surface(CUBE, turned, "one").digest()}) == 3  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("size", "unit", "hint"),
-    [
-        (19.99, "m", None), (20.01, "m", "mm"), (20.01, "mm", "m"),
-        (1.001e-3, "mm", None), (0.999e-3, "mm", "m"), (0.999e-3, "m", "m"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("size", "unit", "hint"), [
+    (19.99, "m", None), (20.01, "m", "mm"), (20.01, "mm", "m"),
+    (1.001e-3, "mm", None), (0.999e-3, "mm", "m"), (0.999e-3, "m", "m"),
+])  # fmt: skip
 def test_part_of_implausible_size_is_refused_with_a_likely_unit(size, unit, hint):
     """Plausible sizes are from a millimetre to twenty metres."""
     points = CUBE * size / (0.1 * np.sqrt(3))
@@ -62,21 +59,6 @@ def test_unit_option_is_ignored_for_a_step_file(tmp_path, monkeypatch):
     )
     tenth = read_surface("bar.stl", "dm").diagonal
     assert tenth == pytest.approx(0.1 * read_surface("bar.stp", "dm").diagonal)
-
-
-@pytest.mark.parametrize(("size", "unit"), [(1e-4, "m"), (100.0, "mm")])
-def test_step_file_with_a_wrong_unit_is_refused_with_the_likely_unit(
-    size, unit, monkeypatch
-):
-    """A part of 0.1 m whose numbers are metres, in a file that states millimetres."""
-    points, triangles = cylinder(0.2 * size, size)
-    monkeypatch.setattr(
-        surface_module, "_read_triangles", lambda *_: (points, triangles, None)
-    )
-    with pytest.raises(
-        BadInput, match=f'"stated in the file"; is the file in "{unit}"'
-    ):
-        read_surface("bar.step", "inch")
 
 
 def test_points_that_belong_to_no_triangle_are_ignored():

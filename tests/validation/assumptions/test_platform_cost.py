@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from forcefit.assembly.files.robot_file import write_robot
-from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.linear.reference.reduction import FreeMotion
 from forcefit.assembly.model.links import link_compliance
 from forcefit.assembly.model.robot import BeamLink, Frame, Robot
-from forcefit.assembly.robots import load_robot
 from forcefit.validation.assumptions.platform_cost import (
     NoSolids,
     difference,
@@ -86,19 +85,6 @@ def test_error_from_a_single_link_model_equals_the_error_of_the_platform():
     costs = platform_costs([posture])
     assert costs.beams == pytest.approx(difference(link_compliance(frame), expected))
     assert costs.by_link == {"tip": pytest.approx(costs.beams)}
-
-
-def test_platform_error_of_many_poses_equals_that_of_each_pose():
-    robot = load_robot("irsbot2")
-    postures = [place_robot(robot, {"tx": x, "tz": -0.5}) for x in (0.0, 0.2)]
-    both = platform_costs(postures)
-    for i, posture in enumerate(postures):
-        alone = platform_costs([posture])
-        assert both.beams[i] == pytest.approx(alone.beams[0], rel=1e-6)
-        assert both.by_link["leg1.link_a"][i] == pytest.approx(
-            alone.by_link["leg1.link_a"][0], rel=1e-6
-        )
-    assert both.beams[0] != pytest.approx(both.beams[1], rel=1e-3)
 
 
 def test_robots_without_solids_or_stiffness_are_refused():

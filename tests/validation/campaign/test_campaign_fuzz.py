@@ -3,17 +3,12 @@
 The same hundred cases of each kind in every run; thousands: ``benchmarks/fuzz.py``.
 """
 
-import re
-
 import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from forcefit.assembly.files.robot_file import read_robot
-from forcefit.assembly.model.error_distributions import read_sources
 from forcefit.inputs.table import BadInput
 from forcefit.validation.campaign.campaign_file import read_campaign
-from forcefit.validation.study.study_file import read_study
 from tests.campaigns_for_tests import HEAD, NOISE, ROWS, write_campaign
 
 LIGHT = settings(
@@ -21,7 +16,6 @@ LIGHT = settings(
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
-QUICK = settings(LIGHT, max_examples=60)
 TEXT = "\n".join([HEAD, *ROWS, ""])
 ODD_CELLS = st.one_of(
     st.sampled_from([
@@ -43,21 +37,6 @@ PIECES = st.sampled_from([
     b"\xff\xfei\x00d\x00", b"\xe9", b"\xed\xa0\x80", b'"0,5"', b"1e400", b"9" * 400,
     b"\x1a", b"# ", b"id,id,", b"m1,", b"[[", b"]]", b"inf", b"nan", b"-0.0",
 ])  # fmt: skip
-STUDY_KEYS = (
-    "robot", "title", "output", "grid", "scales", "frames", "least", "most", "seed",
-    "signs", "source", "surface", "accuracy", "tx", "maps",
-)  # fmt: skip
-ODD_VALUES = (
-    "true", "-1", "0", "1", "1e308", "1e-320", "nan", "inf", "''", "' '", "'.'", "'/'",
-    "[]", "[1, 'a']", "[[1]]", "[[1], [2, 3]]", "[1, true]", "[nan]", "[1, 1]", "{}",
-    "[{}]", "{a = 1}", "[1e308, 1e-308]", "'tx=1:2:1e-300'", "'tx=nan'", "'tx=1,tx=2'",
-    "'=,='", "'tx'", "'tx=0:1e300:1'", "'tx=0,ty=0,tz=0,rx=0,ry=0,rz=0,q=0'",
-    "[-1, 2, 3, 4, 5, 6]", "9223372036854775807", "18446744073709551616", f"{10**400}",
-    "1979-05-27", "07:32:00", "'irsbot2'", "'$x$'", "'study.toml'", "'\\u0000'",
-    '"\\u0000"', '"\\u0001"', "['one', 'one']", "['one.two']", "['']",
-    "[0, 0, 0, 0, 0, 1e400]", f"'{'x' * 300}'", f"'{'x/' * 1000}'",
-    "[0, 0, 0, 0, 0, nan]", "'\U0001f600'", f"'{'x' * 5000}'", "[1.0, 1.0e-200]",
-)  # fmt: skip
 TOML = (
     'robot = "robot.toml"\nmeasurements = "measurements.csv"\n'
     'reference_point = [0, 0, 0]\nregistration = "known"\n'
@@ -137,129 +116,6 @@ def test_garbled_bytes_of_a_campaign_are_read_or_refused_in_one_line(
     folder = write_campaign(tmp_path)
     (folder / name).write_bytes(data.draw(garbled(text)))
     assert_read_or_says_why(folder)
-
-
-@QUICK
-@given(
-    bom=st.booleans(), end=st.sampled_from(["\n", "\r\n", "\r", "\n\n"]),
-    delimiter=st.sampled_from([",", ";", "\t", "|"]), quote=st.booleans(),
-    decimal=st.sampled_from([".", ","]), encoding=st.sampled_from(
-        ["utf-8", "latin-1", "utf-16", "utf-32"]),
-    declared=st.sampled_from(["", 'delimiter = ";"\n', 'delimiter = "tab"\n']),
-    comma=st.booleans(), columns=st.lists(st.integers(0, 10), max_size=2),
-    cut=st.integers(0, 12),
-)  # fmt: skip
-def test_table_of_any_dialect_is_read_or_refused_in_one_line(
-    bom, end, delimiter, quote, decimal, encoding, declared, comma, columns, cut,
-    tmp_path,
-):  # fmt: skip
-    """Line endings, byte order marks, encodings,
-    repeated columns, a truncated last row."""
-    table = [line.split(",") for line in TEXT.splitlines()]
-    table = [[*row, *(row[k] for k in columns)] for row in table]
-    table[1][0] = "é1"
-    table[-1] = table[-1][: len(table[-1]) - cut]
-    cells = [[c.replace(".", decimal) if r else c for c in row]
-             for r, row in enumerate(table)]  # fmt: skip
-    if quote:
-        cells = [[f'"{c}"' for c in row] for row in cells]
-    text = end.join(delimiter.join(row) for row in cells) + end
-    said = f"[table]\n{declared}" + ('decimal = ","\n' if comma else "")
-    folder = write_campaign(tmp_path, extra=said)
-    content = ("\ufeff" * bom + text).encode(encoding, "replace")
-    (folder / "measurements.csv").write_bytes(content)
-    assert_read_or_says_why(folder)
-
-
-STUDY = """
-robot = "robot.toml"
-title = "a study"
-output = "out"
-grid = "tx=-0.1:0.1:0.1,tz=-0.5"
-scales = [1.0, 0.5]
-[errors]
-frames = ["one", "tool"]
-least = [0, 0, 0, 0, 0, 0]
-most = [1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-4]
-seed = 1
-signs = "literal"
-[links]
-source = "beam"
-surface = "robot.toml"
-base = "z=0"
-tip = "z=1"
-accuracy = 0.005
-[pose]
-tx = 0.0
-[checks]
-maps = true
-reference = false
-"""
-SOURCES = """
-[[errors]]
-frames = ["one", "tool"]
-distribution = "truncated"
-deviation = [0, 0, 0, 1e-5, 1e-5, 1e-5]
-most = [0, 0, 0, 3e-5, 3e-5, 3e-5]
-[[errors]]
-frames = ["two"]
-distribution = "uniform"
-most = [0, 0, 0, 0, 0, 2e-5]
-"""
-
-
-def assert_study_is_read_or_refused(content, folder):
-    write_campaign(folder)
-    path = folder / "study.toml"
-    path.write_bytes(content)
-    try:
-        study = read_study(path)
-    except BadInput as error:
-        assert_one_line(error, folder)
-        return
-    assert np.isfinite(study.robot.errors).all()
-    assert set(study.asked) <= set(study.checks)
-    assert not list(folder.glob("out*"))
-
-
-@QUICK
-@given(content=garbled(STUDY))
-def test_garbled_bytes_of_a_study_are_read_or_refused_in_one_line(content, tmp_path):
-    assert_study_is_read_or_refused(content, tmp_path)
-
-
-@QUICK
-@given(key=st.sampled_from(STUDY_KEYS), value=st.sampled_from(ODD_VALUES))
-def test_unusual_values_of_a_study_are_read_or_refused_in_one_line(
-    key, value, tmp_path
-):
-    line = f"{key} = {value}"
-    text = re.sub(rf"(?m)^{re.escape(key)} = .*$", lambda _: line, STUDY, count=1)
-    assert_study_is_read_or_refused(text.encode(), tmp_path)
-
-
-@QUICK
-@given(content=garbled(SOURCES))
-def test_garbled_bytes_of_error_sources_are_read_or_refused_in_one_line(
-    content, tmp_path
-):
-    folder = write_campaign(tmp_path)
-    path = tmp_path / "errors.toml"
-    path.write_bytes(content)
-    robot = read_robot(folder / "robot.toml")
-    try:
-        sources = read_sources(path, robot)
-    except BadInput as error:
-        assert_one_line(error, tmp_path)
-        return
-    assert np.isfinite(sources.errors(sources.draw(0, 1, 1)[0])).all()
-
-
-@LIGHT
-@given(rows=st.lists(st.lists(st.floats(-1e3, 1e3), min_size=10, max_size=10)))
-def test_arbitrary_numbers_are_read_or_refused_in_one_line(rows, tmp_path):
-    lines = [",".join([f"r{i}", *map(repr, row)]) for i, row in enumerate(rows)]
-    assert_read_or_says_why(write_campaign(tmp_path, HEAD, lines))
 
 
 def test_undamaged_campaign_is_read(tmp_path):

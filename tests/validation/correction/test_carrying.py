@@ -33,11 +33,9 @@ def a_machine(tmp_path):
 
 
 def measured(folder, rows, reach, sessions=None, zero=0.0, wave=None):
-    """Measure the machine, with noise, by a device in another place.
-
-    The device's place is a rigid motion of the points, independent of the effect; so is
-    a wave (sine, cosine) [m] with a period of an hour.  The clock is recorded with it.
-    """
+    """Measure the machine, with noise, by a device in another place. The device's place
+    is a rigid motion of the points, independent of the effect; so is a wave (sine,
+    cosine) [m] with a period of an hour. The clock is recorded with it."""
     rng = np.random.default_rng(rows)
     saved = load_robot(folder / "saved.toml")
     names = [f.name for f in saved.frames if f.actuated]

@@ -136,11 +136,8 @@ std = { "1.sine" = 2e-4 }
 
 @pytest.mark.parametrize("name", ["arm6", "delta", "hexapod"])
 def test_compensation_brings_a_simulated_machine_to_its_target(name, tmp_path):
-    """Another program simulates the machine.
-
-    The residual is of second order: the square of the errors over the size of the
-    robot, some nanometres here.
-    """
+    """Another program simulates the machine. The residual is of second order: the
+    square of the errors over the size of the robot, some nanometres here."""
     robot = load_robot(name)
     frames = tuple(replace(f, clearance=None) for f in robot.frames)
     robot = replace(robot, frames=frames)

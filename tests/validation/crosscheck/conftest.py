@@ -24,11 +24,9 @@ def posture(irsbot2):
 
 @pytest.fixture
 def broken(monkeypatch):
-    """Break a term of the numpy model, and clear all that was computed with it.
-
-    Robots of equal data share what is cached.  The compiled model has each term a
-    second time.
-    """
+    """Break a term of the numpy model, and clear all that was computed with it. Robots
+    of equal data share what is cached. The compiled model has each term a second
+    time."""
     from forcefit.assembly.linear.energy import solve_assembly
     from forcefit.validation.crosscheck import crosscheck
 

@@ -9,14 +9,15 @@ import pytest
 
 from forcefit.assembly.exact.exact import solve_exact
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.linear import assembled
 from forcefit.assembly.model.error_distributions import tolerance_sources
 from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, Robot
 from forcefit.assembly.robots import load_robot
 from forcefit.validation.crosscheck.crosscheck import crosscheck
 from forcefit.validation.crosscheck.verdict import verdict
+from forcefit.validation.multibody import exudyn_model
 from forcefit.validation.multibody.contact import (
     ClearanceCone,
-    JointClearance,
     cone_energy,
     cone_forces,
     joint_clearance,
@@ -54,10 +55,8 @@ def push(cone, screw, width):
 
 @pytest.mark.parametrize("arm", [0.0, 0.04, -0.04])
 def test_contact_force_is_the_gradient_of_its_energy(arm):
-    """Central differences of half a nanometre inside, at and outside the bound.
-
-    With an arm of 40 mm, a pin tilted by r / arm touches like one shifted by r.
-    """
+    """Central differences of half a nanometre inside, at and outside the bound. With an
+    arm of 40 mm, a pin tilted by r / arm touches like one shifted by r."""
     disc = replace(DISC, arm=arm)
     unit = np.array([0.04, 0.04, 1, 1, 1, 1])  # [m] for a rad
     for r in (0.0, 1e-5, 2.999e-5, 3.001e-5, 3.3e-5):
@@ -74,10 +73,8 @@ def test_contact_force_is_the_gradient_of_its_energy(arm):
 
 
 def test_pin_in_two_bushes_touches_where_its_axis_reaches_the_radius():
-    """A tilt by c / h, or a shift by c, just touches; both together press.
-
-    At z = h the axis is at (TX + h RY, TY - h RX).
-    """
+    """A tilt by c / h, or a shift by c, just touches; both together press. At z = h the
+    axis is at (TX + h RY, TY - h RX)."""
     clearance = Clearance(radial=3e-5, tilt=7.5e-4, axial=1e-5)
     bushes = joint_clearance(Frame("f", clearance=clearance), bushes=True)
     assert [(c.rows, c.size, c.arm) for c in bushes.cones] == [
@@ -93,30 +90,11 @@ def test_pin_in_two_bushes_touches_where_its_axis_reaches_the_radius():
     assert both[1] == pytest.approx(0.04 * both[3])
 
 
-def test_joint_clearance_follows_the_robot_file():
-    """An absent bound is zero;
-    the own motion of a passive joint is free or bounded by spin."""
-    clearance = Clearance(radial=1e-5, tilt=2e-4, spin=0.01)
-    fixed = joint_clearance(Frame("f", clearance=clearance), scale=0.5)
-    assert [(c.rows, c.size) for c in fixed.cones] == [
-        ((0, 1), 1e-4), ((2,), 5e-3), ((3, 4), 5e-6)
-    ]  # fmt: skip
-    assert fixed.free == ()
-    pin = Frame("p", joint="revolute", clearance=replace(clearance, spin=None))
-    assert joint_clearance(pin).free == (2,)
-    assert sorted(joint_clearance(pin).unlocked) == [0, 1, 2, 3, 4]
-    slide = Frame("s", joint="prismatic", clearance=Clearance(axial=0.02, radial=1e-5))
-    assert [c.rows for c in joint_clearance(slide).cones] == [(3, 4), (5,)]
-    assert joint_clearance(Frame("none")) == JointClearance((), ())
-
-
 @pytest.mark.parametrize("misfit", [5e-5, 1e-4])
 def test_axial_clearance_reduces_the_misfit(misfit):
-    """E = (g - c)^2 EA / 2(2L), c = 30 um; clearance is along the joint's z.
-
-    A contact of 1e12 N/m in series with 3.8e8 N/m takes 4e-4 of the energy, which the
-    correction for its yield gives back; the smoothing 3e-4 of c, 9 nm, is left.
-    """
+    """E = (g - c)^2 EA / 2(2L), c = 30 um; clearance is along the joint's z. A contact
+    of 1e12 N/m in series with 3.8e8 N/m takes 4e-4 of the energy, which the correction
+    for its yield gives back; the smoothing 3e-4 of c, 9 nm, is left."""
     stiffness = E * AREA / 0.8
     check = simulate_assembly(
         coaxial([0, 0, 0, 0, 0, misfit], Clearance(axial=3e-5)),
@@ -129,17 +107,15 @@ def test_axial_clearance_reduces_the_misfit(misfit):
 
 @pytest.mark.parametrize("pause", [0.0, 0.05])
 def test_time_limit_of_a_simulation_does_not_end_other_simulations(pause, monkeypatch):
-    """Also where the processor sleeps; Exudyn's timer is one for all models.
-
-    Without a limit 0.05 s at each of some 3000 calls of the contact are minutes.
-    """
+    """Also where the processor sleeps; Exudyn's timer is one for all models. Without a
+    limit 0.05 s at each of some 3000 calls of the contact are minutes."""
     contacts = SimulationModel(clearances=True)
     posture = coaxial([0, 0, 0, 0, 0, 1e-4], Clearance(axial=3e-5))
     with monkeypatch.context() as patch:
         patch.setattr(
-            "forcefit.validation.multibody.exudyn_model.cone_forces",
+            exudyn_model, "cone_forces",
             lambda *args: time.sleep(pause) or cone_forces(*args),
-        )
+        )  # fmt: skip
         with pytest.raises(OutOfTime, match="time limit was reached while") as error:
             simulate_assembly(posture, model=contacts, time_limit=max(pause, 1e-3))
     assert error.value.robot == "coaxial"
@@ -148,14 +124,11 @@ def test_time_limit_of_a_simulation_does_not_end_other_simulations(pause, monkey
 
 def test_interruption_inside_the_solver_is_raised(monkeypatch):
     """Exudyn turns Ctrl-C into an error of its own."""
-    import forcefit.validation.multibody.exudyn_model
 
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(
-        forcefit.validation.multibody.exudyn_model, "cone_forces", interrupted
-    )
+    monkeypatch.setattr(exudyn_model, "cone_forces", interrupted)
     posture = coaxial([0, 0, 0, 0, 0, 1e-4], Clearance(axial=3e-5))
     with pytest.raises(KeyboardInterrupt):
         simulate_assembly(posture, model=SimulationModel(clearances=True))
@@ -178,19 +151,6 @@ def test_crosscheck_of_a_joint_with_a_ball_passes():
     assert check.passed, check.checks
 
 
-@pytest.fixture(scope="module")
-def irsbot2():
-    """Errors of the paper's size, all positive."""
-    robot = load_robot("irsbot2")
-    rng = np.random.default_rng(3)
-    errors = np.zeros((len(robot.frames), 6))
-    erring = ("elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip")
-    for i, frame in enumerate(robot.frames):
-        if frame.name.split(".")[-1] in erring:
-            errors[i] = rng.uniform(0, 1, 6) * ([2e-2] * 3 + [2e-4] * 3)
-    return robot.with_errors(errors)
-
-
 @pytest.mark.slow
 def test_crosscheck_of_the_papers_robot_with_clearances_passes(irsbot2):
     """The models agree within 2 % as errors vanish;
@@ -206,10 +166,8 @@ def test_crosscheck_of_the_papers_robot_with_clearances_passes(irsbot2):
 
 @pytest.mark.slow
 def test_energy_with_clearances_agrees_with_the_exact_model(irsbot2):
-    """Contacts against cones, springs as links, at the paper's full errors.
-
-    Contacts differ by at most 0.3 %; the linear energy differs by more than 1 %.
-    """
+    """Contacts against cones, springs as links, at the paper's full errors. Contacts
+    differ by at most 0.3 %; the linear energy differs by more than 1 %."""
     posture = place_robot(irsbot2, {"tx": 0.1, "tz": -0.15})
     check = crosscheck(posture, (1.0, 0.5), links="spring", clearances=True)
     assert check.passed, check.checks
@@ -234,11 +192,9 @@ def heavy(length=0.4):
 
 @pytest.mark.parametrize("links", ["beam", "spring"])
 def test_crosscheck_passes_for_weight_together_with_clearance(links):
-    """A hundredfold weight exceeds the clearance:
-    checks of energy, springs and gap pass.
-
-    With beams the simulation also stores q^2 L^5 / 1440 EI each between their ends.
-    """
+    """A hundredfold weight exceeds the clearance: checks of energy, springs and gap
+    pass. With beams the simulation also stores q^2 L^5 / 1440 EI each between their
+    ends."""
     check = crosscheck(
         heavy(), (1.0, 0.5), links=links, gravity=[0, 300.0, -900.0], clearances=True
     )
@@ -252,13 +208,9 @@ def test_crosscheck_passes_for_weight_together_with_clearance(links):
 
 def test_crosscheck_with_clearances_fails_for_a_wrong_weight(monkeypatch):
     """The weight in the linear model is 5 % too large."""
-    import forcefit.assembly.linear.assembled
-
-    right = forcefit.assembly.linear.assembled.weights
+    right = assembled.weights
     monkeypatch.setattr(
-        forcefit.assembly.linear.assembled,
-        "weights",
-        lambda at, g: right(at, 1.05 * np.asarray(g)),
+        assembled, "weights", lambda at, g: right(at, 1.05 * np.asarray(g))
     )
     check = crosscheck(heavy(), (1.0, 0.5), gravity=[0, 300.0, -900.0], clearances=True)
     assert not check.passed
@@ -283,11 +235,8 @@ def drawn(name, size, pose=None):
                   marks=pytest.mark.slow)],
 )  # fmt: skip
 def test_errors_within_the_clearance_store_no_energy(name, size, pose, said):
-    """There is no load.
-
-    This is a check of overconstrained robots only: the others close without energy
-    whatever their clearance.
-    """
+    """There is no load. This is a check of overconstrained robots only: the others
+    close without energy whatever their clearance."""
     check = crosscheck(drawn(name, size, pose), (1.0, 0.5), clearances=True)
     assert check.pairs[0].linear.energy == pytest.approx(0.0, abs=1e-20)
     assert check.pairs[0].simulated.energy < 1e-8
@@ -301,10 +250,8 @@ def test_errors_within_the_clearance_store_no_energy(name, size, pose, said):
      ("five_bar", [0, 0, 0, 0, -20, 0])],
 )  # fmt: skip
 def test_optimality_gap_under_a_load_is_relative_to_the_stored_energy(name, load):
-    """Without errors closing needs no energy: the reference is the load's energy.
-
-    Parts of the five-bar stay free under its load.
-    """
+    """Without errors closing needs no energy: the reference is the load's energy. Parts
+    of the five-bar stay free under its load."""
     check = crosscheck(
         home_posture(load_robot(name)), (1.0, 0.5), load=load, clearances=True
     )

@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from forcefit.assembly.exact import exact
+from forcefit.assembly.exact.exact import solve_exact
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.model.error_distributions import tolerance_sources
 from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, Robot
@@ -77,29 +79,18 @@ def test_crosscheck_fails_for_a_difference_that_finite_rotations_do_not_explain(
 ):
     """The exact model gets errors that are one per cent too large;
     the two others agree."""
-    import forcefit.validation.crosscheck.pair
-
-    right = forcefit.validation.crosscheck.pair.solve_exact
 
     def wrong(place, *_, **__):
         robot = place.robot.with_errors(1.01 * place.robot.errors)
-        return right(replace(place, robot=robot))
+        return solve_exact(replace(place, robot=robot))
 
-    monkeypatch.setattr(forcefit.validation.crosscheck.pair, "solve_exact", wrong)
+    monkeypatch.setattr("forcefit.validation.crosscheck.pair.solve_exact", wrong)
     result = crosscheck(posture, links="spring")
     failed = [name for name, check in result.checks.items() if check.verdict == "fails"]
     assert failed == [
         "rotation that finite rotations do not explain",
         "translation that finite rotations do not explain",
     ]
-
-
-def test_a_load_is_scaled_with_the_errors(irsbot2):
-    posture = place_robot(irsbot2, {"tx": 0.1, "tz": -0.45})
-    check = crosscheck(posture, load=[5.0, -8.0, 3.0, 100.0, 300.0, -200.0])
-    assert check.passed
-    for pair in check.pairs:
-        np.testing.assert_array_equal(pair.linear.load, pair.scale * check.load)
 
 
 @pytest.mark.parametrize("links", ["beam", "spring"])
@@ -140,12 +131,10 @@ def erring(name, density):
 
 @pytest.mark.parametrize("name", ["3rrr", "arm6"])
 def test_exact_model_and_simulation_agree_under_weight_and_moment(name):
-    """Weight on beams with errors,
-    and a couple of dead forces together with a force.
-
+    """Weight on beams with errors, and a couple of dead forces together with a force.
     The bound is relative to the difference from the linear model. A weight that starts
-    at its nominal place would leave 7e-3, a moment of constant direction 58 per cent.
-    """
+    at its nominal place would leave 7e-3, a moment of constant direction 58 per
+    cent."""
     posture = erring(name, 2700.0)
     load = [1, 2, 3, 50, 20, -30]
     check = crosscheck(posture, links="spring", load=load, gravity=[2, -3, -9.81])
@@ -155,14 +144,11 @@ def test_exact_model_and_simulation_agree_under_weight_and_moment(name):
 
 def test_crosscheck_fails_for_a_wrong_weight_in_the_exact_model(monkeypatch):
     """The weight is 5 % too large in the model with finite motions only."""
-    import forcefit.assembly.exact.exact
-
-    right = forcefit.assembly.exact.exact.dead_loads
+    right = exact.dead_loads
     monkeypatch.setattr(
-        forcefit.assembly.exact.exact,
-        "dead_loads",
+        exact, "dead_loads",
         lambda at, w, b, g, p: right(at, w, b, 1.05 * np.asarray(g), p),
-    )
+    )  # fmt: skip
     result = crosscheck(erring("3rrr", 2700.0), links="spring", gravity=[2, -3, -9.81])
     failed = [name for name, check in result.checks.items() if check.verdict == "fails"]
     assert failed
@@ -253,9 +239,7 @@ def test_crosscheck_without_errors_and_load_has_no_signal():
     assert {check.verdict for check in result.checks.values()} == {"no signal"}
     assert not result.passed
     assert result.table()["verdict"] == "no signal"
-    assert (
-        result.text().splitlines()[-1].startswith("NOT CHECKED: no difference exceeds")
-    )
+    assert "\nNOT CHECKED: no difference exceeds" in result.text()
     assert math.isnan(result.slope)
     assert result.metric.differences["translation"].max() < 1e-15  # rounding of 0.4 m
 
@@ -297,15 +281,12 @@ BY_DEFAULT = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "mutation",
-    [
-        pytest.param(
-            mutation, id=name, marks=[pytest.mark.slow] * (name not in BY_DEFAULT)
-        )
-        for name, mutation in MUTATIONS.items()
-    ],
-)
+@pytest.mark.parametrize("mutation", [
+    pytest.param(
+        mutation, id=name, marks=[pytest.mark.slow] * (name not in BY_DEFAULT)
+    )
+    for name, mutation in MUTATIONS.items()
+])  # fmt: skip
 def test_crosscheck_fails_for_a_broken_term_of_the_linear_model(
     irsbot2, mutation, broken
 ):

@@ -39,14 +39,6 @@ def test_page_shows_the_platform_by_both_models_and_a_slope_of_two(run, tmp_path
     assert seen.results == results
 
 
-def test_page_of_a_robot_without_errors_is_amber(run, tmp_path):
-    status, text, _ = shown(run, tmp_path, *PLACE)
-    assert status == 1
-    assert "<p class='verdict mixed'>" in text
-    assert "not checked" in text
-    assert not parse(text).figures  # differences that are rounding have no slope
-
-
 def test_page_of_a_stiffness_check_shows_equal_compliances(run, tmp_path):
     """Without errors and loads the exact and the linear model are the same."""
     status, text, _ = shown(run, tmp_path, "four_bar", "--state", "exact")
@@ -63,15 +55,12 @@ def pose(passed, verdict, status="ok"):
             "status": status}  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("rows", "kind"),
-    [
-        ([pose(True, "passed")] * 2, "good"),
-        ([pose(True, "passed"), pose(False, "not decided")], "mixed"),
-        ([pose(True, "passed"), pose(False, "failed")], "bad"),
-        ([pose(None, "", "out of reach")], "bad"),
-    ],
-)
+@pytest.mark.parametrize(("rows", "kind"), [
+    ([pose(True, "passed")] * 2, "good"),
+    ([pose(True, "passed"), pose(False, "not decided")], "mixed"),
+    ([pose(True, "passed"), pose(False, "failed")], "bad"),
+    ([pose(None, "", "out of reach")], "bad"),
+])  # fmt: skip
 def test_page_of_many_poses_is_red_if_one_fails_and_amber_if_undecided(rows, kind):
     text = poses_page("a robot", rows, Provenance())
     assert f"<p class='verdict {kind}'>" in text

@@ -7,17 +7,8 @@ import pytest
 
 from forcefit.validation.crosscheck.limits import (
     difference_slope,
-    extrapolate,
     slope_check,
 )
-
-
-def test_extrapolation_is_exact_for_polynomials():
-    """Three points of a parabola: 3 - 2 s + 5 s^2 is 3 at s = 0."""
-    s = np.array([1.0, 0.5, 0.25])
-    values = np.array([3 - 2 * s + 5 * s**2, s]).T
-    np.testing.assert_allclose(extrapolate(s, values), [3, 0], atol=1e-14)
-
 
 SCALES = np.array([1.0, 0.5, 0.25, 0.125])
 

@@ -9,11 +9,9 @@ from scipy.sparse import csr_matrix, diags
 from forcefit.assembly.files.solved_links import solve_links
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
-from forcefit.inputs.table import BadInput
 from forcefit.stiffness.fem.condensation import condense
 from forcefit.stiffness.fem.elements import assemble, isoparametric, lame
 from forcefit.validation.crosscheck.crosscheck import crosscheck
-from forcefit.validation.crosscheck.link_models import link_models
 from forcefit.validation.multibody.exudyn_parts import MeshBody, MeshedSolid
 from forcefit.validation.multibody.motion import placement
 from forcefit.validation.multibody.simulation import SimulationModel, simulate_assembly
@@ -91,11 +89,9 @@ def test_solid_between_two_walls_agrees_with_its_spring_to_first_order(block):
 
 @pytest.mark.slow
 def test_crosscheck_of_a_robot_with_meshed_links_passes_with_solids():
-    """From the surface file: K_E in the linear model, the solid in the simulation.
-
-    Both come from one mesh. They differ by the sparse solver's rounding, and a floating
-    frame bends linearly about its base.
-    """
+    """From the surface file: K_E in the linear model, the solid in the simulation. Both
+    come from one mesh. They differ by the sparse solver's rounding, and a floating
+    frame bends linearly about its base."""
     link = MeshLink(SURFACE, "z=0", "z=0.452", 60e9, 0.3)
     error = [1e-3, -2e-3, 1e-3, 1e-4, 2e-4, -1e-4]
     frames = (
@@ -109,8 +105,3 @@ def test_crosscheck_of_a_robot_with_meshed_links_passes_with_solids():
     assembly = crosscheck(posture, links="fem", load=[1, 2, -1, 30, 20, -50])
     assert assembly.passed, assembly.checks
     assert max(check.value for check in assembly.metric.limits.values()) < 1e-3
-
-
-def test_an_unknown_kind_of_link_is_refused():
-    with pytest.raises(BadInput, match="found 'shell', expected one of beam, spring"):
-        link_models(Robot("one", "f", (Frame("f"),)), "shell")

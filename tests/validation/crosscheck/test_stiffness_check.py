@@ -31,10 +31,8 @@ def test_stiffness_of_robots_without_errors_agrees_with_the_simulation(name, lin
 
 @pytest.mark.slow
 def test_stiffness_of_a_forced_assembly_agrees_with_the_simulation():
-    """At the paper's full errors the nominal matrix is off by 5 %.
-
-    The load has a moment, of dead forces in both models.
-    """
+    """At the paper's full errors the nominal matrix is off by 5 %. The load has a
+    moment, of dead forces in both models."""
     case = NUMBERS["cases"][1]
     posture = place_robot(irsbot2_with(case), {"tx": 0.1, "tz": -0.5})
     answer = check_stiffness(posture, [20, 10, -5, 100, 50, -300])
@@ -80,16 +78,6 @@ def test_stiffness_check_fails_for_a_wrong_stiffness():
     assert answer.passed
     wrong = replace(answer.exact, root=answer.exact.root * (1 + 1e-5))
     assert not replace(answer, exact=wrong).passed
-
-
-def test_stiffness_check_ignores_a_method_whose_error_is_large():
-    answer = check_stiffness(home_posture(load_robot("four_bar")))
-    noisy = replace(answer.simulated, stepped=answer.simulated.stepped * 1.1)
-    assert not replace(answer, simulated=noisy).passed
-    noisy = replace(noisy, stepped_error=0.1)
-    assert replace(answer, simulated=noisy).passed
-    noisy = replace(noisy, linearised_error=0.1)
-    assert not replace(answer, simulated=noisy).passed
 
 
 def test_stiffness_of_links_in_pieces_converges_to_that_of_beams():
@@ -152,14 +140,7 @@ def test_crosscheck_of_stiffness_reports_both_compliances(run):
     assert status == 0
     assert answer["passed"]
     assert np.array(answer["compliance"]["multibody"]).shape == (6, 6)
-    status, _, err = run(
-        "validation",
-        "crosscheck",
-        "four_bar",
-        "--state",
-        "exact",
-        "--figure",
-        "x.png",
-    )
+    words = ["validation", "crosscheck", "four_bar", "--state", "exact"]
+    status, _, err = run(*words, "--figure", "x.png")
     assert status == 2
     assert "--state: found together with" in err

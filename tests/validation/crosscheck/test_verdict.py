@@ -94,37 +94,19 @@ def test_undecided_check_is_reported_after_six_scales():
     assert verdict(comparison) == "not decided"
 
 
-def test_comparison_of_noise_has_the_verdict_no_signal():
+@pytest.mark.parametrize(("theirs", "limit", "expected"), [
+    (lambda s: 1e-14, "no signal", "no signal"), (lambda s: 1e-6 * s, "fails", "failed")
+])  # fmt: skip
+def test_noise_against_zero_has_no_signal_and_a_signal_against_zero_fails(
+    theirs, limit, expected
+):
     """Simulations resolve a hundredth of the floor;
     extrapolation multiplies that by 15."""
-
-    def solve(s):
-        return Scale(s, 0.0, 1e-14)
-
-    comparison = compare_scales((1.0, 0.5, 0.25, 0.125), solve, Found)
-    assert [check.verdict for check in comparison.checks.values()] == ["no signal"] * 2
-    assert verdict(comparison) == "no signal"
+    scales = (1.0, 0.5, 0.25, 0.125)
+    comparison = compare_scales(scales, lambda s: Scale(s, 0.0, theirs(s)), Found)
+    assert comparison.checks["limit"].verdict == limit
+    assert verdict(comparison) == expected
     assert len(comparison.pairs) == 4
-
-
-def test_check_of_zero_against_a_signal_fails():
-    """A signal in only one of the models is a difference."""
-
-    def solve(s):
-        return Scale(s, 0.0, 1e-6 * s)
-
-    comparison = compare_scales((1.0, 0.5, 0.25, 0.125), solve, Found)
-    assert comparison.checks["limit"].verdict == "fails"
-    assert verdict(comparison) == "failed"
-
-
-def test_comparison_without_checks_has_the_verdict_no_signal():
-    class Empty(Found):
-        def __post_init__(self):
-            self.checks = {}
-
-    comparison = compare_scales((1.0, 0.5), lambda s: Scale(s, s, s), Empty)
-    assert verdict(comparison) == "no signal"
 
 
 @pytest.mark.parametrize(("check", "expected"), [

@@ -93,7 +93,3 @@ def test_ros_bag_without_the_package_rosbags_is_refused_with_the_package_to_inst
     monkeypatch.setitem(__import__("sys").modules, "rosbags.highlevel", None)
     with pytest.raises(BadInput, match=r"install forcefit\[ros\], or export"):
         read_bag(tmp_path / "lab.bag")
-
-
-def test_overlong_file_name_is_not_taken_for_a_ros_bag():
-    assert not is_bag("x" * 300)

@@ -247,6 +247,9 @@ def test_names_with_any_separator_are_assigned_to_targets_and_commands(line, lab
     ("name;x;y;z;time\nA;1;2;3;noon", {}, "expected a time: seconds"),
     ("name;x;y;z;date\nA;1;2;3;3/4/2026 10:00:00", {}, 'expected dates = "day_fi'),
     ("name;x;y;z;U95 x\nA;1;2;3;-4", {}, "found -0.002 m, expected >= 0"),
+    ("Units: Inches\nname;x;y;z\nA;1;2;3", {},
+     'line 1: found the unit "in", expected "mm" as declared'),
+    (13 * f"{9 * 'NaN '}\n", {}, "found no"),
     ("", {}, "found an empty file, expected a table"),
     ("A 1 2 3", {"unit": '"ft"'}, "unit: found 'ft'"),
     ("A 1 2 3", {"robot": None}, "robot: missing"),
@@ -309,14 +312,16 @@ def test_readings_far_from_any_command_are_reported(lab, run):
     assert "no command is near it in time" in table["left_out"][0]
 
 
-@pytest.mark.parametrize(
-    ("text", "dates"),
-    [
-        ("2026-11-22T10:30:00", None), ("2026-11-22 10:30:00.000", None),
-        ("20261122103000", None), ("22.11.2026 10:30:00", None),
-        ("11/22/2026 10:30:00 AM", "month_first"), ("22/11/2026 10:30:00", "day_first"),
-        ("2026-11-22T11:30:00+01:00", None), ("1795343400", None),
-    ],
-)  # fmt: skip
-def test_times_of_every_notation_are_read(text, dates):
-    assert parse_time("", text, Writing(dates=dates)) == 1795343400.0
+@pytest.mark.parametrize(("text", "seconds", "dates"), [
+    *((text, 1795343400.0, None) for text in (
+        "2026-11-22T10:30:00", "2026-11-22 10:30:00.000", "20261122103000",
+        "22.11.2026 10:30:00", "2026-11-22T11:30:00+01:00", "1795343400",
+    )),
+    ("11/22/2026 10:30:00 AM", 1795343400.0, "month_first"),
+    ("22/11/2026 10:30:00", 1795343400.0, "day_first"),
+    ("10:30:00", 37800.0, None), ("9:30:00 PM", 77400.0, None),
+    ("10:30:00,25", 37800.25, None),
+    ("1.1.1970 00:01:00.123456789", 60.123456, None),
+])  # fmt: skip
+def test_times_of_every_notation_are_read(text, seconds, dates):
+    assert parse_time("", text, Writing(dates=dates)) == seconds

@@ -164,6 +164,10 @@ def test_revisits_classify_the_order_of_repeats(rng):
     assert revisits(row, np.arange(60)).order == "none"
     assert revisits(row, np.zeros(60)).order == "all"
     assert revisits(row, np.r_[np.zeros(59), 1]).order == "back to back"
+    # rows that the file sorts by repeat were measured in passes
+    order = np.argsort(np.tile(np.arange(20), 3), kind="stable")
+    by_time = campaign_of(readings, repeat=row.repeat, time=60.0 * order)
+    assert revisits(by_time, by_time.repeat).order == "interleaved"
 
 
 def test_points_read_at_the_same_time_count_as_one_visit():
@@ -185,12 +189,3 @@ def test_points_read_at_the_same_time_count_as_one_visit():
     assert visits.span == pytest.approx(120 / 179)
     in_one_go = np.repeat(np.repeat(np.arange(20), 3), 3)
     assert revisits(campaign, in_one_go).order == "back to back"
-
-
-def test_revisits_use_time_instead_of_file_order(rng):
-    """Rows are sorted by repeat in the file, and were measured in passes."""
-    order = np.tile(np.arange(20), 3)
-    sort = np.argsort(order, kind="stable")
-    campaign = campaign_of(np.zeros((60, 6)), repeat=order[sort],
-                           time=60.0 * sort)  # fmt: skip
-    assert revisits(campaign, campaign.repeat).order == "interleaved"

@@ -13,7 +13,7 @@ from forcefit.validation.crosscheck.link_models import link_models
 from forcefit.validation.multibody import tangent
 from forcefit.validation.multibody.conservative_springs import far_couple, middle_wrench
 from forcefit.validation.multibody.exudyn_model import Regularisation
-from forcefit.validation.multibody.motion import exponential, logarithm, turn_of, turned
+from forcefit.validation.multibody.motion import exponential, logarithm, turned
 from forcefit.validation.multibody.simulation import SimulationModel
 from forcefit.validation.multibody.simulation import without_clearance as without_play
 from forcefit.validation.multibody.tangent import simulated_tangent
@@ -166,10 +166,3 @@ def test_smaller_load_steps_lead_to_the_stable_equilibrium(monkeypatch):
     assert not straight.stable
     apart = straight.platform[:3, 3] - simulated.platform[:3, 3]
     assert np.abs(apart).max() > 1e-3
-
-
-@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-3, 1.0, 3.0, 3.14159265])
-def test_rotation_vector_is_recovered_from_its_matrix(angle):
-    for axis in np.vstack([np.eye(3), [[0.6, -0.8, 0.0], [-1 / 3, 2 / 3, 2 / 3]]]):
-        R = turned(angle * axis)
-        np.testing.assert_allclose(turn_of(R), angle * axis, rtol=1e-7, atol=1e-15)

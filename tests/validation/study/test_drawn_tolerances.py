@@ -153,20 +153,15 @@ def test_study_without_tolerances_has_no_statistics(tmp_path):
         study_of(tmp_path, "", "[statistics]\n", text)
 
 
-@pytest.mark.parametrize(
-    ("table", "message"),
-    [
-        ("[statistics]\ndraws = 1\n", "statistics.draws: found 1, expected 2 to"),
-        ("[statistics]\nimportance = 3\n", "statistics.importance: found 3, expected"),
-        (
-            "[statistics]\nlimits = { translatoin = 1 }\n",
-            "statistics.limits.translatoin: found a limit of an unknown quantity",
-        ),
-        ("[statistics]\nlimits = { translation = -1 }\n", "translation: found -1"),
-        ("[statistics]\ndraw = 5\n", 'statistics: unknown key "draw"; did you mean'),
-        ('mismatch = "spring"\n[statistics]\n', 'found this table and "mismatch"'),
-    ],
-)
+@pytest.mark.parametrize(("table", "message"), [
+    ("[statistics]\ndraws = 1\n", "statistics.draws: found 1, expected 2 to"),
+    ("[statistics]\nimportance = 3\n", "statistics.importance: found 3, expected"),
+    ("[statistics]\nlimits = { translatoin = 1 }\n",
+     "statistics.limits.translatoin: found a limit of an unknown quantity"),
+    ("[statistics]\nlimits = { translation = -1 }\n", "translation: found -1"),
+    ("[statistics]\ndraw = 5\n", 'statistics: unknown key "draw"; did you mean'),
+    ('mismatch = "spring"\n[statistics]\n', 'found this table and "mismatch"'),
+])  # fmt: skip
 def test_mistake_in_the_statistics_of_a_study_is_reported(tmp_path, table, message):
     with pytest.raises(BadInput) as error:
         study_of(tmp_path, "", table)

@@ -9,7 +9,6 @@ import xarray
 
 import forcefit as ff
 from forcefit.assembly.files.robot_file import write_robot
-from forcefit.assembly.report.platform_stiffness import largest_rows
 from forcefit.validation.study.report import report_page, results_table, write_study
 from forcefit.validation.study.study import run_study
 from forcefit.validation.study.study_file import read_study
@@ -172,10 +171,3 @@ def test_shares_of_all_parts_in_the_chart_add_up_to_100_per_cent(tmp_path):
         total = sum(float(row[column].text) for row in rows)
         # each is printed to 0.05 %
         assert total == pytest.approx(100.0, abs=0.05 * len(rows))
-
-
-def test_parts_beyond_the_largest_are_summed_in_one_row():
-    shares = {f"part {k}": [0.5**k] * 6 for k in range(1, 30)}
-    rows = largest_rows(shares)
-    assert list(rows)[-1] == "17 others"
-    assert np.sum(list(rows.values()), axis=0) == pytest.approx([1 - 0.5**29] * 6)

@@ -103,10 +103,8 @@ def test_effect_in_a_simulation_adds_its_deviation_to_the_machine(
     name, program, robot, machine
 ):
     """Deviations up to 500 um and urad agree with finite motions to 30 nm and nrad.
-
-    What is left is how screws of 1e-4 compound (1e-8), and the beams' own bending.
-    A beam built longer is also softer, which the effect does not say: no load there.
-    """
+    What is left is how screws of 1e-4 compound (1e-8), and the beams' own bending. A
+    beam built longer is also softer, which the effect does not say: no load there."""
     conditions, rows = machine
     conditions = replace(conditions, exact=True)
     if name in {"link_length", "thermal_expansion", "delayed_expansion"}:
