@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-import forcefit.assembly.exact.descent as descent
 from forcefit.assembly.exact.dead_load import dead_loads, work_gradient
 from forcefit.assembly.exact.descent import NotConverged, advance, expand, potential
 from forcefit.assembly.exact.finite_robot import FiniteRobot
@@ -61,14 +60,3 @@ def test_gap_that_clearance_cannot_close_raises_an_error_of_no_convergence():
     message = "rigid: the closures stay open: neither a spring nor a clearance"
     with pytest.raises(NotConverged, match=message):
         advance(local, 1.0, 0.0, False)
-
-
-def test_missing_descent_step_is_reported_with_the_open_distance(monkeypatch):
-    """No attempt is allowed, so that no step can be found."""
-    monkeypatch.setattr(descent, "_ATTEMPTS", 0)
-    local, _ = expansion(0)
-    with pytest.raises(NotConverged) as caught:
-        advance(local, 1.0, 0.0, False)
-    assert str(caught.value).startswith("exact equilibrium of random under [")
-    assert "no step decreases the energy; the closures are open" in str(caught.value)
-    assert caught.value.status.startswith("no step decreases")

@@ -5,8 +5,6 @@ import pytest
 from scipy.linalg import expm
 
 from forcefit.assembly.exact.finite_robot import FiniteRobot
-from forcefit.assembly.exact.placement import place
-from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.kinematics.se3 import (
     bracket,
     exponential,
@@ -16,18 +14,13 @@ from forcefit.assembly.kinematics.se3 import (
     second_form,
 )
 from forcefit.assembly.linear.closure import virtual_joints
-from tests.robots_for_tests import random_robot
 
 
 def moved_unknowns(posture, rng, size):
     """A finite robot with unknowns of a size in rad and reference lengths."""
     model = FiniteRobot(posture, virtual_joints(posture.robot))
-    per = np.sqrt(np.diag(model.metric))
-    return (
-        model,
-        rng.normal(size=len(per)) / per * size,
-        rng.normal(size=len(per)) / per,
-    )
+    x, h = rng.normal(size=(2, len(model.frame))) / np.sqrt(np.diag(model.metric))
+    return model, size * x, h
 
 
 # Finite motions
@@ -79,16 +72,3 @@ def test_second_form_equals_differences_of_the_exponential(rng, size):
 
 
 # Closures of a robot
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_closure_and_platform_rows_equal_central_differences(seed):
-    """Central differences of 1e-5: error 1e-10 of third derivatives of order 1."""
-    rng = np.random.default_rng(seed)
-    model, x, h = moved_unknowns(home_posture(random_robot(rng, legs=3)), rng, 0.05)
-    here, step = place(model, x), 1e-5
-    ahead, behind = place(model, x + step * h), place(model, x - step * h)
-    difference = (ahead.residual - behind.residual) / (2 * step)
-    assert np.abs(here.rows @ h - difference).max() < 1e-7
-    difference = (ahead.platform_screw - behind.platform_screw) / (2 * step)
-    assert np.abs(here.platform_rows @ h - difference).max() < 1e-7

@@ -6,12 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from forcefit import BadInput, Frame, Robot, solve_assembly
 from forcefit.assembly.kinematics.closing import preloaded, rest_in
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
-from forcefit.assembly.linear.energy import solve_assembly
-from forcefit.assembly.model.robot import Frame, Robot
 from forcefit.assembly.robots import load_robot
-from forcefit.inputs.table import BadInput
 
 OFF = 1e-4  # [m] out of the plane of a four-bar: no motion takes it up
 

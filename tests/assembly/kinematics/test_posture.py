@@ -5,17 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from forcefit import BadInput, platform_stiffness, solve_assembly, zone_margin
 from forcefit.assembly.kinematics.pieces import cut_beams
-from forcefit.assembly.kinematics.posture import (
-    home_posture,
-    place_robot,
-    together,
-)
-from forcefit.assembly.linear.energy import solve_assembly
-from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.kinematics.posture import home_posture, place_robot, together
 from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
-from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from forcefit.inputs.table import BadInput
 from tests.linkages_for_tests import four_bar, four_bar_angles
 
 
@@ -93,17 +86,13 @@ def test_missing_distance_in_the_message_has_the_unit_of_the_requested_component
         Frame("rail", rotation=[0, np.pi / 2, 0], joint="prismatic", actuated=True),
         Frame("car", "rail", rotation=[0, -np.pi / 2, 0]),
     ))  # fmt: skip
-    with pytest.raises(BadInput) as caught:
-        place_robot(robot, pose=asked)
     names = ", ".join(f"{name}={value:g}" for name, value in asked.items())
-    message = str(caught.value)
-    assert message.startswith(
-        f"slide: pose {names} cannot be reached: on the straight line from home the "
-        f"platform stops at {next(iter(asked))}="
+    message = (
+        f"^slide: pose {names} cannot be reached: on the straight line from home the "
+        f"platform stops at .*, {missing} short; expected a configuration in which "
     )
-    assert message.endswith(
-        f", {missing} short; expected a configuration in which every closure holds"
-    )
+    with pytest.raises(BadInput, match=message):
+        place_robot(robot, pose=asked)
 
 
 @pytest.mark.parametrize("function", [solve_assembly, zone_margin, platform_stiffness])

@@ -3,15 +3,13 @@
 import numpy as np
 import pytest
 
+from forcefit import BadInput, Clearance, Frame, MatrixLink, Robot, solve_assembly
 from forcefit.assembly.kinematics.posture import home_posture, place_many, together
-from forcefit.assembly.linear.energy import solve_assembly
 from forcefit.assembly.linear.reference.reduction import FreeMotion
-from forcefit.assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from forcefit.assembly.platform_stiffness.linear_tangent import without_clearance
 from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from forcefit.assembly.robots import load_robot
 from forcefit.assembly.solvers.method import METHODS
-from forcefit.inputs.errors import BadInput
 from tests.robots_for_tests import coaxial_beams, random_robot
 
 UNIT = np.eye(6)
