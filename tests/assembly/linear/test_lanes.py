@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from forcefit.assembly.kinematics.posture import home_posture, together
-from forcefit.assembly.linear import zone
 from forcefit.assembly.linear.closure import linearise, virtual_joints
 from forcefit.assembly.linear.energy import solve_assembly
 from forcefit.assembly.linear.zone import zone_margin
@@ -97,29 +96,6 @@ def test_margin_of_a_point_is_independent_of_its_neighbours(grid, rng, compliant
         other = zone_margin(at[order], compliant, errors[order])
         for name in ("margin", "bound", "method"):
             assert np.array_equal(getattr(other, name), getattr(whole, name)[order])
-
-
-@pytest.mark.parametrize("each", [True, False])
-def test_uncertified_margins_are_solved_by_the_reference_method(
-    grid, each, monkeypatch
-):
-    """The last point has no proof; errors are per point, or shared by all points."""
-    robot, postures = grid
-    at = postures[:3]
-    errors = robot.errors * np.arange(1.0, 4.0)[:, None, None]
-    errors = errors if each else errors[0]
-    expected = zone_margin(at, "free", errors)
-
-    def all_but_the_last(structure, T, errors, mismatch, out):
-        out[0][:-1], out[1][:-1] = expected.margin[:-1], expected.bound[:-1]
-        out[3][:-1] = 0
-
-    monkeypatch.setattr(zone, "margins_side_by_side", all_but_the_last)
-    found = zone_margin(at, "free", errors)
-    assert found.method.tolist() == ["compiled", "compiled", "reference"]
-    assert np.array_equal(found.margin[:-1], expected.margin[:-1])
-    assert found.margin[-1] == pytest.approx(expected.margin[-1], rel=1e-7)
-    assert found.bound[-1] <= found.margin[-1]
 
 
 @pytest.mark.parametrize("kappa", [0.05, 0.3, 1.0])

@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from forcefit import BadInput, BeamLink, Frame, PathTimes, Robot, errors_along_path
 from forcefit.assembly.model.force_control import with_drive_forces
 from forcefit.assembly.model.frame import Clearance
-from forcefit.assembly.model.robot import BeamLink, Frame, Robot
 from forcefit.assembly.path.path_errors import path_errors
 from forcefit.assembly.path.path_file import PathTable
-from forcefit.assembly.path.request import PathTimes, errors_along_path
-from forcefit.inputs.table import BadInput
 from tests.assembly.path.moving_robots_for_tests import hinge, instants
 
 ALONG_X = [0, np.pi / 2, 0]  # turns z into x
