@@ -240,12 +240,8 @@ def test_file_that_is_not_a_journal_is_refused_and_unchanged(tmp_path):
 
 def test_block_size_does_not_change_the_results():
     """Blocks of 4 and of 15 points give bit-identical results."""
-    options = {
-        "assumption": "frozen",
-        "wrenches": ("left.elbow",),
-        "clearance_only": True,
-    }
-    small = small_sweep(**options)
+    small = small_sweep(assumption="frozen", wrenches=("left.elbow",),
+                        clearance_only=True)  # fmt: skip
     one = sweep_in_memory(small)
     other = sweep_in_memory(replace(small, block_size=15))
     assert one.identical(other)

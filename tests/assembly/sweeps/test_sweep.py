@@ -4,14 +4,12 @@ import numpy as np
 import pytest
 import xarray
 
-from forcefit.assembly.kinematics.posture import place_robot
-from forcefit.assembly.linear.energy import solve_assembly
+from forcefit import BadInput, place_robot, solve_assembly
 from forcefit.assembly.sweeps import points
 from forcefit.assembly.sweeps.dataset import save_dataset
 from forcefit.assembly.sweeps.maps import map_figure
 from forcefit.assembly.sweeps.sweep import sweep_poses
 from forcefit.assembly.sweeps.targets import parse_grid
-from forcefit.inputs.table import BadInput
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
 
 GRID = "tx=-0.4:0.4:0.2,tz=-0.65:-0.45:0.1"
@@ -79,21 +77,6 @@ def test_maps_show_the_quantities_of_the_grid(data):
     image = next(a for a in figure.axes if "energy" in a.get_title()).collections[0]
     shown = np.ma.filled(image.get_array(), np.nan).ravel()
     assert np.nanmax(shown) == pytest.approx(float(data.energy.max()))
-
-
-def test_sweep_with_an_assumption_stores_pose_error_bounds():
-    robot = irsbot2_with(NUMBERS["cases"][0])
-    data = sweep_poses(robot, parse_grid("tx=-0.2:0.2:0.2,tz=-0.9:-0.45:0.45"),
-                       assumption="frozen")  # fmt: skip
-    assert data.rotation_error.dims == ("tx", "tz", "bound")
-    assert data.bound.values.tolist() == ["lower", "upper"]
-    assert data.translation_error.attrs["units"] == "m"
-    point = NUMBERS["cases"][0]["points"][1]
-    there = data.sel(tx=0.2, tz=-0.45, method="nearest")
-    low, high = there.rotation_error.values
-    assert low <= point["full_rigid_R"][1] + 1e-7
-    assert high >= point["full_rigid_R"][0] - 1e-7
-    assert np.isnan(data.rotation_error.sel(tz=-0.9, method="nearest")).all()
 
 
 def test_map_of_a_single_axis_is_refused(data):
