@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from forcefit import Experiment, Frame, MatrixLink, Robot, run_draws
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.model.error_distributions import tolerance_sources
-from forcefit.assembly.model.robot import Frame, MatrixLink, Robot
 from forcefit.assembly.robots import load_robot
 from forcefit.assembly.statistics.clearance_positions import CLEARANCE_MODELS
-from forcefit.assembly.statistics.experiment import Experiment
 from forcefit.assembly.statistics.importance import (
     SaltelliDesign,
     linear_importance,
@@ -20,7 +19,6 @@ from forcefit.assembly.statistics.importance import (
 )
 from forcefit.assembly.statistics.importance_table import ImportanceOptions
 from forcefit.assembly.statistics.linear_response import linear_response
-from forcefit.assembly.statistics.monte_carlo import run_draws
 from forcefit.assembly.statistics.summary import summarise, summary_text
 from tests.tolerances_for_tests import arm
 

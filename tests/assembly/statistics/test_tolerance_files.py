@@ -227,16 +227,3 @@ def test_errors_of_a_plan_have_the_requested_range_and_deviation(
     drawn = plan.sources.draw(0, 4000, seed=1)
     assert 0.9 < np.abs(drawn).max() <= 1.0
     assert np.std(drawn) == pytest.approx(deviation, rel=0.02)
-
-
-def test_defaults_of_a_tolerance_file_are_as_documented(write_file):
-    """A cost of 1, from 0 to 0.1 rad or 10 mm, and assembly by clearance alone."""
-    tables = [f'[[tolerance]]\nframes = ["link_a"]\ncomponents = ["{c}"]\n' for c in
-              ("RX", "TX")]  # fmt: skip
-    plan = read_plan(write_file("".join(tables)), load_robot("irsbot2"))
-    np.testing.assert_array_equal(plan.costs, [1.0, 1.0])
-    np.testing.assert_array_equal(plan.least, [0.0, 0.0])
-    np.testing.assert_array_equal(plan.most, [0.1, 0.01])
-    assert plan.names == ("leg1.link_a.RX", "leg1.link_a.TX")
-    assert (plan.limits, plan.asked_yield) == ({"margin_free": 1.0}, 1.0)
-    assert (plan.draws, plan.seed, plan.cost) == (1000, 1, "reciprocal")

@@ -76,13 +76,6 @@ def test_advice_omits_tolerances_at_their_loosest():
     assert tiles(none)["Tolerance to tighten"][0] == "nothing"
 
 
-def test_report_without_a_proof_says_so_and_has_no_empty_table():
-    page = shown([1e-3, 1e-4], [1.0, 1.0])
-    assert "not proved" in page
-    assert "at least none" not in page
-    assert all(len(table) > 1 for table in parse(page).tables)
-
-
 def test_report_states_requirements_and_the_share_of_clearances(tmp_path, run):
     """A pin of radius r, and a length t beyond it: t = limit - r, 1 / t is the price.
 

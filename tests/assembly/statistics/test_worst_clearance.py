@@ -98,8 +98,3 @@ def test_worst_clearance_adds_no_error_if_a_load_closes_all_clearances():
     rest = np.linalg.norm(values + [RADIAL, 0, 0], axis=1)
     np.testing.assert_allclose(rows["translation"], rest, atol=1e-9)
     np.testing.assert_allclose(rows["translation_lower"], rest, atol=1e-9)
-
-
-def test_unknown_clearance_model_is_refused():
-    with pytest.raises(ValueError, match="clearance is 'most', expected one of"):
-        papers(0.1, clearance="most")
