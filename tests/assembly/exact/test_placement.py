@@ -1,10 +1,9 @@
-"""Finite motions: exponentials, closures, and their two derivatives."""
+"""Finite motions: the exponential of a screw and its two derivatives."""
 
 import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from forcefit.assembly.exact.finite_robot import FiniteRobot
 from forcefit.assembly.kinematics.se3 import (
     bracket,
     exponential,
@@ -13,17 +12,6 @@ from forcefit.assembly.kinematics.se3 import (
     logarithm,
     second_form,
 )
-from forcefit.assembly.linear.closure import virtual_joints
-
-
-def moved_unknowns(posture, rng, size):
-    """A finite robot with unknowns of a size in rad and reference lengths."""
-    model = FiniteRobot(posture, virtual_joints(posture.robot))
-    x, h = rng.normal(size=(2, len(model.frame))) / np.sqrt(np.diag(model.metric))
-    return model, size * x, h
-
-
-# Finite motions
 
 
 @pytest.mark.parametrize("size", [1e-7, 1e-2, 0.5, 1.5])

@@ -114,12 +114,8 @@ def test_an_interrupted_path_resumes_with_the_same_results(tmp_path):
     file, journal = tmp_path / "way.nc", tmp_path / "way.nc.journal"
     with pytest.raises(KeyboardInterrupt):
         compute(file, stop)
-    kept = journal.stat().st_size
-    assert kept > 2000 * 8
+    assert journal.stat().st_size > 2000 * 8
     assert not file.exists()
-    with pytest.raises(KeyboardInterrupt):
-        compute(file, stop)  # the first block is read, and nothing is added
-    assert journal.stat().st_size == kept
     resumed = compute(file, lambda done, total: seen.append(done))
     whole = compute(tmp_path / "whole.nc")
     assert seen == [0, 2000, 4000, 4100]
@@ -127,7 +123,6 @@ def test_an_interrupted_path_resumes_with_the_same_results(tmp_path):
     for name, values in whole.arrays.items():
         np.testing.assert_array_equal(resumed.arrays[name], values)
     assert file.read_bytes() == (tmp_path / "whole.nc").read_bytes()
-    compute(file)
     with pytest.raises(KeyboardInterrupt):
         compute(file, stop)
     with pytest.raises(BadInput, match="journal of another sweep: found path_sha256"):

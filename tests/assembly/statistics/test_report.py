@@ -72,16 +72,6 @@ def test_tolerance_report_ranks_the_declared_errors(tmp_path, run):
     assert seen.numbers[0].value == present["largest_margin"]
 
 
-@pytest.mark.parametrize("command", ["statistics", "tolerances"])
-def test_report_with_a_wrong_ending_is_refused_before_solving(tmp_path, run, command):
-    status, printed, err = run(
-        "assembly", command, "hexapod", "--errors" if command == "statistics" else
-        "--grid", ERRORS, "--report", tmp_path / "x.txt",
-    )  # fmt: skip
-    assert (status, printed) == (2, "")
-    assert 'found the ending ".txt", expected an HTML page' in err
-
-
 def test_robot_in_the_report_has_the_platform_displacement_of_its_draw():
     """The draw nearest to the 95 % quantile, solved as a single assembly."""
     posture = place_robot(load_robot("hexapod"))
