@@ -101,6 +101,19 @@ def test_tangent_stiffness_is_the_slope_of_the_curve():
     assert 1 / slope == pytest.approx(curve.stiffness[1], rel=1e-6)
 
 
+@pytest.mark.slow
+def test_clamped_column_has_a_critical_event_at_the_euler_load():
+    width, E = 0.02, 70e9
+    link = BeamLink({"width": width, "height": width}, E, 0.3, pieces=16,
+                    theory="euler")  # fmt: skip
+    euler = np.pi**2 * E * width**4 / 12 / 4
+    loads = -euler * np.array([0.0, 0.5, 0.9, 1.1])
+    (event,) = deflection_curve(cantilever(link), 3, loads, state="exact").events
+    assert event.kind == "critical"
+    assert -event.load == pytest.approx(euler, rel=2e-3)
+    assert "tip link" in event.what
+
+
 def test_thin_cantilever_has_a_critical_event_at_the_lateral_buckling_load():
     """4.013 sqrt(EI GJ) / L^2 (Michell, Prandtl 1899), and the effect of prebuckling.
 
