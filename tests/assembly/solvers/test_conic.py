@@ -93,3 +93,13 @@ def test_pressed_disc_moves_to_the_point_nearest_to_the_target(off):
     assert u == pytest.approx(a / 13, abs=1e-9)
     assert y == pytest.approx(a / 13 - a, abs=1e-8)
     assert len(n) == 0
+
+
+def test_pressed_interval_ends_at_its_bound_and_the_row_moves_the_other():
+    """Work 3 u_1 + u_2 on u_1 + u_2 = 1 / 2 within +-1: the corner (1, -1 / 2)."""
+    H, k = np.array([[1.0, 1.0]]), np.array([0.5])
+    problem = (NONE, np.zeros(0), np.array([3.0, 1.0]), H, k, np.array([0, 1]))
+    u, y, n = next(refine(problem, np.array([0.999, -0.498]), np.array([-1.01])))
+    assert u == pytest.approx([1.0, -0.5], abs=1e-12)
+    assert len(y) == 0
+    assert n == pytest.approx([-1.0], abs=1e-9)

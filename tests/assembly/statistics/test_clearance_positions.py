@@ -13,7 +13,10 @@ from forcefit.assembly.model.error_distributions import (
 from forcefit.assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from forcefit.assembly.robots import load_robot
 from forcefit.assembly.solvers.uniform_clearance import sample_uniform_position
-from forcefit.assembly.statistics.clearance_positions import position_clearances
+from forcefit.assembly.statistics.clearance_positions import (
+    loaded_clearances,
+    position_clearances,
+)
 from forcefit.assembly.statistics.contact_positions import move_to_contact
 from forcefit.assembly.statistics.linear_response import linear_response
 from tests.tolerances_for_tests import ARM, arm
@@ -150,6 +153,19 @@ def drawn():
     one = linear_response(place_robot(robot))
     errors = sources.errors(sources.draw(0, DRAWN, seed=2))
     return one, one.solve(errors)
+
+
+@pytest.mark.parametrize("play", ["uniform", "contact"])
+def test_unloaded_clearances_cause_finite_displacements_of_the_platform(drawn, play):
+    """Clearances are loaded only in draws that store energy."""
+    one, found = drawn
+    loaded = loaded_clearances(one, found)
+    assert not loaded[found.energy < 1e-20].any()
+    assert loaded[found.energy > 1e-8].any()
+    settled, mixed = position_clearances(one, found, play, generators(DRAWN))
+    assert mixed.all()
+    assert np.isfinite(settled).all()
+    assert np.abs(settled - found.platform_screw).max() > 1e-5
 
 
 @pytest.mark.slow
