@@ -70,14 +70,6 @@ def test_energy_after_a_convex_clearance_step_equals_that_of_scipy_slsqp(seed, r
     assert energy(p, p.start + step[0]) == pytest.approx(least, rel=1e-5)
 
 
-@pytest.mark.parametrize("near", [True, False])
-def test_unreachable_rows_have_no_clearance_step(near):
-    rng = np.random.default_rng(2)
-    p = problem(rng, 1)
-    far = ClearanceProblem(p.S, p.s, p.start, GROUP, p.rows, p.right + 50.0)
-    assert clearance_step(far, near) is None
-
-
 @pytest.mark.parametrize("units", [1e-9, 1.0, 1e6])
 def test_negative_curvature_leads_to_the_bound_on_the_side_of_the_force(units):
     """Energy -v^2 about the middle of an interval, and a small force to one side."""

@@ -6,27 +6,19 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from forcefit.assembly.exact.dead_load import (
-    dead_loads,
-    work_gradient,
-    wrenches_on_frames,
-)
+from forcefit.assembly.exact.dead_load import dead_loads, work_gradient
 from forcefit.assembly.exact.exact import solve_exact
 from forcefit.assembly.exact.finite_robot import FiniteRobot
 from forcefit.assembly.exact.placement import place
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.linear.closure import virtual_joints
-from forcefit.assembly.linear.energy import solve_assembly
-from forcefit.assembly.model.links import link_compliance
 from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 from forcefit.stiffness.screws import rotation_matrix, rotation_vector, screw_map
 from forcefit.validation.multibody.simulation import (
-    SimulationModel,
     simulate_assembly,
     without_clearance,
 )
-from tests.assembly.exact.test_exact import only
-from tests.assembly.exact.test_placement import moved_unknowns
+from tests.assembly.exact.test_exact import as_springs, only
 from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot, with_bodies
 
 G = 9.81
@@ -121,12 +113,8 @@ def test_base_reactions_balance_the_whole_weight():
         if robot.parents[i] < 0:
             # the joint's wrench, and what pulls the body itself
             T = answer.transforms[i]
-            w = (
-                screw_map(-T[:3, 3]).T
-                @ np.kron(np.eye(2), T[:3, :3])
-                @ (answer.wrenches[i])
-            )
-            balance += w
+            in_base = np.kron(np.eye(2), T[:3, :3]) @ answer.wrenches[i]
+            balance += screw_map(-T[:3, 3]).T @ in_base
     assert np.abs(answer.linear.platform_screw).max() > 1e-6
     assert balance == pytest.approx(total, rel=1e-8, abs=1e-8 * np.abs(total).max())
 
@@ -153,14 +141,6 @@ def test_rotating_robot_and_gravity_together_rotates_the_solution(seed):
     assert there.platform_screw == pytest.approx(both @ here.platform_screw, abs=1e-9)
 
 
-def test_start_from_a_solution_under_other_loads_is_refused():
-    posture = on_a_hinge(10.0, Frame("arm", "hinge", [0.5, 0, 0], mass=1.0))
-    start = solve_assembly(posture, gravity=[0, -G, 0])
-    assert solve_exact(posture, start=start, gravity=[0, -G, 0]).energy > 0
-    with pytest.raises(ValueError, match="another posture or load"):
-        solve_exact(posture, start=start)
-
-
 @pytest.mark.exudyn
 @pytest.mark.parametrize("gravity", [[0, 0, -9.81], [300.0, -200.0, -500.0]])
 def test_exact_solution_with_weight_equals_the_multibody_simulation(gravity):
@@ -171,15 +151,8 @@ def test_exact_solution_with_weight_equals_the_multibody_simulation(gravity):
     robot = without_clearance(irsbot2_with(NUMBERS["cases"][1]))
     robot = with_bodies(robot, np.random.default_rng(4), heaviest=2, off=0.05)
     posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.5})
-    stiffness = {
-        frame.name: np.linalg.inv(link_compliance(frame))
-        for frame in robot.frames
-        if frame.link is not None
-    }
     answer = solve_exact(posture, gravity=gravity)
-    other = simulate_assembly(
-        posture, model=SimulationModel("spring", stiffness), gravity=gravity
-    )
+    other = simulate_assembly(posture, model=as_springs(robot), gravity=gravity)
     light = solve_exact(posture)
     sag = np.abs(answer.platform_screw - light.platform_screw)[3:].max()
     difference = np.abs(other.platform_screw - answer.platform_screw)
@@ -188,31 +161,3 @@ def test_exact_solution_with_weight_equals_the_multibody_simulation(gravity):
     assert difference[3:].max() < 1e-8
     weight = sum(f.mass for f in robot.frames) * np.linalg.norm(gravity)
     assert other.energy == pytest.approx(answer.energy, abs=1e-8 * weight)
-
-
-def test_frame_wrench_is_the_sum_of_all_loads_beyond_the_frame():
-    """Forces and moments summed along the tree; joints omit their own body."""
-    rng = np.random.default_rng(4)
-    robot = with_bodies(random_robot(rng, legs=2), rng)
-    posture = home_posture(robot)
-    model, x, _ = moved_unknowns(posture, rng, 0.1)
-    there, load = place(model, x), np.r_[np.zeros(3), rng.normal(size=3)]
-    bodies, gravity = rng.normal(size=(len(robot.frames), 6)), np.array([1.0, -2, -9])
-    bodies[:, :3] = 0.0
-    body, joint = wrenches_on_frames(there, dead_loads(posture, load, bodies, gravity))
-    origin, own = posture.platform[:3, 3], []
-    for i, frame in enumerate(robot.frames):
-        T = there.body_ends[i]
-        weight, at = frame.mass * gravity, T[:3, :3] @ frame.centre_of_mass + T[:3, 3]
-        parts = [(at, weight), (T[:3, 3], bodies[i, 3:])]
-        if frame.name == robot.platform:
-            parts.append((there.platform[:3, 3], load[3:]))
-        own.append(sum(np.r_[np.cross(p - origin, f), f] for p, f in parts))
-    for i, frame in enumerate(robot.frames):
-        behind = [
-            own[k] for k in range(len(robot.frames)) if robot.on_path[k, i] and k != i
-        ]
-        held = np.sum(behind, axis=0) if behind else np.zeros(6)
-        scale = np.abs(own).sum()
-        assert joint[i] == pytest.approx(held, abs=1e-12 * scale), frame.name
-        assert body[i] == pytest.approx(held + own[i], abs=1e-12 * scale)

@@ -15,7 +15,11 @@ from forcefit.assembly.model.links import link_compliance
 from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.stiffness.screws import rotation_matrix, rotation_vector
-from forcefit.validation.multibody.simulation import SimulationModel, without_clearance
+from forcefit.validation.multibody.simulation import (
+    SimulationModel,
+    simulate_assembly,
+    without_clearance,
+)
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with, small_clearance
 
 CASES = {case["name"]: case for case in NUMBERS["cases"]}
@@ -296,6 +300,16 @@ def test_exact_solution_of_the_paper_robot_converges_at_full_errors(case):
         assert 1e-6 < shift < 1e-3  # [m]; the paper's target is 20e-6
 
 
+def as_springs(robot, **options):
+    """The multibody model whose links are springs of the robot's own stiffness."""
+    stiffness = {
+        frame.name: np.linalg.inv(link_compliance(frame))
+        for frame in robot.frames
+        if frame.link is not None
+    }
+    return SimulationModel("spring", stiffness, **options)
+
+
 @pytest.mark.exudyn
 @pytest.mark.parametrize("place", [(0, -0.5), (-0.15, -0.6)])
 @pytest.mark.parametrize("case", CASES)
@@ -306,17 +320,10 @@ def test_exact_solution_equals_the_multibody_simulation_at_full_errors(case, pla
     gradient to s^2 / 24 only: 1e-5 of the wrench in hinges turned by 2e-2 rad, and up
     to 1e-7 rad of the soft ones.
     """
-    from forcefit.validation.multibody.simulation import simulate_assembly
-
     robot = without_clearance(irsbot2_with(CASES[case]))
     posture = place_robot(robot, pose=dict(zip(("tx", "tz"), place, strict=True)))
-    stiffness = {
-        frame.name: np.linalg.inv(link_compliance(frame))
-        for frame in robot.frames
-        if frame.link is not None
-    }
     answer = solve_exact(posture)
-    other = simulate_assembly(posture, model=SimulationModel("spring", stiffness))
+    other = simulate_assembly(posture, model=as_springs(robot))
     assert answer.linearisation_error.energy != pytest.approx(0, abs=0.1)  # [J]
     assert other.energy == pytest.approx(answer.energy, rel=1e-9)
     difference = np.abs(other.platform_screw - answer.platform_screw)
@@ -332,19 +339,10 @@ def test_exact_solution_equals_the_multibody_simulation_at_full_errors(case, pla
 @pytest.mark.parametrize("case", CASES)
 def test_exact_solution_with_clearances_equals_the_multibody_simulation(case):
     """Contacts of the simulation deform; twice their energy is added (first order)."""
-    from forcefit.validation.multibody.simulation import simulate_assembly
-
     robot = irsbot2_with(CASES[case])
     posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.4})
-    stiffness = {
-        frame.name: np.linalg.inv(link_compliance(frame))
-        for frame in robot.frames
-        if frame.link is not None
-    }
     answer = solve_exact(posture)
-    other = simulate_assembly(
-        posture, model=SimulationModel("spring", stiffness, clearances=True)
-    )
+    other = simulate_assembly(posture, model=as_springs(robot, clearances=True))
     energy = other.energy + 2 * other.contact_energy
     assert energy == pytest.approx(answer.energy, rel=5e-4)
     difference = np.abs(other.platform_screw - answer.platform_screw)

@@ -1,22 +1,20 @@
 """Properties of the exact equilibrium: limits, invariance, balance of wrenches."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from forcefit.assembly.exact.exact import solve_exact
+from forcefit import BeamLink, Clearance, Frame, Robot, solve_assembly, solve_exact
+from forcefit.assembly.exact.equilibrium import active_clearances
 from forcefit.assembly.kinematics.closure_rates import closure_signs
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
-from forcefit.assembly.linear.energy import solve_assembly
-from forcefit.assembly.model.robot import BeamLink, Frame, Robot
 from forcefit.assembly.robots import load_robot
 from forcefit.assembly.robots.delta import delta
 from forcefit.assembly.robots.hexapod import hexapod
 from forcefit.validation.multibody.simulation import without_clearance
-from tests.assembly.exact.test_exact import pendulum
+from tests.assembly.exact.test_exact import pendulum, two_bars
 from tests.assembly.kinematics.test_closing import parallelograms
 from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot
 
@@ -172,18 +170,6 @@ def test_force_at_a_platform_point_moves_with_the_platform(point):
     assert given.platform_screw == pytest.approx(answer.platform_screw, rel=1e-12)
 
 
-def test_solution_text_states_load_energy_and_certificate():
-    text = repr(solve_exact(pendulum(10.0, 0.5), [0, 0, 2.0, 0, 0, 0]))
-    assert text.startswith("ExactAssembly of bar\n")
-    lines = dict(re.split(r"  +", line.strip()) for line in text.splitlines()[1:])
-    assert lines["load"] == "[0 0 2] N m, [0 0 0] N"
-    assert lines["assembly energy"] == "0.2 J"
-    assert "closure residual 0.0e+00, equilibrium residual " in lines["certificate"]
-    assert lines["certificate"].endswith("iterations")
-    still = repr(solve_exact(pendulum(10.0, 0.5)))
-    assert "load" not in still
-
-
 @pytest.mark.parametrize("pieces", [1, 3, 5])
 @pytest.mark.parametrize("radius", [0.01, 0.03])
 def test_exact_solution_balances_loads_from_nanonewtons_to_newtons(pieces, radius):
@@ -222,3 +208,16 @@ def test_closures_open_by_file_rounding_store_no_energy():
     posture = home_posture(parallelograms(digits=6))
     assert posture.mismatch > 1e-9
     assert solve_exact(posture).energy == 0.0
+
+
+def test_contact_force_equals_the_energy_slope_by_the_clearance():
+    """In a closed chain, force times clearance is -c dE/dc, by central differences."""
+    clearance, step = 5e-3, 1e-6
+    low, here, high = (
+        solve_exact(two_bars(0.06, Clearance(radial=c)))
+        for c in (clearance - step, clearance, clearance + step)
+    )
+    active, force = active_clearances(here.expansion)
+    assert active.tolist() == [True]
+    saved = (low.energy - high.energy) / (2 * step)
+    assert force == pytest.approx([clearance * saved], rel=1e-6)

@@ -5,19 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from forcefit.assembly.exact.exact import solve_exact
+from forcefit import Clearance, natural_modes, solve_assembly, solve_exact, zone_margin
 from forcefit.assembly.kinematics import continuation_side_by_side
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.linear import lanes
-from forcefit.assembly.linear.energy import solve_assembly
 from forcefit.assembly.linear.pose_error import bound_pose_error
 from forcefit.assembly.linear.reference.pose_error import ASSUMPTIONS
-from forcefit.assembly.linear.zone import zone_margin
-from forcefit.assembly.model.robot import Clearance
 from forcefit.assembly.platform_stiffness.arc_length import follow_load
 from forcefit.assembly.platform_stiffness.deflection import deflection_curve
 from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from forcefit.assembly.platform_stiffness.vibration import natural_modes
 from forcefit.assembly.robots import BUILT_IN
 from forcefit.assembly.solvers import one_problem
 from forcefit.assembly.solvers.conic import GAP

@@ -1,9 +1,11 @@
-"""Finite motions: exponentials, closures, and their two derivatives."""
+"""Finite motions: exponentials, closures and potential, and their derivatives."""
 
 import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from forcefit.assembly.exact.dead_load import dead_loads, work_gradient
+from forcefit.assembly.exact.descent import expand, potential
 from forcefit.assembly.exact.finite_robot import FiniteRobot
 from forcefit.assembly.exact.placement import place
 from forcefit.assembly.kinematics.posture import home_posture
@@ -16,21 +18,8 @@ from forcefit.assembly.kinematics.se3 import (
     second_form,
 )
 from forcefit.assembly.linear.closure import virtual_joints
+from tests.assembly.exact.test_dead_load import heavy
 from tests.robots_for_tests import random_robot
-
-
-def moved_unknowns(posture, rng, size):
-    """A finite robot with unknowns of a size in rad and reference lengths."""
-    model = FiniteRobot(posture, virtual_joints(posture.robot))
-    per = np.sqrt(np.diag(model.metric))
-    return (
-        model,
-        rng.normal(size=len(per)) / per * size,
-        rng.normal(size=len(per)) / per,
-    )
-
-
-# Finite motions
 
 
 @pytest.mark.parametrize("size", [1e-7, 1e-2, 0.5, 1.5])
@@ -81,6 +70,13 @@ def test_second_form_equals_differences_of_the_exponential(rng, size):
 # Closures of a robot
 
 
+def moved_unknowns(posture, rng, size):
+    """A finite robot with unknowns of a size in rad and reference lengths."""
+    model = FiniteRobot(posture, virtual_joints(posture.robot))
+    x, h = rng.normal(size=(2, len(model.frame))) / np.sqrt(np.diag(model.metric))
+    return model, size * x, h
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_closure_and_platform_rows_equal_central_differences(seed):
     """Central differences of 1e-5: error 1e-10 of third derivatives of order 1."""
@@ -92,3 +88,35 @@ def test_closure_and_platform_rows_equal_central_differences(seed):
     assert np.abs(here.rows @ h - difference).max() < 1e-7
     difference = (ahead.platform_screw - behind.platform_screw) / (2 * step)
     assert np.abs(here.platform_rows @ h - difference).max() < 1e-7
+
+
+def expansion(seed):
+    """Far from home, where the closures hold nevertheless, under loads of all kinds."""
+    rng = np.random.default_rng(seed)
+    posture = home_posture(heavy(random_robot(rng, 3, 3), rng))
+    model, x, h = moved_unknowns(posture, rng, 0.1)
+    x[model.bounded] *= 0.5 / np.abs(x[model.bounded]).max(initial=1.0)
+    T, (first, second) = place(model, x).transforms, model.closed_frames.T
+    vars(model)["nominal_closures"] = inverse(T[first]) @ T[second]
+    bodies = rng.normal(size=(len(posture.robot.frames), 6))
+    loads = dead_loads(posture, rng.normal(size=6), bodies, 9.81 * rng.normal(size=3))
+    there = place(model, x)
+    return expand(there, loads, rng.normal(size=len(there.residual))), h
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_expansion_derivatives_equal_central_differences(seed):
+    """Central differences of 1e-5; multipliers and basis are held."""
+    local, h = expansion(seed)
+    model, x, step = local.placement.model, local.placement.x, 1e-5
+    ahead, behind = place(model, x + step * h), place(model, x - step * h)
+    slope = (potential(ahead, local.loads) - potential(behind, local.loads)) / step / 2
+    assert local.gradient @ h == pytest.approx(slope, rel=1e-6)
+
+    def unbalanced(at):
+        forces = -work_gradient(at, local.loads) - at.rows.T @ local.multipliers
+        forces[model.springs] += at.x[model.springs]
+        return forces
+
+    bend = (unbalanced(ahead) - unbalanced(behind)) / (2 * step)
+    assert np.abs(local.hessian @ h - bend).max() < 1e-6 * np.abs(bend).max()

@@ -18,10 +18,8 @@ import pytest
 from scipy.optimize import brentq
 
 from benchmarks.evidence.princeton_solids import in_pieces, root_link
-from forcefit.assembly.exact.exact import solve_exact
+from forcefit import BeamLink, Frame, MatrixLink, Robot, solve_assembly, solve_exact
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
-from forcefit.assembly.linear.energy import solve_assembly
-from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 from forcefit.assembly.platform_stiffness.matrices import Part
 from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from forcefit.assembly.robots import load_robot

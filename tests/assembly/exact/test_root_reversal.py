@@ -5,10 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from forcefit.assembly.exact.exact import solve_exact
+from forcefit import Clearance, Frame, MatrixLink, Robot, solve_assembly, solve_exact
 from forcefit.assembly.kinematics.posture import home_posture
-from forcefit.assembly.linear.energy import solve_assembly
-from forcefit.assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from forcefit.stiffness.screws import (
     rotation_matrix,
     rotation_vector,
@@ -81,13 +79,11 @@ def robot_of(legs):
 
 def from_the_platform(legs):
     """Every leg backwards: bodies inverted, each joint now at its body's other end."""
-    return [
-        [
-            leg[k].reversed(leg[k - 1].joint if k else {})
-            for k in reversed(range(len(leg)))
-        ]
-        for leg in legs
-    ]
+    turned = []
+    for leg in legs:
+        joints = [{}, *(one.joint for one in leg)]
+        turned.append([leg[k].reversed(joints[k]) for k in reversed(range(len(leg)))])
+    return turned
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -124,9 +120,7 @@ def test_exact_energy_depends_on_the_root_by_second_order_only(seed):
         for leg in legs:
             for one in leg:
                 one.error = one.error * s
-                one.joint = {
-                    k: v for k, v in one.joint.items() if k != "clearance"
-                }  # fmt: skip
+                one.joint.pop("clearance", None)
         energies = [
             solve_exact(home_posture(robot_of(these))).energy
             for these in (legs, from_the_platform(legs))

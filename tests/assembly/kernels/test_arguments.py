@@ -76,16 +76,6 @@ def test_array_with_a_wrong_number_of_points_is_refused_by_name(name):
         kernels.assemble_all(**right | {name: array[:-1]})
 
 
-def test_message_states_found_and_expected_type_and_shape():
-    wrong = given() | {"T": np.zeros((K, N, 4, 3), dtype=np.float32)}
-    message = (
-        f"T: float32 of shape ({K}, {N}, 4, 3), expected float64 of shape "
-        f"(any, {N}, 4, 4), row after row"
-    )
-    with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
-        kernels.assemble_all(**wrong)
-
-
 @pytest.mark.parametrize("name", ["outcome", "energy", "elastic"])
 def test_read_only_output_array_is_refused(name):
     wrong = given()

@@ -83,16 +83,8 @@ def test_highest_instruction_level_is_loaded_by_default(monkeypatch):
 @x86_64
 @pytest.mark.parametrize("level", ["x86-64-v9", "native", "haswell"])
 def test_unknown_instruction_level_is_refused_in_one_line(level):
-    words = [
-        "-m",
-        "forcefit",
-        "assembly",
-        "solve",
-        "five_bar",
-        "--quantities",
-        "margin",
-    ]
-    status, out, err = run(level, *words)
+    words = "-m forcefit assembly solve five_bar --quantities margin"
+    status, out, err = run(level, *words.split())
     assert (status, out) == (2, "")
     assert err == (
         f'forcefit: FORCEFIT_MARCH is "{level}"; expected a level that this processor '

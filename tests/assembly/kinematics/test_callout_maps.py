@@ -38,9 +38,13 @@ def placed(robot, *callouts):
 
 
 def hole(*datums):
-    return Callout(
-        "hole", "hole", datums, extent=(0.02,), widths={"position": 1e-9}
-    )  # fmt: skip
+    return Callout("hole", "hole", datums, extent=(0.02,), widths={"position": 1e-9})
+
+
+def with_bore(x, y):
+    """The plate with another bore along z at a point [m]."""
+    bore = Frame("bore", "plate", np.array([x, y, 0]))
+    return replace(PLATE, frames=(*PLATE.frames, bore))
 
 
 def test_exchanging_two_datums_moves_a_hole_by_the_amount_computed_by_hand():
@@ -71,13 +75,8 @@ def test_side_face_tilts_at_most_its_width_over_its_side():
 
 def test_datum_restricted_by_an_earlier_datum_fixes_only_the_remaining_freedoms():
     """A (plane) holds RX, RY, TZ.  A bore B along z then holds TX and TY, not RZ."""
-    robot = replace(
-        PLATE,
-        frames=(*PLATE.frames, Frame("bore", "plate", np.array([0.0, 0.05, 0]))),
-    )
-    bore = Callout(
-        "bore", "bore", (A,), extent=(0.02,), widths={"position": 0.1e-3}
-    )  # fmt: skip
+    robot = with_bore(0.0, 0.05)
+    bore = Callout("bore", "bore", (A,), extent=(0.02,), widths={"position": 0.1e-3})
     first, _ = placed(robot, bore, hole(A, Datum("bore")))
     moved = first.errors[robot.index("hole")]
     own = first.errors[robot.index("bore")]
@@ -89,10 +88,7 @@ def test_datum_restricted_by_an_earlier_datum_fixes_only_the_remaining_freedoms(
 def test_shift_of_a_datum_at_maximum_material_depends_on_the_size_of_its_hole():
     """Bore 12 H7 after face A: 0 to 18 um larger than its least size, so the datum
     shifts by up to 9 um along x and y; uniform sizes and positions: 9 um / sqrt 12."""
-    robot = replace(
-        PLATE,
-        frames=(*PLATE.frames, Frame("bore", "plate", np.array([0.0, 0.05, 0]))),
-    )
+    robot = with_bore(0.0, 0.05)
     shifting = Datum("bore", hole="12 H7", hole_of="bore")
     _, shift = placed(robot, hole(A, shifting))
     moved = shift.errors[robot.index("hole")]
@@ -112,10 +108,7 @@ def test_shift_of_a_datum_at_maximum_material_depends_on_the_size_of_its_hole():
 def test_shift_of_a_second_bore_rotates_the_features_measured_from_it():
     """Bore A at the origin holds all but the turn.  Bore B, 50 mm from A, shifts by
     9 um: the hole, 80 mm from A, moves by 9 um x 80/50 = 14.4 um around A."""
-    robot = replace(
-        PLATE,
-        frames=(*PLATE.frames, Frame("bore", "plate", np.array([0.05, 0, 0]))),
-    )
+    robot = with_bore(0.05, 0.0)
     shifting = Datum("bore", hole="12 H7", hole_of="bore")
     _, shift = placed(robot, hole(Datum("A"), shifting))
     moved = shift.errors[robot.index("hole")]
@@ -169,13 +162,9 @@ def _platform(home, errors):
     frames = []
     for frame, e in zip(home.robot.frames, errors, strict=True):
         R = rotation_matrix(frame.rotation)
-        frames.append(
-            replace(
-                frame,
-                translation=frame.translation + R @ e[3:],
-                rotation=rotation_vector(R @ rotation_matrix(e[:3])),
-            )
-        )
+        turn = rotation_vector(R @ rotation_matrix(e[:3]))
+        place = frame.translation + R @ e[3:]
+        frames.append(replace(frame, translation=place, rotation=turn))
     robot = replace(home.robot, frames=tuple(frames), callouts=())
     q = {f.name: f.position for f in robot.frames if f.actuated}
     return place_robot(robot, joints=q).platform

@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput
-from forcefit.stiffness.screws import rotation_matrix, rotation_vector
 from tests.linkages_for_tests import (
     CRANK,
     GROUND,
@@ -124,26 +123,6 @@ def test_unspecified_pose_components_are_chosen_nearest_to_home():
     ])
     expected = gradient * 1e-4 / (gradient @ gradient)
     np.testing.assert_allclose(step[:2], expected, rtol=0, atol=1e-7)
-
-
-def test_spherical_wrist_reaches_the_requested_rotation_vector():
-    """Three driven axes z, y, z at one point reach any rotation."""
-    half = math.pi / 2
-    robot = Robot("wrist", "hand", (
-        frame("yaw", **driven(0.2)),
-        frame("pitch", "yaw", turn=(-half, 0, 0), **driven(0.7)),
-        frame("roll", "pitch", turn=(half, 0, 0), **driven(-0.4)),
-        frame("hand", "roll", (0, 0, 0.1)),
-    ))  # fmt: skip
-    goal = np.array([0.4, 0.9, -0.3])
-    pose = dict(zip(("rx", "ry", "rz"), goal, strict=True))
-    posture = place_robot(robot, pose=pose)
-    R = rotation_matrix(goal)
-    np.testing.assert_allclose(posture.platform[:3, :3], R, rtol=0, atol=EXACT)
-    assert [posture.pose()[k] for k in pose] == pytest.approx(goal, abs=EXACT)
-    # one component alone: the other two are free
-    one = place_robot(robot, pose={"ry": 0.9})
-    assert rotation_vector(one.platform[:3, :3])[1] == pytest.approx(0.9, abs=EXACT)
 
 
 def test_slider_crank_position_equals_its_closed_form():

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from forcefit.assembly.kinematics.mobility import mobility
 from forcefit.assembly.kinematics.nominal import size_of
 from forcefit.assembly.kinematics.posture import (
     home_posture,
@@ -16,6 +17,7 @@ from forcefit.assembly.kinematics.posture import (
 from forcefit.assembly.kinematics.singularity import find_singularities
 from forcefit.assembly.model.robot import Frame, Robot
 from forcefit.assembly.robots import load_robot
+from tests.linkages_for_tests import five_bar, four_bar
 
 
 def at(robot, **options):
@@ -39,21 +41,20 @@ def five_bar_jacobian(T, robot):
 
 
 @pytest.fixture(scope="module")
-def five_bar():
+def five_bars():
+    """The built-in robot and its transforms at poses drawn at random."""
     robot = load_robot("five_bar")
     rng = np.random.default_rng(1)
     poses = np.full((40, 6), np.nan)
-    poses[:, 0], poses[:, 1] = (
-        rng.uniform(-0.05, 0.05, 40),
-        rng.uniform(0.08, 0.165, 40),
-    )
+    poses[:, 0] = rng.uniform(-0.05, 0.05, 40)
+    poses[:, 1] = rng.uniform(0.08, 0.165, 40)
     postures, _ = place_many(robot, poses)
     return robot, np.array([p.transforms for p in postures if p is not None])
 
 
-def test_singularity_distances_of_a_five_bar_equal_its_closed_form_jacobian(five_bar):
+def test_singularity_distances_of_a_five_bar_equal_its_closed_form_jacobian(five_bars):
     """J = A^-1 B with the tip's rotation and translation: tangents of the angles."""
-    robot, T = five_bar
+    robot, T = five_bars
     found = find_singularities(robot, T)
     assert len(T) >= 30
     size = size_of(robot)
@@ -98,15 +99,12 @@ def test_singularity_distances_of_a_four_bar_equal_the_speed_of_its_closed_form(
 
     def point(t):
         root = math.sqrt((5 + math.cos(t)) / (5 - 4 * math.cos(t)))
-        return 0.1 * np.array([
-            2 + 2 * root * math.sin(t),
-            2 * root * (2 - math.cos(t)),
-        ])
+        x, y = 2 + 2 * root * math.sin(t), 2 * root * (2 - math.cos(t))
+        return 0.1 * np.array([x, y])
 
     def coupler(t):  # from the crank's pin to the point: the coupler, twice
-        return math.atan2(
-            *(point(t) - 0.1 * np.array([math.cos(t), math.sin(t)]))[::-1]
-        )
+        x, y = point(t) - 0.1 * np.array([math.cos(t), math.sin(t)])
+        return math.atan2(y, x)
 
     h = 1e-5
     speed = (point(angle + h) - point(angle - h)) / (2 * h)
@@ -142,9 +140,9 @@ def test_arm_with_aligned_wrist_axes_is_serially_singular():
     assert found.names(robot, 0.02)[1].startswith("serial: ")
 
 
-def test_singularity_distances_do_not_depend_on_the_unit_of_length(five_bar):
+def test_singularity_distances_do_not_depend_on_the_unit_of_length(five_bars):
     """Every length times 1000 changes no angle: lengths are relative to a body's."""
-    robot, T = five_bar
+    robot, T = five_bars
     frames = [replace(f, translation=1000 * f.translation) for f in robot.frames]
     large = T.copy()
     large[..., :3, 3] *= 1000
@@ -256,3 +254,36 @@ def test_platform_that_no_joint_moves_has_no_serial_singularity():
     assert found.serial_joints.tolist() == [[0.0, 0.0, 0.0]]
     assert found.parallel_screws.tolist() == [[0.0] * 6]
     assert found.names(robot, near=0.5) == [""]
+
+
+TURNING = {"joint": "revolute", "actuated": True}
+
+
+def side_by_side(*joints):
+    """Joints at one place about or along z, of which the first is driven."""
+    frames, closures = [], []
+    for k, joint in enumerate(joints):
+        frames += [Frame(f"j{k}", joint=joint, actuated=k == 0),
+                   Frame(f"end{k}", f"j{k}", [0.1, 0, 0])]  # fmt: skip
+        closures += [("end0", f"end{k}")] if k else []
+    return Robot("bundle", "end0", tuple(frames), tuple(closures))
+
+
+@pytest.mark.parametrize(("robot", "counts"), [
+    # an arm closes nothing: its joints are its freedoms
+    (Robot("arm", "tip", (Frame("a", **TURNING), Frame("b", "a", [1, 0, 0], **TURNING),
+                          Frame("tip", "b"))), (2, 0, 0)),
+    # in a plane: three equations of a closure of six
+    (four_bar(), (1, 0, 3)), (four_bar(mode=-1.0), (1, 0, 3)),
+    # its tip turns by itself about the two pins it hangs from
+    (five_bar(), (3, 1, 3)),
+    # one motion in common, of twelve equations two
+    (side_by_side("prismatic", "prismatic", "prismatic"), (1, 0, 10)),
+    # nothing in common
+    (side_by_side("revolute", "prismatic"), (0, 0, 4)),
+    (side_by_side("revolute", "fixed"), (0, 0, 5)),
+])  # fmt: skip
+def test_freedoms_and_overconstraint_equal_hand_counts(robot, counts):
+    """All freedoms, freedoms with locked drives, and redundant equations."""
+    found = mobility(home_posture(robot))
+    assert (found.freedoms, found.locked_freedoms, found.overconstraint) == counts

@@ -198,9 +198,8 @@ def assert_sent_there(robot, target, track):
 def test_track_does_not_depend_on_other_targets(rng):
     """Bit-identical: alone, in another order, among longer tracks."""
     home = home_posture(BUILT_IN["irsbot2"]())
-    poses = targets_of(home, rng)[
-        2
-    ].pose  # which parts are free differs from row to row
+    # which parts are free differs from row to row
+    poses = targets_of(home, rng)[2].pose
     together = follow(home.robot, home.coordinates, Target(pose=poses))
     order = rng.permutation(len(poses))
     shuffled = follow(home.robot, home.coordinates, Target(pose=poses[order]))
@@ -224,10 +223,3 @@ def test_joint_rotation_equals_scipy_for_any_angle(rng):
     track = follow(robot, np.zeros(2), Target(coordinates=held), guess=True)
     expected = Rotation.from_rotvec(angles[:, None] * [0.0, 0.0, 1.0]).as_matrix()
     np.testing.assert_allclose(track.transforms[:, 1, :3, :3], expected, atol=4e-16)
-
-
-def test_empty_list_of_targets_has_empty_tracks():
-    home = home_posture(BUILT_IN["five_bar"]())
-    track = follow(home.robot, home.coordinates, Target(pose=np.zeros((0, 6))))
-    assert track.coordinates.shape == (0, len(home.robot.frames))
-    assert track.reached.shape == (0,)

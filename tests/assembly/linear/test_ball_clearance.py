@@ -5,19 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from forcefit import BadInput, Clearance, Frame, Robot, bound_pose_error, zone_margin
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
-from forcefit.assembly.linear.pose_error import bound_pose_error
 from forcefit.assembly.linear.reference.as_printed import (
     energy_as_printed,
     margin_as_printed,
 )
 from forcefit.assembly.linear.reference.reduction import FreeMotion
-from forcefit.assembly.linear.zone import zone_margin
-from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from forcefit.assembly.platform_stiffness.deflection import clearance_names
 from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from forcefit.inputs.errors import BadInput
 from tests.robots_for_tests import coaxial_beams, random_robot
 
 C = 10e-6  # [m]

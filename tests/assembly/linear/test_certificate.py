@@ -5,40 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.kinematics.posture import home_posture, place_robot, together
 from forcefit.assembly.linear.certificate import bound_screw, unproved, unproved_screw
-from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
+from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly, together_at
 from forcefit.assembly.linear.reference.as_printed import energy_as_printed
+from forcefit.assembly.model.clearance import CONES, clearance_bounds
+from forcefit.assembly.model.links import joint_compliances, link_compliances
 from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 from forcefit.assembly.statistics.linear_response import linear_response
 from tests.robots_for_tests import (
     NUMBERS,
     assemble_at,
     coaxial_beams,
-    irsbot2_over,
     irsbot2_with,
     random_robot,
 )
-
-
-@pytest.mark.parametrize("kappa", [0.0, 0.05, 0.1, 1.0])
-def test_least_energy_is_certified_over_half_of_the_workspace(kappa):
-    """Errors times 0.05 and 0.1 are near the edge of the zone, with little energy."""
-    robot, postures = irsbot2_over(
-        np.arange(-0.65, 0.651, 0.15), np.arange(-0.75, 0.001, 0.15)
-    )
-    reached = [posture for posture in postures if posture is not None]
-    assert len(reached) > 20
-    for posture in reached:
-        erring = replace(posture, robot=robot.with_errors(kappa * robot.errors))
-        assert_proved(solve_assembly(erring))
-
-
-def assert_proved(answer):
-    """The gap is at most 1e-8 of the energy and 1e-12 of that without clearance."""
-    assert unproved(answer) == ""
-    gap = answer.potential - answer.bound
-    assert gap <= 1e-8 * answer.energy + 1e-12 * answer.energy_without_clearance
 
 
 def test_solutions_with_nan_or_wrong_values_are_not_certified():
@@ -176,3 +157,69 @@ def test_rotation_and_translation_are_certified_to_their_own_tolerances():
     open_ = replace(open_, rotation_error=2e-4, translation_error=9e-6)
     (sentence,) = unproved_screw(assembly, open_)
     assert "rotation is certified to 2.0e-04 rad only, expected 1.1e-04 rad" in sentence
+
+
+def disturbed(rng, seed):
+    """A random robot's assembly, and the same with a disturbed solution."""
+    robot = random_robot(np.random.default_rng(seed), 2, link_share=0.8)
+    load = rng.normal(size=6) * [1, 1, 1, 10, 10, 10]
+    best = solve_assembly(home_posture(robot), load)
+    other = replace(
+        best,
+        elastic=best.elastic + 1e-2 * rng.normal(size=best.elastic.shape),
+        clearances=0.3 * rng.normal(size=best.clearances.shape),
+        motions=best.motions + 1e-4 * rng.normal(size=best.motions.shape),
+        multipliers=best.multipliers + 0.1 * rng.normal(size=best.multipliers.shape),
+    )
+    return best, other
+
+
+def bound_by_hand(assembly):
+    """-w.dl - w C w / 2 - what clearances gain - |w q|, frame by frame."""
+    robot, total = assembly.posture.robot, 0.0
+    C_link, C_joint = link_compliances(robot), joint_compliances(robot)
+    bounds = clearance_bounds(robot)
+    free = (assembly.joints.free * np.abs(assembly.motions)).sum(axis=1).reshape(-1, 6)
+    for i in range(len(robot.frames)):
+        w, j = assembly.wrenches[i], assembly.joint_wrenches[i]
+        total -= w @ robot.errors[i] + w @ C_link[i] @ w / 2 + j @ C_joint[i] @ j / 2
+        for size, rows in zip(bounds[i], CONES, strict=True):
+            unbounded = free[i, list(rows)].any() or not np.isfinite(size)
+            total -= 0.0 if unbounded else size * np.linalg.norm(j[list(rows)])
+        total -= np.abs(j) @ free[i]
+    return total
+
+
+SEEDS = (1, 3, 4, 6, 9, 12)
+
+
+def solvable(rng):
+    """Assemblies of the random robots that have one."""
+    for seed in SEEDS:
+        try:
+            yield disturbed(rng, seed)
+        except (ValueError, RuntimeError):
+            continue
+
+
+def test_any_wrenches_imply_a_lower_bound_of_the_energy(rng):
+    """Weak duality; the bound is the sum that its docstring defines."""
+    some = list(solvable(rng))
+    assert len(some) >= 3
+    assert any(len(other.motions) for _, other in some)
+    for best, other in some:
+        bounded = replace(other, motions=best.motions)
+        scale = best.energy_without_clearance + abs(best.work)
+        assert bounded.bound <= best.potential + 1e-9 * scale
+        by_hand = bound_by_hand(other)
+        assert other.bound == pytest.approx(by_hand, rel=1e-9, abs=1e-9 * scale)
+
+
+def test_joining_solutions_keeps_the_certificate_of_each_point():
+    """The bound is the energy less the gap, also above the least energy."""
+    robot = coaxial_beams([0, 0, 0, 1e-4, 0, 0])
+    best = solve_assembly(home_posture(robot))
+    worse = replace(best, elastic=1.001 * best.elastic)
+    found = together_at(together([best.posture] * 2), (best, worse))
+    gaps = [best.duality_gap(), worse.duality_gap()]
+    assert found.duality_gap() == pytest.approx(gaps)

@@ -3,14 +3,12 @@
 import numpy as np
 import pytest
 
+from forcefit import Clearance, Frame, Robot, bound_pose_error, solve_assembly
 from forcefit.assembly.kinematics.posture import home_posture, together
-from forcefit.assembly.linear.energy import solve_assembly
-from forcefit.assembly.linear.pose_error import bound_pose_error
 from forcefit.assembly.linear.reference.reduction import FreeMotion
-from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from forcefit.assembly.robots import BUILT_IN
 from tests.assembly.linear.test_pose_error import hinged_frame
-from tests.robots_for_tests import coaxial_beams, random_robot
+from tests.robots_for_tests import random_robot
 
 PARTS = ("rotation_error", "translation_error")
 ASSUMPTIONS = ("frozen", "free")
@@ -106,30 +104,6 @@ def test_motion_limits_of_passive_joints_apply_to_many_points(spin, assumption):
     most = bound_pose_error(solve_assembly([loose]), assumption)
     less = batch.rotation_error[0, 1] < 0.99 * most.rotation_error[0, 0]
     assert less == (spin < 1e-3)
-
-
-@pytest.mark.parametrize("assumption", ASSUMPTIONS)
-def test_only_points_at_a_motion_limit_use_the_reference_method(assumption):
-    """In every other of six draws the errors are so large that a limit is reached."""
-    home = home_posture(hinged_frame(2e-3))
-    sizes = 1e-4 * np.array([0, 1, 3, 10, 30, 100])[:, None]
-    errors = np.zeros((6, 6, 6))
-    errors[[0, 2, 4, 1, 3, 5], 2] = sizes * np.random.default_rng(0).normal(size=(6, 6))
-    many = solve_assembly(home, errors=errors)
-    found = bound_pose_error(many, assumption)
-    assert found.one_by_one.tolist() == [False, True] * 3
-    for i in range(6):
-        one = bound_pose_error(many[i], assumption, method="reference")
-        assert_overlap(found, i, one, uncertain=1e-12)
-
-
-def test_budget_assumption_is_solved_point_by_point():
-    robot = coaxial_beams(np.array([0, 0, 0, 2e-4, 0, 0]))
-    posture = home_posture(robot)
-    batch = bound_pose_error(solve_assembly([posture]), "budget", energy_budget=0.5)
-    one = bound_pose_error(solve_assembly(posture), "budget", 0.5, method="reference")
-    assert batch.one_by_one[0]
-    assert_overlap(batch, 0, one)
 
 
 def test_robot_that_cannot_be_assembled_has_no_pose_error_bounds():

@@ -5,14 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from forcefit.assembly.exact.exact import solve_exact
+from forcefit import BadInput, platform_stiffness, solve_assembly, solve_exact
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
-from forcefit.assembly.linear.energy import solve_assembly
 from forcefit.assembly.linear.reference.reduction import FreeMotion
 from forcefit.assembly.model.force_control import with_drive_forces
 from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
-from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from forcefit.inputs.table import BadInput
 from tests.assembly.exact.test_exact import only
 
 ALONG_X = [0.0, np.pi / 2, 0.0]  # turns z to x
@@ -178,19 +175,6 @@ def test_forces_for_many_postures_and_errors_equal_those_computed_one_by_one():
         one = solve_assembly(posture)
         np.testing.assert_allclose(together[k].platform_screw, one.platform_screw)
         assert together[k].energy == pytest.approx(one.energy, rel=1e-9)
-
-
-def test_clearance_and_stiffness_of_the_drive_itself_are_released():
-    drive = Frame(
-        "drive", joint="prismatic", actuated=True, joint_stiffness=_along(1e6),
-        clearance=Clearance(radial=1e-5, axial=2e-5),
-    )  # fmt: skip
-    robot = Robot("slide", "tip", (drive, Frame("tip", "drive")))
-    frame = with_drive_forces(robot, {"drive": 7.0}).frame("drive")
-    assert not frame.actuated
-    assert frame.drive_force == 7.0
-    assert frame.clearance == Clearance(radial=1e-5)
-    assert frame.own_stiffness == 0.0
 
 
 def test_unknown_and_coupled_drives_are_refused():

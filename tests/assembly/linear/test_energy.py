@@ -7,15 +7,14 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from forcefit.assembly.exact.exact import solve_exact
+from forcefit import CannotAssemble, bound_pose_error, solve_assembly, solve_exact
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.linear.certificate import unproved
-from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
-from forcefit.assembly.linear.pose_error import bound_pose_error
 from forcefit.assembly.linear.reference.as_printed import energy_as_printed
 from forcefit.assembly.linear.reference.reduction import FreeMotion
 from forcefit.assembly.linear.zone import zone_margin
 from forcefit.assembly.measurement.settled_clearance import without_joint_clearances
+from forcefit.assembly.model.links import joint_compliances, link_compliances
 from forcefit.assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from forcefit.assembly.robots import load_robot
 from forcefit.assembly.solvers.conic import minimise_energy
@@ -72,11 +71,7 @@ def test_springs_deform_only_by_the_gap_beyond_the_clearance(gap, left):
 def test_wrench_equals_stiffness_times_deformation_of_every_spring(method):
     """w = K_E e = K_B b, eq. (6): half their squared difference is within the gap."""
     posture = place_robot(irsbot2_with(NUMBERS["cases"][0]), pose={"tx": 0.1})
-    answer = solve_assembly(
-        posture, load=[1.0, 2.0, 3.0, 40.0, 50.0, 60.0], method=method
-    )
-    from forcefit.assembly.model.links import joint_compliances, link_compliances
-
+    answer = solve_assembly(posture, [1.0, 2.0, 3.0, 40.0, 50.0, 60.0], method=method)
     robot = posture.robot
     gap = 2 * answer.uncertainty / answer.energy
     for compliances, screws in (

@@ -5,13 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from forcefit.assembly.exact.exact import solve_exact
+from forcefit import BeamLink, Frame, Robot, bound_pose_error, solve_exact, zone_margin
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
-from forcefit.assembly.linear.pose_error import bound_pose_error
 from forcefit.assembly.linear.reference.reduction import FreeMotion
-from forcefit.assembly.linear.zone import zone_margin
-from forcefit.assembly.model.robot import BeamLink, Frame, Robot
 from forcefit.assembly.robots.irsbot2 import irsbot2
 from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.stiffness.screws import rotation_matrix, rotation_vector, transform

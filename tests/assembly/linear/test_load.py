@@ -1,16 +1,17 @@
 """Loads on bodies and weight, against beams worked by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from forcefit.assembly.exact.exact import solve_exact
+from forcefit import BadInput, platform_stiffness, solve_assembly, solve_exact
 from forcefit.assembly.kinematics.posture import home_posture
-from forcefit.assembly.linear.energy import solve_assembly
-from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.linear.closure import linearise, virtual_joints
+from forcefit.assembly.linear.load import loads_on_frames
+from forcefit.assembly.linear.reference.reduction import FreeMotion, reduce_problem
 from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
-from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from forcefit.assembly.robots import load_robot
-from forcefit.inputs.errors import BadInput
 from forcefit.stiffness.screws import rotation_matrix
 from tests.robots_for_tests import planar_four_bar
 
@@ -88,8 +89,6 @@ def test_load_on_a_body_deforms_its_link_and_not_its_distal_joint():
 
 def test_base_reactions_of_a_closed_loop_sum_to_its_weight():
     """Both chains of the loop are attached to the base."""
-    from dataclasses import replace
-
     robot = planar_four_bar()
     heavy = tuple(
         replace(f, mass=1.5, centre_of_mass=[0.02, 0.01, 0.03])
@@ -198,7 +197,10 @@ def beam_on_two_pins():
 
 
 def test_beam_on_two_pins_has_zero_end_moments_under_its_weight():
-    """q L / 2 and no moment at both ends; the deformation corresponds to q L^2 / 12."""
+    """q L / 2 and no moment at both ends; the deformation corresponds to q L^2 / 12.
+
+    Finite motions leave no moment there either.
+    """
     posture = home_posture(beam_on_two_pins())
     answer = solve_assembly(posture, gravity=[0, 0, -G])
     row = posture.robot.index("b")
@@ -212,30 +214,18 @@ def test_beam_on_two_pins_has_zero_end_moments_under_its_weight():
     np.testing.assert_allclose(
         answer.tip_wrenches[row], answer.joint_wrenches[row], atol=1e-9 * Q * L
     )
-
-
-def test_exact_solution_has_zero_end_moment_at_a_pin():
-    """The moment at the tip is zero, the force q L / 2."""
-    posture = home_posture(beam_on_two_pins())
     exact = solve_exact(posture, gravity=[0, 0, -G])
-    row = posture.robot.index("b")
     assert np.abs(exact.tip_wrenches[row, :3]).max() < 1e-9 * Q * L**2
-    assert exact.tip_wrenches[row, 4] == pytest.approx(Q * L / 2, rel=1e-3)
+    assert exact.tip_wrenches[row, 4] == pytest.approx(half, rel=1e-3)
 
 
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (
-            {"load": np.zeros(5)},
-            r"load: found an array of shape \(5,\), expected \(6,\)",
-        ),
+        ({"load": np.zeros(5)}, r"load: found .* \(5,\), expected \(6,\)"),
         ({"load": np.zeros((3, 6))}, r"load: .*\(3, 6\), expected \(6,\) or \(2, 6\)"),
         ({"bodies": np.zeros((2, 6))}, r"bodies: .*\(2, 6\), expected \(8, 6\)"),
-        (
-            {"gravity": np.zeros((3, 3))},
-            r"gravity: .*\(3, 3\), expected \(3,\) or \(2, 3",
-        ),
+        ({"gravity": np.zeros((3, 3))}, r"gravity: .*\(3, 3\), expected \(3,\) or \(2"),
         ({"gravity": 9.81}, r"gravity: found an array of shape \(\), expected \(3,\)"),
     ],
 )
@@ -244,3 +234,34 @@ def test_loads_of_a_wrong_shape_are_refused(given, message):
     posture = home_posture(load_robot("four_bar"))
     with pytest.raises(BadInput, match=message):
         solve_assembly([posture, posture], **given)
+
+
+def reduced(robot, load=None):
+    """The problem of a robot at home."""
+    posture = home_posture(robot)
+    loads = None if load is None else loads_on_frames(posture, load)
+    return reduce_problem(linearise(posture), virtual_joints(robot), loads)
+
+
+def turn_and_slide():
+    """A pin about z and a slider along it, 10 m long."""
+    return Robot("chain", "tip", (
+        Frame("turn", joint="revolute"),
+        Frame("slide", "turn", [10, 0, 0], joint="prismatic"),
+        Frame("tip", "slide"),
+    ))  # fmt: skip
+
+
+@pytest.mark.parametrize("load", [1e-9, 1.0, 1e9])
+def test_free_motion_message_does_not_depend_on_the_size_of_the_load(load):
+    """0.3 N m and 2 N: 0.3 rad against 2 m / 10 m; a unit turn shifts by 10 m."""
+    with pytest.raises(FreeMotion) as told:
+        reduced(turn_and_slide(), load * np.array([0, 0, 2.0, 0, 0, 0.3]))
+    assert "it moves turn rz, slide tz; " in str(told.value)
+    with pytest.raises(FreeMotion) as told:
+        reduced(turn_and_slide(), load * np.array([0, 0, 0.15, 0, 0, 2.0]))
+    assert "it moves slide tz, turn rz; " in str(told.value)
+    with pytest.raises(FreeMotion) as told:
+        reduced(turn_and_slide(), load * np.array([0, 0, 0, 0, 0, 2.0]))
+    text = str(told.value)
+    assert "it moves slide tz; the platform moves along [0 0 0 0 0 1] [rad, m]" in text

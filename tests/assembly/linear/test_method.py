@@ -5,11 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from forcefit import Clearance, platform_stiffness, solve_assembly
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.linear import energy
-from forcefit.assembly.linear.energy import solve_assembly
-from forcefit.assembly.model.robot import Clearance
-from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
 
 GAP = np.array([0, 0, 0, 1e-4, 0, 0])

@@ -213,30 +213,15 @@ def test_finite_motions_start_from_the_nearest_pose():
 
 
 PLAYING = """
-name = "playing"
 platform = "end"
-[[frame]]
-name = "drive"
-parent = "base"
-joint = "prismatic"
-actuated = true
-clearance = { radial = 2e-5, axial = 2e-5 }
-[[frame]]
-name = "end"
-parent = "drive"
-translation = [0.3, 0, 0]
-[[frame]]
-name = "guide"
-parent = "base"
-joint = "prismatic"
-clearance = { radial = 2e-5 }
-[[frame]]
-name = "meets"
-parent = "guide"
-translation = [0.3, 0, 0]
-[[closure]]
-frames = ["end", "meets"]
-"""
+closure = [{ frames = ["end", "meets"] }]
+frame = [
+    { name = "drive", parent = "base", joint = "prismatic", actuated = true, clearance = { radial = 2e-5, axial = 2e-5 } },
+    { name = "end", parent = "drive", translation = [0.3, 0, 0] },
+    { name = "guide", parent = "base", joint = "prismatic", clearance = { radial = 2e-5 } },
+    { name = "meets", parent = "guide", translation = [0.3, 0, 0] },
+]
+"""  # noqa: E501
 
 
 @pytest.fixture(scope="module")

@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from forcefit import Clearance, Frame, Robot, bound_pose_error, solve_assembly
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.linear.closure import linearise
-from forcefit.assembly.linear.energy import solve_assembly
-from forcefit.assembly.linear.pose_error import bound_pose_error
 from forcefit.assembly.linear.reference.pose_error import reachable_screws
 from forcefit.assembly.model.clearance import CONES, clearance_bounds
-from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from forcefit.assembly.robots.irsbot2 import irsbot2
 from forcefit.assembly.solvers.method import METHODS
 from tests.robots_for_tests import (

@@ -11,10 +11,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from forcefit import bound_pose_error, place_robot, solve_assembly
 from forcefit.assembly.exchange.robot_files import load_robot
-from forcefit.assembly.kinematics.posture import place_robot
-from forcefit.assembly.linear.energy import solve_assembly
-from forcefit.assembly.linear.pose_error import bound_pose_error
 from tests.test_tutorials import DOCS, ROOT, blocks
 
 BASE, PLATFORM, TILT = 0.24, 0.08, 2e-4  # [m], [m], [rad]

@@ -1,12 +1,24 @@
-"""Solutions of many points: selection, iteration, and loads of each point."""
+"""Many points in one call: equal to single points, selected, proved or refused."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.kinematics.posture import home_posture, together
+from forcefit.assembly.linear.closure import linearise, virtual_joints
 from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
+from forcefit.assembly.linear.zone import zone_margin
 from forcefit.assembly.model.robot import Clearance, Frame, MatrixLink, Robot
-from tests.robots_for_tests import coaxial_beams
+from forcefit.assembly.robots import BUILT_IN
+from tests.robots_for_tests import (
+    ROWS,
+    assemble_at,
+    coaxial_beams,
+    random_robot,
+    row,
+    with_bounded_motion,
+)
 
 K = 1e6
 
@@ -81,3 +93,174 @@ def test_loaded_and_unloaded_points_keep_their_own_errors(loaded):
     assert found.loaded.tolist() == [bool(one) for one in loaded]
     for one, errors in zip(found, sets, strict=True):
         assert (one.posture.robot.errors == errors).all()
+
+
+def test_redundant_free_motions_have_the_least_norm():
+    """Two pins on one axis share its rotation: half each, as by the reference."""
+    gap = [1e-3, 0, 2e-3, 1e-4, 0, 0]
+    frames = (
+        Frame("one", translation=[0.5, 0, 0], link=MatrixLink(1e5 * np.eye(6))),
+        Frame("pin", "one", joint="revolute"),
+        Frame("mid", "pin"),
+        Frame("second", "mid", [0, 0, 0.1], joint="revolute"),
+        Frame("end", "second", [0, 0, -0.1]),
+        Frame("wall", translation=[0.5, 0, 0], geometric_error=gap),
+    )
+    robot = Robot("pins", "mid", frames, (("end", "wall"),))
+    home = home_posture(robot)
+    batch = assemble_at(robot, home.transforms[None])
+    one = solve_assembly(home, method="reference")
+    assert batch.method[0] == "compiled"
+    assert batch.platform_screw[0] == pytest.approx(one.platform_screw, abs=1e-14)
+    # the pin below the platform turns half the 2e-3 rad about their common axis
+    assert batch.platform_screw[0, 2] == pytest.approx(1e-3, rel=1e-9)
+
+
+def test_energy_of_a_stiff_spring_in_series_with_a_soft_one_is_accurate():
+    """1 and 1e-8 rad/(N m) about one axis, twice 1e-8 across it."""
+    soft = np.diag([1.0, 1e8, 1e8, 1e8, 1e8, 1e8])
+    gap = np.array([1e-2, 1e-4, 0, 0, 0, 0])
+    frames = (
+        Frame("one", translation=[0.5, 0, 0], link=MatrixLink(soft)),
+        Frame("end", "one", rotation=[0, 0, 0.3], link=MatrixLink(1e8 * np.eye(6))),
+        Frame("wall", translation=[0.5, 0, 0], rotation=[0, 0, 0.3],
+              geometric_error=gap),
+    )  # fmt: skip
+    robot = Robot("two", "end", frames, (("end", "wall"),))
+    batch = assemble_at(robot, home_posture(robot).transforms[None])
+    turned = np.array([
+        gap[0] * np.cos(0.3) - gap[1] * np.sin(0.3),
+        gap[0] * np.sin(0.3) + gap[1] * np.cos(0.3),
+    ])
+    # by hand: 1 + 1e-8 about the soft axis, 2e-8 across
+    by_hand = turned[0] ** 2 / (1 + 1e-8) / 2 + turned[1] ** 2 / 2e-8 / 2
+    assert batch.energy[0] == pytest.approx(by_hand, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("shape", "errors", "message"),
+    [
+        ((2, 5, 4, 4), None, r"transforms of shape \(2, 5, 4, 4\)"),
+        ((2, 6, 4, 4), (3, 6, 6), r"errors of shape \(3, 6, 6\), expected"),
+        ((2, 6, 3, 4), None, r"transforms of shape \(2, 6, 3, 4\)"),
+    ],
+)
+def test_transforms_or_errors_of_a_wrong_shape_are_refused(shape, errors, message):
+    robot = coaxial_beams(np.zeros(6))
+    given = None if errors is None else np.zeros(errors)
+    with pytest.raises(ValueError, match=message):
+        assemble_at(robot, np.zeros(shape), given)
+
+
+def test_values_that_are_not_finite_are_refused():
+    robot = coaxial_beams(np.zeros(6))
+    T = home_posture(robot).transforms[None].copy()
+    with pytest.raises(ValueError, match="not all finite"):
+        assemble_at(robot, T, np.full((6, 6), np.nan))
+    T[0, 0, 0, 3] = np.inf
+    with pytest.raises(ValueError, match="not all finite"):
+        assemble_at(robot, T)
+
+
+def test_empty_list_of_postures_gives_an_empty_solution():
+    robot = coaxial_beams(np.zeros(6))
+    assert len(assemble_at(robot, np.zeros((0, 6, 4, 4))).energy) == 0
+
+
+# some postures in blocks of two, four and eight, where their factors are kept
+BLOCKS = [0] * 16 + [5] * 8 + [3] * 8 + [0] * 5 + [3, 7, 3, 7] + [0] * 16 + [7] * 9
+
+
+@pytest.mark.parametrize("load", ["none", "each its own", "the same"])
+def test_energy_of_a_point_is_independent_of_its_neighbours(grid, rng, load):
+    """In another order, among other points, alone: bit-identical."""
+    robot, postures = grid
+    at = together([*postures, *(postures[i] for i in BLOCKS)])
+    count = len(postures) + len(BLOCKS)
+    errors = robot.errors * rng.uniform(0, 1, (count, 1, 1))
+    errors[::7] = 0.0  # some need nothing, others many iterations
+    wrenches = 30.0 * rng.normal(size=(count, 6))
+    if load == "the same":  # but for some in the middle
+        wrenches[:60], wrenches[63:] = wrenches[0], wrenches[100]
+    if load == "none":
+        wrenches[:] = 0.0
+    whole = solve_assembly(at, wrenches, errors=errors)
+    assert set(whole.method) == {"compiled"}
+    for rows in [rng.permutation(count) for _ in range(3)] + [
+        [i] for i in range(0, count, 5)
+    ]:
+        other = solve_assembly(at[rows], wrenches[rows], errors=errors[rows])
+        for name in ROWS:
+            assert np.array_equal(row(other, name), row(whole, name)[rows]), name
+
+
+@pytest.mark.parametrize("loaded", [False, True])
+def test_energy_with_motion_limits_equals_the_reference_method(loaded):
+    """Equal to 1e-8 of the energy and the work, which both certificates allow."""
+    held = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        home = home_posture(with_bounded_motion(random_robot(rng, joints=4), rng))
+        load = rng.normal(size=6) if loaded else None
+        one = solve_assembly(home, load)
+        reference = solve_assembly(home, load, method="reference")
+        held += bool(one.joints.bounded_motion)
+        assert bool(reference.joints.bounded_motion) <= bool(one.joints.bounded_motion)
+        allowed = 2e-8 * (reference.stored + abs(reference.work))
+        allowed += 2e-12 * reference.energy_without_clearance + 1e-25
+        assert abs(one.potential - reference.potential) <= allowed
+        assert one.clearance_excess() <= 1e-9
+    assert held >= 5
+
+
+def test_postures_of_different_rank_do_not_depend_on_each_other(rng):
+    """Rotations of three parallel hinges are independent unless they are in line."""
+    home = home_posture(BUILT_IN["five_bar"]())
+    robot, T = home.robot, np.repeat(home.transforms[None], 8, axis=0)
+    T[::3, :, 1:3, 3] = 0.0
+    free = virtual_joints(robot).free
+    ranks = [
+        np.linalg.matrix_rank(linearise(replace(home, transforms=own)).rows @ free)
+        for own in T[:2]
+    ]
+    assert ranks == [2, 3]
+    errors = 1e-4 * rng.normal(size=(8, len(robot.frames), 6))
+    whole = assemble_at(robot, T, errors)
+    for i in range(8):
+        alone = assemble_at(robot, T[[i]], errors[[i]])
+        for name in ROWS:
+            np.testing.assert_array_equal(row(alone, name)[0], row(whole, name)[i])
+
+
+@pytest.mark.parametrize("compliant", ["rigid", "free"])
+def test_margin_of_a_point_is_independent_of_its_neighbours(grid, rng, compliant):
+    robot, postures = grid
+    at = together([*postures, *(postures[i] for i in BLOCKS)])
+    count = len(postures) + len(BLOCKS)
+    errors = robot.errors * rng.uniform(0, 1, (count, 1, 1))
+    errors[::5] = 0.0
+    whole = zone_margin(at, compliant, errors)
+    orders = [rng.permutation(count) for _ in range(3)]
+    for order in orders + [[i] for i in range(0, count, 9)]:
+        other = zone_margin(at[order], compliant, errors[order])
+        for name in ("margin", "bound", "method"):
+            assert np.array_equal(getattr(other, name), getattr(whole, name)[order])
+
+
+@pytest.mark.parametrize("kappa", [0.05, 0.3, 1.0])
+@pytest.mark.parametrize("load", [None, [1.0, 2.0, 3.0, 30.0, 10.0, -100.0]])
+def test_draws_at_one_posture_are_bit_identical_to_separate_points(
+    grid, rng, kappa, load
+):
+    """One posture for all draws, or a posture for each."""
+    robot, postures = grid
+    errors = kappa * robot.errors * rng.uniform(-1, 1, (61, 1, 1))
+    errors += kappa * robot.errors * rng.uniform(-1, 1, (61, *robot.errors.shape))
+    errors[::9] = 0.0
+    draws = solve_assembly(postures[3], load, errors=errors)
+    points = solve_assembly([postures[3]] * 61, load, errors=errors)
+    alone = [solve_assembly(postures[3], load, errors=errors[[i]]) for i in range(12)]
+    for name in ROWS:
+        assert np.array_equal(row(draws, name), row(points, name)), name
+        for i, one in enumerate(alone):
+            assert np.array_equal(row(one, name)[0], row(draws, name)[i]), name

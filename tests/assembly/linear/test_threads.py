@@ -6,15 +6,12 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from forcefit.assembly.exact.exact import solve_exact
+from forcefit import Clearance, Frame, Robot, solve_assembly, solve_exact, zone_margin
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
-from forcefit.assembly.linear.energy import solve_assembly
 from forcefit.assembly.linear.reference.as_printed import (
     energy_as_printed,
     margin_as_printed,
 )
-from forcefit.assembly.linear.zone import zone_margin
-from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from tests.robots_for_tests import random_robot
 
 METHODS = ["compiled", "reference"]

@@ -138,13 +138,8 @@ def test_beam_in_pieces_deflects_as_the_whole_beam(theory):
 def test_section_at_the_start_of_a_beam_transmits_the_wrench_of_the_hub():
     """Equilibrium of the whole beam: its load and a tool beside its tip."""
     robot, path = spinning_beam(80.0, 3000.0, radius=0.03, axis=(0.3, -0.5, 1))
-    tool = Frame(
-        "tool",
-        "piece0",
-        [0.1, 0.05, -0.07],
-        mass=1.2,
-        inertia=np.diag([1e-3, 2e-3, 2e-3]),
-    )
+    tool = Frame("tool", "piece0", [0.1, 0.05, -0.07], mass=1.2,
+                 inertia=np.diag([1e-3, 2e-3, 2e-3]))  # fmt: skip
     robot = Robot("beam", "tool", (*robot.frames, tool))
     motion = moving_drives(robot, path.names, (path.values, path.first, path.second))
     load = inertial_loads(motion, GRAVITY).beams[1]

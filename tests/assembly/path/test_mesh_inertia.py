@@ -38,13 +38,8 @@ def rod_mass(section_inertia):
         shift[2, [5, 1, 11, 7]] = cubic * sign
         turn[1, [5, 1, 11, 7]] = -np.array(slope) * sign
         M += weight * RHO * area * shift.T @ shift
-        M += (
-            weight
-            * RHO
-            * turn.T
-            @ np.diag(section_inertia * np.array([2, 1, 1]))
-            @ turn
-        )
+        turning = section_inertia * np.diag([2, 1, 1])
+        M += weight * RHO * turn.T @ turning @ turn
     return M
 
 

@@ -80,15 +80,16 @@ def test_velocities_and_accelerations_equal_differences_of_poses(name):
     np.testing.assert_allclose(found, acceleration, atol=2e-6)
 
 
+def two_links(a, b):
+    """A planar arm with two drives, stretched along x at home."""
+    frames = hinge("one"), hinge("two", "one", [a, 0, 0])
+    return Robot("arm", "tip", (*frames, Frame("tip", "two", [b, 0, 0])))
+
+
 def test_arm_given_by_joints_moves_as_its_closed_form():
     """Two links in a plane: the tip's velocity and acceleration by hand."""
     a, b = 0.4, 0.3
-    frames = (
-        hinge("one"),
-        hinge("two", "one", [a, 0, 0]),
-        Frame("tip", "two", [b, 0, 0]),
-    )
-    robot, names = Robot("arm", "tip", frames), ("q.one", "q.two")
+    robot, names = two_links(a, b), ("q.one", "q.two")
     q, rate, second = ([[0.5, 0.8]], [[3.0, -2.0]], [[20.0, 15.0]])
     path = tuple(np.array(x) for x in (q, rate, second))
     motion = follow_path(placed(robot, names, path[0]), names, path)
@@ -125,12 +126,7 @@ def test_rotation_rate_is_correct_for_rotations_beyond_half_a_turn():
 
 def test_velocity_out_of_a_stretched_arm_is_refused():
     """Stretched, the arm's tip cannot move along itself."""
-    frames = (
-        hinge("one"),
-        hinge("two", "one", [0.4, 0, 0]),
-        Frame("tip", "two", [0.3, 0, 0]),
-    )
-    robot, names = Robot("arm", "tip", frames), ("tx", "ty")
+    robot, names = two_links(0.4, 0.3), ("tx", "ty")
     there = together([home_posture(robot)])
     path = tuple(np.array(x) for x in ([[0.7, 0.0]], [[1.0, 0.0]], [[0.0, 0.0]]))
     with pytest.raises(NotFollowed, match="point 0"):

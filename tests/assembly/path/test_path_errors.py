@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from forcefit.assembly.files.robot_file import read_robot
-from forcefit.assembly.kinematics.posture import home_posture, place_many, together
+from forcefit.assembly.kinematics.posture import (
+    POSE,
+    home_posture,
+    place_many,
+    together,
+)
 from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, Robot, beam_axis
 from forcefit.assembly.path.motion import follow_path
 from forcefit.assembly.path.path_errors import path_errors
@@ -23,6 +28,7 @@ from tests.assembly.path.moving_robots_for_tests import GRAVITY, hinge, instants
 from tests.assembly.path.test_motion import CASES, path_of
 
 DENSITY = 2700.0
+GRAVITY_ALONG_Z = [0.0, 0.0, -9.81]
 
 
 def heavy(name, density=DENSITY, mass=1.5):
@@ -156,17 +162,6 @@ def test_clearance_adds_to_the_deflection_of_an_accelerated_arm():
     assert upper >= stretch + 1e-5
 
 
-def test_no_load_makes_a_rod_between_two_ball_joints_spin():
-    """Turned about an axis across it, a rod free to spin carries no moment along it."""
-    robot = heavy("delta")
-    names = CASES["delta"]
-    pose = home_posture(robot).pose()
-    path = path_of(names, np.array([pose[one] for one in names]), np.array([0.3]))
-    found = path_errors(robot, Trajectory(names, np.zeros(1), *path, "times"))
-    assert found.free == 6
-    assert found.status[0] == "ok"
-
-
 def test_weightless_robot_and_unknown_assumption_are_refused():
     path = instants(["q.hub"], [[0.0]], [[1.0]], [[0.0]])
     frames = (hinge("hub"), Frame("arm", "hub", [0.3, 0, 0]))
@@ -215,10 +210,7 @@ SPHERICAL_ENDS = """
 format = 2
 platform = "plate"
 platform_at = [0, 0, 0.5]
-[[body]]
-name = "plate"
-mass = 3.0
-centre = [0, 0, 0.5]
+body = [{ name = "plate", mass = 3.0, centre = [0, 0, 0.5] }]
 """
 LEG = """
 [[leg]]
@@ -260,27 +252,30 @@ def six_legs(file, kind, mass=0.0, across=0.0, about=0.0):
     return read_robot(file), along
 
 
+def forces_of_six_legs(robot):
+    """(6,) [N] of the drives in a posture off the middle, moving and accelerated."""
+    pose, rate, second = [0.05, -0.02, 0.55, 0.1, -0.1, 0.2], [0.5] * 6, [-3.0] * 6
+    path = instants(POSE, [pose], [rate], [second])
+    return path_errors(robot, path, gravity=GRAVITY_ALONG_Z).arrays["drive_force"][0]
+
+
 def test_drives_carry_the_platform_where_massless_legs_spin_freely(tmp_path):
     """Six equal legs between balls: each drive has m (g + a) / (6 cos(angle to z))."""
     robot, along = six_legs(tmp_path / "six_sps.toml", "spherical")
-    names = ["tx", "ty", "tz", "rx", "ry", "rz"]
     pose = [0.0, 0.0, 0.5, 0.0, 0.0, 0.0]
-    path = instants(names, [pose], [np.zeros(6)], [[0, 0, 5.0, 0, 0, 0]])
-    errors = path_errors(robot, path, gravity=[0.0, 0.0, -9.81])
+    path = instants(POSE, [pose], [np.zeros(6)], [[0, 0, 5.0, 0, 0, 0]])
+    errors = path_errors(robot, path, gravity=GRAVITY_ALONG_Z)
     expected = 3.0 * (9.81 + 5.0) / (6 * along[2] / np.linalg.norm(along))
     np.testing.assert_allclose(errors.arrays["drive_force"][0], expected, rtol=1e-9)
 
 
 def test_spin_of_legs_with_masses_on_their_axes_does_not_change_the_result(tmp_path):
     """Balls at the base let them spin, universal joints do not: the same forces."""
-    names = ["tx", "ty", "tz", "rx", "ry", "rz"]
-    pose, rate, second = [0.05, -0.02, 0.55, 0.1, -0.1, 0.2], [0.5] * 6, [-3.0] * 6
-    forces = []
-    for kind in ("spherical", "universal"):
-        robot, _ = six_legs(tmp_path / f"{kind}.toml", kind, mass=0.8)
-        path = instants(names, [pose], [rate], [second])
-        errors = path_errors(robot, path, gravity=[0.0, 0.0, -9.81])
-        forces.append(errors.arrays["drive_force"][0])
+    file = tmp_path / "six.toml"
+    forces = [
+        forces_of_six_legs(six_legs(file, kind, mass=0.8)[0])
+        for kind in ("spherical", "universal")
+    ]
     np.testing.assert_allclose(forces[0], forces[1], rtol=1e-9)
 
 
@@ -289,14 +284,11 @@ def test_spin_of_round_legs_between_ball_joints_is_removed(tmp_path):
 
     So no force depends on their moment of inertia about the axis.
     """
-    names = ["tx", "ty", "tz", "rx", "ry", "rz"]
-    pose, rate, second = [0.05, -0.02, 0.55, 0.1, -0.1, 0.2], [0.5] * 6, [-3.0] * 6
-    forces = []
-    for about in (0.0, 0.02):
-        robot, _ = six_legs(tmp_path / "six.toml", "spherical", 0.8, 0.02, about)
-        path = instants(names, [pose], [rate], [second])
-        errors = path_errors(robot, path, gravity=[0.0, 0.0, -9.81])
-        forces.append(errors.arrays["drive_force"][0])
+    file = tmp_path / "six.toml"
+    forces = [
+        forces_of_six_legs(six_legs(file, "spherical", 0.8, 0.02, about)[0])
+        for about in (0.0, 0.02)
+    ]
     np.testing.assert_allclose(forces[1], forces[0], rtol=1e-9)
 
 
@@ -305,16 +297,11 @@ def test_thread_converts_the_force_of_a_slide_into_a_torque(tmp_path):
 
     The spindle turns many times, but has no inertia about its axis.
     """
-    names = ["tx", "ty", "tz", "rx", "ry", "rz"]
-    pose, rate, second = [0.05, -0.02, 0.55, 0.1, -0.1, 0.2], [0.5] * 6, [-3.0] * 6
-    path, file = instants(names, [pose], [rate], [second]), tmp_path / "six.toml"
+    file = tmp_path / "six.toml"
     slides, _ = six_legs(file, "universal", mass=0.8)
     threads = file.read_text().replace(
         'type = "prismatic"', 'type = "helical", pitch = 0.01'
     )
     file.write_text(threads)
-    force, torque = (
-        path_errors(robot, path, gravity=[0.0, 0.0, -9.81]).arrays["drive_force"]
-        for robot in (slides, read_robot(file))
-    )
+    force, torque = map(forces_of_six_legs, (slides, read_robot(file)))
     np.testing.assert_allclose(torque, 0.01 / (2 * np.pi) * force, rtol=1e-9)

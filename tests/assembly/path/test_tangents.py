@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from forcefit import BadInput, BeamLink, Frame, Robot, errors_along_path
 from forcefit.assembly.model.force_control import with_drive_forces
 from forcefit.assembly.model.frame import Clearance
-from forcefit.assembly.model.robot import BeamLink, Frame, Robot
 from forcefit.assembly.path.path_errors import path_errors
 from forcefit.assembly.path.path_file import PathTable
-from forcefit.assembly.path.request import errors_along_path
-from forcefit.inputs.table import BadInput
 from tests.assembly.path.moving_robots_for_tests import hinge, instants
 
 ALONG_X = [0, np.pi / 2, 0]  # turns z into x
@@ -118,12 +116,8 @@ def test_an_interrupted_path_resumes_with_the_same_results(tmp_path):
     file, journal = tmp_path / "way.nc", tmp_path / "way.nc.journal"
     with pytest.raises(KeyboardInterrupt):
         compute(file, stop)
-    kept = journal.stat().st_size
-    assert kept > 2000 * 8
+    assert journal.stat().st_size > 2000 * 8
     assert not file.exists()
-    with pytest.raises(KeyboardInterrupt):
-        compute(file, stop)  # the first block is read, and nothing is added
-    assert journal.stat().st_size == kept
     resumed = compute(file, lambda done, total: seen.append(done))
     whole = compute(tmp_path / "whole.nc")
     assert seen == [0, 2000, 4000, 4100]
@@ -131,7 +125,6 @@ def test_an_interrupted_path_resumes_with_the_same_results(tmp_path):
     for name, values in whole.arrays.items():
         np.testing.assert_array_equal(resumed.arrays[name], values)
     assert file.read_bytes() == (tmp_path / "whole.nc").read_bytes()
-    compute(file)
     with pytest.raises(KeyboardInterrupt):
         compute(file, stop)
     with pytest.raises(BadInput, match="journal of another sweep: found path_sha256"):

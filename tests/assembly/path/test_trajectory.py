@@ -115,18 +115,12 @@ def test_motion_profile_over_many_rows_has_no_jump_of_acceleration():
         (lambda p: profiled(p, 11, "quintic", 1.0, duration=1.0, speed=1.0), "--speed"),
         (lambda p: profiled(p, 1, "quintic", 1.0, duration=1.0), "--points: found 1"),
         (lambda p: profiled(line(0, 0.1, 0.1), 9, "quintic", 1.0, duration=1), "row 3"),
-        (
-            lambda p: profiled(
-                PathTable(("rz",), np.array([[0.0], [1.0]])), 9, "quintic", 1.0, speed=1
-            ),
-            "does not move",
-        ),
-        (
-            lambda p: timed(line(0, 1, times=np.array([0.0, 1.0])), 9, "moving"),
-            "found 2 rows, expected at least 6",
-        ),
+        (lambda p: profiled(PathTable(("rz",), np.array([[0.0], [1.0]])), 9, "quintic",
+                            1.0, speed=1), "does not move"),
+        (lambda p: timed(line(0, 1, times=np.array([0.0, 1.0])), 9, "moving"),
+         "found 2 rows, expected at least 6"),
     ],
-)
+)  # fmt: skip
 def test_path_that_cannot_be_computed_is_refused(call, message):
     with pytest.raises(ValueError, match=message):
         call(line(0.0, 0.1))

@@ -1,10 +1,11 @@
-"""K_C of many postures together equals that of single postures."""
+"""K_C of many postures equals that of single ones; refusals."""
 
 import numpy as np
 import pytest
 
+from forcefit import BadInput, Clearance, Frame, MatrixLink, Robot, solve_assembly
 from forcefit.assembly.kinematics.posture import home_posture, place_many, together
-from forcefit.assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.linear.reference.reduction import FreeMotion
 from forcefit.assembly.platform_stiffness.linear_tangent import without_clearance
 from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from forcefit.assembly.robots import load_robot
@@ -60,21 +61,6 @@ def test_stiffness_of_random_robots_equals_that_of_one_posture(seed):
     assert_same(many, 0, without_clearance(posture))
 
 
-def test_spring_along_x_has_infinite_stiffness_across_it():
-    """A slide with a spring along x, turned by a rounded right angle."""
-    K = np.diag([np.inf] * 5 + [1e5])
-    frames = (
-        Frame("slide", rotation=[0, np.pi / 2, 0], joint="prismatic",
-              joint_stiffness=K),
-        Frame("tip", "slide", rotation=[0, -np.pi / 2, 0]),
-    )  # fmt: skip
-    posture = home_posture(Robot("slide", "tip", frames))
-    many = platform_stiffness([posture])
-    along = np.array([many.along(axis)[0] for axis in UNIT])
-    assert along[3] == pytest.approx(1e5, rel=1e-9)
-    assert np.isinf(np.delete(along, 3)).all()
-
-
 @pytest.mark.parametrize("method", METHODS)
 def test_stiffness_among_many_equals_that_of_its_single_posture_at_any_point(method):
     """Compliance, stiffness and shares of each posture."""
@@ -95,9 +81,8 @@ def test_stiffness_among_many_equals_that_of_its_single_posture_at_any_point(met
             assert np.abs(off).max() < 1e-8, name
         for axis in UNIT:
             assert one.along(axis) == pytest.approx(expected.along(axis), rel=1e-6)
-            own = one.shares(axis)
-            for part, share in expected.shares(axis).items():
-                assert own[part] == pytest.approx(share, abs=1e-8)
+            shares = expected.shares(axis)
+            assert one.shares(axis) == pytest.approx(shares, abs=1e-8)
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
@@ -116,3 +101,40 @@ def test_tangents_of_many_postures_are_bit_identical_to_those_of_single_postures
     np.testing.assert_array_equal(many.along(UNIT[3]), [one.along(UNIT[3])[0]] * 2)
     shares = {part: share.tolist() for part, share in many.shares(UNIT[3]).items()}
     assert shares == {part: [s] * 2 for part, s in one.shares(UNIT[3]).items()}
+
+
+def test_free_motion_of_another_body_is_refused_with_a_fixed_platform():
+    """A wheel turns freely, driven by a couple on its rim."""
+    frames = (
+        Frame("wheel", joint="revolute"),
+        Frame("rim", "wheel", [0.1, 0, 0]),
+        Frame("tip", translation=[0, 0, 0.3], link=MatrixLink(np.eye(6))),
+    )
+    couple = np.zeros((3, 6))
+    couple[1, 2] = 2.0
+    with pytest.raises(FreeMotion, match="it moves wheel rz; the platform is at rest"):
+        solve_assembly(home_posture(Robot("beside", "tip", frames)), bodies=couple)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ({"at": [0, np.nan, 0]}, "at: found nan as number 2, expected 3 numbers"),
+        ({"at": [0, 1]}, "at: found .* of length 2, expected 3 numbers"),
+        ({"load": [1.0]}, "load: found .* of length 1, expected 6 numbers"),
+        ({"load": [np.inf] * 6}, "load: found inf as number 1"),
+        ({"state": "loaded"}, "no state 'loaded'"),
+        ({"side": "left"}, "no side 'left'"),
+    ],
+)
+def test_invalid_point_load_or_state_is_refused(words, message):
+    with pytest.raises(ValueError, match=message):
+        platform_stiffness(home_posture(load_robot("orthoglide")), **words)
+
+
+@pytest.mark.parametrize("direction", [[0] * 6, [1, 0, 0], [np.nan] * 6, "tx"])
+def test_invalid_direction_is_refused(direction):
+    stiffness = platform_stiffness(home_posture(load_robot("orthoglide")))
+    for asked in (stiffness.along, stiffness.shares):
+        with pytest.raises(BadInput, match="direction: found"):
+            asked(direction)

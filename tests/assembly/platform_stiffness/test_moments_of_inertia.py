@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from forcefit.assembly.exact.exact import solve_exact
+from forcefit import BeamLink, Frame, Robot, natural_modes, solve_exact
 from forcefit.assembly.kinematics.posture import home_posture
-from forcefit.assembly.model.robot import BeamLink, Frame, Robot
-from forcefit.assembly.platform_stiffness.vibration import natural_modes
 from forcefit.stiffness.screws import rotation_matrix, rotation_vector
 from tests.assembly.exact.test_exact import only
 

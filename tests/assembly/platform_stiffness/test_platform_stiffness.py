@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 
 from benchmarks.evidence.stiffness_random_robots import by_differences
-from forcefit.assembly.exact.exact import solve_exact
+from forcefit import platform_stiffness, solve_assembly, solve_exact
 from forcefit.assembly.files.robot_file import read_robot
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.kinematics.se3 import turn_jacobian
-from forcefit.assembly.linear.energy import solve_assembly
 from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
 from forcefit.assembly.platform_stiffness.active_set import contacts
 from forcefit.assembly.platform_stiffness.matrices import Part
-from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from forcefit.assembly.robots import load_robot
 from forcefit.stiffness.screws import screw_map
 from tests.assembly.exact.test_exact import only
@@ -309,7 +307,7 @@ def test_stiffness_at_a_change_of_contact_depends_on_the_side(state):
 
 
 def test_block_pressed_on_a_table_slides_freely_and_is_rigid_normal_to_the_table(
-    tmp_path,
+    write_file,
 ):
     """Its drives cannot hold it within their clearances, nor can they tilt it."""
     text = """
@@ -335,9 +333,7 @@ joint = [
     { name = "head", type = "revolute", between = ["rod", "puck"], at = [-0.0643, 0.0766, 0], axis = [0, 0, 1], clearance = { radial = 1e-5, axial = 2e-5, tilt = 1e-3 } },
 ]
 """  # noqa: E501
-    file = tmp_path / "block.toml"
-    file.write_text(text)
-    posture = home_posture(read_robot(file))
+    posture = home_posture(read_robot(write_file(text)))
     tangent = platform_stiffness(posture, "contact", [0, 0, 0, 0, 0, -50])
     assert tangent.free.shape == tangent.rigid.shape == (6, 3)
     np.testing.assert_allclose(tangent.free[[0, 1, 5]], 0.0, atol=1e-9)

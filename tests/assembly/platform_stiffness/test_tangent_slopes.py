@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
+from forcefit import Clearance, Frame, Robot, platform_stiffness, solve_assembly
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
-from forcefit.assembly.linear.energy import solve_assembly
-from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from forcefit.assembly.platform_stiffness.active_set import contacts
-from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from forcefit.assembly.platform_stiffness.tangent_slopes import TangentState
 from forcefit.assembly.sweeps.parameters import design_of
 from forcefit.assembly.sweeps.stiffness_slopes import stiffness_slopes

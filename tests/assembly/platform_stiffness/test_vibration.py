@@ -177,11 +177,9 @@ joint = [
 """  # noqa: E501
 
 
-def test_massless_rods_that_spin_freely_do_not_change_the_frequencies(tmp_path):
+def test_massless_rods_that_spin_freely_do_not_change_the_frequencies(write_file):
     """Expected: K and M of all bodies' twists, constraints by their null space."""
-    file = tmp_path / "robot.toml"
-    file.write_text(SCREWS_AND_RODS)
-    modes = natural_modes(home_posture(read_robot(file)), 3)
+    modes = natural_modes(home_posture(read_robot(write_file(SCREWS_AND_RODS))), 3)
     expected = [241.53112443, 349.76392046, 970.11496002]
     np.testing.assert_allclose(modes.frequencies, expected, rtol=1e-8)
 

@@ -1,22 +1,18 @@
 """Text of objects in a console or notebook: a few lines, with units, at any size."""
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from forcefit.assembly.exact.exact import solve_exact
+from forcefit import Clearance, solve_assembly, solve_exact, zone_margin
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.kinematics.singularity import find_singularities
-from forcefit.assembly.linear.energy import solve_assembly
 from forcefit.assembly.linear.pose_error import bound_pose_error
 from forcefit.assembly.linear.reference.pose_error import reachable_screws
-from forcefit.assembly.linear.zone import zone_margin
-from forcefit.assembly.model.robot import Clearance
 from forcefit.assembly.report.results import solution_of, solution_text
-from forcefit.results.display import brief, html_table, short_repr
 from forcefit.stiffness.beam.beam import beam_compliance
 from forcefit.stiffness.beam.sections import round_section
 from forcefit.stiffness.link import LinkStiffness
@@ -110,39 +106,3 @@ def test_names_from_files_are_escaped_in_notebooks(answer):
     table = robot._repr_html_()
     assert "&lt;script&gt;&amp;" in table
     assert "<script>" not in table
-
-
-@dataclass
-class Thing:
-    """With fields of all sorts."""
-
-    name: str
-    many: tuple
-    few: list
-    array: np.ndarray
-    small: np.ndarray
-    text: str
-
-    __repr__, _repr_html_ = short_repr, html_table
-
-
-def test_default_text_shortens_long_fields():
-    thing = Thing("a\nb", (0,) * 99, [1, 2], np.zeros((6, 6)), np.array([1e-12, 2.0]),
-                  "x" * 500)  # fmt: skip
-    assert repr(thing).splitlines() == [
-        "Thing a b",
-        "  many   tuple of 99",
-        "  few    [1, 2]",
-        "  array  float64 array (6, 6)",
-        "  small  [1e-12 2]",
-        "  text   " + "x" * 68 + " ...",
-    ]
-
-
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [(None, "None"), (0.1, "0.1"), ({}, "none"), ({"a": 1.0}, "{'a': 1.0}"),
-     ([[1], [2]], "list of 2"), (np.zeros((6, 0)), "float64 array (6, 0)")],
-)  # fmt: skip
-def test_text_of_any_value_has_one_line(value, text):
-    assert brief(value) == text

@@ -5,11 +5,9 @@ from itertools import product
 import numpy as np
 import pytest
 
+from forcefit import Clearance, Frame, Robot, bound_pose_error, solve_assembly
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
-from forcefit.assembly.linear.energy import solve_assembly
-from forcefit.assembly.linear.pose_error import bound_pose_error
 from forcefit.assembly.linear.reference.pose_error import reachable_screws
-from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from forcefit.assembly.report.error_body import ErrorBody, error_body
 from forcefit.assembly.report.plot import plot_assembly
 from forcefit.assembly.robots.irsbot2 import irsbot2

@@ -6,13 +6,12 @@ import re
 import numpy as np
 import pytest
 
+from forcefit import BeamLink, run_study
 from forcefit.assembly.files.robot_file import write_robot
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
-from forcefit.assembly.model.robot import BeamLink
 from forcefit.assembly.report.pose_errors import pose_error_of, pose_error_text
 from forcefit.assembly.report.results import solution_of, solution_text
 from forcefit.validation.study.headline import verdict
-from forcefit.validation.study.study import run_study
 from forcefit.validation.study.study_file import read_study
 from tests.linkages_for_tests import SLIDER_CRANK, slider_crank
 from tests.three_upu_for_tests import HEIGHT, three_upu

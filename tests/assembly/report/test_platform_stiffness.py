@@ -1,39 +1,18 @@
-"""Results of ``assembly stiffness``: keys, sums, statuses."""
+"""Results of assembly stiffness: keys, sums, statuses, and charts of shares."""
 
 import numpy as np
 import pytest
 
-from forcefit.assembly.kinematics.posture import home_posture, place_robot
-from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.model.robot import Frame, MatrixLink, Robot
 from forcefit.assembly.report.platform_stiffness import (
     DIRECTIONS,
     stiffness_of,
     stiffness_text,
 )
-from forcefit.assembly.report.share_pictures import plot_shares
-from forcefit.assembly.robots import load_robot
-
-
-def total(shares):
-    """Sum of all shares of a direction."""
-    return shares.get("forces", 0.0) + sum(
-        value
-        for kind in ("links", "joints", "clearances")
-        for value in shares.get(kind, {}).values()
-    )
-
-
-@pytest.mark.parametrize("exact", [False, True])
-def test_compliance_shares_sum_to_one_in_every_direction(exact):
-    load = [0, 0, 0, 10.0, -20.0, -50.0]
-    posture = home_posture(load_robot("hexapod"))
-    results = stiffness_of(posture, load, state="exact" if exact else "nominal")
-    assert results["status"] == "ok"
-    for name in DIRECTIONS:
-        assert total(results["shares"][name]) == pytest.approx(1.0, rel=1e-9)
-    C, K = np.array(results["compliance"]), np.array(results["stiffness"])
-    np.testing.assert_allclose(C @ K, np.eye(6), atol=1e-6)
+from forcefit.assembly.report.share_pictures import plot_shares, share_chart
+from forcefit.page.charts import GREY
+from tests.pages_for_tests import parse
 
 
 def test_free_motion_is_reported_and_other_entries_stay_finite():
@@ -57,24 +36,24 @@ def test_load_without_resistance_is_reported_as_no_equilibrium():
     assert "no equilibrium" in stiffness_text(results)
 
 
-def test_bars_of_the_share_chart_sum_to_100_percent_per_direction():
-    results = stiffness_of(home_posture(load_robot("four_bar")))
-    (axes,) = plot_shares(results).axes
-    heights = [bar.get_height() for bar in axes.patches]
-    np.testing.assert_allclose(sum(heights), 600.0)
+def shares(parts):
+    """Equal shares of the links in the compliance along every axis."""
+    one = {f"part{k}": 1.0 / parts for k in range(parts)}
+    return {name: {"links": dict(one), "joints": {}} for name in DIRECTIONS}
 
 
-def test_contact_compliance_equals_differences_of_the_least_energy_solution():
-    """Central differences of (22); the load presses clearances of two legs."""
-    posture = place_robot(load_robot("irsbot2"), {"tx": 0.1, "tz": -0.5})
-    load, step = np.array([0, 0, 0, 20.0, 50.0, -100.0]), np.eye(6)[5]
-    ahead, back = (
-        solve_assembly(posture, load + sign * step).platform_screw for sign in (1, -1)
-    )
-    results = stiffness_of(posture, load, state="contact")
-    assert results["state"] == "contact"
-    moved = (ahead[5] - back[5]) / 2
-    assert results["compliance"][5, 5] == pytest.approx(moved, rel=1e-4)
-    # other than the nominal one, which clearances have no part in
-    nominal = stiffness_of(posture, load)
-    assert (nominal["compliance"][5, 5] / moved - 1) ** 2 > 1e-6
+@pytest.mark.parametrize(("parts", "others"), [(5, 0), (20, 8)])
+def test_sum_of_other_parts_is_shown_in_grey_and_shares_add_up_to_one(parts, others):
+    (spec,) = parse(share_chart(shares(parts), "")).figures
+    heights = {t["name"]: t["y"] for t in spec["traces"]}
+    np.testing.assert_allclose(sum(np.array(v) for v in heights.values()), 1.0)
+    grey = [t for t in spec["traces"] if t["marker"]["color"] == GREY]
+    assert [t["name"] for t in grey] == ([f"{others} others"] if others else [])
+    assert all(one["y"] == pytest.approx([others / parts] * 6) for one in grey)
+
+
+def test_plot_shows_the_sum_of_the_other_parts_in_grey():
+    figure = plot_shares({"robot": "r", "shares": shares(20)})
+    bars = {c.get_label(): c.patches[0] for c in figure.axes[0].containers}
+    spread = {name: np.ptp(p.get_facecolor()[:3]) for name, p in bars.items()}
+    assert [name for name, size in spread.items() if size < 0.1] == ["8 others"]

@@ -1,9 +1,10 @@
-"""Results printed by solve: certified sizes, and gravity without masses."""
+"""Results printed by solve: certified sizes, remarks, and tables of wrenches."""
 
 from pathlib import Path
 
 import pytest
 
+from forcefit.assembly.files.robot_file import read_robot
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.linear.load import massless
 from forcefit.assembly.model.robot import Clearance, Frame, MeshLink, Robot
@@ -40,3 +41,51 @@ def test_gravity_without_mass_is_reported_to_have_no_effect():
     assert massless(load_robot("hexapod"), [0, 0, -9.81]) == []
     results = solution_of(home_posture(robot), gravity=[0, 0, -9.81])
     assert remark in results["remarks"]
+
+
+ARM = """
+format = 2
+platform = "tool"
+platform_at = [0, 0, "150 mm"]
+body = [{ name = "tool" }]
+joint = [{ name = "rail", type = "prismatic", between = ["base", "tool"], at = [0, 0, 0], axis = [0, 0, 1], axis2 = [1, 0, 0], actuated = true, clearance = { guide = { gap = "12 um", length = "70 mm", width = "50 mm", height = "24 mm" } } }]
+"""  # noqa: E501
+
+
+def test_table_of_wrenches_has_one_row_for_a_joint_with_contacts(write_file):
+    """50 N along -y, 0.15 m above a vertical rail: 7.5 N m about the joint's x."""
+    posture = home_posture(read_robot(write_file(ARM)))
+    text = solution_text(solution_of(posture, [0, 0, 0, 0, -50, 0]))
+    table = text.split("wrenches through the bodies")[1].splitlines()[2:]
+    rows = {row.split()[0]: row.split()[1:] for row in table if row.strip()}
+    assert set(rows) == {"rail", "tool"}
+    found = [float(number) for number in rows["rail"]]
+    assert found == pytest.approx([7.5, 0, 0, 0, -50, 0])
+
+
+GANTRY = """
+format = 2
+platform = "table"
+platform_at = [0, 0, 0]
+body = [{ name = "table" }]
+joint = [
+    { name = "left", type = "prismatic", between = ["base", "table"], at = [-0.1, 0, 0], axis = [0, 1, 0], actuated = true },
+    { name = "yrail", type = "TYPE", between = ["base", "table"], at = [0.1, 0, 0], axis = [0, 1, 0] },
+]
+"""  # noqa: E501
+
+
+@pytest.mark.parametrize("kind", ["prismatic", "cylindrical"])
+def test_tables_of_wrenches_name_the_drawn_joint_that_closes_a_loop(write_file, kind):
+    """The public keys keep the names of the frames."""
+    results = solution_of(
+        home_posture(read_robot(write_file(GANTRY.replace("TYPE", kind)))),
+        [0, 0, 0, 0, -50, 0],
+    )
+    assert [c["frames"] for c in results["closures"]] == [["yrail.end", "table"]]
+    text = solution_text(results)
+    assert ".end" not in text
+    bodies, closures = text.split("wrenches ")[1:]
+    rows = [row.split()[0] for row in bodies.splitlines()[2:] if row.strip()]
+    assert sorted(rows) == ["left", "table", "yrail"]
+    assert closures.splitlines()[2].startswith("yrail - table ")

@@ -91,13 +91,6 @@ def test_table_of_many_points_has_a_row_for_each_point(batches):
     assert set(errors["status", ""]) == {"ok"}
 
 
-def test_table_of_one_point_has_one_row(answer):
-    bound, zone = bound_pose_error(answer), zone_margin(answer.posture)
-    assert zone.to_pandas()["margin", ""].tolist() == [zone.margin]
-    upper = bound.to_pandas()["translation_error", "upper"]
-    assert upper.tolist() == [bound.translation_error[1]]
-
-
 def small_stiffness():
     """A bar of length L = 0.4 m along x with a round section, held at its base."""
     beam = ff.BeamLink({"radius": 0.01}, 2e11, 0.3, 7850.0, theory="euler")

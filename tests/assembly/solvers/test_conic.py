@@ -5,6 +5,7 @@ import pytest
 
 from forcefit.assembly.solvers.cones import cone_sizes
 from forcefit.assembly.solvers.conic import least_factor, minimise_energy
+from forcefit.assembly.solvers.pressed_cones import refine
 
 GROUP = np.array([0, 0, 1, 2, 2])
 
@@ -77,3 +78,28 @@ def test_unreachable_row_without_scaled_cones_has_no_finite_factor(reach):
     right = np.array([3.0 * 0.9, 50.0 * 0.9 + 0.01])
     t, _, _ = least_factor(B, right, np.array([0, 1]), np.array([False, True]))
     assert t == pytest.approx(0.5, rel=1e-7)
+
+
+NONE = np.zeros((0, 2))
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-3, 1e-2])
+def test_pressed_disc_moves_to_the_point_nearest_to_the_target(off):
+    """The least |u - a| with |u| <= 1 is at a / |a|, pressed by |a| - 1 = 12."""
+    a = np.array([5.0, 12.0])
+    guess = (1.0 - off) * np.array([np.cos(1.17 + off), np.sin(1.17 + off)])
+    problem = (np.eye(2), -a, np.zeros(2), NONE, np.zeros(0), np.zeros(2, np.int64))
+    u, y, n = next(refine(problem, guess, np.zeros(0)))
+    assert u == pytest.approx(a / 13, abs=1e-9)
+    assert y == pytest.approx(a / 13 - a, abs=1e-8)
+    assert len(n) == 0
+
+
+def test_pressed_interval_ends_at_its_bound_and_the_row_moves_the_other():
+    """Work 3 u_1 + u_2 on u_1 + u_2 = 1 / 2 within +-1: the corner (1, -1 / 2)."""
+    H, k = np.array([[1.0, 1.0]]), np.array([0.5])
+    problem = (NONE, np.zeros(0), np.array([3.0, 1.0]), H, k, np.array([0, 1]))
+    u, y, n = next(refine(problem, np.array([0.999, -0.498]), np.array([-1.01])))
+    assert u == pytest.approx([1.0, -0.5], abs=1e-12)
+    assert len(y) == 0
+    assert n == pytest.approx([-1.0], abs=1e-9)

@@ -80,14 +80,3 @@ def test_solving_for_a_loaded_disc_does_not_move_other_discs():
     last = np.array([[0.0, 0.9, 0.4]])
     found = closest_of_same_energy(minima, last, G, (G, h, d, H, group))
     assert found == pytest.approx(np.array([[1.0, 0.0, 0.4]]), abs=1e-9)
-
-
-def test_solution_of_a_programme_does_not_depend_on_other_programmes(rng):
-    """Lanes are independent; the right sides are multiplied in another order."""
-    group = GROUPS["discs and intervals"]
-    G, H = rng.normal(size=(3, 9)), np.zeros((0, 9))
-    h, d, k = 4 * rng.normal(size=(19, 3)), np.zeros((19, 9)), np.zeros((19, 0))
-    together = minimise_energies(G, h, d, H, k, group).clearances
-    for i in (0, 7, 18):
-        alone = minimise_energies(G, h[[i]], d[[i]], H, k[[i]], group).clearances
-        assert alone[0] == pytest.approx(together[i], rel=0, abs=1e-14)

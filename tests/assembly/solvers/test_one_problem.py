@@ -3,11 +3,13 @@
 import cvxpy as cp
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 from forcefit.assembly.linear.reference.pose_error import ReachableSet
-from forcefit.assembly.solvers import conic, one_problem
+from forcefit.assembly.solvers import conic
 from forcefit.assembly.solvers.cones import cone_sizes, cone_starts
 from forcefit.assembly.solvers.conic import ConeProgramme
+from forcefit.assembly.solvers.one_problem import farthest_points
 
 GROUP = np.array([0, 0, 1, 2, 2, 3])  # discs and intervals
 SPRINGS = 4
@@ -50,33 +52,6 @@ def least(p):
 
 def value(p, u):
     return float(np.sum((p.G @ u + p.h) ** 2) / 2 - p.d @ u)
-
-
-def proved(p, y, n):
-    """Of any y and n, a bound: min over unit cones of what is linear in u."""
-    z = p.G.T @ y + p.H.T @ n - p.d
-    return float(y @ p.h - y @ y / 2 - n @ p.k - cone_sizes(z, p.group).sum())
-
-
-def interior_point(p, tolerance):
-    return one_problem.interior_point(p[:5], cone_starts(p.group), tolerance)
-
-
-@pytest.mark.parametrize("rows", [0, 1, 2])
-@pytest.mark.parametrize("widest", [2, 7])
-@pytest.mark.parametrize("seed", range(3))
-def test_value_of_the_interior_point_method_equals_clarabel_and_is_certified(
-    seed, widest, rows
-):
-    group = GROUP if widest == 2 else random_cones(np.random.default_rng(seed), widest)
-    p = programme(seed, min(rows, len(group) - 1), group=group)
-    u, n = interior_point(p, 1e-9)
-    np.testing.assert_allclose(p.H @ u, p.k, atol=1e-12)
-    assert (cone_sizes(u, group) <= 1).all()
-    assert value(p, u) == pytest.approx(least(p), abs=1e-8)
-    # rounding of the rows may end it just before
-    most = 1e-8 if rows else 1.1e-9
-    assert value(p, u) - proved(p, p.G @ u + p.h, n) <= most
 
 
 @pytest.mark.parametrize("widest", [1, 2, 3, 20])
@@ -133,18 +108,6 @@ def test_farthest_point_of_a_ball_or_interval_equals_its_closed_form():
     assert (low, high) == pytest.approx((5e-3, 5e-3), abs=1e-9)
 
 
-def test_farthest_point_of_an_ellipse_needs_at_most_two_supports():
-    """|x|, |y|, |z| <= 1, 3, 2 in a ball, with v_y = v_z: sqrt((9 + 4) / 2)."""
-    X = np.zeros((6, 3))
-    X[3:] = np.diag([1.0, 3.0, 2.0])
-    H = np.array([[0.0, 1.0, -1.0]]) / np.sqrt(2)
-    body = ReachableSet(np.zeros(6), X, H, np.zeros(3), np.zeros(3, np.int64))
-    (low, high), _, supports = body.farthest(3, 1e-6)
-    assert low == pytest.approx(np.sqrt(6.5), abs=1e-6)
-    assert high - low <= 1e-6
-    assert supports <= 2
-
-
 @pytest.mark.parametrize("widest", [2, 12])
 def test_farthest_distance_bounds_the_support_in_every_direction(rng, widest):
     """Supports by Clarabel in many directions; with rows, and cones of many columns."""
@@ -174,3 +137,54 @@ def height(body, part, direction):
     problem = cp.Problem(cp.Maximize((step / size) @ (v - body.start)), cones)
     problem.solve(solver="CLARABEL")
     return direction @ body.centre[part : part + 3] + size * problem.value
+
+
+CONES = np.array([0, 0, 1, 2, 2, 2])  # cones of two, one and three columns
+
+
+def rows_of(rng, count, nu=6):
+    return np.linalg.qr(rng.normal(size=(nu, count)))[0].T.copy()
+
+
+def directions_of(rng, count, nu=6):
+    d = rng.normal(size=(count, nu))
+    return d / np.linalg.norm(d, axis=1)[:, None]
+
+
+def found(rows, group, d, right, tolerance=1e-9):
+    return farthest_points(
+        rows, cone_starts(group), d, right, np.full(len(d), tolerance)
+    )
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3])
+def test_multipliers_prove_that_no_point_is_farther(rng, rows):
+    """d.u is at most n.e + sum |(d - H^T n)_k| for every u of the set and any n."""
+    H, d = rows_of(rng, rows), directions_of(rng, 20)
+    start = rng.uniform(-0.4, 0.4, size=(20, 6))
+    points, multipliers, solved = found(H, CONES, d, start @ H.T)
+    # rounding of several rows may end some a little before
+    assert solved.all() if rows == 1 else solved.sum() > 12
+    assert np.abs((points - start)[solved] @ H.T).max() < 1e-12
+    for i in np.flatnonzero(solved).tolist():
+        assert cone_sizes(points[i], CONES).max() <= 1
+        gradient = d[i] - H.T @ multipliers[i]
+        most = multipliers[i] @ H @ start[i] + cone_sizes(gradient, CONES).sum()
+        assert -1e-12 <= most - d[i] @ points[i] <= 1.1e-9
+        assert d[i] @ points[i] >= d[i] @ start[i] - 1e-9
+
+
+def test_farthest_points_of_intervals_equal_a_linear_programme(rng):
+    H, d = rows_of(rng, 2), directions_of(rng, 8)
+    start = rng.uniform(-0.5, 0.5, size=(8, 6))
+    points, _, solved = found(H, np.arange(6), d, start @ H.T)
+    assert solved.all()
+    for i in range(8):
+        least = linprog(-d[i], A_eq=H, b_eq=H @ start[i], bounds=[(-1, 1)] * 6)
+        assert d[i] @ points[i] == pytest.approx(-least.fun, abs=1e-8)
+
+
+def test_infeasible_rows_are_reported_as_not_solved(rng):
+    H, d = rows_of(rng, 1), directions_of(rng, 3)
+    _, _, solved = found(H, CONES, d, np.array([[0.1], [10.0], [-0.2]]))
+    assert solved.tolist() == [True, False, True]

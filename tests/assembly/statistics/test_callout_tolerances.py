@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from forcefit.assembly.callouts.callout import Callout, Datum
-from forcefit.assembly.files.robot_file import write_robot
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.model.robot import Frame, Robot
 from forcefit.assembly.statistics.allocated_tolerances import (
@@ -62,7 +61,7 @@ def allotted(tmp_path, robot, text):
 def test_lengths_are_allocated_tolerances_as_independent_errors_along_them(tmp_path):
     """The draws of an interval are those of an independent uniform error, so both
     plans must have the same tolerances, whatever the robot file states."""
-    callouts = allotted(tmp_path, ARM, PLAN.format(**OF_CALLOUTS))
+    callouts = allotted(tmp_path, ARM, PLAN_OF_CALLOUTS)
     frames = allotted(tmp_path, ARM, PLAN.format(**OF_FRAMES))
     assert callouts.tolerances == pytest.approx(frames.tolerances, rel=1e-6)
     assert "arm: +-" in allocation_text(allocation_of(callouts))
@@ -100,40 +99,19 @@ def test_width_of_a_position_meets_its_yield_in_finite_geometry(tmp_path):
     assert "+-" not in text.splitlines()[0]
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (
-            PLAN
-            .format(**OF_CALLOUTS)
-            .replace("0.9", "1.0")
-            .replace("translation", "energy"),
-            "found 1 with callouts",
-        ),
-        (PLAN.format(**OF_CALLOUTS).replace('["hand"]', '["hnd"]'), 'found "hnd"; did'),
-        (PLAN.format(**OF_CALLOUTS).replace('["hand"]', '["arm"]'), '"arm" twice'),
-        (PLAN.format(**OF_CALLOUTS).replace('["hand"]', "[]"), "at least one"),
-        (PLAN.format(**OF_CALLOUTS).replace('["hand"]', "[1]"), "a list of names"),
-    ],
-)
+PLAN_OF_CALLOUTS = PLAN.format(**OF_CALLOUTS)
+MISTAKES = [
+    (PLAN_OF_CALLOUTS.replace("0.9", "1.0").replace("translation", "energy"),
+     "found 1 with callouts"),
+    (PLAN_OF_CALLOUTS.replace('["hand"]', '["hnd"]'), 'found "hnd"; did'),
+    (PLAN_OF_CALLOUTS.replace('["hand"]', '["arm"]'), '"arm" twice'),
+    (PLAN_OF_CALLOUTS.replace('["hand"]', "[]"), "at least one"),
+    (PLAN_OF_CALLOUTS.replace('["hand"]', "[1]"), "a list of names"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "message"), MISTAKES)
 def test_mistake_in_a_plan_of_callouts_is_reported_in_one_line(tmp_path, text, message):
     with pytest.raises(BadInput, match=message) as error:
         allotted(tmp_path, ARM, text)
     assert "\n" not in str(error.value)
-
-
-def test_command_allocates_widths_of_callouts(tmp_path):
-    from typer.testing import CliRunner
-
-    from forcefit.commands.app import app
-
-    write_robot(ARM, tmp_path / "arm.toml")
-    (tmp_path / "plan.toml").write_text(PLAN.format(**OF_CALLOUTS))
-    words = ["assembly", "tolerances", str(tmp_path / "arm.toml"), "--plan",
-             str(tmp_path / "plan.toml"), "--grid", "tx=0.43", "--draws", "200",
-             "--clearance", "least", "--json", str(tmp_path / "answer.json"),
-             "-o", str(tmp_path / "out.nc"),
-             "--report", str(tmp_path / "page.html")]  # fmt: skip
-    result = CliRunner().invoke(app, words)
-    assert result.exit_code == 0, result.output
-    assert "arm: +-" in result.output

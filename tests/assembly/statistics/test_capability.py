@@ -62,22 +62,16 @@ def test_intervals_of_parts_per_million_equal_hand_calculation():
     assert proportion(0, 10**6, 0.9)["upper"] * 1e6 == pytest.approx(3.0, abs=0.01)
 
 
-def test_cpk_by_quantiles_of_a_uniform_disc_equals_that_of_its_radius():
-    """Rayleigh: median s sqrt(2 ln 2), 99.865 % quantile s sqrt(-2 ln 0.00135)."""
-    x = np.random.default_rng(2).normal(size=(400_000, 2))
-    middle, tail = np.sqrt(2 * np.log(2)), np.sqrt(-2 * np.log(0.00135))
-    value, lower, upper = quantile_cpk(np.linalg.norm(x, axis=1), 4.0)
-    assert value == pytest.approx((4 - middle) / (tail - middle), rel=0.01)
-    assert lower < value < upper
-
-
-def test_cp_by_quantiles_of_a_uniform_disc_equals_that_of_its_radius():
-    """Rayleigh: quantiles s sqrt(-2 ln(1 - p)) of 0.135 % and 99.865 %; limit 4 s."""
-    x = np.random.default_rng(3).normal(size=(400_000, 2))
-    low, tail = np.sqrt(-2 * np.log(0.99865)), np.sqrt(-2 * np.log(0.00135))
-    value, lower, upper = quantile_cp(np.linalg.norm(x, axis=1), 4.0)
-    assert value == pytest.approx(4 / (tail - low), rel=0.01)
-    assert lower < 4 / (tail - low) < upper
+def test_indices_by_quantiles_of_a_disc_equal_those_of_its_radius():
+    """Rayleigh: the quantile at p is s sqrt(-2 ln(1 - p)); the limit is 4 s."""
+    low, middle, tail = np.sqrt(-2 * np.log(1 - np.array([0.00135, 0.5, 0.99865])))
+    x = np.linalg.norm(np.random.default_rng(2).normal(size=(400_000, 2)), axis=1)
+    for index, expected in (
+        (quantile_cpk, (4 - middle) / (tail - middle)), (quantile_cp, 4 / (tail - low))
+    ):  # fmt: skip
+        value, lower, upper = index(x, 4.0)
+        assert value == pytest.approx(expected, rel=0.01)
+        assert lower < expected < upper
 
 
 def test_cpk_of_few_draws_has_no_lower_bound_above_zero():

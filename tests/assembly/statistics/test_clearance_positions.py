@@ -1,4 +1,4 @@
-"""Uniform and contact clearance positions, against known volumes and rejection."""
+"""Clearance positions against known volumes, rejection and closed forms."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,9 @@ from forcefit.assembly.statistics.clearance_positions import (
     loaded_clearances,
     position_clearances,
 )
+from forcefit.assembly.statistics.contact_positions import move_to_contact
 from forcefit.assembly.statistics.linear_response import linear_response
+from tests.tolerances_for_tests import ARM, arm
 
 
 def generators(count, seed=3):
@@ -180,14 +182,6 @@ def test_contact_position_is_at_least_as_far_along_its_force_as_uniform(drawn):
     assert reach.min() > -1e-9
 
 
-def test_clearance_positions_of_least_energy_equal_those_of_the_solution(drawn):
-    one, found = drawn
-    screws, mixed = position_clearances(one, found, "least", [])
-    np.testing.assert_array_equal(screws, found.platform_screw)
-    assert mixed.shape == (DRAWN,)
-    assert mixed.all()
-
-
 @pytest.mark.parametrize("play", ["most", "worst"])
 def test_unknown_clearance_position_is_refused(drawn, play):
     """The model worst has no single position, so it is refused too."""
@@ -195,3 +189,43 @@ def test_unknown_clearance_position_is_refused(drawn, play):
     with pytest.raises(ValueError, match=f"clearance is '{play}'") as error:
         position_clearances(one, found, play, generators(DRAWN))
     assert str(error.value).endswith("expected one of ('uniform', 'contact', 'least')")
+
+
+def moved(directions, starts, rows=(), free=None, positions=None):
+    """The farthest positions along some directions, from the middle by default."""
+    directions, starts = np.array(directions, dtype=float), np.array(starts)
+    nu = starts[-1]
+    free = np.ones(nu, dtype=bool) if free is None else np.array(free)
+    positions = np.zeros(directions.shape) if positions is None else positions
+    rows = np.array(rows, dtype=float).reshape(-1, nu)
+    return move_to_contact(rows, starts, free, np.array(positions), directions)
+
+
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+def test_farthest_positions_in_discs_and_intervals_equal_closed_forms(size, rng):
+    """A linear function is largest at d / |d| of a disc, at the sign of an interval."""
+    directions = rng.normal(size=(6, 3)) + 0.1
+    expected = np.column_stack([
+        directions[:, :2] / np.linalg.norm(directions[:, :2], axis=1)[:, None],
+        np.sign(directions[:, 2]),
+    ])
+    found = moved(size * directions, [0, 2, 3])
+    np.testing.assert_allclose(found, expected, atol=1e-4)
+
+
+@pytest.mark.parametrize("length", [0.05, 0.4, 5.0])
+def test_contact_length_weighs_moments_against_forces(length):
+    """A pin with tilt t, and the platform on an arm L along x across its axis z.
+
+    The moments at the pin are M_x and M_y - L F_z, of deviations 1 and
+    s = sqrt(1 + (L / length)^2).  Their direction is that of the tilt, so the platform
+    moves along z by L t |cos|, whose median is L t s / sqrt(1 + s^2).
+    """
+    tilt = 2e-3
+    prepared = linear_response(home_posture(arm(tilt=tilt)))
+    draws = prepared.solve(np.zeros((4000, 2, 6)))
+    rngs = [draw_generator(3, i, 9) for i in range(4000)]
+    screws, _ = position_clearances(prepared, draws, "contact", rngs, length)
+    s = np.hypot(1.0, ARM / length)
+    expected = ARM * tilt * s / np.hypot(1.0, s)
+    assert np.median(np.abs(screws[:, 5])) == pytest.approx(expected, rel=0.03)

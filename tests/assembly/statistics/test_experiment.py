@@ -5,18 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from forcefit import BadInput, Clearance, solve_assembly
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
-from forcefit.assembly.linear.energy import solve_assembly
 from forcefit.assembly.model.error_distributions import tolerance_sources
 from forcefit.assembly.model.link_stress import peak_stresses
-from forcefit.assembly.model.robot import Clearance
 from forcefit.assembly.robots import load_robot
 from forcefit.assembly.statistics.experiment import Experiment
-from forcefit.assembly.statistics.monte_carlo import run_draws
-from forcefit.assembly.statistics.summary import summarise, summary_text
-from forcefit.inputs.table import BadInput
 from tests.robots_for_tests import coaxial_beams
-from tests.tolerances_for_tests import PLAY, arm, rigid_pair
+from tests.tolerances_for_tests import PLAY, rigid_pair
 
 STIFFNESS = 1e6  # [N/m]
 
@@ -26,13 +22,6 @@ def springs(radial=PLAY, **options):
     play = Clearance(radial=radial)
     robot = coaxial_beams(np.zeros(6), (STIFFNESS, STIFFNESS), clearance=play)
     sources = tolerance_sources(robot, [0, 0, 0, 4e-4, 4e-4, 0], ("one", "two"))
-    return Experiment(home_posture(robot), sources, **options)
-
-
-def tip(**options):
-    """An arm with clearance of its pin and errors of its tip."""
-    robot = arm(radial=PLAY)
-    sources = tolerance_sources(robot, [1e-3, 0, 0, 3e-4, 3e-4, 3e-4], ("tip",))
     return Experiment(home_posture(robot), sources, **options)
 
 
@@ -126,19 +115,3 @@ def test_limits_on_quantities_that_are_not_computed_are_refused():
         with pytest.raises(BadInput) as error:
             bare.check_limits(["energy", limit])
         assert str(error.value) == message
-
-
-@pytest.mark.parametrize("contact_length", [None, 0.25])
-def test_results_state_the_contact_length_of_pose_errors(contact_length):
-    """In text, plain values and data set; the default is the longest body."""
-    robot = arm()
-    sources = tolerance_sources(robot, [0, 0, 0, 1e-4, 0, 0], ("tip",))
-    data = run_draws(
-        Experiment(home_posture(robot), sources, clearance="contact",
-                   contact_length=contact_length), 20,
-    )  # fmt: skip
-    summary, length = summarise(data), contact_length or 0.4
-    assert summary["contact_length"] == data.attrs["contact_length"] == length
-    text = summary_text(summary)
-    assert f"moments / {length:g} m, contact length" in text
-    assert "the service load (--load)" in text

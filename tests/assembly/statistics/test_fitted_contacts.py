@@ -8,24 +8,21 @@ to 17.5 um, of uniform sizes 10.25 um with a deviation of sqrt(18^2 + 11^2)/sqrt
 import numpy as np
 import pytest
 
+from forcefit import BadInput, worst_pose
 from forcefit.assembly.files.robot_file import read_robot, write_robot
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.statistics.callout_sources import sources_of
 from forcefit.assembly.statistics.experiment import Experiment
 from forcefit.assembly.statistics.linear_response import linear_response
 from forcefit.assembly.statistics.monte_carlo import run_draws
-from forcefit.assembly.statistics.worst_pose import worst_pose
-from forcefit.inputs.table import BadInput
 
 FIRST = np.sqrt((18.0**2 + 11.0**2) / 12) / 2 * 1e-6  # [m] deviation of 12 H7/g6
 SECOND = np.sqrt((22.0**2 + 15.0**2) / 12) / 2 * 1e-6  # [m] of 8 H8/h7
 SPINDLE = """
 format = 2
-name = "spindle"
 platform = "shaft"
 platform_at = [0, 0, "200 mm"]
-[[body]]
-name = "shaft"
+body = [{{ name = "shaft" }}]
 [[joint]]
 name = "bore"
 type = "{kind}"
@@ -180,56 +177,37 @@ def test_mistake_in_a_fitted_contact_is_reported_in_one_line(
 
 BOLTED = """
 format = 2
-name = "slot"
 platform = "plate"
 platform_at = [0, 0, 0]
-[[body]]
-name = "plate"
-[[joint]]
-name = "pin"
-type = "fixed"
-between = ["base", "plate"]
-at = [0, 0, 0]
-[[joint]]
-name = "slot"
-type = "fixed"
-between = ["base", "plate"]
-at = [0.1, 0, 0]
-locked_at = "home"
-clearance = { fit = "12 H7/g6" }
-[[tolerance]]
-feature = "slot"
-datums = ["pin"]
-length = "100 +- 0.03 mm"
-"""
+body = [{ name = "plate" }]
+joint = [
+    { name = "pin", type = "fixed", between = ["base", "plate"], at = [0, 0, 0] },
+    { name = "slot", type = "fixed", between = ["base", "plate"], at = [0.1, 0, 0], locked_at = "home", clearance = { CLEARANCE } },
+]
+tolerance = [{ feature = "slot", datums = ["pin"], length = "100 +- 0.03 mm" }]
+"""  # noqa: E501
 
 
-def test_bolted_slot_with_a_fit_assembles_if_its_clearance_covers_the_error(tmp_path):
+@pytest.mark.parametrize(
+    ("clearance", "largest", "share"),
+    [('fit = "12 H7/g6"', 17.5e-6, 10.25 / 30), ("radial = 12e-6", 12e-6, 0.4)],
+)
+def test_bolted_slot_assembles_if_its_clearance_covers_the_error(
+    write_file, clearance, largest, share
+):
     """A rigid plate closes only if the clearance c exceeds the error e of the length:
-    e is uniform to 30 um, so the share is the mean of c over 30 um, 0.342.
+    e is uniform to 30 um, so the share is the mean of c over 30 um.
 
-    Three standard errors of 500 draws are 0.064.
+    Three standard errors of 500 draws are 0.066.
     """
-    path = tmp_path / "slot.toml"
-    path.write_text(BOLTED)
-    robot = read_robot(path)
+    robot = read_robot(write_file(BOLTED.replace("CLEARANCE", clearance)))
     sources = sources_of(robot)
     bolt = sources.with_largest_clearances().frame("slot").locked_at
-    assert bolt.clearance.radial == pytest.approx(17.5e-6)
-    experiment = Experiment(home_posture(robot), sources, margins=False)
-    closed = int((run_draws(experiment, 500)["status"].values == 0).sum())
-    assert closed / 500 == pytest.approx(10.25 / 30, abs=0.064)
-
-
-def test_draws_that_cannot_be_bolted_are_counted_as_not_assembled(tmp_path):
-    """A gap of 12 um closes errors uniform to 30 um in 0.4 of the machines."""
-    path = tmp_path / "slot.toml"
-    path.write_text(BOLTED.replace('fit = "12 H7/g6"', "radial = 12e-6"))
-    robot = read_robot(path)
-    experiment = Experiment(home_posture(robot), sources_of(robot))
+    assert bolt.clearance.radial == pytest.approx(largest)
+    experiment = Experiment(home_posture(robot), sources)
     data = run_draws(experiment, 500)
     solved = data["status"].values == 0
-    assert solved.mean() == pytest.approx(0.4, abs=0.066)
+    assert solved.mean() == pytest.approx(share, abs=0.066)
     assert np.isnan(data["energy"].values[~solved]).all()
     assert data["translation"].values[solved].max() < 1e-12
     again = experiment.solve(137, 1)["status"]
@@ -238,15 +216,11 @@ def test_draws_that_cannot_be_bolted_are_counted_as_not_assembled(tmp_path):
 
 FRAMES = """
 platform = "a"
-[[frame]]
-name = "a"
-parent = "base"
-clearance = { fit = "12 H7/g6", length = 0.04, parts = "pin" }
-[[frame]]
-name = "b"
-parent = "a"
-clearance = { fit = "12 H7/g6", length = 0.04, parts = "pin" }
-"""
+frame = [
+    { name = "a", parent = "base", clearance = { fit = "12 H7/g6", length = 0.04, parts = "pin" } },
+    { name = "b", parent = "a", clearance = { fit = "12 H7/g6", length = 0.04, parts = "pin" } },
+]
+"""  # noqa: E501
 
 
 @pytest.mark.parametrize(
@@ -259,10 +233,10 @@ clearance = { fit = "12 H7/g6", length = 0.04, parts = "pin" }
         ("length = 0.04", "length = -1", "clearance.length: found -1"),
     ],
 )
-def test_mistake_in_a_fitted_frame_is_reported_in_one_line(tmp_path, old, new, message):
-    path = tmp_path / "frames.toml"
-    path.write_text(FRAMES.replace(old, new, 1))
+def test_mistake_in_a_fitted_frame_is_reported_in_one_line(
+    write_file, old, new, message
+):
     with pytest.raises(BadInput) as error:
-        read_robot(path)
+        read_robot(write_file(FRAMES.replace(old, new, 1)))
     assert message in str(error.value)
     assert "\n" not in str(error.value)

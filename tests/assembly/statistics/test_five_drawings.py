@@ -7,204 +7,89 @@ contact's gap times its lever, worked without the program.
 import numpy as np
 import pytest
 
+from forcefit import BadInput, worst_pose
 from forcefit.assembly.files.robot_file import read_robot
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.statistics.callout_sources import sources_of
 from forcefit.assembly.statistics.linear_response import linear_response
 from forcefit.assembly.statistics.tolerance_file import read_plan
-from forcefit.assembly.statistics.worst_pose import worst_pose
-from forcefit.inputs.table import BadInput
 
 # a shaft in two bearings of a house; its front bore is coaxial with the seat
 SHAFT = """
 format = 2
-name = "shaft"
 platform = "shaft"
 platform_at = [0, 0, "300 mm"]
-[[body]]
-name = "house"
-[[body.tolerance]]
-feature = "front"
-datums = ["seat"]
-coaxiality = "0.02 mm"
-extent = "15 mm"
-[[body]]
-name = "shaft"
-[[joint]]
-name = "seat"
-type = "fixed"
-between = ["base", "house"]
-at = [0, 0, 0]
-axis = [0,0,1]
-[[joint]]
-name = "front"
-type = "revolute"
-between = ["house", "shaft"]
-at = [0, 0, "100 mm"]
-axis = [0, 0, 1]
-actuated = true
-clearance = { bearings = [ {z = 0, fit = "20 H7/h6"}, {z = "60 mm", fit="15 H7/h6"} ] }
-"""
+body = [
+    { name = "house", tolerance = [{ feature = "front", datums = ["seat"], coaxiality = "0.02 mm", extent = "15 mm" }] },
+    { name = "shaft" },
+]
+joint = [
+    { name = "seat", type = "fixed", between = ["base", "house"], at = [0, 0, 0], axis = [0, 0, 1] },
+    { name = "front", type = "revolute", between = ["house", "shaft"], at = [0, 0, "100 mm"], axis = [0, 0, 1], actuated = true, clearance = { bearings = [{ z = 0, fit = "20 H7/h6" }, { z = "60 mm", fit = "15 H7/h6" }] } },
+]
+"""  # noqa: E501
 # a block in a guide; the rail is positioned on its foot
 GUIDE = """
 format = 2
-name = "guide"
 platform = "block"
 platform_at = [0, 0, "200 mm"]
-[[body]]
-name = "rail"
-[[body.tolerance]]
-feature = "slide"
-datums = ["foot"]
-position = "0.05 mm"
-parallelism = "0.03 mm"
-extent = "80 mm"
-[[body]]
-name = "block"
-[[joint]]
-name = "foot"
-type = "fixed"
-between = ["base", "rail"]
-at = [0, 0, 0]
-axis = [0,0,1]
-[[joint]]
-name = "slide"
-type = "prismatic"
-between = ["rail", "block"]
-at = [0, 0, 0]
-axis = [0, 0, 1]
-actuated = true
-[joint.clearance]
-guide = { fit = "40 H7/g6", length = "80 mm", width = "40 mm", height = "30 mm" }
-"""
+body = [
+    { name = "rail", tolerance = [{ feature = "slide", datums = ["foot"], position = "0.05 mm", parallelism = "0.03 mm", extent = "80 mm" }] },
+    { name = "block" },
+]
+joint = [
+    { name = "foot", type = "fixed", between = ["base", "rail"], at = [0, 0, 0], axis = [0, 0, 1] },
+    { name = "slide", type = "prismatic", between = ["rail", "block"], at = [0, 0, 0], axis = [0, 0, 1], actuated = true, clearance = { guide = { fit = "40 H7/g6", length = "80 mm", width = "40 mm", height = "30 mm" } } },
+]
+"""  # noqa: E501
 # a crank with the general tolerances of ISO 2768-mK; its second bore is square
 LINK = """
 format = 2
-name = "link"
 platform = "tip"
 platform_at = ["700 mm", 0, 0]
-[[body]]
-name = "crank"
-[[body.tolerance]]
-feature = "elbow"
-datums = ["root"]
-general = "ISO 2768-mK"
-extent = "30 mm"
-[[body]]
-name = "tip"
-[[joint]]
-name = "root"
-type = "revolute"
-between = ["base", "crank"]
-at = [0, 0, 0]
-axis = [0, 1, 0]
-actuated = true
-[[joint]]
-name = "elbow"
-type = "revolute"
-between = ["crank", "tip"]
-at = ["400 mm", 0, 0]
-axis = [0, 0, 1]
-actuated = true
-"""
+body = [
+    { name = "crank", tolerance = [{ feature = "elbow", datums = ["root"], general = "ISO 2768-mK", extent = "30 mm" }] },
+    { name = "tip" },
+]
+joint = [
+    { name = "root", type = "revolute", between = ["base", "crank"], at = [0, 0, 0], axis = [0, 1, 0], actuated = true },
+    { name = "elbow", type = "revolute", between = ["crank", "tip"], at = ["400 mm", 0, 0], axis = [0, 0, 1], actuated = true },
+]
+"""  # noqa: E501
 # a plate whose hole is measured from a side face that is out of square
 PLATE = """
 format = 2
-name = "plate"
 platform = "pin"
 platform_at = ["80 mm", 0, "60 mm"]
-[[body]]
-name = "plate"
-[[body.tolerance]]
-feature = "hole"
-datums = ["side", "face"]
-position = "0.05 mm (M)"
-hole = "12 H7"
-extent = "20 mm"
-[[body.tolerance]]
-feature = "side"
-datums = ["face"]
-perpendicularity = "0.05 mm"
-extent = ["60 mm", "40 mm"]
-[[body]]
-name = "pin"
-[[body]]
-name = "stopA"
-[[body]]
-name = "stopB"
-[[joint]]
-name = "mount"
-type = "fixed"
-between = ["base", "plate"]
-at = ["40 mm", 0, 0]
-[[joint]]
-name = "face"
-type = "planar"
-between = ["plate", "stopA"]
-at = [0, 0, 0]
-axis = [0,0,1]
-[[joint]]
-name = "side"
-type = "planar"
-between = ["plate", "stopB"]
-at = [0, 0, 0]
-axis = [1, 0, 0]
-[[joint]]
-name = "hole"
-type = "revolute"
-between = ["plate", "pin"]
-at = ["80 mm", 0, 0]
-axis = [0, 0, 1]
-actuated = true
-clearance = { fit = "12 H7/g6", length = "20 mm" }
-"""
+body = [
+    { name = "plate", tolerance = [
+        { feature = "hole", datums = ["side", "face"], position = "0.05 mm (M)", hole = "12 H7", extent = "20 mm" },
+        { feature = "side", datums = ["face"], perpendicularity = "0.05 mm", extent = ["60 mm", "40 mm"] },
+    ] },
+    { name = "pin" }, { name = "stopA" }, { name = "stopB" },
+]
+joint = [
+    { name = "mount", type = "fixed", between = ["base", "plate"], at = ["40 mm", 0, 0] },
+    { name = "face", type = "planar", between = ["plate", "stopA"], at = [0, 0, 0], axis = [0, 0, 1] },
+    { name = "side", type = "planar", between = ["plate", "stopB"], at = [0, 0, 0], axis = [1, 0, 0] },
+    { name = "hole", type = "revolute", between = ["plate", "pin"], at = ["80 mm", 0, 0], axis = [0, 0, 1], actuated = true, clearance = { fit = "12 H7/g6", length = "20 mm" } },
+]
+"""  # noqa: E501
 # a bracket on a face A and a hole B at maximum material, with a bore C
 BRACKET = """
 format = 2
-name = "bracket"
 platform = "rod"
 platform_at = ["300 mm", 0, "20 mm"]
-
-[[body]]
-name = "bracket"
-[[body.tolerance]]
-feature = "C"
-name = "bore C"
-datums = ["A", "B (M)"]
-datum_hole = "12 H7"
-position = "0.04 mm"
-perpendicularity = "0.02 mm"
-extent = "20 mm"
-[[body]]
-name = "rod"
-[[body.tolerance]]
-feature = "C"
-cylindricity = "0.006 mm"
-
-[[joint]]
-name = "A"
-type = "planar"
-between = ["base", "bracket"]
-at = [0, 0, 0]
-axis = [0, 0, 1]
-clearance = { pad = { gap = "5 um", length = "60 mm", width = "40 mm" } }
-[[joint]]
-name = "B"
-type = "revolute"
-between = ["base", "bracket"]
-at = [0, 0, 0]
-axis = [0, 0, 1]
-actuated = true
-clearance = { fit = "12 H7/g6", axial="1 mm", tilt="10 mrad" }
-[[joint]]
-name = "C"
-type = "revolute"
-between = ["bracket", "rod"]
-at = ["100 mm", 0, "20 mm"]
-axis = [0, 0, 1]
-actuated = true
-clearance = { fit = "10 H7/h6", length = "20 mm" }
-"""
+body = [
+    { name = "bracket", tolerance = [{ feature = "C", name = "bore C", datums = ["A", "B (M)"], datum_hole = "12 H7", position = "0.04 mm", perpendicularity = "0.02 mm", extent = "20 mm" }] },
+    { name = "rod", tolerance = [{ feature = "C", cylindricity = "0.006 mm" }] },
+]
+joint = [
+    { name = "A", type = "planar", between = ["base", "bracket"], at = [0, 0, 0], axis = [0, 0, 1], clearance = { pad = { gap = "5 um", length = "60 mm", width = "40 mm" } } },
+    { name = "B", type = "revolute", between = ["base", "bracket"], at = [0, 0, 0], axis = [0, 0, 1], actuated = true, clearance = { fit = "12 H7/g6", axial = "1 mm", tilt = "10 mrad" } },
+    { name = "C", type = "revolute", between = ["bracket", "rod"], at = ["100 mm", 0, "20 mm"], axis = [0, 0, 1], actuated = true, clearance = { fit = "10 H7/h6", length = "20 mm" } },
+]
+"""  # noqa: E501
 
 
 def bore_variance(radius, length, height):
@@ -243,16 +128,10 @@ CASES = {
 }  # fmt: skip
 
 
-def read(tmp_path, text):
-    path = tmp_path / "robot.toml"
-    path.write_text(text)
-    return read_robot(path)
-
-
 @pytest.mark.parametrize("name", CASES)
-def test_worst_case_of_a_drawing_equals_hand_calculation(tmp_path, name):
+def test_worst_case_of_a_drawing_equals_hand_calculation(write_file, name):
     text, expected, _ = CASES[name]
-    robot = read(tmp_path, text)
+    robot = read_robot(write_file(text))
     prepared = linear_response(home_posture(robot))
     worst = worst_pose(prepared, sources_of(robot), "translation")
     assert worst.attained == pytest.approx(expected * um, rel=1e-6)
@@ -262,10 +141,10 @@ def test_worst_case_of_a_drawing_equals_hand_calculation(tmp_path, name):
 @pytest.mark.parametrize(
     "name", [n for n, case in CASES.items() if case[2] is not None]
 )
-def test_standard_deviations_of_a_drawing_equal_hand_calculation(tmp_path, name):
+def test_standard_deviations_of_a_drawing_equal_hand_calculation(write_file, name):
     """200 000 draws have a deviation within 0.3 % of the true one."""
     text, _, expected = CASES[name]
-    moved = translations(read(tmp_path, text))
+    moved = translations(read_robot(write_file(text)))
     assert moved.std(axis=0) == pytest.approx(np.array(expected) * um, rel=0.006)
 
 
@@ -277,12 +156,12 @@ def translations(robot):
 
 
 def test_variance_of_a_bracket_is_that_of_its_bore_plus_that_of_its_datum_shift(
-    tmp_path,
+    write_file,
 ):
     """Perpendicularity 0.02 in position 0.04 on 20 mm: an own sample of both ends in
     their discs.  The tilt moves a point 200 mm away along z; the datum's shift of up
     to 9 um adds 81/12 um^2 along x and y."""
-    moved = translations(read(tmp_path, BRACKET))
+    moved = translations(read_robot(write_file(BRACKET)))
     rng = np.random.default_rng(11)
     angle, radius = rng.uniform(0, 2 * np.pi, (2, 400_000)), rng.random((2, 400_000))
     ends = 20 * np.sqrt(radius) * np.stack([np.cos(angle), np.sin(angle)])
@@ -296,8 +175,8 @@ def test_variance_of_a_bracket_is_that_of_its_bore_plus_that_of_its_datum_shift(
     )
 
 
-def test_callout_at_maximum_material_is_not_allocated(tmp_path):
-    robot = read(tmp_path, PLATE)
+def test_callout_at_maximum_material_is_not_allocated(tmp_path, write_file):
+    robot = read_robot(write_file(PLATE))
     plan = tmp_path / "plan.toml"
     plan.write_text(
         "yield = 0.9\n[limits]\ntranslation = 3e-4\n[[tolerance]]\n"

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from forcefit import Frame, MatrixLink, Robot
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.model.error_distributions import tolerance_sources
-from forcefit.assembly.model.robot import Frame, MatrixLink, Robot
 from forcefit.assembly.robots import load_robot
 from forcefit.assembly.statistics.clearance_positions import CLEARANCE_MODELS
 from forcefit.assembly.statistics.experiment import Experiment

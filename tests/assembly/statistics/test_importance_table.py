@@ -1,11 +1,16 @@
-"""The importance table of a linear platform whose indices are known."""
+"""Importance of errors: levers by hand, known indices, central differences."""
 
 import numpy as np
 import pytest
 
-from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.model.error_distributions import tolerance_sources
+from forcefit.assembly.robots import load_robot
 from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.importance_slopes import (
+    platform_gains,
+    platform_slopes,
+)
 from forcefit.assembly.statistics.importance_table import (
     ImportanceOptions,
     importance_dataset,
@@ -14,22 +19,31 @@ from forcefit.assembly.statistics.importance_table import (
     importance_rows,
     importance_text,
 )
-from tests import tolerances_for_tests
+from forcefit.assembly.statistics.linear_response import linear_response
+from forcefit.assembly.statistics.ranking import (
+    kind_of,
+    leaders,
+    named_together,
+    possible_ranks,
+    rank_text,
+    shares_sentence,
+)
+from tests.tolerances_for_tests import arm
 
 WIDTHS = np.array([2e-3, 0, 0, 3e-4, 4e-4, 0.0])
 NAMES = ["tip.RX", "tip.TX", "tip.TY"]
 
 
-def arm(**options):
+def driven_arm(**options):
     """A driven arm; its tip follows its errors, of an angle and of two lengths."""
-    robot = tolerances_for_tests.arm()
+    robot = arm()
     sources = tolerance_sources(robot, WIDTHS, ("tip",))
     return Experiment(home_posture(robot), sources, margins=False, **options)
 
 
 def solved(by="source", draws=400, **options):
     """The data set of an arm without clearance, and its plain values."""
-    experiment = arm(clearance="least", **options)
+    experiment = driven_arm(clearance="least", **options)
     design = importance_design(experiment, ImportanceOptions(draws, by))
     rows = importance_rows(experiment, design, 0, len(design))
     data = importance_dataset(experiment, design, rows)
@@ -76,7 +90,7 @@ def test_group_of_angles_and_lengths_has_a_standard_deviation_but_no_gain():
 
 def test_draws_without_a_solution_are_reported_with_the_reason():
     """At most 5 % may be left out; beyond, the remaining draws are not independent."""
-    experiment = arm(clearance="least")
+    experiment = driven_arm(clearance="least")
     design = importance_design(experiment, ImportanceOptions(100, "source"))
     rows = importance_rows(experiment, design, 0, len(design))
     for lost, reason in ((4, None), (6, "6.0%")):
@@ -89,17 +103,11 @@ def test_draws_without_a_solution_are_reported_with_the_reason():
         lines = importance_text(report).splitlines()
         if reason is None:
             assert "reason" not in one
-            assert (
-                "translation: up to 4.0% of the draws have no solution and are left out"
-                in lines
-            )
+            said = "up to 4.0% of the draws have no solution and are left out"
+            assert f"translation: {said}" in lines
             assert report["platform"]["tip.TX"]["translation_gain"] > 0.5
             continue
-        assert one["reason"] == (
-            "no indices are computed if more than 5% of the draws have no solution: "
-            "up to 6.0% were left out, and the errors of the other draws are not "
-            "independent"
-        )
+        assert "more than 5% of the draws have no solution: up to 6" in one["reason"]
         assert f"translation: {one['reason']}" in lines
         assert all(np.isnan(v).all() for v in one["total_index"].values())
         # no part of a platform that is not known
@@ -107,56 +115,105 @@ def test_draws_without_a_solution_are_reported_with_the_reason():
         assert np.isnan(parts).all()
 
 
-def told(units, left_out=0.0, rank=(1, 1)):
-    """The table's lines for a group of each unit, the first of the largest part."""
-    count = len(units)
-    platform = {
-        f"group{k}": {
-            "error_unit": unit, "translation_part": 1e-6 * (count - k),
-            "rotation_part": 2e-3 * (k + 1), "translation_gain": 0.5 + k,
-            "rotation_gain": 0.1,
-        }
-        for k, unit in enumerate(units)
-    }  # fmt: skip
-    index = {group: np.array([0.25, 0.2, 0.3]) for group in platform}
-    one = {
-        "total_index": index, "first_index": index, "largest_share_left_out": 0.0,
-        "rank": dict.fromkeys(platform, rank),
-    }  # fmt: skip
-    lines = importance_text({
-        "base_draws": 64, "clearance": "least", "platform": platform,
-        "quantities": {
-            "translation": one, "energy": one | {"largest_share_left_out": left_out},
-            "stress": one | {"reason": "it does not vary"},
-        },
-    }).splitlines()  # fmt: skip
-    assert lines[-1].startswith("largest: group0")
-    return lines[:-1]
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_gain_of_a_rotation_error_equals_its_lever_arm(seed):
+    """A turn of the pin moves a tip 0.4 m away by 0.4 um for each urad, along y or z.
+
+    Along x the tip stays, so the gain of RX is 0 in translation and 1 in rotation.
+    """
+    robot = arm()
+    sources = tolerance_sources(robot, [1e-3, 2e-3, 3e-3, 0, 0, 0], ("pin",))
+    experiment = Experiment(home_posture(robot), sources, seed, "least", margins=False)
+    design = importance_design(experiment, ImportanceOptions(16, "source"))
+    rotation, translation = platform_gains(experiment, design)
+    np.testing.assert_allclose(rotation, 1.0, rtol=1e-12)
+    np.testing.assert_allclose(translation, [0.0, 0.4, 0.4], atol=1e-12)
 
 
-def test_importance_table_has_um_per_um_for_lengths_and_um_per_mrad_for_angles():
-    head, stress, columns, length, angle, both = told(["m", "rad", "rad, m"])
-    assert "64 base draws" in head
-    assert stress == "stress: it does not vary"
-    begin = [columns.index(word) for word in ("for each um", "for each mrad", "[mrad]")]
-    assert length.split() == "group0 3 0.5 2 0.250 (0.200 to 0.300) 1".split()
-    assert begin[0] <= length.index(" 0.5 ") < begin[1]
-    # 1.5 m for each rad are 1500 um for each mrad
-    assert angle.split() == "group1 2 1500 4 0.250 (0.200 to 0.300) 1".split()
-    assert begin[1] <= angle.index(" 1500 ") < begin[2]
-    # rad and m together have no gain
-    assert both.split() == "group2 1 6 0.250 (0.200 to 0.300) 1".split()
-    ends = [len(line) for line in (length, angle, both)]
-    assert len(set(ends)) == 1
+def test_gain_of_a_group_is_the_root_mean_square_weighted_by_variance():
+    """RY at the pin (lever 0.4) and at the tip (none), deviations 1 and 2."""
+    robot = arm()
+    pin = tolerance_sources(robot, [0, 1e-3, 0, 0, 0, 0], ("pin", "tip"))
+    pin.scale[1] *= 2.0
+    experiment = Experiment(home_posture(robot), pin, 1, "least", margins=False)
+    design = importance_design(experiment, ImportanceOptions(16, "source"))
+    groups = [("both", np.arange(2))]
+    _, translation = platform_gains(
+        experiment, type(design)(design.A, design.B, groups)
+    )
+    assert translation[0] == pytest.approx(0.4 / np.sqrt(5), rel=1e-12)
 
 
-def test_importance_table_reports_omitted_draws_and_further_groups():
-    lines = told(["m"] * 18, left_out=0.015)
-    assert "energy: up to 1.5% of the draws have no solution and are left out" in lines
-    assert lines[-1] == "and 3 more, see --json"
-    assert [line.split()[0] for line in lines[-4:-1]] == [
-        "group12",
-        "group13",
-        "group14",
+@pytest.mark.parametrize(
+    ("name", "load"),
+    [
+        ("irsbot2", None),
+        ("irsbot2", [3.0, 0, -2.0, 20.0, -10.0, -60.0]),
+        ("five_bar", [0, 0, 0, 20.0, -10.0, 0]),
+    ],
+)
+def test_platform_slopes_equal_central_differences_also_under_load(name, load, rng):
+    """Differences of the screws of (22); springs are pressed by errors or loads."""
+    robot = load_robot(name)
+    pose = {"tx": 0.1, "tz": -0.5} if name == "irsbot2" else None
+    posture = place_robot(robot, pose=pose) if pose else home_posture(robot)
+    prepared = linear_response(posture, load)
+    touched = np.array([f.link is not None for f in robot.frames])[:, None]
+    size = np.array([5e-3] * 3 + [2e-4] * 3) * touched
+    errors = rng.normal(size=(4, *size.shape)) * size
+    draws = prepared.solve(errors)
+    slopes = platform_slopes(prepared, draws)
+    step = 1e-5 * rng.normal(size=size.shape) * size
+    ahead, back = (prepared.solve(errors + s).platform_screw for s in (step, -step))
+    along = np.einsum("ckni,ni->kc", slopes, step)
+    scale = np.abs(along).max(axis=0)
+    assert (ahead - back) / 2 / scale == pytest.approx(along / scale, abs=2e-3)
+
+
+def shares(**intervals):
+    return {name: ((a + b) / 2, a, b) for name, (a, b) in intervals.items()}
+
+
+def test_overlapping_intervals_share_ranks():
+    """a and b overlap, b and c overlap, a and c do not; d is certainly last."""
+    ranks = possible_ranks(
+        shares(a=(0.5, 0.7), b=(0.4, 0.6), c=(0.3, 0.45), d=(0.0, 0.1))
+    )
+    assert ranks == {"a": (1, 2), "b": (1, 3), "c": (2, 3), "d": (4, 4)}
+    assert leaders(ranks) == ["a", "b"]
+    assert [rank_text(ranks[k]) for k in "abd"] == ["1-2", "1-3", "4"]
+
+
+def test_shares_that_could_not_be_computed_have_no_rank():
+    nan = float("nan")
+    ranks = possible_ranks(shares(a=(0.5, 0.7)) | {"b": (nan, nan, nan)})
+    assert ranks == {"a": (1, 1)}
+    assert rank_text(ranks.get("b")) == ""
+    assert possible_ranks({}) == {}
+
+
+def test_legs_with_equal_shares_are_reported_as_all_legs():
+    every = [f"leg{i}.hinge.{c}" for i in (1, 2, 3) for c in ("RX", "RY")]
+    some = ["leg3.hinge.RX", "leg1.hinge.RX", "leg2.hinge.RX"]
+    assert named_together(some, every) == ["hinge.RX of all legs"]
+    # one leg is surely not among them: the two others by their names
+    assert named_together(some[:2], every) == some[:2]
+    assert named_together(["leg1.hinge.RY", *some], every) == [
+        "leg1.hinge.RY",
+        "hinge.RX of all legs",
     ]
-    assert "more" not in told(["m"] * 15)[-1]
+
+
+def test_error_of_a_robot_without_legs_is_reported_by_its_name():
+    assert named_together(["tip.RX"], ["tip.RX", "tip.RY"]) == ["tip.RX"]
+    assert kind_of("tip.RX") == "tip.RX"
+    assert kind_of("leg1.upper.pin.TZ") == "upper.pin.TZ"
+    assert kind_of("leg1.hinge") == "hinge"
+
+
+def test_sentence_states_no_share_beyond_the_whole_variance():
+    few = [("bore", (0.78, 0.3, 1.63)), ("pin", (0.01, -0.02, 0.02))]
+    assert shares_sentence(few, "translation") == (
+        "bore: 78 % of the variance of the translation (30 to 100 %); "
+        "pin: 1 % (0 to 2 %)"
+    )

@@ -1,12 +1,11 @@
-"""Many draws of errors at one posture, against single solutions."""
+"""Many draws of errors at one posture: properties, and single solutions."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from forcefit.assembly.kinematics.posture import place_robot
-from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
+from forcefit import CannotAssemble, place_robot, solve_assembly, zone_margin
 from forcefit.assembly.linear.reference.reduction import FreeMotion
 from forcefit.assembly.robots import load_robot
 from forcefit.assembly.solvers.conic import SolverFailed
@@ -19,6 +18,31 @@ ROBOTS = ["irsbot2", "five_bar", "3rrr", "orthoglide", "hexapod", "arm6"]
 LOAD, GRAVITY = [1.0, 2.0, 3.0, 30.0, 10.0, -100.0], [1.0, 2.0, -9.81]
 
 
+def assert_equal_single_solutions(posture, errors, *loads):
+    """Both certify 1e-8 of the energy, so wrenches agree to about its root, 1e-4.
+
+    With a load the energy without its work is compared in the certificate.
+    """
+    found = linear_response(posture, *loads).solve(errors)
+    wrenches = found.wrenches
+    for i, own in enumerate(errors):
+        try:
+            erring = replace(posture, robot=posture.robot.with_errors(own))
+            answer = solve_assembly(erring, loads[0], gravity=loads[1])
+        except (CannotAssemble, FreeMotion, SolverFailed):
+            assert np.isnan(found.energy[i])
+            continue
+        allowed = 3e-8 * answer.energy + 3e-12 * answer.energy_without_clearance + 1e-20
+        assert 0.0 <= found.duality_gap()[i] <= allowed
+        unloaded = loads == (None, None)
+        spread = {"abs": allowed} if unloaded else {"rel": 1e-6, "abs": 1e-12}
+        assert found.energy[i] == pytest.approx(answer.energy, **spread)
+        if answer.energy > 1e-6 * answer.energy_without_clearance:
+            off = np.abs(wrenches[i] - answer.wrenches).max()
+            limit = 3e-4 if unloaded else 1e-4
+            assert off <= limit * np.abs(answer.wrenches).max()
+
+
 @pytest.mark.parametrize("name", ROBOTS)
 @pytest.mark.parametrize(
     ("scale", "load", "gravity"),
@@ -26,24 +50,9 @@ LOAD, GRAVITY = [1.0, 2.0, 3.0, 30.0, 10.0, -100.0], [1.0, 2.0, -9.81]
      (4.0, LOAD, GRAVITY)],
 )  # fmt: skip
 def test_draws_equal_single_solutions(name, scale, load, gravity):
-    """Both certify 1e-8 of the energy, so wrenches agree to about its root, 1e-4."""
     robot = load_robot(name)
-    posture = place_robot(robot)
     errors = drawn_errors(robot, scale)
-    found = linear_response(posture, load, gravity).solve(errors)
-    wrenches = found.wrenches
-    for i, own in enumerate(errors):
-        erring = replace(posture, robot=robot.with_errors(own))
-        answer = solve_assembly(erring, load, gravity=gravity)
-        allowed = 2e-8 * answer.energy + 2e-12 * answer.energy_without_clearance
-        assert 0.0 <= found.duality_gap()[i] <= allowed
-        # with a load the energy without its work is compared in the certificate
-        spread = {"abs": allowed} if load is None else {"rel": 1e-6}
-        assert found.energy[i] == pytest.approx(answer.energy, **spread)
-        if answer.energy > 1e-6 * answer.energy_without_clearance:
-            off = np.abs(wrenches[i] - answer.wrenches).max()
-            limit = 3e-4 if load is None else 1e-4
-            assert off <= limit * np.abs(answer.wrenches).max()
+    assert_equal_single_solutions(place_robot(robot), errors, load, gravity)
 
 
 @pytest.mark.parametrize(
@@ -56,22 +65,10 @@ def test_draws_of_random_robots_equal_single_solutions(seed, load):
     draws = np.random.default_rng(seed + 100).normal(size=(4, len(robot.frames), 6))
     draws *= np.array([1e-3] * 3 + [1e-4] * 3)
     try:
-        found = linear_response(posture, load).solve(draws)
+        assert_equal_single_solutions(posture, draws, load, None)
     except ValueError:
         with pytest.raises(ValueError, match="motion"):
             solve_assembly(posture, load)
-        return
-    for i, own in enumerate(draws):
-        try:
-            erring = replace(posture, robot=robot.with_errors(own))
-            answer = solve_assembly(erring, load)
-        except (CannotAssemble, FreeMotion, SolverFailed):
-            assert np.isnan(found.energy[i])
-            continue
-        allowed = 3e-8 * answer.energy + 3e-12 * answer.energy_without_clearance + 1e-20
-        spread = {"abs": allowed} if load is None else {"rel": 1e-6, "abs": 1e-12}
-        assert found.energy[i] == pytest.approx(answer.energy, **spread)
-        assert found.duality_gap()[i] <= allowed
 
 
 def test_errors_of_a_wrong_shape_are_refused():
@@ -81,3 +78,45 @@ def test_errors_of_a_wrong_shape_are_refused():
         linear_response(posture).solve(np.zeros((3, 7, 6)))
     with pytest.raises(ValueError, match="all finite"):
         prepare_margins(posture).solve(np.full((1, 8, 6), np.nan))
+
+
+def test_margins_are_proportional_to_the_errors_and_convex():
+    """Euler: slope . errors is the margin; the margin of a mean is at most the mean."""
+    robot = load_robot("irsbot2")
+    errors = drawn_errors(robot, count=40)
+    ready = prepare_margins(place_robot(robot), "free")
+    found = ready.solve(errors)
+    work = (ready.slopes(found) * errors).sum(axis=(1, 2))
+    np.testing.assert_allclose(work, found.margin, rtol=1e-8)
+    halves = ready.solve((errors[:20] + errors[20:]) / 2)
+    # bounds lie below the least factor, margins above it; both by less than 1e-8
+    assert (halves.bound <= (found.margin[:20] + found.margin[20:]) / 2).all()
+    np.testing.assert_allclose(halves.bound, halves.margin, rtol=1e-8)
+    np.testing.assert_allclose(ready.solve(3 * errors).margin, 3 * found.margin, 1e-8)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_margins_of_draws_of_random_robots_equal_single_solutions(seed):
+    robot = random_robot(np.random.default_rng(seed))
+    posture = place_robot(robot)
+    draws = np.random.default_rng(seed + 100).normal(size=(3, len(robot.frames), 6))
+    draws *= np.array([1e-3] * 3 + [1e-4] * 3)
+    for compliant in ("rigid", "free"):
+        found = prepare_margins(posture, compliant).solve(draws)
+        for i, own in enumerate(draws):
+            one = replace(posture, robot=robot.with_errors(own))
+            zone = zone_margin(one, compliant)
+            assert found.margin[i] == pytest.approx(zone.margin, rel=1e-6)
+
+
+def test_errors_that_cannot_be_closed_have_infinite_compiled_margins():
+    """A planar four-bar whose coupler is out of the plane by more than rounding."""
+    robot = load_robot("four_bar")
+    tight = tuple(replace(f, clearance=None) for f in robot.frames)
+    robot = replace(robot, frames=tight)
+    errors = np.zeros((5, len(robot.frames), 6))
+    errors[1:, 2, 5] = 1e-9, 1e-6, 1e-3, -1.0
+    for compliant in ("rigid", "free"):
+        found = prepare_margins(place_robot(robot), compliant).solve(errors)
+        assert set(found.method) == {"compiled"}
+        assert found.margin.tolist() == found.bound.tolist() == [0.0] + [np.inf] * 4

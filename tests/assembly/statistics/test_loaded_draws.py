@@ -7,20 +7,19 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from forcefit import BadInput, BeamLink, Clearance, Frame, MatrixLink, Robot
 from forcefit.assembly.files.robot_file import write_robot
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.model.error_distributions import (
     draw_generator,
     tolerance_sources,
 )
-from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
 from forcefit.assembly.robots import load_robot
 from forcefit.assembly.statistics.clearance_positions import position_clearances
 from forcefit.assembly.statistics.experiment import Experiment
 from forcefit.assembly.statistics.linear_response import linear_response
 from forcefit.assembly.statistics.monte_carlo import run_draws
 from forcefit.commands.assembly import app
-from forcefit.inputs.table import BadInput
 from tests.tolerances_for_tests import drawn_errors
 
 LOAD = [1.0, 2.0, 3.0, 30.0, 10.0, -100.0]

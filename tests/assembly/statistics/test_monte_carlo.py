@@ -7,7 +7,7 @@ import sys
 import pytest
 import xarray
 
-from forcefit.assembly.kinematics.posture import place_robot
+from forcefit import place_robot
 from forcefit.assembly.model.error_distributions import tolerance_sources
 from forcefit.assembly.robots import load_robot
 from forcefit.assembly.statistics import monte_carlo
@@ -118,9 +118,7 @@ def test_statistics_and_tolerances_commands_write_results_and_figures(
     assert said["draws"] == 200
     assert 0 < said["within_limits"]["probability"] < 1
     assert len(said["safety"]) == 4
-    assert (
-        said["clearance"] == said["quantities"]["translation"]["clearance"] == "worst"
-    )
+    assert said["quantities"]["translation"]["clearance"] == "worst"
     assert "link_a.TX" in said["importance"]["platform"]
     status, _, _ = run(
         "assembly", "tolerances", "irsbot2", "--grid", "tx=-0.1:0.1:0.2,tz=-0.5",
@@ -130,13 +128,9 @@ def test_statistics_and_tolerances_commands_write_results_and_figures(
     found = json.loads((tmp_path / "t.json").read_text())["allocation"]
     assert found["worst"]["margin_free"]["proven"] == pytest.approx(1, rel=1e-3)
     with xarray.open_dataset(tmp_path / "d.nc", engine="h5netcdf") as data:
-        figure = histogram_figure(data)
-        assert len(figure.axes) == 8
-        assert (
-            "pose errors: clearance worst: largest pose errors" in figure.get_suptitle()
-        )
-        assert "of the 200 of 200 draws that assemble" in figure.get_suptitle()
-        assert sum(panel.get_title() == "clearance worst" for panel in figure.axes) == 2
+        title = histogram_figure(data).get_suptitle()
+        assert "pose errors: clearance worst: largest pose errors" in title
+        assert "of the 200 of 200 draws that assemble" in title
         assert len(tornado_figure(data).axes) == 6
         with pytest.raises(ValueError, match="need a data set of draws"):
             histogram_figure(data.drop_vars("energy"))

@@ -1,7 +1,5 @@
 """Perfect parts: clearances by hand, and limits exceeded by clearances alone."""
 
-import json
-
 import numpy as np
 import pytest
 
@@ -90,27 +88,6 @@ def test_advice_names_the_clearances_if_perfect_parts_exceed_the_limit(
     assert ("no tolerance of the errors meets it" in text) == broken
     assert answer == ("the clearances" if broken else "nothing")
     assert "perfect parts, clearances alone: rotation of 0.002 rad (pin.tilt" in text
-
-
-def test_report_names_equal_legs_together(tmp_path, run):
-    """Three equal errors by symmetry: all legs govern the result."""
-    (tmp_path / "errors.toml").write_text(
-        ERRORS.replace("tip", "elbow").replace(
-            "0, 0, 0, 1e-6, 1e-6, 1e-6", "0, 1e-3, 0, 0, 0, 0"
-        )
-    )
-    page, written = tmp_path / "page.html", tmp_path / "s.json"
-    status, _, err = run(
-        "assembly", "statistics", "delta", "--errors", tmp_path / "errors.toml",
-        "--draws", 40, "--importance", 256, "--by", "source", "--clearance", "least",
-        "--report", page, "--json", written,
-    )  # fmt: skip
-    assert status == 0, err
-    quantities = json.loads(written.read_text())["importance"]["quantities"]
-    ranks = quantities["translation"]["rank"]
-    assert {tuple(rank) for rank in ranks.values()} == {(1, 3)}
-    answer, _ = tiles(page.read_text("utf-8"))["Tolerance to tighten"]
-    assert answer == "elbow.RY of all legs"
 
 
 def test_free_platform_is_reported_without_a_bound(tmp_path, run):

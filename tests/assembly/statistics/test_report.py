@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from forcefit import place_robot
 from forcefit.assembly.files.robot_file import write_robot
-from forcefit.assembly.kinematics.posture import place_robot
 from forcefit.assembly.model.error_distributions import read_sources
 from forcefit.assembly.robots import load_robot
 from forcefit.assembly.statistics.experiment import Experiment
@@ -18,16 +18,6 @@ from tests.pages_for_tests import parse
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 
 ERRORS = Path(__file__).parents[3] / "examples" / "hexapod_errors.toml"
-PLAN = """
-[[tolerance]]
-name = "link <length>"
-frames = ["link_a", "link_b"]
-components = ["TX"]
-[[tolerance]]
-name = "elbows"
-frames = ["elbow_a", "elbow_b"]
-components = ["RX", "RY"]
-"""
 
 
 def shown(path):
@@ -70,25 +60,6 @@ def test_draws_report_shows_the_numbers_of_the_summary(tmp_path, run):
     assert str(ERRORS.name) in " ".join(rows)  # with its digest
 
 
-def test_tolerance_report_shows_the_numbers_of_the_json(tmp_path, run):
-    (tmp_path / "plan.toml").write_text(PLAN)
-    page, written = tmp_path / "t.html", tmp_path / "t.json"
-    status, _, err = run(
-        "assembly", "tolerances", "irsbot2", "--grid", "tx=0.1,tz=-0.5", "--draws", 20,
-        "--plan", tmp_path / "plan.toml", "--report", page, "--json", written,
-    )  # fmt: skip
-    assert status == 0, err
-    results = json.loads(written.read_text())
-    seen, rows = shown(page)
-    assert seen.results == results
-    assert "<length>" not in page.read_text(encoding="utf-8")
-    for one in results["allocation"]["tolerances"]:
-        assert rows[one["name"]][0].value == one["tolerance"]
-    worst = results["allocation"]["worst"]["margin_free"]
-    cells = rows["zone margin, compliant joints free"]
-    assert [c.value for c in cells] == [1.0, worst["found"], worst["proven"]]
-
-
 def test_tolerance_report_ranks_the_declared_errors(tmp_path, run):
     write_robot(irsbot2_with(NUMBERS["cases"][0]), tmp_path / "robot.toml")
     page, written = tmp_path / "t.html", tmp_path / "t.json"
@@ -102,16 +73,6 @@ def test_tolerance_report_ranks_the_declared_errors(tmp_path, run):
     first = present["slopes"][0]
     assert rows[first["error"]][1].value == first["share_of_margin"]
     assert seen.numbers[0].value == present["largest_margin"]
-
-
-@pytest.mark.parametrize("command", ["statistics", "tolerances"])
-def test_report_with_a_wrong_ending_is_refused_before_solving(tmp_path, run, command):
-    status, printed, err = run(
-        "assembly", command, "hexapod", "--errors" if command == "statistics" else
-        "--grid", ERRORS, "--report", tmp_path / "x.txt",
-    )  # fmt: skip
-    assert (status, printed) == (2, "")
-    assert 'found the ending ".txt", expected an HTML page' in err
 
 
 def test_robot_in_the_report_has_the_platform_displacement_of_its_draw():
@@ -145,11 +106,3 @@ def test_report_maps_margins_over_a_grid_and_shows_the_tightest_robot():
     assert np.max(values) == present["largest_margin"]
     (scene,) = parse(tightest_robot(postures, present)).figures
     assert {one["name"] for one in scene["bodies"]} == {f.name for f in robot.frames}
-
-
-def test_report_shows_a_curve_for_a_line_and_no_map_for_one_posture():
-    robot = irsbot2_with(NUMBERS["cases"][0])
-    for grid, figures in (("tx=-0.1:0.1:0.1,tz=-0.5", 1), ("tx=0,tz=-0.5", 0)):
-        postures, _ = grid_postures(robot, grid)
-        shown_map = margin_map(postures, present_errors(postures))
-        assert len(parse(shown_map).figures) == figures

@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 
+from forcefit import BadInput, Clearance, Frame, Robot
 from forcefit.assembly.kinematics.posture import home_posture
-from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from forcefit.assembly.statistics.experiment import Experiment
 from forcefit.assembly.statistics.requirement import Requirement
-from forcefit.inputs.table import BadInput
-from tests.robots_for_tests import coaxial_beams
 from tests.tolerances_for_tests import PLAY, arm, plan_for, rigid_pair
 
 ENDS = [("one", 3), ("two", 3)]
@@ -36,13 +34,6 @@ def test_random_clearances_do_not_depend_on_the_batch():
     np.testing.assert_allclose(found[0], rows["translation"] / 1e-3, rtol=1e-9)
     # clearance of 0.1 mm beside an error of 1 mm
     assert np.ptp(found[0, -8:] - np.abs(values[-8:, 0]) / 1e-3) > 0.01
-
-
-def test_limit_without_a_computed_quantity_is_refused_before_solving():
-    posture = home_posture(coaxial_beams(np.zeros(6)))
-    plan = plan_for(posture.robot, ENDS, [1, 1], {"margin": 1.0, "stress": 1e6})
-    with pytest.raises(BadInput, match="limit stress: no link of beams has a shape"):
-        Requirement([posture], plan).experiments  # noqa: B018
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from forcefit.assembly.kinematics.posture import place_robot
-from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
-from forcefit.assembly.linear.zone import zone_margin
+from forcefit import CannotAssemble, place_robot, solve_assembly, zone_margin
 from forcefit.assembly.model.error_distributions import tolerance_sources
 from forcefit.assembly.robots import load_robot
 from forcefit.assembly.statistics.linear_response import linear_response

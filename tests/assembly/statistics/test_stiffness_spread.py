@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 import xarray
 
+from forcefit import Clearance, Frame, Robot, platform_stiffness
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.model.error_distributions import tolerance_sources
-from forcefit.assembly.model.robot import Clearance, Frame, Robot
-from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from forcefit.assembly.robots import load_robot
 from forcefit.assembly.statistics.experiment import Experiment
 from forcefit.assembly.statistics.monte_carlo import run_draws

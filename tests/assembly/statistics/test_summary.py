@@ -140,11 +140,3 @@ def test_limit_on_a_quantity_that_was_not_computed_is_refused(key):
         BadInput, match=f"^limit {key}: found a quantity that was not computed; "
     ):
         summarise(data, {"energy": 1.0, key: 1.0})
-
-
-def test_summary_without_assembled_draws_states_only_margins():
-    text = summary_text(summarise(draws(margin=[2.0, 3, 4], status=[1, 1, 1])))
-    assert text.splitlines()[-2:] == [
-        "of the 0 of 3 draws that assemble: no results",
-        "margin of all 3 draws: median 3 (-inf to inf), 95 % below 3.9 (3 to inf)",
-    ]

@@ -11,6 +11,7 @@ from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.linear.zone import zone_margin
 from forcefit.assembly.robots import load_robot
 from forcefit.assembly.statistics import verification
+from forcefit.assembly.statistics.quantities import UNITS, limit_names, parse_limit
 from forcefit.assembly.statistics.tolerance_file import read_plan
 from forcefit.assembly.statistics.tolerances import (
     grid_postures,
@@ -229,14 +230,24 @@ def test_errors_of_a_plan_have_the_requested_range_and_deviation(
     assert np.std(drawn) == pytest.approx(deviation, rel=0.02)
 
 
-def test_defaults_of_a_tolerance_file_are_as_documented(write_file):
-    """A cost of 1, from 0 to 0.1 rad or 10 mm, and assembly by clearance alone."""
-    tables = [f'[[tolerance]]\nframes = ["link_a"]\ncomponents = ["{c}"]\n' for c in
-              ("RX", "TX")]  # fmt: skip
-    plan = read_plan(write_file("".join(tables)), load_robot("irsbot2"))
-    np.testing.assert_array_equal(plan.costs, [1.0, 1.0])
-    np.testing.assert_array_equal(plan.least, [0.0, 0.0])
-    np.testing.assert_array_equal(plan.most, [0.1, 0.01])
-    assert plan.names == ("leg1.link_a.RX", "leg1.link_a.TX")
-    assert (plan.limits, plan.asked_yield) == ({"margin_free": 1.0}, 1.0)
-    assert (plan.draws, plan.seed, plan.cost) == (1000, 1, "reciprocal")
+@pytest.mark.parametrize("name", limit_names())
+def test_limit_is_read_with_and_without_spaces(name):
+    assert parse_limit(f"{name}=2.5e-4") == (name, 2.5e-4)
+    assert parse_limit(f" {name} = 3 ") == (name, 3.0)
+    assert UNITS[name]
+
+
+@pytest.mark.parametrize("number", ["0", "-1e-9", "inf", "nan", "", "2 J", "1=2"])
+def test_limit_that_is_not_a_positive_number_is_refused_with_its_text(number):
+    with pytest.raises(BadInput) as error:
+        parse_limit(f"force={number}")
+    expected = f'--limit force: found "{number}", expected a number > 0'
+    assert str(error.value) == expected
+
+
+def test_unknown_quantity_is_refused_with_the_nearest_name():
+    with pytest.raises(BadInput, match='unknown quantity "enrgy".*energy'):
+        parse_limit("enrgy=2")
+    for name in ("translation_lower", "duality_gap", "platform_screw", ""):
+        with pytest.raises(BadInput, match=f'^--limit: unknown quantity "{name}"'):
+            parse_limit(f"{name}=1")

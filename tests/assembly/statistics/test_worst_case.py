@@ -123,11 +123,8 @@ def test_energy_bound_of_a_spring_is_finite_along_its_axis_only():
     for component in (4, 5):
         places = [("two", 3), ("two", component)]
         sources = plan_for(robot, places, [1, 1], {}).sources
-        for across, bound in (
-            (0.0, K * 4e-8 / 2),
-            (1e-14, K * 4e-8 / 2),
-            (1e-9, np.inf),
-        ):
+        stored = K * 4e-8 / 2
+        for across, bound in ((0.0, stored), (1e-14, stored), (1e-9, np.inf)):
             found = bound_energy(prepared, sources, np.array([2e-4, across]))
             assert found == pytest.approx(bound, rel=1e-6)
 

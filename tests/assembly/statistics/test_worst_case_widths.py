@@ -94,14 +94,11 @@ def test_all_corners_of_the_tolerances_meet_the_limit_in_finite_geometry(tmp_pat
     a, b = allotted(tmp_path, [arm()], OF_ARM).tolerances
 
     def tip(first, second):
-        return first * np.array([np.cos(0.5), np.sin(0.5)]) + second * np.array([
-            np.cos(1.3),
-            np.sin(1.3),
-        ])
+        return first * np.exp(0.5j) + second * np.exp(1.3j)
 
     signs = itertools.product((-1, 1), repeat=2)
     corners = [tip(0.4 + s * a, 0.3 + t * b) - tip(0.4, 0.3) for s, t in signs]
-    largest = np.linalg.norm(corners, axis=1).max()
+    largest = np.abs(corners).max()
     assert 0.998 * LIMIT < largest <= LIMIT * (1 + 1e-9)
 
 
@@ -123,11 +120,10 @@ def test_posture_of_the_larger_error_determines_the_tolerances(tmp_path):
 
 def test_shares_of_the_lengths_in_the_rotation_of_a_four_bar_equal_hand_calculation(
     tmp_path,
+    write_file,
 ):
     """Least 1/a + 4/b with (ca a + cb b)/lever <= limit: a, b as sqrt(cost/c)."""
-    path = tmp_path / "four_bar.toml"
-    path.write_text(four_bar_file())
-    robot = read_robot(path)
+    robot = read_robot(write_file(four_bar_file()))
     text = PLAN.format(
         limit="rotation = 1e-4", first="B on crank", second="C on rocker"
     )
@@ -138,21 +134,12 @@ def test_shares_of_the_lengths_in_the_rotation_of_a_four_bar_equal_hand_calculat
     assert found.tolerances == pytest.approx(best, rel=2e-3)
 
 
-@pytest.mark.parametrize(
-    ("limit", "message"),
-    [
-        ("energy = 1.0", "yield: found 1 with callouts and a limit on energy"),
-        ("translation = 1e-5", "limit translation: "),
-    ],
-)
-def test_worst_case_that_cannot_be_allocated_is_refused(tmp_path, limit, message):
+def test_limit_below_the_clearance_of_a_fit_is_refused(tmp_path):
     clearance = {"clearance": Clearance(radial=10.25e-6)}
     robot = replace(arm(**clearance), fits={"elbow": "12 H7/g6"})
-    text = PLAN.format(limit=limit, first="arm", second="hand")
-    with pytest.raises(BadInput) as error:
+    text = PLAN.format(limit="translation = 1e-5", first="arm", second="hand")
+    with pytest.raises(BadInput, match="^limit translation: [^\n]*$"):
         allotted(tmp_path, [robot], text)
-    assert message in str(error.value)
-    assert "\n" not in str(error.value)
 
 
 def test_over_constrained_parts_with_clearance_are_refused(tmp_path):

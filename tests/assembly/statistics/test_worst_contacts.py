@@ -2,6 +2,7 @@
 
 import pytest
 
+from forcefit import worst_pose
 from forcefit.assembly.files.robot_file import read_robot
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.model.joint_names import joint_of
@@ -9,7 +10,6 @@ from forcefit.assembly.statistics.callout_sources import sources_of
 from forcefit.assembly.statistics.experiment import Experiment
 from forcefit.assembly.statistics.linear_response import linear_response
 from forcefit.assembly.statistics.perfect_parts import perfect_parts
-from forcefit.assembly.statistics.worst_pose import worst_pose
 from tests.guided_stage_for_tests import STAGE
 
 # [rad, m] largest value; part of each joint: its derivative with respect to the

@@ -86,11 +86,9 @@ def linear_sizes(robot, seed):
 
 
 @pytest.mark.slow
-def test_yields_of_callouts_equal_those_of_finite_geometry(tmp_path):
+def test_yields_of_callouts_equal_those_of_finite_geometry(write_file):
     """20 cases, 95 % intervals: one miss is expected, four have a chance of 1.6 %."""
-    path = tmp_path / "four_bar.toml"
-    path.write_text(four_bar_file())
-    four_bar = read_robot(path)
+    four_bar = read_robot(write_file(four_bar_file()))
     inside = []
     for case in range(20):
         rng = np.random.default_rng([7, case])

@@ -113,18 +113,6 @@ def test_flipped_bit_in_a_journal_drops_only_its_record(whole, tmp_path):
     assert go_on(sweep, tmp_path, bytes(spoilt)) == (expected, [3])
 
 
-def test_journal_record_of_another_sweep_is_ignored(whole, tmp_path):
-    sweep, expected, kept = whole
-    other, path = small_sweep(near=0.5), tmp_path / "other.nc"
-    run_sweep(other, path, lambda *_: kept.update(other=read_if(journal_path(path))))
-    theirs = kept["other"][kept["other"].index(b"\n") + 1 :]
-    assert go_on(sweep, tmp_path, kept[4] + theirs) == (expected, [1, 2, 3])
-
-
-def read_if(path):
-    return path.read_bytes() if path.exists() else b""
-
-
 def test_block_changed_during_the_sweep_is_refused_with_one_message(whole, tmp_path):
     sweep, expected, _ = whole
     path = tmp_path / "map.nc"
@@ -240,12 +228,8 @@ def test_file_that_is_not_a_journal_is_refused_and_unchanged(tmp_path):
 
 def test_block_size_does_not_change_the_results():
     """Blocks of 4 and of 15 points give bit-identical results."""
-    options = {
-        "assumption": "frozen",
-        "wrenches": ("left.elbow",),
-        "clearance_only": True,
-    }
-    small = small_sweep(**options)
+    small = small_sweep(assumption="frozen", wrenches=("left.elbow",),
+                        clearance_only=True)  # fmt: skip
     one = sweep_in_memory(small)
     other = sweep_in_memory(replace(small, block_size=15))
     assert one.identical(other)

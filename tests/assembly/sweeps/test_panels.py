@@ -42,13 +42,6 @@ def test_map_shows_the_named_component(data, name, at, scale, title):
     assert panel.get_title().startswith(title)
 
 
-def test_translation_panel_shows_the_norm_of_the_platform_translation(data):
-    (panel, *_) = ff.show(data, quantities=["translation"]).axes
-    parts = data["platform_screw"].sel(screw=["TX", "TY", "TZ"])
-    expected = np.linalg.norm(parts.transpose("ty", "tx", "screw").values, axis=2)
-    np.testing.assert_allclose(shown(panel), 1e3 * expected, rtol=1e-12)
-
-
 def test_variable_without_a_component_plots_all_its_components(data):
     figure = ff.show(data.isel(ty=[0]), quantities=["stiffness", "energy"])
     lines = [panel for panel in figure.axes if panel.lines]

@@ -32,20 +32,38 @@ def test_derivative_by_the_modulus_equals_minus_the_share_of_the_links():
     np.testing.assert_allclose(slope * young / size, -sum(links) / size, atol=1e-6)
 
 
-def test_derivative_by_the_length_of_a_bar_equals_the_textbook(tmp_path):
-    """d(L/EA)/dL = 1/EA, d(L^2/2EI)/dL = L/EI of a single arm."""
-    path = tmp_path / "bar.toml"
-    path.write_text("""
-name = "bar"
+BAR = """
 platform = "tip"
 [[frame]]
 name = "tip"
-parent = "base"
+parent = "PARENT"
 translation = [0.5, 0.0, 0.0]
 link = { beam = { radius = 0.01 }, young = 7e10, poisson = 0.3 }
-""")
-    name = "tip.translation.x"
-    slope = stiffness_slopes(load_design(path), [name])[name]
+"""
+DRIVE = """
+[[frame]]
+name = "drive"
+parent = "base"
+joint = "revolute"
+actuated = true
+"""
+EFFECT = """
+[[effect]]
+name = "drive_compliance"
+parameters = { drive = 5e4 }
+"""
+
+
+def slope_by_length(tmp_path, text):
+    """dC / dL of a bar along x, clamped or on a drive."""
+    path, name = tmp_path / "bar.toml", "tip.translation.x"
+    path.write_text(text)
+    return stiffness_slopes(load_design(path), [name])[name]
+
+
+def test_derivative_by_the_length_of_a_bar_equals_the_textbook(tmp_path):
+    """d(L/EA)/dL = 1/EA, d(L^2/2EI)/dL = L/EI of a single arm."""
+    slope = slope_by_length(tmp_path, BAR.replace("PARENT", "base"))
     area, inertia = np.pi * 1e-4, np.pi * 1e-8 / 4
     assert slope[3, 3] == pytest.approx(1 / (7e10 * area), rel=1e-6)
     assert slope[2, 4] == pytest.approx(0.5 / (7e10 * inertia), rel=1e-6)
@@ -69,34 +87,11 @@ def test_stiffness_command_computes_derivatives_at_the_exact_equilibrium(run):
 
 def test_slopes_include_the_effects_of_the_file(tmp_path):
     """A drive of k = 5e4 N m/rad below an arm L adds L^2/k; its slope is 2 L/k."""
-    arm = """
-name = "arm"
-platform = "tip"
-[[frame]]
-name = "drive"
-parent = "base"
-joint = "revolute"
-actuated = true
-[[frame]]
-name = "tip"
-parent = "drive"
-translation = [0.5, 0.0, 0.0]
-link = { beam = { radius = 0.01 }, young = 7e10, poisson = 0.3 }
-"""
-    effect = """
-[[effect]]
-name = "drive_compliance"
-parameters = { drive = 5e4 }
-"""
-    slopes = []
-    for text in (arm, arm + effect):
-        path = tmp_path / "arm.toml"
-        path.write_text(text)
-        name = "tip.translation.x"
-        slopes.append(stiffness_slopes(load_design(path), [name])[name])
+    arm = BAR.replace("PARENT", "drive") + DRIVE
+    rigid, soft = (slope_by_length(tmp_path, text) for text in (arm, arm + EFFECT))
     difference = np.zeros((6, 6))
     difference[4, 4], difference[2, 4], difference[4, 2] = 2 * 0.5 / 5e4, 2e-5, 2e-5
-    np.testing.assert_allclose(slopes[1] - slopes[0], difference, atol=1e-11)
+    np.testing.assert_allclose(soft - rigid, difference, atol=1e-11)
 
 
 def test_length_in_an_overconstrained_loop_is_refused_with_its_alternative(run):

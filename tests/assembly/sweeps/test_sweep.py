@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 import xarray
 
-from forcefit.assembly.kinematics.posture import place_robot
-from forcefit.assembly.linear.energy import solve_assembly
+import forcefit as ff
+from forcefit import BadInput, place_robot, solve_assembly
 from forcefit.assembly.sweeps import points
 from forcefit.assembly.sweeps.dataset import save_dataset
 from forcefit.assembly.sweeps.maps import map_figure
 from forcefit.assembly.sweeps.sweep import sweep_poses
 from forcefit.assembly.sweeps.targets import parse_grid
-from forcefit.inputs.table import BadInput
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
 
 GRID = "tx=-0.4:0.4:0.2,tz=-0.65:-0.45:0.1"
@@ -71,31 +70,6 @@ def test_saving_to_a_missing_folder_is_refused(data, tmp_path):
         save_dataset(data, tmp_path / "nowhere" / "map.nc")
 
 
-def test_maps_show_the_quantities_of_the_grid(data):
-    figure = map_figure(data)
-    titles = [axes.get_title() for axes in figure.axes]
-    assert "minimum assembly energy [J]" in titles
-    assert "ok: 13, out of reach: 2" in titles
-    image = next(a for a in figure.axes if "energy" in a.get_title()).collections[0]
-    shown = np.ma.filled(image.get_array(), np.nan).ravel()
-    assert np.nanmax(shown) == pytest.approx(float(data.energy.max()))
-
-
-def test_sweep_with_an_assumption_stores_pose_error_bounds():
-    robot = irsbot2_with(NUMBERS["cases"][0])
-    data = sweep_poses(robot, parse_grid("tx=-0.2:0.2:0.2,tz=-0.9:-0.45:0.45"),
-                       assumption="frozen")  # fmt: skip
-    assert data.rotation_error.dims == ("tx", "tz", "bound")
-    assert data.bound.values.tolist() == ["lower", "upper"]
-    assert data.translation_error.attrs["units"] == "m"
-    point = NUMBERS["cases"][0]["points"][1]
-    there = data.sel(tx=0.2, tz=-0.45, method="nearest")
-    low, high = there.rotation_error.values
-    assert low <= point["full_rigid_R"][1] + 1e-7
-    assert high >= point["full_rigid_R"][0] - 1e-7
-    assert np.isnan(data.rotation_error.sel(tz=-0.9, method="nearest")).all()
-
-
 def test_map_of_a_single_axis_is_refused(data):
     with pytest.raises(ValueError, match="two axes, this one has 1"):
         map_figure(data.isel(tx=[0]))
@@ -118,3 +92,37 @@ def test_failed_margin_has_the_status_solver_failed_at_its_point(monkeypatch):
     assert data.reason.values.ravel().tolist() == ["zone margin: gave up", ""]
     assert np.isnan(data.energy.values[0, 0])
     assert np.isfinite(data.energy.values[1, 0])
+
+
+FIVE_BAR_GRID = "tx=-0.02:0.02:0.02,ty=0.13:0.14:0.01"
+
+
+def test_sweep_to_a_file_equals_the_sweep_in_memory(tmp_path):
+    done = []
+    written = ff.sweep(
+        "five_bar", grid=FIVE_BAR_GRID, output=tmp_path / "map.nc",
+        progress=lambda *numbers: done.append(numbers),
+    )  # fmt: skip
+    xarray.testing.assert_identical(written, ff.sweep("five_bar", grid=FIVE_BAR_GRID))
+    assert done == [(0, 6), (6, 6)]
+    assert [path.name for path in tmp_path.iterdir()] == ["map.nc"]
+
+
+def test_sweep_of_a_robot_object_equals_that_of_its_name():
+    named = ff.sweep("five_bar", grid=FIVE_BAR_GRID)
+    command = named.attrs.pop("command")
+    assert command == f"forcefit assembly sweep five_bar --grid {FIVE_BAR_GRID}"
+    xarray.testing.assert_identical(
+        ff.sweep(ff.load_robot("five_bar"), grid=FIVE_BAR_GRID), named
+    )
+
+
+def test_varying_a_robot_object_is_refused():
+    with pytest.raises(ff.BadInput, match="--vary: found a robot in memory"):
+        ff.sweep(ff.load_robot("five_bar"), grid=FIVE_BAR_GRID, vary=["a.b=1,2"])
+
+
+def test_sweep_records_its_command_with_all_options():
+    data = ff.sweep("five_bar", grid="ty=0.13", wrench_of=["left.elbow"], seed=3)
+    expected = "five_bar --grid ty=0.13 --seed 3 --wrench-of left.elbow"
+    assert data.attrs["command"] == f"forcefit assembly sweep {expected}"
