@@ -5,8 +5,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
@@ -45,17 +43,3 @@ def test_every_module_of_the_equation_map_exists():
 def test_every_relative_link_of_the_readme_exists():
     for target in re.findall(r"\]\(([^)#]+)\)", README):
         assert (ROOT / target).exists(), target
-
-
-def test_python_m_forcefit_prints_the_version():
-    assert "`python -m forcefit`" in README
-    run = [sys.executable, "-m", "forcefit", "--version"]
-    done = subprocess.run(run, capture_output=True, text=True, check=True)
-    assert done.stdout.startswith("forcefit ")
-
-
-@pytest.mark.parametrize("command", ["make study", "make test"])
-def test_readme_make_commands_are_makefile_targets(command):
-    assert command in README
-    target = command.split()[1]
-    assert re.search(rf"^{target}:", (ROOT / "Makefile").read_text(), flags=re.M)

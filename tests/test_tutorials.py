@@ -64,11 +64,6 @@ def follow(page, folder):
     return ran, compared
 
 
-def test_tutorials_folder_has_the_six_known_tutorials():
-    known = ["assembly_order", "cad_link", "first_tasks", "own_robot", "tolerances"]
-    assert [*known, "tracker"] == TUTORIALS
-
-
 @pytest.mark.slow
 @pytest.mark.exudyn
 @pytest.mark.parametrize("name", TUTORIALS)

@@ -66,6 +66,9 @@ def loose(span, values):
 def read(path):
     return int("three")
 
+def count(path):
+    return 3
+
 def apply(conditions, values):
     return conditions.nothing
 
@@ -115,7 +118,8 @@ def broken(packages):
         "forcefit.effects": {"drive_gain": "broken:fails", "raising": "raises:GAIN",
                              "gone": "no_such_module:GAIN",
                              "failing": "broken:FAILS", "misnamed": "broken:OTHER"},
-        "forcefit.readers": {"three": "broken:read"},
+        "forcefit.readers": {"three": "broken:read", "count": "broken:count",
+                             "absent": "broken:absent", "gone": "no_such_module:read"},
         "forcefit.link_models": {"fails": "broken:fails", "small": "broken:small",
                                  "loose": "broken:loose", "ragged": "broken:ragged",
                                  "cone": "broken:absent"},
@@ -248,84 +252,43 @@ def test_diagnosis_finds_the_effect_of_another_distribution(example, tmp_path):
     assert found.robot.effects["drive_gain"]["one"] == pytest.approx(2e-3, rel=0.02)
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        (
-            "raising",
-            "the effect raises:GAIN of their-tools cannot be imported: ZeroDiv",
-        ),
-        (
-            "gone",
-            "the effect no_such_module:GAIN of their-tools cannot be imported: No",
-        ),
-        (
-            "drive_gain",
-            "the effect broken:fails of their-tools: found function, expected",
-        ),
-    ],
-)
-def test_broken_effect_names_its_distribution_in_one_line(
+BROKEN_PARTS = [
+    ("raising", "the effect raises:GAIN of their-tools cannot be imported: ZeroDiv"),
+    ("gone", "the effect no_such_module:GAIN of their-tools cannot be imported: No"),
+    ("drive_gain", "the effect broken:fails of their-tools: found function, expected"),
+    ("failing", "the effect broken:FAILS of their-tools failed: Attrib"),
+    ("cone", "model broken:absent of their-tools cannot be imported: "),
+    ("fails", "model broken:fails of their-tools failed: KeyError: 'absent'"),
+    ("small", "model broken:small of their-tools returned an array of shape "),
+    ("loose", "model broken:loose of their-tools: stiffness is not positive"),
+    ("ragged", "model broken:ragged of their-tools returned no array of "),
+    ("cine", 'found "cine", expected a link model of an installed package; did you'),
+    ("arm.three", "the reader broken:read of their-tools failed: ValueEr"),
+    ("arm.count", "of their-tools returned int, expected a Robot"),
+    ("arm.absent", "of their-tools cannot be imported: "),
+    ("arm.gone", "of their-tools cannot be imported: No module named"),
+]
+
+
+@pytest.mark.parametrize(("name", "message"), BROKEN_PARTS)
+def test_broken_effect_link_model_or_reader_names_its_distribution_in_one_line(
     name, message, broken, tmp_path, run
 ):
-    path = written(tmp_path, ARM.replace("drive_gain", name))
+    path, place = tmp_path / name, ""
+    if "the effect" in message:
+        values = "{ }" if name == "failing" else "{ joint1 = 1e-3 }"
+        text = ARM.replace("drive_gain", name).replace("{ joint1 = 1e-3 }", values)
+        path = written(tmp_path, text)
+        place = "" if name == "failing" else f'{path}: effect "{name}"'
+    elif "model" in message:
+        path = written(tmp_path, CONE.replace('"cone"', f'"{name}"'))
+        place = f'{path}: frame "tip".link.model'
+    else:
+        path.write_text("3")
     code, out, err = run("assembly", "solve", path)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert message in err
-    assert f'{path}: effect "{name}"' in err
-
-
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("cone", "the link model broken:absent of their-tools cannot be imported: "),
-        (
-            "fails",
-            "the link model broken:fails of their-tools failed: KeyError: 'absent'",
-        ),
-        (
-            "small",
-            "the link model broken:small of their-tools returned an array of shape ",
-        ),
-        (
-            "loose",
-            "the link model broken:loose of their-tools: stiffness is not positive",
-        ),
-        ("ragged", "the link model broken:ragged of their-tools returned no array of "),
-        (
-            "cine",
-            'found "cine", expected a link model of an installed package; did you mean',
-        ),
-    ],
-)
-def test_broken_link_model_names_its_distribution_in_one_line(
-    name, message, broken, tmp_path, run
-):
-    path = written(tmp_path, CONE.replace('"cone"', f'"{name}"'))
-    code, out, err = run("assembly", "solve", path)
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert message in err
-    assert f'{path}: frame "tip".link.model' in err
-
-
-def test_fault_within_an_effect_or_a_reader_names_its_distribution(
-    broken, tmp_path, run
-):
-    text = ARM.replace("drive_gain", "failing").replace("{ joint1 = 1e-3 }", "{ }")
-    (tmp_path / "arm.three").write_text("3")
-    for path, message in (
-        (
-            written(tmp_path, text),
-            "the effect broken:FAILS of their-tools failed: Attrib",
-        ),
-        (
-            tmp_path / "arm.three",
-            "the reader broken:read of their-tools failed: ValueEr",
-        ),
-    ):
-        code, out, err = run("assembly", "solve", path)
-        assert (code, out, err.count("\n")) == (2, "", 1)
-        assert message in err
+    assert place in err
 
 
 def test_broken_effect_does_not_affect_robots_without_this_effect(broken, tmp_path):
@@ -351,13 +314,41 @@ def test_effects_of_forcefit_cannot_be_replaced(example, packages, tmp_path):
     assert float(screw.sel(screw="RZ")) == pytest.approx(1e-3)  # not times 0.5 rad
 
 
-def test_message_of_the_example_s_reader_is_the_user_s_message(example, tmp_path):
-    (tmp_path / "arm.chain").write_text("0.4 0.3")
-    robot = ff.load_robot(tmp_path / "arm.chain")
-    assert ff.place_robot(robot).pose()["tx"] == pytest.approx(0.7)
-    (tmp_path / "arm.chain").write_text("")
+def test_every_command_accepts_a_file_of_an_installed_reader(example, run, tmp_path):
+    """The chain lies along x: its end is at the sum of the lengths."""
+    path = tmp_path / "arm.CHAIN"
+    path.write_text("0.3 0.2 0.15")
+    assert ff.place_robot(ff.load_robot(path)).pose()["tx"] == pytest.approx(0.65)
+    status, out, err = run("assembly", "solve", path, "--json", "-")
+    assert (status, err) == (0, "")
+    assert json.loads(out)["pose"]["tx"] == pytest.approx(0.65)
+    swept = ff.sweep(path, grid="q.joint1=0:0.2:0.1", quantities=["energy"],
+                     vary=["joint2.translation.x=0.1,0.2"])  # fmt: skip
+    assert np.all(swept.energy.values == 0.0)
+    path.write_text("")
     with pytest.raises(BadInput, match="found no lengths"):
+        ff.load_robot(path)
+
+
+def test_two_readers_of_one_file_ending_are_refused_with_both_names(
+    example, packages, tmp_path
+):
+    install(packages, "another", {"forcefit.readers": {"chain": "broken:read"}})
+    (tmp_path / "arm.chain").write_text("1")
+    with pytest.raises(
+        BadInput, match=r"reader chain in another and forcefit-extension"
+    ):
         ff.load_robot(tmp_path / "arm.chain")
+
+
+def test_installed_reader_cannot_replace_a_file_ending_that_forcefit_reads(
+    example, packages, tmp_path
+):
+    readers = dict.fromkeys(("toml", "urdf"), "forcefit_extension:read_chain")
+    install(packages, "another", {"forcefit.readers": readers})
+    for name in ("arm.toml", "arm.urdf"):
+        ff.write_robot(ff.load_robot("arm6"), tmp_path / name)
+        assert len(ff.load_robot(tmp_path / name).frames) > 5
 
 
 def test_page_of_extensions_shows_the_lines_of_the_example():

@@ -23,10 +23,8 @@ from forcefit.assembly.platform_stiffness.platform_stiffness import platform_sti
 from forcefit.stiffness.screws import screw_map
 
 AT, AXIS, AXIS2 = (
-    np.array([0.1, -0.2, 0.3]),
-    unit([1.0, 2.0, 2.0]),
-    unit([2.0, 1.0, -1]),
-)
+    np.array([0.1, -0.2, 0.3]), unit([1.0, 2.0, 2.0]), unit([2.0, 1.0, -1]),
+)  # fmt: skip
 # free screws at the joint's point in its axes, of the page on joints (1.1)
 RX, RY, RZ, TX, TY, TZ = np.eye(6)
 PITCH = 0.02  # [m]

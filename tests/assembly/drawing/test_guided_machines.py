@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial import HalfspaceIntersection
 
 from forcefit.assembly.exchange.convert import convert
-from forcefit.assembly.files.robot_file import read_robot, write_robot
+from forcefit.assembly.files.robot_file import write_robot
 from forcefit.assembly.kinematics.mobility import mobility
 from forcefit.assembly.kinematics.posture import home_posture, together
 from forcefit.assembly.linear.energy import solve_assembly
@@ -28,7 +28,6 @@ from forcefit.assembly.statistics.worst_pose import worst_pose
 from forcefit.assembly.steps.plan import Join, Plan
 from forcefit.assembly.steps.run import assemble_in_steps
 from forcefit.assembly.sweeps.robot_sweep import sweep
-from forcefit.inputs.table import BadInput
 from forcefit.validation.multibody.simulation import (
     simulate_assembly,
     without_clearance,
@@ -244,26 +243,6 @@ def test_chain_of_bounded_clearances_is_counted_as_a_loop_of_the_mechanism():
     robot = Robot("two bores", "table", frames, (("table", "end"),))
     assert not contact_closures(robot).any()
     assert mobility(home_posture(robot)).overconstraint == 6
-
-
-def test_only_a_fixed_joint_may_have_an_unbounded_clearance(tmp_path):
-    """The range of a joint that moves is unbounded where the key is left out."""
-    file = tmp_path / "robot.toml"
-    frame = """
-        platform = "end"
-        [[frame]]
-        name = "end"
-        parent = "a"
-        [[frame]]
-        name = "a"
-        parent = "base"
-        clearance = { spin = inf }
-    """
-    file.write_text(frame)
-    assert read_robot(file).frame("a").clearance == Clearance(spin=np.inf)
-    file.write_text(frame + 'joint = "revolute"\n')
-    with pytest.raises(BadInput, match=r"clearance.spin: found inf, expected a finite"):
-        read_robot(file)
 
 
 @pytest.mark.exudyn

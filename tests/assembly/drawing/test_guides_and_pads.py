@@ -251,12 +251,6 @@ def test_energy_of_two_guides_on_springs_equals_that_of_their_inequalities(drawn
         assert found.energy == pytest.approx(problem.value * 1e-6, rel=1e-6)
 
 
-def test_the_guides_of_a_pair_count_as_two_slides(drawn):
-    """One freedom and five over-constraints, as without clearances."""
-    found = mobility(on_two_guides(drawn, np.zeros(6)))
-    assert (found.freedoms, found.overconstraint) == (1, 5)
-
-
 @pytest.mark.parametrize(("kind", "clearance"), [
     ("prismatic", GUIDE), ("planar", PAD)
 ])  # fmt: skip

@@ -19,7 +19,6 @@ from forcefit.assembly.platform_stiffness.vibration import natural_modes
 from forcefit.assembly.statistics.experiment import Experiment
 from forcefit.assembly.statistics.linear_response import linear_response
 from forcefit.assembly.statistics.monte_carlo import run_draws
-from forcefit.assembly.sweeps.sweep import sweep_poses
 from tests.screws_for_tests import DIFFERENTIAL, LIFT, NUT
 
 METHODS = ["compiled", "reference"]
@@ -100,14 +99,6 @@ def test_rotation_error_of_the_screw_lowers_the_table_by_its_lead(read):
         np.testing.assert_allclose(found.platform_screw, expected, rtol=0, atol=1e-12)
     drawn = linear_response(home_posture(robot)).solve(np.stack([errors, -errors]))
     np.testing.assert_allclose(drawn.platform_screw[:, 5], [-0.3 * LEAD, 0.3 * LEAD])
-
-
-def test_sweep_of_heights_has_the_error_of_the_pitch_at_every_height(read):
-    robot, errors = read(), np.zeros((6, 6))
-    errors[robot.index("bearing"), 2] = 1e-3
-    data = sweep_poses(robot.with_errors(errors), {"tz": np.array([0.3, 0.4, 0.5])})
-    assert set(data["status"].values.tolist()) == {"ok"}
-    np.testing.assert_allclose(data["platform_screw"].values[:, 5], -1e-3 * LEAD)
 
 
 def test_differential_screw_moves_by_the_difference_of_its_pitches(read):

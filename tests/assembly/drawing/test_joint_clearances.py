@@ -219,15 +219,6 @@ def test_ball_joint_moves_up_to_its_gap_in_every_direction_and_turns_freely(
     assert mobility(posture).freedoms == 3
 
 
-def test_guide_reaches_the_largest_motion_of_each_component_separately(one_joint):
-    """10 um, 80 by 40 by 30 mm: yaw and pitch 2 c / L, roll 2 c / w."""
-    posture = one_joint("prismatic", GUIDE)
-    expected = [0.25e-3, 0.25e-3, 0.5e-3, 1e-5, 1e-5]
-    found = heights(posture, np.eye(6)[:5])
-    np.testing.assert_allclose(found, expected, rtol=1e-7)
-    assert mobility(posture).freedoms == 1
-
-
 def test_a_guide_may_have_different_gaps_and_axes(one_joint):
     """Gaps 10 um along x, the direction of axis2, and 4 um along y."""
     text = GUIDE.replace("1e-5", '["10 um", "4 um"]')

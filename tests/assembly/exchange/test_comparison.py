@@ -19,13 +19,10 @@ def path(tmp_path):
     return path
 
 
-@pytest.mark.parametrize(
-    ("worker", "reason"),
-    [
-        ("import os; os.abort()", "MuJoCo terminated without a result"),
-        ("import time; time.sleep(60)", "MuJoCo took longer than 0.5 s"),
-    ],
-)
+@pytest.mark.parametrize(("worker", "reason"), [
+    ("import os; os.abort()", "MuJoCo terminated without a result"),
+    ("import time; time.sleep(60)", "MuJoCo took longer than 0.5 s"),
+])  # fmt: skip
 def test_failed_or_hanging_mujoco_process_is_reported_as_the_reason(
     worker, reason, path, monkeypatch
 ):

@@ -30,17 +30,6 @@ def test_example_robots_convert_and_close(name, tmp_path):
 
 
 @pytest.mark.slow
-def test_loops_of_the_generator_default_type_are_converted_to_points(tmp_path):
-    """Kangaroo closes without options, and the result reports the assumption."""
-    answer = convert(example("kangaroo_like"), tmp_path / "robot.toml")
-    assert answer.open_after < 1e-9
-    assert answer.difference < 1e-12
-    (taken,) = answer.taken
-    assert taken.startswith("every loop as 3d (a point without")
-    assert "loop2" in taken
-
-
-@pytest.mark.slow
 def test_kangaroo_closes_with_the_points_of_its_later_loop_file(tmp_path):
     """In that file (kangaroo_like_2legs) loops 3, 4 and 5 are 6d, all others 3d."""
     points = [f"closedloop{i}_A" for i in (0, 2, 6, 7, 8, 9, 10, 11)]
@@ -207,22 +196,15 @@ def test_overlay_adds_platform_clearances_and_links_to_a_urdf(tmp_path):
     assert robot.frame("free1").link.section == {"radius": 0.02}
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (
-            '[[frame]]\nname = "fre1"\nmass = 1\n',
-            'found "fre1", expected the name of a frame',
-        ),
-        (
-            '[[frame]]\nname = "free1"\ntranslation = [0, 0, 1]\n',
-            "which cannot place frames",
-        ),
-        ('[[frame]]\nname = "free1"\nmas = 1\n', 'unknown key "mas"'),
-        ("[[link]]\n", 'unknown key "link"'),
-        ('platform = "efector"\n', 'did you mean "effector"?'),
-    ],
-)
+@pytest.mark.parametrize(("text", "message"), [
+    ('[[frame]]\nname = "fre1"\nmass = 1\n',
+     'found "fre1", expected the name of a frame'),
+    ('[[frame]]\nname = "free1"\ntranslation = [0, 0, 1]\n', "which cannot place frames"
+     ),
+    ('[[frame]]\nname = "free1"\nmas = 1\n', 'unknown key "mas"'),
+    ("[[link]]\n", 'unknown key "link"'),
+    ('platform = "efector"\n', 'did you mean "effector"?'),
+])  # fmt: skip
 def test_invalid_overlay_is_refused_with_its_message(run, text, message, tmp_path):
     overlay = tmp_path / "overlay.toml"
     overlay.write_text(text)
@@ -234,18 +216,6 @@ def test_invalid_overlay_is_refused_with_its_message(run, text, message, tmp_pat
     assert message in err
     assert "overlay.toml" in err
     assert not (tmp_path / "robot.toml").exists()
-
-
-def test_convert_refuses_to_overwrite_a_file_of_another_program(run, tmp_path):
-    target = tmp_path / "robot.urdf"
-    target.write_text("<robot/>")
-    status, _, err = run("convert", "arm6", "-o", target)
-    assert status == 2
-    assert "it is not overwritten" in err
-    assert target.read_text() == "<robot/>"
-    status, _, err = run("convert", "arm6", "-o", tmp_path / "robot.sdf")
-    assert status == 2
-    assert "expected .toml or .urdf or .xml" in err
 
 
 def test_joints_of_several_freedoms_become_single_joints_and_mimics_drives(tmp_path):

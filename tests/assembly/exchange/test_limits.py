@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from forcefit.assembly.exchange.convert import convert
-from forcefit.assembly.exchange.robot_files import load_robot as load_robot_of_any_kind
 from forcefit.assembly.files.robot_file import read_robot, write_robot
-from forcefit.assembly.kinematics.verdict import limits_passed
 from forcefit.assembly.robots import load_robot
 
 URDF = """<robot name="arm"><link name="a"/><link name="b"/><link name="c"/>
@@ -33,28 +31,30 @@ def limits(tmp_path, name, text):
     return {f.name: f.limits for f in frames if f.joint != "fixed"}
 
 
-def test_urdf_ranges_become_limits(tmp_path):
-    text = URDF.format(turn='lower="-1.5" upper="2"', slide='lower="-0.1" upper="0.3"')
-    found = limits(tmp_path, "arm.urdf", text)
-    assert found == {"turn": (-1.5, 2.0), "slide": (-0.1, 0.3)}
+RANGES = [
+    ("arm.urdf", URDF.format(turn='lower="-1.5" upper="2"',
+                             slide='lower="-0.1" upper="0.3"'), (-1.5, 2.0)),
+    ("arm.urdf", URDF.format(turn="", slide='lower="-0.1" upper="0.3"'), None),
+    ("arm.xml", MJCF.format(unit="degree", turn="-90 45", limited=""),
+     (-np.pi / 2, np.pi / 4)),
+    ("arm.xml", MJCF.format(unit="radian", turn="-1 0.5", limited=""), (-1.0, 0.5)),
+    ("arm.xml", MJCF.format(unit="radian", turn="-1 0.5", limited='limited="false"'),
+     None),
+]  # fmt: skip
 
 
-def test_infinite_or_missing_urdf_ranges_set_no_limits(tmp_path):
-    text = URDF.format(turn="", slide='lower="-1e16" upper="inf"')
-    assert limits(tmp_path, "arm.urdf", text) == {"turn": None, "slide": None}
-
-
-@pytest.mark.parametrize(
-    ("unit", "turn", "limited", "expected"),
-    [("degree", "-90 45", "", (-np.pi / 2, np.pi / 4)),
-     ("radian", "-1 0.5", "", (-1.0, 0.5)),
-     ("radian", "-1 0.5", 'limited="false"', None)],
-)  # fmt: skip
-def test_mjcf_ranges_become_limits_in_radians(tmp_path, unit, turn, limited, expected):
-    text = MJCF.format(unit=unit, turn=turn, limited=limited)
-    found = limits(tmp_path, "arm.xml", text)
+@pytest.mark.parametrize(("name", "text", "expected"), RANGES)
+def test_ranges_of_urdf_and_mjcf_become_limits_in_radians(
+    tmp_path, name, text, expected
+):
+    found = limits(tmp_path, name, text)
     assert found["slide"] == (-0.1, 0.3)
     assert found["turn"] == (None if expected is None else pytest.approx(expected))
+
+
+def test_infinite_range_of_a_urdf_joint_sets_no_limits(tmp_path):
+    text = URDF.format(turn="", slide='lower="-1e16" upper="inf"')
+    assert limits(tmp_path, "arm.urdf", text) == {"turn": None, "slide": None}
 
 
 SDF = """<sdf version="1.9"><model name="m"><link name="a"/><link name="b">
@@ -96,23 +96,6 @@ def test_springs_of_a_universal_joint_become_stiffness_about_each_axis(tmp_path)
         stiffness = np.diag(robot.frame(name).joint_stiffness)
         assert stiffness[2] == k
         assert np.isinf(np.delete(stiffness, 2)).all()
-
-
-def test_posture_beyond_a_limit_of_a_universal_joint_is_reported(tmp_path):
-    text = SDF.format(first="world", second="a", kind="universal")
-    (tmp_path / "m.sdf").write_text(text)
-    robot = load_robot_of_any_kind(tmp_path / "m.sdf")
-    for name, value in (("cross.first", 0.39), ("cross.second", -0.51)):
-        frames = tuple(
-            replace(f, position=value if f.name == name else 0.0)
-            if f.joint != "fixed" else f for f in robot.frames
-        )  # fmt: skip
-        turned = replace(robot, frames=frames)
-        passed = limits_passed(turned, turned.positions)
-        within = name == "cross.first"
-        assert passed == (
-            "" if within else "cross.second at -0.51 rad, limits -0.5 to 0.6"
-        )
 
 
 @pytest.mark.parametrize("ending", ["urdf", "xml"])

@@ -142,11 +142,14 @@ def test_comparison_names_the_first_difference_from_mujoco(tmp_path):
     path = file_of(tmp_path, KINDS["welds"])
     right = read_mjcf(path)
     joint = replace(right.joints[0], axis=np.array([0.0, 1.0, 0.0]))
-    heavy = {**right.bodies, "b": replace(right.bodies["b"], mass=1.02)}
+    b = right.bodies["b"]
+    heavy = {**right.bodies, "b": replace(b, mass=1.02)}
+    wide = {**right.bodies, "b": replace(b, inertia=b.inertia + 1e-6 * np.eye(3))}
     weld = replace(right.loops[1], at_second=np.eye(4))
     for wrong, where in (
         (replace(right, joints=(joint, *right.joints[1:])), "body a"),
         (replace(right, bodies=heavy), "mass of b"),
+        (replace(right, bodies=wide), "moments of inertia of b"),
         (replace(right, loops=(right.loops[0], weld)), "loop w"),
     ):
         answer = compare(wrong, path)

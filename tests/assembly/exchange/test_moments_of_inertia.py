@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from forcefit.assembly.exchange.convert import convert
-from forcefit.assembly.exchange.mjcf import read_mjcf
 from forcefit.assembly.exchange.robot_files import load_robot
 from forcefit.assembly.exchange.sdf import read_sdf
 from forcefit.assembly.exchange.urdf import read_urdf
@@ -168,20 +167,3 @@ def test_written_moments_of_inertia_are_read_back(ending, tmp_path):
     ))  # fmt: skip
     ours, theirs = (natural_modes(home_posture(r)).frequencies for r in (robot, back))
     np.testing.assert_allclose(theirs, ours, rtol=1e-8)
-
-
-def test_difference_of_moments_of_inertia_from_mujoco_is_reported(tmp_path):
-    pytest.importorskip("mujoco", reason="MuJoCo is not installed")
-    from forcefit.assembly.exchange.mujoco_reading import compare_here
-
-    for name, text, read in (
-        ("r.urdf", URDF, read_urdf), ("r.xml", SPRINGS, read_mjcf)
-    ):  # fmt: skip
-        path = file_of(tmp_path, text, name)
-        right = read(path)
-        assert compare_here(right, path).difference < 1e-12
-        changed = replace(right.bodies["b"], inertia=J.T + 1e-6 * np.eye(3))
-        wrong = replace(right, bodies={**right.bodies, "b": changed})
-        answer = compare_here(wrong, path)
-        assert answer.where == "moments of inertia of b"
-        assert not answer.agrees

@@ -84,18 +84,6 @@ def test_mujoco_model_changed_in_memory_is_read_with_its_changes(tmp_path):
     assert np.linalg.norm(elbow) == pytest.approx(0.2)
 
 
-def test_tendon_of_a_model_is_reported_as_omitted():
-    model = mujoco.MjModel.from_xml_string("""<mujoco><worldbody><body name="a">
-        <joint name="j"/><geom size="0.1"/></body></worldbody><tendon><fixed name="t">
-        <joint joint="j" coef="1"/></fixed></tendon><actuator><motor tendon="t"/>
-        </actuator></mujoco>""")  # fmt: skip
-    remarks = "\n".join(ff.load_robot(model).remarks)
-    assert (
-        "MjModel: left out: tendon, not converted, though it may carry load" in remarks
-    )
-    assert "actuator of a tendon" in remarks
-
-
 def test_object_that_is_not_a_mujoco_model_is_refused():
     with pytest.raises(
         BadInput, match=r"load_robot: found 3\.0 .* an MjModel, MjSpec or pinocchio"

@@ -140,32 +140,6 @@ def test_joint_that_has_the_name_of_a_link_is_renamed(tmp_path):
     assert {one.name for one in mechanism.joints} == {"fix", "arm_joint"}
 
 
-def test_joints_between_frames_close_a_loop(tmp_path):
-    """Grashof's four-bar as a parallelogram: its coupler only translates."""
-    text = (
-        ARM
-        + """
-        <frame name="A" attached_to="base"><pose>0 0 0 0 0 0</pose></frame>
-        <frame name="B" attached_to="A"><pose>2 0 0 0 0 0</pose></frame>
-        <link name="left"/><link name="right"><pose relative_to="B"/></link>
-        <frame name="top" attached_to="left"><pose>0 1 0 0 0 0</pose></frame>
-        <link name="bar"><pose relative_to="top"/></link>
-        <frame name="end" attached_to="bar"><pose>2 0 0 0 0 0</pose></frame>
-        <frame name="other" attached_to="right"><pose>0 1 0 0 0 0</pose></frame>"""
-    )
-    for name, ends in {"a": ("A", "left"), "b": ("B", "right"), "c": ("top", "bar"),
-                       "d": ("end", "other")}.items():  # fmt: skip
-        text += joint(name, *ends, Z_UP.format(""))
-    mechanism = model(tmp_path, text)
-    (loop,) = mechanism.loops
-    q = {"a": 0.3, "b": 0.3, "c": -0.3, "d": 0.3}
-    poses = body_poses(
-        mechanism, np.array([q.get(one.name, 0.0) for one in mechanism.joints])
-    )
-    first, second = poses[loop.first] @ loop.at_first, poses[loop.second]
-    assert first == pytest.approx(second @ loop.at_second, abs=1e-15)
-
-
 SHAPES = {
     "<box><size>0.4 0.05 0.02</size></box>": 4e-4,
     "<sphere><radius>0.1</radius></sphere>": 4 / 3 * np.pi * 1e-3,

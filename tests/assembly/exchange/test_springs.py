@@ -42,26 +42,15 @@ def test_converted_spring_deflects_by_load_over_stiffness(name, run, tmp_path):
     assert screw[component] == pytest.approx(10 / 2000, rel=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("text", "line"),
-    [
-        (
-            MJCF.format('axis="0 0 1" stiffness="2000" springref="90"'),
-            "springs preloaded at home, not converted, though they may carry load: 1 "
-            "(spring by -1.57 rad or m)",
-        ),
-        (
-            MJCF.format('type="ball" stiffness="2000"'),
-            "joint stiffness, not converted, though it may carry load: 1 (spring)",
-        ),
-        (
-            MJCF.format('axis="1 0 0"').replace(
-                'name="drive"', 'name="drive" stiffness="5"'
-            ),
-            "springs beside drives: 1 (drive)",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("text", "line"), [
+    (MJCF.format('axis="0 0 1" stiffness="2000" springref="90"'),
+     "springs preloaded at home, not converted, though they may carry load: 1 "
+     "(spring by -1.57 rad or m)"),
+    (MJCF.format('type="ball" stiffness="2000"'),
+     "joint stiffness, not converted, though it may carry load: 1 (spring)"),
+    (MJCF.format('axis="1 0 0"').replace('name="drive"', 'name="drive" stiffness="5"'),
+     "springs beside drives: 1 (drive)"),
+])  # fmt: skip
 def test_spring_that_is_not_converted_is_reported(text, line, tmp_path):
     path = tmp_path / "robot.xml"
     path.write_text(text)

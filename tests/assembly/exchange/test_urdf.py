@@ -30,16 +30,13 @@ def file_of(folder, text, links="", attributes=""):
 Z = '<axis xyz="0 0 1"/>'
 
 
-@pytest.mark.parametrize(
-    ("before", "attributes", "inside"),
-    [
-        ('\n\n<?xml version="1.0"?>\n', "", ""),
-        ('<!-- of -- mine --><?xml version="1.0"?>', "", "<!-- a -- b --- -->"),
-        ("", 'xmlns="http://drake.mit.edu" xmlns:x="a" x:schemaLocation="b c"', ""),
-        ("", "", "<gazebo><lost:thing lost:key='1'/></gazebo>"),
-        ("\ufeff", 'xmlns="urn:other"', ""),
-    ],
-)
+@pytest.mark.parametrize(("before", "attributes", "inside"), [
+    ('\n\n<?xml version="1.0"?>\n', "", ""),
+    ('<!-- of -- mine --><?xml version="1.0"?>', "", "<!-- a -- b --- -->"),
+    ("", 'xmlns="http://drake.mit.edu" xmlns:x="a" x:schemaLocation="b c"', ""),
+    ("", "", "<gazebo><lost:thing lost:key='1'/></gazebo>"),
+    ("\ufeff", 'xmlns="urn:other"', ""),
+])  # fmt: skip
 def test_urdf_variants_that_other_readers_accept_are_read(
     before, attributes, inside, tmp_path
 ):
@@ -132,13 +129,10 @@ def test_loop_in_the_urdf_closes_with_one_freedom(kind, run, tmp_path):
     assert coupler[:3, 3] == pytest.approx(crank, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("flag", "expected"),
-    [
-        ("", [1, 0, 0]),
-        ("<use_parent_model_frame>1</use_parent_model_frame>", [0, 0, 1]),
-    ],
-)
+@pytest.mark.parametrize(("flag", "expected"), [
+    ("", [1, 0, 0]),
+    ("<use_parent_model_frame>1</use_parent_model_frame>", [0, 0, 1]),
+])  # fmt: skip
 def test_gazebo_joint_axis_is_given_in_the_child_or_the_model(flag, expected, tmp_path):
     """The child is turned by 90 degrees about y, which takes its z to x."""
     turned = f'<origin xyz="0 0 1" rpy="0 {np.pi / 2} 0"/>'

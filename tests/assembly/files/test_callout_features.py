@@ -119,17 +119,6 @@ def largest(one, row):
     return one.zone.support(row @ np.linalg.pinv(one.zone.columns))
 
 
-def test_file_of_frames_contains_round_faces_and_shifting_datums(tmp_path):
-    robot = read(tmp_path, BRACKET)
-    write_robot(robot, tmp_path / "frames.toml")
-    again = read_robot(tmp_path / "frames.toml")
-    for one, other in zip(robot.callouts, again.callouts, strict=True):
-        assert vars(one) == vars(other)
-    for one, other in zip(placed(robot), placed(again), strict=True):
-        assert one.name == other.name
-        assert one.errors == pytest.approx(other.errors, abs=1e-15)
-
-
 def test_zone_of_a_round_face_is_a_double_cone_of_its_diameter(tmp_path):
     """Profile 0.06: 30 um along the normal, 30 um / 20 mm of tilt; parallelism 0.04
     leaves 20 um / 20 mm = 1 mrad."""

@@ -1,7 +1,5 @@
 """Flatness and cylindricity add half their width to the clearance of a joint."""
 
-import re
-
 import pytest
 
 from forcefit.assembly.files.robot_file import read_robot, write_robot
@@ -9,7 +7,6 @@ from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.statistics.callout_sources import sources_of
 from forcefit.assembly.statistics.linear_response import linear_response
 from forcefit.assembly.statistics.worst_pose import worst_pose
-from forcefit.inputs.table import BadInput
 
 ARM = """
 format = 2
@@ -96,67 +93,3 @@ def test_flatness_widens_the_gap_of_a_pad(tmp_path):
         for text in (PAD, exact)
     )
     assert wide == pytest.approx(1.5 * narrow, rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ('"0.006 mm"', '"0.006"', 'tolerance of "pin".cylindricity: found \'0.006\''),
-        ('"0.006 mm"', '"-0.006 mm"', "found '-0.006 mm', expected a width > 0"),
-        ('"0.006 mm"', '"0.006 mm (M)"', "found a width with (M), expected a width"),
-        ("cylindricity", "flatness", "found no gap that the flatness of its features"),
-        ('{ fit = "12 H7/g6", length = "40 mm" }', '{ axial = "5 um" }',
-         'joint "pin".clearance: found no gap that the cylindricity of its features '
-         "could widen, expected a radial clearance, a fit or bearings"),
-        ('{ fit = "12 H7/g6", length = "40 mm" }', '{ fit = "25 H7/p6" }',
-         'clearance.fit: found "25 H7/p6", an interference fit'),
-        ('cylindricity = "0.006 mm"', 'cylindricity = "0.006 mm"\ndatums = ["pin"]',
-         "datums: found this key at a feature that has only a form tolerance, expected "
-         "none"),
-        ('[[body.tolerance]]\nfeature = "pin"', '[[body.tolerance]]\nfeature = "pn"',
-         'found "pn", expected a joint of "rod"; did you mean "pin"'),
-    ],
-)  # fmt: skip
-def test_form_tolerance_that_is_not_modelled_is_refused_in_one_line(
-    tmp_path, old, new, message
-):
-    assert old in ARM
-    with pytest.raises(BadInput, match=re.escape(message)) as error:
-        read(tmp_path, ARM.replace(old, new))
-    assert "\n" not in str(error.value)
-
-
-TWO_PINS = (
-    ARM
-    + """
-[[joint]]
-name = "tip"
-type = "revolute"
-between = ["rod", "wheel"]
-at = ["200 mm", 0, 0]
-axis = [0, 0, 1]
-clearance = { radial = "10 um" }
-[[body]]
-name = "wheel"
-"""
-)
-
-
-@pytest.mark.parametrize(
-    ("zones", "message"),
-    [
-        ('position = "0.05 mm"\nparallelism = "0.02 mm"\ncylindricity = "0.03 mm"',
-         "found 0.03 mm, expected less than the parallelism, 0.02 mm"),
-        ('position = "0.05 mm"\ncylindricity = "0.05 mm"',
-         "found 0.05 mm, expected less than the position, 0.05 mm"),
-        ('position = "0.05 mm"\nparallelism = "0.05 mm"',
-         "parallelism: found 0.05 mm, expected less than that of the location"),
-    ],
-)  # fmt: skip
-def test_zones_of_form_orientation_and_location_must_increase_in_this_order(
-    tmp_path, zones, message
-):
-    table = f'[[body.tolerance]]\nfeature = "tip"\ndatums = ["pin"]\n{zones}\n'
-    text = TWO_PINS.replace("[[joint]]", f'{table}extent = "20 mm"\n[[joint]]', 1)
-    with pytest.raises(BadInput, match=re.escape(message)):
-        read(tmp_path, text)

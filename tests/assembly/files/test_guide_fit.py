@@ -1,7 +1,5 @@
 """A fit as the gaps of a guide: its limits by hand, in draws and in the worst case."""
 
-import re
-
 import numpy as np
 import pytest
 
@@ -10,7 +8,6 @@ from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.statistics.callout_sources import sources_of
 from forcefit.assembly.statistics.linear_response import linear_response
 from forcefit.assembly.statistics.worst_pose import worst_pose
-from forcefit.inputs.table import BadInput
 
 # a block in a guide of 80 mm; a point of its axis 200 mm from its middle
 GUIDE = """
@@ -83,28 +80,3 @@ def test_one_gap_of_a_guide_is_drawn_along_each_axis(tmp_path):
     ]  # fmt: skip
     rotation = np.array([means[0] + 1e-6, means[1] - 2e-6]) / 0.08
     assert turns == pytest.approx(np.repeat(rotation, 2), rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("fit", "message"),
-    [
-        ('"25 H7/p6"', 'guide.fit: found "25 H7/p6", an interference fit'),
-        ('["40 H7/g6"]', "guide.fit: found a list of length 1, expected one fit, "),
-        ('["40 H7/g6", "30 H7/z6"]', 'guide.fit: found "z6", expected one of the'),
-        ("12", "guide.fit: found 12, expected a fit such as"),
-        ('["40 H7/g6", 3]', "guide.fit: found 3, expected a fit such as"),
-        ('"40 H7/g6", gap = "5 um"', 'guide.gap: found it together with "fit"'),
-    ],
-)
-def test_fit_that_is_not_possible_for_a_guide_is_refused_in_one_line(
-    tmp_path, fit, message
-):
-    with pytest.raises(BadInput, match=re.escape(message)) as error:
-        read(tmp_path, GUIDE.replace("FIT", fit))
-    assert "\n" not in str(error.value)
-
-
-def test_fit_of_a_guide_is_declared_in_its_contact(tmp_path):
-    text = GUIDE.replace("fit = FIT", 'gap = "5 um"') + 'fit = "40 H7/g6"\n'
-    with pytest.raises(BadInput, match='with "guide", expected it in the guide'):
-        read(tmp_path, text)

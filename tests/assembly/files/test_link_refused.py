@@ -1,7 +1,5 @@
 """Links of robot files that break a rule are each refused with one message."""
 
-import math
-
 import pytest
 
 from tests.robot_files_for_tests import BEAM, LINK, assert_refused, mesh, rows
@@ -11,21 +9,6 @@ REFUSED_LINKS = {
         LINK, f"link = {{ stiffness = {rows({(3, 6): 0.1})} }}",
         'frame "coupler".link.stiffness: not symmetric: found [3, 6] = 1.000000e-01 '
         "but [6, 3] = 0.000000e+00, expected equal numbers"),
-    "a link that is soft in one direction": (
-        LINK, f"link = {{ stiffness = {rows({(3, 3): -2.5})} }}",
-        'frame "coupler".link.stiffness: not positive definite: found -2.5 as term '
-        "[3, 3] of the diagonal, expected > 0"),
-    "a singular link": (
-        LINK, f"link = {{ stiffness = {rows({(1, 2): 1, (2, 1): 1})} }}",
-        'frame "coupler".link.stiffness: not positive definite'),
-    "an infinite link": (
-        LINK, f"link = {{ stiffness = {rows({(4, 4): math.inf})} }}",
-        'frame "coupler".link.stiffness: found inf as number 4 in row 4, expected 6 '
-        "rows of 6 finite numbers [N m/rad .. N/m]"),
-    "a link of 5 rows": (
-        LINK, "link = { stiffness = [[1], [2], [3], [4], [5]] }",
-        'frame "coupler".link.stiffness: found [[1], [2], [3], [4], [5]] of length 5, '
-        "expected 6 rows of 6 finite numbers [N m/rad .. N/m]"),
     "a link of nothing": (
         LINK, "link = {}",
         'frame "coupler".link: found no kind of link, expected exactly one of "beam" | '
@@ -60,9 +43,6 @@ REFUSED_LINKS = {
         "inner_radius = 0.03", "inner_radius = 0.04",
         'frame "coupler".link.beam.inner_radius: found 0.04, expected a finite number '
         ">= 0 and < 0.04 [m]"),
-    "a bore without a radius": (
-        BEAM, "beam = { inner_radius = 0.03 }",
-        'frame "coupler".link.beam.radius: missing; expected a finite number > 0 [m]'),
     "a radius below any machine": (
         BEAM, "beam = { radius = 1e-30 }",
         'frame "coupler".link.beam.radius: found 1e-30, expected at least 1e-12 [m]'),
@@ -74,10 +54,6 @@ REFUSED_LINKS = {
         BEAM, "beam = { radius = 0.04, length = 0.5 }",
         'frame "coupler".link.beam.axis: missing; expected "length" and "axis", or '
         "neither"),
-    "an axis without a length": (
-        BEAM, "beam = { radius = 0.04, axis = [1, 0, 0] }",
-        'frame "coupler".link.beam.length: missing; expected "length" and "axis", or '
-        "neither"),
     "an axis of zero": (
         BEAM, "beam = { radius = 0.04, length = 1, axis = [0, 0, 0] }",
         'frame "coupler".link.beam.axis: found [0.0, 0.0, 0.0], expected a direction'),
@@ -88,24 +64,12 @@ REFUSED_LINKS = {
         "mass = 1.2", f"[[frame]]\nname = 'x'\nparent = 'base'\n{LINK}",
         'frame "x".link: found a distance of 0 m from the parent; expected '
         'a translation, or a beam with "length" and "axis"'),
-    "no pieces": (
-        "poisson = 0.3 }", "poisson = 0.3, pieces = 0 }",
-        'frame "coupler".link.pieces: found 0, expected a finite number >= 1'),
     "too many pieces": (
         "poisson = 0.3 }", "poisson = 0.3, pieces = 101 }",
         'frame "coupler".link.pieces: found 101, expected a finite number >= 1'),
     "half a piece": (
         "poisson = 0.3 }", "poisson = 0.3, pieces = 2.5 }",
         'frame "coupler".link.pieces: found 2.5, expected a whole number'),
-    "a word for pieces": (
-        "poisson = 0.3 }", "poisson = 0.3, pieces = 'a' }",
-        "frame \"coupler\".link.pieces: found 'a', expected a finite number"),
-    "pieces of a stiffness": (
-        LINK, f"link = {{ stiffness = {rows({})}, pieces = 4 }}",
-        'frame "coupler".link: unknown key "pieces"'),
-    "a mesh without a surface": (
-        BEAM, 'mesh = { base = "z=0", tip = "z=0.5" }',
-        'frame "coupler".link.mesh.surface: missing; expected a string'),
     "an interface of another syntax": (
         BEAM, mesh(tip='"z=half"'),
         'frame "coupler".link.mesh.tip: found '),
@@ -135,9 +99,6 @@ REFUSED_LINKS = {
         BEAM, mesh() + ', parts = "solid=end/young=1e9,poisson=0.3"',
         "frame \"coupler\".link.parts: found 'solid=end/young=1e9,poisson=0.3', "
         "expected a list such as "),
-    "parts of a beam": (
-        BEAM, BEAM + ', parts = ["solid=end/young=1e9,poisson=0.3"]',
-        'frame "coupler".link: unknown key "parts"'),
     "a mesh with an unknown key": (
         BEAM, mesh(more=", units = 1"),
         'frame "coupler".link.mesh: unknown key "units"; did you mean "unit"?'),

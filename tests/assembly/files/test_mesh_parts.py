@@ -4,7 +4,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from forcefit.assembly.effects.modulus_scale import MODULUS_SCALE
-from forcefit.assembly.files.robot_file import read_robot, write_robot
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.measurement.conditions import as_declared
 from forcefit.assembly.model.robot import Frame, MeshLink, Robot
@@ -16,12 +15,6 @@ PARTS = ("solid=end a+end_b/young=2.1e11,poisson=0.3", "z=0..0.1/young=1e9,poiss
 def arm(parts=PARTS):
     link = MeshLink(Path("/arm.step#*"), "z=0", "z=1", 7e10, 0.3, parts=parts)
     return Robot("one", "arm", (Frame("arm", translation=[0, 0, 1], link=link),))
-
-
-def test_mesh_parts_are_equal_after_writing_and_reading(tmp_path):
-    path = tmp_path / "arm.toml"
-    write_robot(arm(), path)
-    assert read_robot(path).frame("arm").link.parts == PARTS
 
 
 def test_modulus_scale_multiplies_the_modulus_of_every_part():

@@ -74,26 +74,6 @@ def test_additional_legs_of_a_new_robot_are_redundant(
     ) == expected  # fmt: skip
 
 
-@pytest.mark.parametrize(("words", "message"), [
-    (["mine"], "--kind: missing, expected UPS | RUS | UPU | PRS | RRR | delta"),
-    (["mine", "--kind", "UPX"], '--kind: found "UPX"; did you mean "UPU"?'),
-    (["mine", "--kind", "UPS", "--legs", "7"],
-     "--legs: found 7, expected a multiple of 2 from 6 to 12 for --kind UPS"),
-    (["mine", "--kind", "RRR", "--legs", "2"],
-     "--legs: found 2, expected from 3 to 12 for --kind RRR"),
-    (["a b", "--kind", "RRR"], 'NAME: found "a b", expected letters'),
-    (["absent/mine", "--kind", "RRR"], "found no folder"),
-])  # fmt: skip
-def test_unusable_request_for_a_new_robot_is_refused_in_one_line(
-    run, tmp_path, monkeypatch, words, message
-):
-    monkeypatch.chdir(tmp_path)
-    status, out, err = run("new", *words)
-    assert (status, out, err.count("\n")) == (2, "", 1)
-    assert message in err
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_new_robot_overwrites_no_file(run, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text("# Written by forcefit.\n")

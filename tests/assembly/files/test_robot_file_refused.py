@@ -36,25 +36,9 @@ REFUSED = {
     "limits of a fixed joint": (
         "mass = 1.2", "mass = 1.2\nlimits = [-1.0, 1.0]",
         'frame "coupler".limits: found limits on a fixed joint'),
-    "tolerance of another shape": (
-        "mass = 1.2", "mass = 1.2\ntolerance = [1e-3]",
-        'frame "coupler".tolerance: found [0.001] of length 1, expected 6 finite '),
-    "unknown key at the root": (
-        'description = "', 'descripton = "',
-        'unknown key "descripton"; did you mean "description"?'),
-    "unknown key of a frame": (
-        "mass = 1.2", "masss = 1.2",
-        'frame "coupler": unknown key "masss"; did you mean "mass"?'),
-    "unknown key of a clearance": (
-        "spin = 3.0", "spinn = 3.0",
-        'frame "elbow".clearance: unknown key "spinn"; did you mean "spin"?'),
     "unknown key of a link": (
         "poisson = 0.3 }", "poisson = 0.3, densty = 1.0 }",
         'frame "coupler".link: unknown key "densty"; did you mean "density"?'),
-    "unknown key of a beam": (
-        "inner_radius", "inner_radiu",
-        'frame "coupler".link.beam: unknown key "inner_radiu"; did you mean '
-        '"inner_radius"?'),
     "unknown key of a closure": (
         'frames = ["coupler", "seat"]', 'frames = ["coupler", "seat"]\nframe = 1',
         'closure[1]: unknown key "frame"; did you mean "frames"?'),
@@ -62,8 +46,6 @@ REFUSED = {
         "mass = 1.2", "mass = 1.2\n[[frame]]\nname = 'x'\nparent = 'base'\n"
         "dh = { tetha = 1 }",
         'frame "x".dh: unknown key "tetha"; did you mean "theta"?'),
-    "no platform": (
-        'platform = "coupler"', "", "platform: missing; expected the name of a frame"),
     "unknown platform": (
         'platform = "coupler"', 'platform = "coupler1"',
         'platform: found "coupler1", expected the name of a frame; did you mean '
@@ -72,8 +54,6 @@ REFUSED = {
         'platform = "coupler"', 'platform = "base"',
         'platform: found "base"; expected a frame (add a fixed one whose parent is '
         "it)"),
-    "a frame without a name": (
-        'name = "seat"', "", "frame[6].name: missing; expected a string"),
     "a frame without a parent": (
         'parent = "wrist"', "",
         'frame "seat".parent: missing; expected the name of a frame, or "base"'),
@@ -81,10 +61,6 @@ REFUSED = {
         'parent = "wrist"', 'parent = "wirst"',
         'frame "seat".parent: found "wirst", expected a frame of this robot or '
         '"base"; did you mean "wrist"?'),
-    "a frame that is its own parent": (
-        'parent = "wrist"', 'parent = "seat"',
-        'frame "seat".parent: found "seat", which leads to a cycle of parents; '
-        'expected parents that lead to "base"'),
     "a ring of parents": (
         'name = "rocker"\nparent = "base"', 'name = "rocker"\nparent = "seat"',
         'frame "rocker".parent: found "seat", which leads to a cycle of parents; '
@@ -97,8 +73,6 @@ REFUSED = {
         'name = "wrist"', 'name = "base"',
         'frame[5].name: found "base", already the name of the root; expected '
         'another name'),
-    "an empty name": (
-        'name = "wrist"', 'name = " "', "frame[5].name: found ' ', expected a string"),
     "a joint of another kind": (
         'joint = "revolute"\nactuated', 'joint = "revolut"\nactuated',
         'frame "crank".joint: found \'revolut\', expected "fixed" | "revolute" | '
@@ -119,10 +93,6 @@ REFUSED = {
         'joint = "revolute"\nactuated = true', "",
         'frame "crank".position: found position on a fixed joint; expected joint = '
         '"revolute" | "prismatic" | "helical", or no position'),
-    "an actuated fixed joint": (
-        'joint = "revolute"\nactuated = true\nposition = 1.0', "actuated = true",
-        'frame "crank".actuated: found actuated on a fixed joint; expected joint = '
-        '"revolute" | "prismatic" | "helical", or no actuated'),
     "a negative mass": (
         "mass = 1.2", "mass = -1.2",
         'frame "coupler".mass: found -1.2, expected a finite number >= 0 [kg]'),
@@ -131,25 +101,10 @@ REFUSED = {
         'frame "crank".drive_force: found a force on a joint that is not passive; '
         'expected a joint = "revolute" | "prismatic" | "helical" that is not '
         "actuated: a drive that applies a force holds no coordinate"),
-    "a force without a joint": (
-        "mass = 1.2", "mass = 1.2\ndrive_force = 5.0",
-        'frame "coupler".drive_force: found a force on a joint that is not passive; '),
     "a force that is no number": (
         "position = 1.0\njoint_stiffness", "position = 1.0\ndrive_force = nan\n"
         "joint_stiffness",
         'frame "rocker".drive_force: found nan, expected a finite number'),
-    "moments of inertia of no body": (
-        "mass = 1.2", "mass = 1.2\ninertia = [1, 1, 2.1, 0, 0, 0]",
-        'frame "coupler".inertia: found principal moments 1, 1, 2.1; expected none '
-        "negative, and none larger than the sum of the other two"),
-    "a negative principal moment": (
-        "mass = 1.2", "mass = 1.2\ninertia = [1, 1, 1, 2, 0, 0]",
-        'frame "coupler".inertia: found principal moments -1, 1, 3; expected none '
-        "negative, and none larger than the sum of the other two"),
-    "moments of inertia as a matrix": (
-        "mass = 1.2", "mass = 1.2\ninertia = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]",
-        'frame "coupler".inertia: found [[1, 0, 0], [0, 1, 0], [0, 0, 1]] of length '
-        "3, expected 6 finite numbers [kg m^2]"),
     "an infinite length": (
         "translation = [0.3, 0.0, 0.0]", "translation = [0.3, -inf, 0.0]",
         'frame "wrist".translation: found -inf as number 2, expected 3 finite numbers '
@@ -162,10 +117,6 @@ REFUSED = {
         "translation = [0.3, 0.0, 0.0]", "translation = [0.3, 0.0, 0.0]\ndh = {a = 1}",
         'frame "wrist".translation: found translation together with "dh"; both '
         "place the frame, expected only one of them"),
-    "dh beside a rotation": (
-        "translation = [0.3, 0.0, 0.0]", "rotation = [0, 0, 0]\ndh = {a = 1}",
-        'frame "wrist".rotation: found rotation together with "dh"; both place '
-        "the frame, expected only one of them"),
     "a list for dh": (
         "translation = [0.3, 0.0, 0.0]", "dh = [0, 0, 0.3, 0]",
         'frame "wrist".dh: found [0, 0, 0.3, 0], expected a table'),
@@ -184,6 +135,9 @@ REFUSED = {
         'joint = "revolute"\nposition = -1.0\n' + PLAY,
         'joint = "prismatic"\nclearance = { ball = 1e-5 }',
         'frame "elbow".clearance.ball: found a bound on a sliding joint, '),
+    "an unbounded clearance of a joint that moves": (
+        PLAY, "clearance = { spin = inf }",
+        'frame "elbow".clearance.spin: found inf, expected a finite'),
     "a number for a clearance": (
         PLAY, "clearance = 1e-5",
         'frame "elbow".clearance: found 1e-05, expected a table'),
@@ -194,8 +148,7 @@ REFUSED = {
         "[N m/rad .. N/m]"),
     "a stiffness of zero": (
         SPRING, "joint_stiffness = [1, 0, 3, 4, 5, 6]",
-        'frame "rocker".joint_stiffness: found the number 0, expected 6 diagonal terms '
-        "> 0 or inf (number 3 may be 0: free), or 6 rows of 6 [N m/rad .. N/m]"),
+        'frame "rocker".joint_stiffness: found the number 0, expected 6 diagonal '),
     "a locked bearing": (
         SPRING, "joint_stiffness = [inf, inf, inf, 2e8, 2e8, 2e8]",
         'frame "rocker".joint_stiffness: found inf along the motion of a passive '
@@ -205,19 +158,9 @@ REFUSED = {
         SPRING, f"joint_stiffness = {rows({(3, 3): 0, (3, 4): 1, (4, 3): 1})}",
         'frame "rocker".joint_stiffness: not positive definite: found 0 as term '
         "[3, 3] of the diagonal, expected > 0"),
-    "a stiffness of minus infinity": (
-        SPRING, "joint_stiffness = [1, 2, -inf, 4, 5, 6]",
-        'frame "rocker".joint_stiffness: found the number -inf, expected 6 diagonal '
-        "terms > 0 or inf (number 3 may be 0: free), or 6 rows of 6 [N m/rad .. N/m]"),
     "nan in a joint's stiffness": (
         SPRING, f"joint_stiffness = {rows({(2, 3): math.nan})}",
-        'frame "rocker".joint_stiffness: found nan as number 3 in row 2, expected 6 '
-        "diagonal terms > 0 or inf (number 3 may be 0: free), or 6 rows of 6 "
-        "[N m/rad .. N/m]"),
-    "inf off the diagonal": (
-        SPRING, f"joint_stiffness = {rows({(1, 2): math.inf, (2, 1): math.inf})}",
-        'frame "rocker".joint_stiffness: found inf at [1, 2]; expected inf only on the '
-        "diagonal, with zeros elsewhere in its row and column"),
+        'frame "rocker".joint_stiffness: found nan as number 3 in row 2, expected 6 '),
     "something beside an inf": (
         SPRING, f"joint_stiffness = {rows({(1, 1): math.inf, (2, 1): 1, (1, 2): 1})}",
         'frame "rocker".joint_stiffness: found 1 at [1, 2]; expected inf only on the '
@@ -234,13 +177,6 @@ REFUSED = {
         '["coupler", "seat"]', '["coupler", "coupler"]',
         "closure[1].frames: found ['coupler', 'coupler'], expected two different frame "
         "names"),
-    "a closure of three": (
-        '["coupler", "seat"]', '["coupler", "seat", "crank"]',
-        "closure[1].frames: found ['coupler', 'seat', 'crank'], expected two different "
-        "frame names"),
-    "a closure of numbers": (
-        '["coupler", "seat"]', "[1, 2]",
-        "closure[1].frames: found [1, 2], expected two different frame names"),
     "a closure with nobody": (
         '["coupler", "seat"]', '["coupler", "seta"]',
         'closure[1].frames: found "seta", expected the name of a frame; did you mean '
@@ -253,10 +189,6 @@ REFUSED = {
         '["coupler", "seat"]', '["coupler", "wrist"]',
         'closure[1].frames: found a revolute joint at frame "wrist"; expected a fixed '
         "joint without clearance or joint_stiffness (add a frame after it)"),
-    "a closure at a clearance": (
-        'parent = "wrist"', 'parent = "wrist"\nclearance = { radial = 1e-5 }',
-        'closure[1].frames: found clearance at frame "seat"; expected a fixed joint '
-        "without clearance or joint_stiffness (add a frame after it)"),
     "a platform with a stiffness": (
         "mass = 1.2", "joint_stiffness = [1, 1, 1, 1, 1, 1]",
         'platform: found joint_stiffness at frame "coupler"; expected a fixed joint '

@@ -9,39 +9,13 @@ from random import Random
 import pytest
 
 from benchmarks.fuzz_mutations import change_file
+from benchmarks.fuzz_seeds import ARM, BAR
 from forcefit.assembly.files.robot_file import read_robot
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.inputs.table import BadInput
-from tests.robot_files_for_tests import FOUR_BAR, rows
+from tests.robot_files_for_tests import rows
 
 STEEL = "young = 2.1e11, poisson = 0.3 }"
-SERIAL = f"""
-name = "serial"
-platform = "tool"
-[[frame]]
-name = "j1"
-parent = "base"
-joint = "revolute"
-actuated = true
-dh = {{ theta = 0.1, d = 0.2, a = 0.3, alpha = 1.5 }}
-mass = 1.2
-joint_stiffness = [1e8, 1e8, 1.0, 3.51e8, 3.51e8, 4.39e8]
-[[frame]]
-name = "j2"
-parent = "j1"
-joint = "prismatic"
-position = 0.1
-rotation = [0.1, -0.2, 3.0]
-geometric_error = [1e-5, 0, 0, 0, 2e-6, 0]
-joint_stiffness = {rows({})}
-[[frame]]
-name = "tool"
-parent = "j2"
-translation = [0, 0.1, 0.4]
-mass = 2
-centre_of_mass = [0, 0, 0.1]
-link = {{ beam = {{ radius = 0.01 }}, density = 2700.0, {STEEL}
-"""
 BODIES = (
     f'{{ beam = {{ radius = 0.02, inner_radius = 0.01, theory = "euler" }}, {STEEL}',
     f"{{ beam = {{ width = 0.02, height = 0.04, up = [0, 0, 1] }}, {STEEL}",
@@ -58,7 +32,7 @@ LINKS = 'name = "links"\nplatform = "f5"\n' + "".join(
     f"translation = [0.1, 0.2, 0.0]\nlink = {link}\n"
     for i, link in enumerate(BODIES)
 )
-SEEDS = {"four_bar": FOUR_BAR, "serial": SERIAL, "links": LINKS}
+SEEDS = {"four_bar": BAR, "serial": ARM, "links": LINKS}
 
 
 @pytest.mark.parametrize("name", SEEDS)

@@ -41,50 +41,19 @@ from forcefit.stiffness.report.library_build import build_library, read_spec
 from forcefit.stiffness.surface.beam_surfaces import shape_surface
 from forcefit.validation.crosscheck.crosscheck import crosscheck
 from tests.libraries_for_tests import SPEC
+from tests.robot_files_for_tests import FOUR_BAR, LINK, PLAY, SPRING
 
-FILE = """
-name = "loop"
-platform = "coupler"
-[[frame]]
-name = "crank"
-parent = "base"
-joint = "revolute"
-actuated = true
-position = 1.0
-[[frame]]
-name = "elbow"
-parent = "crank"
-translation = [0.3, 0, 0]
-joint = "revolute"
-position = -1.0
-geometric_error = [1e-4, 2e-4, 2e-4, 1e-4, 1e-4, 3e-4]
+WRIST = 'name = "wrist"\nparent = "rocker"\n'
+FILE = (
+    FOUR_BAR.replace(LINK, "").replace(SPRING, "")
+    .replace(PLAY, """geometric_error = [1e-4, 2e-4, 2e-4, 1e-4, 1e-4, 3e-4]
 clearance = { radial = 2e-5, axial = 2e-5, tilt = 1e-5 }
 link = { mesh = { surface = "bar.stl", base = "z=0", tip = "z=0.3" }, \
-young = 6e10, poisson = 0.3, density = 2700 }
-[[frame]]
-name = "coupler"
-parent = "elbow"
-translation = [0.5, 0, 0]
-mass = 1.2
-[[frame]]
-name = "rocker"
-parent = "base"
-translation = [0.5, 0, 0]
-joint = "revolute"
-position = 1.0
-[[frame]]
-name = "wrist"
-parent = "rocker"
-translation = [0.3, 0, 0]
-joint = "revolute"
-position = -1.0
-link = { library = "links#round-beam-length0.3-radius0.01-young6e+10-poisson0.3" }
-[[frame]]
-name = "seat"
-parent = "wrist"
-[[closure]]
-frames = ["coupler", "seat"]
-"""
+young = 6e10, poisson = 0.3, density = 2700 }""")
+    .replace(WRIST, f"""{WRIST}\
+link = {{ library = "links#round-beam-length0.3-radius0.01-young6e+10-poisson0.3" }}
+""")
+)  # fmt: skip
 LOAD, GRAVITY = (1, 2, -1, 30, 20, -50), (0, 0, -9.81)
 
 

@@ -65,28 +65,6 @@ def test_second_order_part_is_added_to_the_linear_model_only(rows, rng):
     assert exact == pytest.approx(np.zeros((ROWS, 6)), abs=1e-12)
 
 
-def test_selected_rows_keep_their_own_and_shared_arrays(rows, rng):
-    """Selection by number and by mask; base and tool shared by all rows are kept."""
-    some, mask = [3, 0], np.isin(np.arange(ROWS), [1, 4])
-    whole = as_declared(
-        rows, rng.normal(size=(ROWS, 6)), gravity=rng.normal(size=(ROWS, 3)),
-        target=rng.normal(size=(ROWS, 3)),
-        covariates={"temperature": rng.normal(size=ROWS), "dust": rng.normal(size=ROWS),
-                    "session": list("abcde")},
-    )  # fmt: skip
-    own = replace(whole, base=rng.normal(size=(ROWS, 6)), tool=rng.normal(size=3))
-    for chosen in (some, mask):
-        part = own.take(chosen)
-        numbers = np.arange(ROWS)[chosen]
-        for name in ("load", "gravity", "target", "temperature", "base", "transforms"):
-            expected = getattr(own, name)[numbers]
-            assert np.array_equal(getattr(part, name), expected), name
-        assert np.array_equal(part.covariates["dust"], own.covariates["dust"][numbers])
-        assert part.session.tolist() == [list("abcde")[k] for k in numbers]
-        assert np.array_equal(part.tool, own.tool)
-    assert np.array_equal(replace(whole, base=np.ones(6)).take(some).base, np.ones(6))
-
-
 def test_work_of_a_load_does_not_depend_on_the_reference_point(rows, rng):
     """M . theta + F . t at the reference point and at the platform's origin."""
     load, screw = rng.normal(size=(ROWS, 6)), rng.normal(size=6)

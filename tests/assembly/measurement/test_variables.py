@@ -1,13 +1,11 @@
 """Variables of effects by public name, and the history of rows."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from forcefit.assembly.kinematics.posture import place_robot, together
 from forcefit.assembly.measurement.conditions import as_declared
-from forcefit.assembly.measurement.variables import past, variable, with_history
+from forcefit.assembly.measurement.variables import variable
 from forcefit.assembly.model.robot import Frame, Robot
 
 ROWS = 4
@@ -51,16 +49,3 @@ def test_each_variable_name_has_the_value_of_its_row(rows):
         expected[name] = [np.nan] * ROWS
     for name, values in expected.items():
         np.testing.assert_allclose(variable(here, name), values, atol=1e-12)
-
-
-@pytest.mark.parametrize("missing", ["history", "row", "both"])
-def test_rows_without_history_are_first_rows_of_their_own_sessions(rows, missing):
-    here = with_history(rows[0])
-    lost = ("history", "row") if missing == "both" else (missing,)
-    here = replace(here, **dict.fromkeys(lost))
-    history, row = past(here, ["q.slide"])
-    assert row.tolist() == [0, 1, 2, 3]
-    assert history.first.tolist() == [True] * 4
-    assert history.values.keys() == {"q.slide", "time", "approach"}
-    for name in ("q.slide", "time"):
-        np.testing.assert_array_equal(history.values[name], variable(here, name))

@@ -37,14 +37,11 @@ def test_bodies_without_mass_keep_their_moments():
     np.testing.assert_array_equal(J, np.eye(3))
 
 
-@pytest.mark.parametrize(
-    ("inertia", "message"),
-    [
-        ([[1, 0.1, 0], [0, 1, 0], [0, 0, 1]], "not symmetric"),
-        (np.diag([1.0, 1.0, -0.1]), "principal moments -0.1, 1, 1"),
-        (np.diag([0.1, 1.0, 1.2]), "principal moments 0.1, 1, 1.2"),
-    ],
-)
+@pytest.mark.parametrize(("inertia", "message"), [
+    ([[1, 0.1, 0], [0, 1, 0], [0, 0, 1]], "not symmetric"),
+    (np.diag([1.0, 1.0, -0.1]), "principal moments -0.1, 1, 1"),
+    (np.diag([0.1, 1.0, 1.2]), "principal moments 0.1, 1, 1.2"),
+])  # fmt: skip
 def test_a_frame_with_moments_of_no_body_is_refused(inertia, message):
     with pytest.raises(BadInput, match=r'^frame "arm"\.inertia: found .*' + message):
         Frame("arm", mass=1.0, inertia=inertia)

@@ -5,14 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from forcefit.assembly.files.robot_file import read_robot, write_robot
 from forcefit.assembly.kinematics.mobility import mobility
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.linear.energy import solve_assembly
 from forcefit.assembly.linear.reference.as_printed import energy_as_printed
 from forcefit.assembly.linear.zone import zone_margin
-from forcefit.assembly.model.clearance import clearance_bounds
-from forcefit.assembly.model.links import joint_compliances, link_compliances
+from forcefit.assembly.model.links import joint_compliances
 from forcefit.assembly.model.random_errors import frames_named
 from forcefit.assembly.model.robot import BeamLink, Robot, beam_axis
 from forcefit.assembly.robots import BUILT_IN, load_robot
@@ -52,13 +50,6 @@ def robot(name):
     return BUILT_IN[name]()
 
 
-# joints with clearance, counted once: all that are not driven, and the arm's drives
-PLAYING = {
-    "irsbot2": 8, "four_bar": 3, "five_bar": 3, "3rrr": 6,
-    "hexapod": 12, "delta": 12, "orthoglide": 18, "arm6": 6,
-}  # fmt: skip
-
-
 ELASTIC_DRIVES = [n for n in COUNTS if n != "irsbot2"]  # whose own has none
 
 
@@ -74,12 +65,6 @@ def with_random_errors(robot, rng, rotation=1e-3, translation=2e-4):
     size = [rotation] * 3 + [translation] * 3
     errors[rows] = rng.uniform(-1, 1, (len(rows), 6)) * size
     return robot.with_errors(errors)
-
-
-def test_built_in_robots_have_the_known_number_of_joint_clearances(name, robot):
-    playing = [f for f in robot.frames if f.clearance is not None]
-    assert len(playing) == PLAYING[name]
-    assert all(f.clearance.radial > 0 and f.clearance.axial > 0 for f in playing)
 
 
 def test_beams_extend_from_the_parent_origin_to_the_frame_origin(robot):
@@ -104,18 +89,6 @@ def test_freedoms_and_overconstraint_equal_published_values(name, robot, rng):
         found = mobility(posture)
         counts = (found.freedoms, found.locked_freedoms, found.overconstraint)
         assert counts == COUNTS[name]
-
-
-def test_built_in_robot_is_equal_after_writing_and_reading(robot, tmp_path):
-    """Files keep all digits, so no transform may change."""
-    write_robot(robot, tmp_path / "robot.toml")
-    again = read_robot(tmp_path / "robot.toml")
-    assert again.closures == robot.closures
-    assert [f.name for f in again.frames] == [f.name for f in robot.frames]
-    change = home_posture(again).transforms - home_posture(robot).transforms
-    assert np.abs(change).max() == 0.0
-    for table in (link_compliances, joint_compliances, clearance_bounds):
-        assert np.array_equal(table(again), table(robot), equal_nan=True)
 
 
 def test_pose_is_recovered_from_its_joint_positions(name, robot, rng):

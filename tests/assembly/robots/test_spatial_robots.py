@@ -95,13 +95,10 @@ def test_pose_error_of_the_hexapod_is_the_farthest_of_64_corners(rng):
     assert_pose_error_is_of_64_corners(posture, lines, joints)
 
 
-@pytest.mark.parametrize(
-    ("position", "degrees"),
-    [
-        ((0.0, 0.0, -0.9), (-20.5, -20.5, -20.5)),
-        ((0.3, 0.5, -1.1), (47.5, -11.6, 21.4)),
-    ],
-)
+@pytest.mark.parametrize(("position", "degrees"), [
+    ((0.0, 0.0, -0.9), (-20.5, -20.5, -20.5)),
+    ((0.3, 0.5, -1.1), (47.5, -11.6, 21.4)),
+])  # fmt: skip
 def test_drive_angles_of_the_delta_robot_equal_the_examples_of_williams(
     position, degrees
 ):

@@ -210,18 +210,6 @@ def test_search_over_subsets_that_ends_early_bounds_the_least_peak_force(most, r
     assert outcome(found.plan, posture, "force") == pytest.approx(found.value)
 
 
-def test_interrupted_search_over_subsets_bounds_the_least_peak_force(rng):
-    posture, plan, k, d = legs_along_z(rng, 9)
-
-    def stop(done):
-        if done == 14:
-            raise KeyboardInterrupt
-
-    found = best_order(plan, posture, "force", progress=stop)
-    least = least_peak(k, d) * (1 + 1e-9)
-    assert found.bound <= least <= found.value * (1 + 2e-9)
-
-
 def test_interrupted_search_returns_the_best_order_so_far():
     posture = planar_platform([0.0, 0.4, 0.1, 0.3], [0, 3e-5, 4e-5, -2e-5])
     steps = tuple(join(i, locked=("TZ",) if i == 4 else ()) for i in range(1, 5))

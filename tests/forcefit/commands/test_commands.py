@@ -62,16 +62,6 @@ def test_pose_and_its_joint_values_have_equal_results(run, robot_file):
     assert by_joints["pose"]["tx"] == pytest.approx(0.1, abs=1e-10)
 
 
-def test_solve_reports_the_screw_and_potential_of_a_load(run, tmp_path):
-    path = tmp_path / "beams.toml"
-    write_robot(coaxial_beams(np.zeros(6), (1e6, 3e6)), path)
-    status, out, _ = run("assembly", "solve", path, "--load", "fx=400", "--json", "-")
-    found = json.loads(out)
-    assert status == 0
-    assert found["platform_screw"][3] == pytest.approx(1e-4)  # 400 / (1e6 + 3e6)
-    assert found["potential"] == pytest.approx(-400 * 1e-4 / 2)
-
-
 def test_robot_that_cannot_assemble_has_exit_status_1(run, tmp_path):
     path = tmp_path / "stuck.toml"
     path.write_text(
@@ -135,14 +125,6 @@ def test_exact_solution_reports_a_state_beyond_a_critical_load(run, tmp_path):
         assert found == status
 
 
-def test_solve_with_gravity_lowers_an_arm(run):
-    _, out, _ = run("assembly", "solve", "arm6", "--gravity", "z=-9.81", "--json", "-")
-    found = json.loads(out)
-    assert found["platform_screw"][5] < 0
-    # springs alone would give potential = -energy; the arm's play falls as well
-    assert found["potential"] < -found["energy"]
-
-
 def test_show_writes_a_figure(run, robot_file, tmp_path):
     status, _, _ = run(
         "assembly", "show", robot_file, "--figure", tmp_path / "robot.png"
@@ -187,8 +169,6 @@ def test_show_refuses_an_exaggeration_of_a_page_with_a_slider(run, tmp_path):
         (["assembly", "solve", "irsbot3"], '"irsbot3": neither a built-in robot nor a'),
         (["assembly", "solve", "no.toml"], "no.toml: cannot be read: No such file"),
         (["assembly", "solve", "irsbot2", "--pose", "tx"], '--pose: found "tx"'),
-        (["assembly", "solve", "irsbot2", "--pose", "q=1"], 'unknown component "q"'),
-        (["assembly", "solve", "irsbot2", "--pose", "tx=nan"], "--pose tx: found nan"),
         (["assembly", "solve", "irsbot2", "--pose", "tz=-9"], "cannot be reached"),
         (["assembly", "solve", "irsbot2", "--pose", "tx=0", "--joint", "leg1.drive=0"],
          "found both a pose and joints"),
@@ -197,30 +177,54 @@ def test_show_refuses_an_exaggeration_of_a_page_with_a_slider(run, tmp_path):
         (["assembly", "solve", "irsbot2", "--load", "f=1"], '--load: unknown'),
         (["assembly", "solve", "irsbot2", "--json", "/nowhere/x.json"],
          "/nowhere/x.json: "),
-        (["assembly", "solve", "irsbot2", "--gravity", "w=1"], "--gravity: unknown"),
         (["assembly", "error", "irsbot2", "--assumption", "fre"],
          '--assumption: found'),
         (["assembly", "error", "irsbot2", "--tolerance-rotation", "-1"],
          "--tolerance-rotation: found -1.0, expected a finite number > 0"),
         (["assembly", "sweep", "irsbot2", "--grid", "tx=0:1:0", "-o", "x.nc"],
          "grid tx: found a step of 0"),
-        (["assembly", "sweep", "irsbot2", "--grid", "tx=0", "-o", "/nowhere/x.nc"],
-         "/nowhere/x.nc: found no folder /nowhere"),
         (["assembly", "solve", "irsbot2", "--poze", "tx=0"],
          "--pose"),
         (["assembly", "solve", "irsbot2", "--po\nze"], r"--po\x0aze"),
         (["assembly", "solve"], "Missing argument 'ROBOT'"),
-        (["assembly", "solev", "irsbot2"], "'solve'"),
         (["asembly"], "'assembly'"),
         (["assembly", "solve", "irsbot2", "more"], "unexpected extra argument"),
-        (["assembly", "solve", "irsbot2", "--pose"], "--pose"),
         (["assembly", "sweep", "irsbot2", "--grid", "tx=0"], "Missing option '-o'"),
         (["assembly", "error", "irsbot2", "--energy-budget", "x"],
          "Invalid value for '--energy-budget': "),
-        (["assembly", "sweep", "irsbot2", "-o", "x.nc", "--draws", "0"],
-         "Invalid value for '--draws': "),
-        (["stiffness", "beam", "--length", "1", "--young", "1", "--poisson", "a"],
-         "Invalid value for '--poisson': "),
+        (["assembly", "stiffness", "delta", "--along", "tx=0"],
+         "--along: expected components of a translation"),
+        (["assembly", "stiffness", "delta", "--along", "tx=nan"],
+         "--along tx: found nan"),
+        (["assembly", "stiffness", "delta", "--at", "1,2"],
+         "--at: found '1,2', expected three numbers"),
+        (["assembly", "stiffness", "delta", "--length", "0"],
+         "--length: found 0, expected a finite number > 0"),
+        (["assembly", "stiffness", "delta", "--load", "fz=nan"],
+         "--load fz: found nan, expected a finite number"),
+        (["assembly", "deflection", "four_bar", "--along", "fz"],
+         "--along: found 'fz', expected COMPONENT=FROM:TO:STEP"),
+        (["assembly", "deflection", "four_bar", "--along", "fq=0:1:1"],
+         '--along: unknown component "fq"'),
+        (["assembly", "deflection", "four_bar", "--along", "fz=0:1:0"],
+         "expected two different loads and a step"),
+        (["assembly", "deflection", "four_bar", "--along", "fz=0:inf:1"],
+         "expected finite numbers"),
+        (["assembly", "deflection", "four_bar", "--along", "fz=0:1e9:1"],
+         "expected at most 10000"),
+        (["assembly", "deflection", "four_bar", "--along", "fx=0:1:1", "--follow",
+          "--back"], "--follow: found together with --back"),
+        (["assembly", "frequencies", "irsbot2"],
+         'irsbot2: found no moving mass; expected "density"'),
+        (["example", "irsbot"], 'example: found "irsbot"; did you mean "irsbot2"?'),
+        (["example", "irsbot2", "-o", "nowhere"], "nowhere: found no such folder"),
+        (["new", "mine"],
+         "--kind: missing, expected UPS | RUS | UPU | PRS | RRR | delta"),
+        (["new", "mine", "--kind", "UPX"], '--kind: found "UPX"; did you mean "UPU"?'),
+        (["new", "mine", "--kind", "UPS", "--legs", "7"],
+         "--legs: found 7, expected a multiple of 2 from 6 to 12 for --kind UPS"),
+        (["new", "a b", "--kind", "RRR"], 'NAME: found "a b", expected letters'),
+        (["new", "absent/mine", "--kind", "RRR"], "found no folder"),
         (["study", "no.toml"], "no.toml: cannot be read: No such file or directory"),
         (["validation", "crosscheck", "irsbot2", "--scale", "1"], "--scale: found"),
     ],
@@ -281,12 +285,6 @@ def test_help_prints_every_unit_in_brackets_and_whole_sentences(run, words):
     assert "..." not in out.partition("Commands:")[2]
 
 
-def test_help_texts_have_units_in_many_options():
-    assert len(EVERY_COMMAND) > 25
-    helps = [p.help or "" for c in EVERY_COMMAND.values() for p in c.params]
-    assert sum("[" in text for text in helps) > 40
-
-
 def test_version_option_prints_the_version_of_the_package(run):
     installed = version("forcefit")
     assert run("--version") == (0, f"forcefit {installed}\n", "")
@@ -333,10 +331,7 @@ def test_module_command_refuses_an_unknown_robot_without_a_traceback():
 @pytest.mark.parametrize(
     "words",
     [
-        ["assembly", "sweep", "bar.toml", "--grid", "rz=0:1:1", "-o", "x.nc",
-         "--workers", "1025"],
         ["validation", "diagnose", "campaign", "--calibrate", "1" * 9],
-        ["validation", "plan", "arm6", "-o", "x", "--rows", "0"],
         ["assembly", "statistics", "bar.toml", "-o", "x.nc", "--workers", "9" * 40],
         ["assembly", "statistics", "bar.toml", "-o", "x.nc", "--importance", "1" * 9],
         ["stiffness", "library", "spec.toml", "--workers", "1025"],

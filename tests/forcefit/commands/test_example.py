@@ -70,23 +70,6 @@ def test_example_files_are_unchanged_on_repeat_and_edited_files_are_kept(run, tm
     assert files_of(tmp_path) == before
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["irsbot"], 'example: found "irsbot"; did you mean "irsbot2"?'),
-        (["irsbot2", "-o", "nowhere"], "nowhere: found no such folder"),
-    ],
-)
-def test_invalid_example_name_or_folder_is_reported_by_one_message(
-    run, tmp_path, monkeypatch, words, message
-):
-    monkeypatch.chdir(tmp_path)
-    status, _, err = run("example", *words)
-    assert (status, err.count("\n")) == (2, 1)
-    assert message in err
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_wheel_includes_the_files_of_all_examples():
     table = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     packages = table["tool"]["scikit-build"]["wheel"]["packages"]

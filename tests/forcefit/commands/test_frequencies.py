@@ -21,13 +21,6 @@ def test_frequencies_are_ascending_with_shares_of_the_parts(run):
         assert sum(mode["shares"].values()) == pytest.approx(1.0)
 
 
-def test_frequencies_of_a_robot_without_mass_are_refused(run):
-    status, out, err = run("assembly", "frequencies", "irsbot2")
-    assert status == 2
-    assert out == ""
-    assert 'irsbot2: found no moving mass; expected "density"' in err
-
-
 def test_nominal_frequencies_report_that_gravity_is_left_out(run, tmp_path):
     """A compound pendulum has the frequency sqrt(m g l / I) / (2 pi);
     nominally it has none."""

@@ -42,24 +42,6 @@ def test_help_lists_every_option_once_under_a_group(run, words):
     assert {one[0] for one in found.values()} <= {"What", *GROUPS}
 
 
-@pytest.mark.parametrize(
-    ("words", "option", "title"),
-    [
-        ("assembly error", "--assumption", "What"),
-        ("assembly error", "--pose", "Where"),
-        ("assembly error", "--tolerance-rotation", "How sure"),
-        ("assembly error", "--json", "Output"),
-        ("assembly sweep", "--workers", "Run"),
-        ("stiffness fea", "--tip", "Where"),
-        ("stiffness fea", "--accuracy", "How sure"),
-        ("validation diagnose", "--save", "Output"),
-    ],
-)
-def test_help_lists_an_option_under_its_group(run, words, option, title):
-    _, out, _ = run(*words.split(), "--help")
-    assert titles_of_options(out)[option] == [title]
-
-
 def test_every_name_in_a_group_is_an_option_of_some_command():
     """A name that is no longer an option must leave the table too."""
     declared = {

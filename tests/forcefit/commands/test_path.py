@@ -51,19 +51,6 @@ def test_path_of_a_slide_has_the_deflection_of_its_cantilever(run, slide):
     assert "less than 10" in answer["remarks"][0]
 
 
-def test_text_of_a_path_names_its_largest_values(run, slide):
-    status, out, _ = run(
-        "assembly", "path", slide / "slide.toml", "--path", slide / "way.csv",
-        "--profile", "trapezoid", "--speed", 0.1,
-    )  # fmt: skip
-    assert status == 0
-    assert "law        trapezoid" in out
-    assert "path time  1.5 s" in out
-    assert "deflection by acceleration [um]" in out
-    assert "drive rail [N]" in out
-    assert "note: the acceleration jumps" in out
-
-
 def test_path_writes_data_figure_and_page(run, tmp_path):
     files = {name: tmp_path / f"path.{name}" for name in ("nc", "png", "html", "json")}
     status, _, _ = run(

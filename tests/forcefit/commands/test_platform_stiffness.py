@@ -59,16 +59,13 @@ def test_free_motion_has_null_compliance_and_exit_status_1(run, tmp_path):
     assert answer["compliance"][3][3] == pytest.approx(0.5 / (7e10 * np.pi * 1e-4))
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["stiffness", "--state", "exact", "--load", "fz=5"],
-        ["deflection", "--along", "fz=0:5:5"],
-        ["deflection", "--along", "fz=0:5:5", "--state", "exact"],
-        ["deflection", "--along", "fz=0:5:5", "--follow"],
-        ["frequencies", "--state", "exact", "--load", "fz=5"],
-    ],
-)
+@pytest.mark.parametrize("words", [
+    ["stiffness", "--state", "exact", "--load", "fz=5"],
+    ["deflection", "--along", "fz=0:5:5"],
+    ["deflection", "--along", "fz=0:5:5", "--state", "exact"],
+    ["deflection", "--along", "fz=0:5:5", "--follow"],
+    ["frequencies", "--state", "exact", "--load", "fz=5"],
+])  # fmt: skip
 def test_load_on_a_free_motion_gives_exit_status_1_and_the_motion_is_named(
     run, tmp_path, words
 ):
@@ -98,22 +95,6 @@ def test_sweep_names_the_free_motion(tmp_path):
     assert float(data.stiffness.sel(wrench_component="FX")) == pytest.approx(stretched)
 
 
-@pytest.mark.parametrize(
-    ("option", "message"),
-    [
-        (["--at", "0,0"], "--at: found '0,0', expected three numbers"),
-        (["--at", "0,nan,0"], "--at: found '0,nan,0', expected three numbers"),
-        (["--length", "0"], "--length: found 0, expected a finite number > 0"),
-        (["--load", "fy=x"], '--load: found "fy=x", expected NAME=NUMBER'),
-    ],
-)
-def test_wrong_point_length_or_load_is_refused(run, option, message):
-    status, out, err = run("assembly", "stiffness", "four_bar", *option)
-    assert status == 2
-    assert out == ""
-    assert message in err
-
-
 def test_stiffness_command_writes_its_chart(run, tmp_path):
     picture = tmp_path / "shares.png"
     status, out, _ = run(
@@ -140,40 +121,10 @@ def test_stiffness_along_a_direction_has_its_value_and_shares(run):
     assert along["shares"] == answer["shares"]["tz"]
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--along", "tx=0"], "--along: expected components of a translation"),
-        (["--along", "tx=nan"], "--along tx: found nan"),
-        (["--at", "1,2"], "--at: found '1,2', expected three numbers"),
-        (["--length", "0"], "--length: found 0, expected a finite number > 0"),
-        (["--load", "fz=nan"], "--load fz: found nan, expected a finite number"),
-        (["--pose", "tz=-9"], "cannot be reached"),
-    ],
-)
-def test_invalid_input_to_stiffness_is_reported_in_one_line_with_exit_status_2(
-    run, words, message
-):
-    status, out, err = run("assembly", "stiffness", "delta", *words)
-    assert status == 2
-    assert out == ""
-    assert message in err
-    assert len(err.strip().splitlines()) == 1
-
-
 @pytest.mark.slow
 def test_load_without_an_equilibrium_has_exit_status_1(run):
-    status, out, _ = run(
-        "assembly",
-        "stiffness",
-        "four_bar",
-        "--state",
-        "exact",
-        "--load",
-        "fx=1e9",
-        "--json",
-        "-",
-    )
+    words = ["--state", "exact", "--load", "fx=1e9", "--json", "-"]
+    status, out, _ = run("assembly", "stiffness", "four_bar", *words)
     answer = json.loads(out)
     assert status == 1
     assert answer["status"] == "solver failed"
@@ -184,17 +135,8 @@ def test_stiffness_reports_a_platform_far_from_its_nominal_pose(run):
     """10 MN move it from 0.5 m below the base to above it;
     300 N move it by micrometres."""
     for load, far in (("fz=1e7", True), ("fz=-300", False)):
-        _, out, _ = run(
-            "assembly",
-            "stiffness",
-            "irsbot2",
-            "--state",
-            "exact",
-            "--load",
-            load,
-            "--json",
-            "-",
-        )
+        words = ["--state", "exact", "--load", load, "--json", "-"]
+        _, out, _ = run("assembly", "stiffness", "irsbot2", *words)
         found = json.loads(out)
         assert (found["point"][2] > 0) == far
         assert len(found["remarks"]) == far

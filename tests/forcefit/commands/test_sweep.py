@@ -93,8 +93,6 @@ def test_plot_draws_a_saved_sweep_without_solving(run, tmp_path, monkeypatch):
          "no.csv: cannot be read: No such file"),
         (["sweep", "five_bar", "--grid", "tx=0", "--vary", "left.elbow.young=1",
           "-o", "x.nc"], 'five_bar: no number "left.elbow.young"'),
-        (["sweep", "five_bar", "--grid", "tx=0", "--errors", "no.toml", "--draws", "2",
-          "-o", "x.nc"], "no.toml: cannot be read: No such file"),
         (["plot", "no.nc", "--figure", "x.png"],
          "no.nc: no such file; expected a data set"),
     ],
@@ -217,35 +215,27 @@ def test_sweep_of_listed_poses_and_designs_draws_a_map(run, tmp_path):
     [
         (["-o", "robot.toml"], 'robot.toml: found the ending ".toml", expected a '
          "NetCDF file of forcefit: .nc"),
-        (["-o", "x"], "x: found no ending, expected a NetCDF file of forcefit: .nc"),
         (["-o", "other.nc"], "other.nc: found a file that is not a NetCDF file of "
          "forcefit; expected such a file, or no file: it is not overwritten"),
         (["-o", "measured.nc"], "measured.nc: found a NetCDF file that is not one of a "
          "sweep by forcefit"),
         (["-o", "x.nc", "--figure", "x.xyz"], 'x.xyz: found the ending ".xyz", '
          "expected a picture: .png or .svg or .pdf"),
-        (["-o", "x.nc", "--figure", "other.png"], "other.png: found a file that is not "
-         "a picture"),
         (["-o", "x.nc", "--json", "robot.toml"], 'found the ending ".toml", expected a '
          "JSON file: .json"),
         (["-o", "x.nc", "--figure", "x.png"], "figure: found a single point"),
         (["-o", "x.nc", "--json", "full.json"], "full.json: found a device, pipe or "
          "socket, expected a regular file"),
-        (["-o", "pipe.nc"], "pipe.nc: found a device, pipe or socket"),
-        (["-o", "no/x.nc"], "no/x.nc: found no folder no; expected an existing"),
-        (["-o", "robot.toml/x.nc"], "found no folder robot.toml"),
-        (["-o", f"{'x' * 300}.nc"], "cannot be written: File name too long"),
     ],
 )  # fmt: skip
 def test_file_of_another_program_is_refused_as_output_and_kept(
     run, tmp_path, monkeypatch, words, message
 ):
     monkeypatch.chdir(tmp_path)
-    for name in ("robot.toml", "other.nc", "other.png"):
+    for name in ("robot.toml", "other.nc"):
         (tmp_path / name).write_text("mine\n")
     xarray.Dataset({"x": 1}).to_netcdf("measured.nc", engine="h5netcdf")
     os.symlink("/dev/full", "full.json")
-    os.mkfifo("pipe.nc")
     before = {p: p.lstat().st_mtime_ns for p in tmp_path.iterdir()}
     status, out, err = run("assembly", "sweep", "five_bar", "--grid", "tx=0,ty=0.13",
                            *words)  # fmt: skip

@@ -24,27 +24,6 @@ def test_locked_file_is_refused_until_its_lock_is_released(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_lock_of_a_killed_program_is_released(tmp_path):
-    path = tmp_path / "map.nc.journal"
-    held = f"""
-import os
-from pathlib import Path
-from forcefit.inputs.locking import locked_file
-with locked_file(Path({str(path)!r})):
-    os._exit(9)
-"""
-    search = {"PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])}
-    ran = subprocess.run([sys.executable, "-c", held], env=os.environ | search)
-    assert ran.returncode == 9
-    assert sorted(p.name for p in tmp_path.iterdir()) == [
-        path.name,
-        f"{path.name}.lock",
-    ]
-    with locked_file(path, wait=False):
-        pass
-    assert [p.name for p in tmp_path.iterdir()] == [path.name]
-
-
 WITHOUT_POSIX = """
 import os, sys, warnings
 for module in ("fcntl", "resource", "pwd", "grp", "termios", "readline"):

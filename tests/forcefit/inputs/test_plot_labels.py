@@ -9,7 +9,7 @@ from forcefit.assembly.statistics.plot import (
     histogram_figure,
     tornado_figure,
 )
-from forcefit.assembly.sweeps.maps import map_figure, path_figure
+from forcefit.assembly.sweeps.maps import map_figure
 from forcefit.inputs.errors import plot_label
 
 ODD = ["$x^{<b>&_\\$", "a$b", "$\\frac{1}{$", "_$_$", "\\$", "\\\\$a$", "^_\\&<>"]
@@ -55,18 +55,6 @@ def grid(count, axes):
     data["platform_screw"] = ((*axes, "screw"), np.ones((*shape, 6)))
     coords = {a: np.arange(n, dtype=float) for a, n in zip(axes, shape, strict=True)}
     return xarray.Dataset(data, coords, {"robot": ODD[0]})
-
-
-@pytest.mark.slow
-def test_maps_and_paths_show_unusual_joint_names_unchanged():
-    both = grid((2, 3), (f"q.{ODD[0]}", f"{ODD[2]}.link.length"))
-    shown = drawn_texts(map_figure(both))
-    assert any(text.startswith(plot_label(ODD[0])) for text in shown)
-    for name in both["energy"].dims:
-        assert shown.count(plot_label(name)) == 6  # panels
-    shown = drawn_texts(path_figure(grid((4,), (f"q.{ODD[2]}",))))
-    assert shown.count(plot_label(f"q.{ODD[2]}")) == 6
-    assert any(plot_label(f"parallel: {ODD[2]}") in text for text in shown)
 
 
 def test_constant_map_states_its_value_without_a_colour_scale():

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from forcefit.inputs.errors import checked, one_line
-from forcefit.inputs.number_arrays import find_fault
 from forcefit.inputs.table import (
     BadInput,
     Table,
@@ -61,22 +60,6 @@ def test_nearest_name_is_suggested_or_all_names_are_listed():
     assert len(nearest("x" * 10**6, ["y" * 10**5] * 20)) < 100
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        (True, "true"),
-        (1.5, "1.5"),
-        ("a", "'a'"),
-        ([1, [2]], "[1, [2]]"),
-        (2**2000, "an integer of 2001 bits"),
-        ({"b": True}, "{'b': true}"),
-    ],
-    ids=str,
-)
-def test_value_is_described_as_written_in_the_file(value, text):
-    assert describe(value) == text
-
-
 def test_description_of_any_value_is_short():
     deep = []
     for _ in range(100_000):
@@ -86,19 +69,6 @@ def test_description_of_any_value_is_short():
         assert len(describe(value)) <= 60
     while deep:  # taken apart by hand: Python would recurse
         deep = deep[0]
-
-
-@pytest.mark.parametrize(("value", "shape", "text"), [
-    ("abc", (3,), "'abc'"),
-    ([1, 2], (3,), "[1, 2] of length 2"),
-    ([1, math.nan, 3], (3,), "nan as number 2"),
-    ([1, 2, math.inf], (3,), "inf as number 3"),
-    ([[1, 2], [3, True]], (2, 2), "true as number 2 in row 2"),
-    ([[1, 2], 3], (2, 2), "3 in row 2"),
-    ([[1, 2], [3]], (2, 2), "[3] of length 1 in row 2"),
-])  # fmt: skip
-def test_fault_in_an_array_is_reported_with_its_position(value, shape, text):
-    assert find_fault(value, shape) == text
 
 
 @pytest.mark.parametrize(
@@ -113,31 +83,6 @@ def test_number_out_of_range_is_refused(value, text):
     found = message(table(a=value).number, "a", "m", above=0.0, below=2.0)
     assert found.startswith(f"f.toml: place.a: {text}")
     assert found.endswith("expected a finite number > 0 and < 2 [m]")
-
-
-def test_absent_keys_have_their_defaults():
-    empty = table()
-    assert empty.number("a", "m", 2.5) == 2.5
-    assert empty.text("b", "x") == "x"
-    assert empty.boolean("c", True) is True
-    assert empty.integer("d", 3) == 3
-    assert empty.choice("e", ("x", "y"), "y") == "y"
-    assert empty.tables("f") == []
-    np.testing.assert_array_equal(empty.array("g", (2,), "m", np.ones(2)), [1, 1])
-
-
-def test_wrong_value_is_refused_in_spite_of_a_default():
-    wrong = table(a="x", b=3, c=1, d=1.5, e="z", f=[1], g=[1])
-    assert "place.a: found 'x'" in message(wrong.number, "a", "m", 2.5)
-    assert "place.b: found 3, expected a string" in message(wrong.text, "b", "x")
-    assert "found 1, expected true or false" in message(wrong.boolean, "c", True)
-    assert "found 1.5, expected a whole number >= 0" in message(wrong.integer, "d", 3)
-    assert "found 'z', expected \"x\"" in message(wrong.choice, "e", ("x",), "x")
-    assert "found [1], expected tables [[f]]" in message(wrong.tables, "f")
-    assert "found [1] of length 1, expected 2 finite numbers [m]" in message(
-        wrong.array, "g", (2,), "m", np.ones(2)
-    )
-    assert "place.g: found [1], expected a table" in message(wrong.table, "g")
 
 
 @pytest.mark.parametrize("value", [True, -1, 1.0, "1"])
@@ -156,14 +101,6 @@ def test_text_that_is_not_one_short_line_is_refused(value, text):
     assert text in message(
         table(a=value).text, "a", expected="a name", longest=50
     )  # fmt: skip
-
-
-def test_misspelt_key_is_reported_as_missing_and_as_unknown():
-    wrong = table(raduis=1.0)
-    assert 'found "raduis" instead' in message(wrong.number, "radius", "m")
-    assert message(wrong.finish) == (
-        'f.toml: place: unknown key "raduis"; did you mean "radius"?'
-    )
 
 
 def test_text_is_read_with_a_byte_order_mark_and_any_line_ends(tmp_path):

@@ -26,25 +26,22 @@ def written(*body, **changes):
     return page(Page(**{**content, **changes}))
 
 
-@pytest.mark.parametrize(
-    ("value", "unit", "text"),
-    [
-        (7.943e-4, "m", "0.7943 mm"),
-        (7.943e-5, "m", "79.43 µm"),
-        (-0.013, "rad", "-13 mrad"),
-        (math.pi / 2, "rad", "90 deg"),
-        (2.5e-5, "rad", "25 µrad"),
-        (0.0, "m", "0 mm"),
-        (1.926, "J", "1.926 J"),
-        (3.874e3, "N", "3874 N"),
-        (2.1e11, "Pa", "210 GPa"),
-        (2.5e8, "N/m", "250 N/µm"),
-        (math.inf, "m", "unbounded"),
-        (math.nan, "m", "none"),
-        (0.25, "", "0.25"),
-        (3.0, "m/s^2", "3 m/s^2"),
-    ],
-)
+@pytest.mark.parametrize(("value", "unit", "text"), [
+    (7.943e-4, "m", "0.7943 mm"),
+    (7.943e-5, "m", "79.43 µm"),
+    (-0.013, "rad", "-13 mrad"),
+    (math.pi / 2, "rad", "90 deg"),
+    (2.5e-5, "rad", "25 µrad"),
+    (0.0, "m", "0 mm"),
+    (1.926, "J", "1.926 J"),
+    (3.874e3, "N", "3874 N"),
+    (2.1e11, "Pa", "210 GPa"),
+    (2.5e8, "N/m", "250 N/µm"),
+    (math.inf, "m", "unbounded"),
+    (math.nan, "m", "none"),
+    (0.25, "", "0.25"),
+    (3.0, "m/s^2", "3 m/s^2"),
+])  # fmt: skip
 def test_page_numbers_are_shown_in_drawing_units(value, unit, text):
     (cell,) = parse(table(["a"], [[Value(value, unit)]])).tables[0][1]
     assert cell.text == text
@@ -151,19 +148,12 @@ def test_page_states_the_command_and_digests_of_its_input_files(tmp_path):
     assert {"forcefit", "Python", "numpy", "clarabel"} <= set(rows)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("<!doctype html><p>", "x: found a page without results of forcefit"),
-        ("hello", "neither HTML nor JSON, expected a report of forcefit or the JSON"),
-        ("[" * 100_000, "x: found text that is neither HTML nor JSON, expected"),
-        ("[1]", "x: found a JSON list or value, expected results"),
-    ],
-)
+@pytest.mark.parametrize(("text", "message"), [
+    ("<!doctype html><p>", "x: found a page without results of forcefit"),
+    ("hello", "neither HTML nor JSON, expected a report of forcefit or the JSON"),
+    ("[" * 100_000, "x: found text that is neither HTML nor JSON, expected"),
+    ("[1]", "x: found a JSON list or value, expected results"),
+])  # fmt: skip
 def test_page_without_results_is_refused(text, message):
     with pytest.raises(BadInput, match=message):
         results_in(text, "x")
-
-
-def test_integer_beyond_the_range_of_doubles_is_read_as_infinite():
-    assert results_in(f'{{"a": {"9" * 400}, "b": 3}}', "x") == {"a": np.inf, "b": 3}

@@ -127,14 +127,11 @@ def test_every_command_with_json_has_a_schema():
     assert {*commands(typer.main.get_command(app))} == {*OUTPUTS}
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("crosscheck", "four_bar", "--grid", "tx=3:4:1"),  # out of reach
-        ("crosscheck", "four_bar", "--pose", "tx=0.2", "--load", "fx=1e9"),
-        ("validity", "four_bar", "--grid", "q.crank=0:0.1:0.1", "--load", "fx=10"),
-    ],
-)
+@pytest.mark.parametrize("words", [
+    ("crosscheck", "four_bar", "--grid", "tx=3:4:1"),
+    ("crosscheck", "four_bar", "--pose", "tx=0.2", "--load", "fx=1e9"),
+    ("validity", "four_bar", "--grid", "q.crank=0:0.1:0.1", "--load", "fx=10"),
+])  # fmt: skip
 def test_results_of_failed_points_follow_the_schema(run, words):
     """``run`` compares every result with its schema."""
     assert run("validation", *words, "--json", "-")[0] in {0, 1}

@@ -26,27 +26,24 @@ def test_display_unit_is_a_multiple_of_the_si_unit(name):
     assert known.kind == "number" or known.unit == "1"
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "expected"),
-    [
-        ("energy", 2.820441e-05, "2.82044e-05 J"),
-        ("platform_screw", [1e-3, 0, 0, 0, 2.5e-3, 0], "[1 0 0] mrad, [0 2.5 0] mm"),
-        ("load", [0, 0, 1, 0, 0, -50], "[0 0 1] N m, [0 0 -50] N"),
-        ("rotation_error", (1.5e-3, 1.25e-2), "1.5 to 12.5 mrad"),
-        ("stress", 2.5e8, "250 MPa"),
-        ("margin", 0.25, "0.25"),
-        ("margin", math.inf, "without bound"),
-        ("margin", None, "none"),
-        ("energy", math.nan, "none"),
-        ("energy", 1e-12, "1e-12 J"),
-        ("passed", False, "no"),
-        ("verdict", "explained", "explained"),
-        ("names", [], "none"),
-        ("names", ["a", "b"], "a, b"),
-        ("pose", {"tx": 0.1, "tz": -0.5}, "[0.1 -0.5] m"),
-        ("pose", {"tx": 0.1, "rz": 0.2}, "[0.2] rad, [0.1] m"),
-    ],
-)
+@pytest.mark.parametrize(("name", "value", "expected"), [
+    ("energy", 2.820441e-05, "2.82044e-05 J"),
+    ("platform_screw", [1e-3, 0, 0, 0, 2.5e-3, 0], "[1 0 0] mrad, [0 2.5 0] mm"),
+    ("load", [0, 0, 1, 0, 0, -50], "[0 0 1] N m, [0 0 -50] N"),
+    ("rotation_error", (1.5e-3, 1.25e-2), "1.5 to 12.5 mrad"),
+    ("stress", 2.5e8, "250 MPa"),
+    ("margin", 0.25, "0.25"),
+    ("margin", math.inf, "without bound"),
+    ("margin", None, "none"),
+    ("energy", math.nan, "none"),
+    ("energy", 1e-12, "1e-12 J"),
+    ("passed", False, "no"),
+    ("verdict", "explained", "explained"),
+    ("names", [], "none"),
+    ("names", ["a", "b"], "a, b"),
+    ("pose", {"tx": 0.1, "tz": -0.5}, "[0.1 -0.5] m"),
+    ("pose", {"tx": 0.1, "rz": 0.2}, "[0.2] rad, [0.1] m"),
+])  # fmt: skip
 def test_a_value_is_written_in_its_display_unit(name, value, expected):
     assert value_text(name, value) == expected
 
