@@ -11,6 +11,7 @@ from forcefit.assembly.model.function import Function
 from forcefit.validation.campaign.campaign_file import read_campaign, read_commands
 from forcefit.validation.correction.carried_file import save
 from forcefit.validation.correction.carrying import carry
+from forcefit.validation.correction.machine_numbers import machine_numbers
 from forcefit.validation.correction.spread import number_slopes
 from forcefit.validation.diagnosis.diagnose import diagnose
 from forcefit.validation.diagnosis.saved_covariance import (
@@ -90,6 +91,28 @@ def test_prior_is_widened_if_a_parameter_changes_by_twenty_standard_deviations(
     assert day.error.position < 0.05 * y
     assert day.held == pytest.approx(y)
     assert day.suffices
+
+
+def test_machine_parameters_exclude_those_of_a_session(tmp_path):
+    saved, _ = wet_post([0.0] * 12, [1] * 12, np.eye(2) * 1e-12, tmp_path)
+    clock = Function("reading", ("tx",), ("time",), "powers", {"1": 1e-9})
+    robot = replace(
+        saved.robot,
+        functions=(*saved.robot.functions, clock),
+        effects={"registration": {"base.tx": 0.1}, "self_weight": {"g.z": -9.0}},
+    )
+    numbers = (
+        Number(FUNCTION, "0", "0"),
+        Number(FUNCTION, "1", "1"),
+        Number(EFFECT, "registration", "base.tx"),
+        Number(EFFECT, "self_weight", "g.z"),
+        Number(EFFECT, "self_weight", "g.z", "monday"),
+    )
+    path = tmp_path / "saved.npz"
+    write_covariance(SavedCovariance(numbers, 1e-12 * np.eye(5)), path)
+    own = machine_numbers(robot)
+    assert own.numbers == (numbers[0], numbers[3])
+    assert len(own) == 2
 
 
 def test_refitted_compliance_stays_positive():

@@ -291,6 +291,7 @@ def test_message_about_a_robot_file_given_as_a_study_states_the_missing_line(tmp
     ("tz=-0.5:-0.4:0.1", "tz=-0.5:-0.4", 'grid tz: found "-0.5:-0.4", expected'),
     ("[pose]", "[poze]", 'unknown key "poze"; did you mean "pose"?'),
     ('"link_a"', '"link_q"', 'no frame "link_q"'),
+    ('"link_a"', "3", "expected a list of frame names"),
     ("least = [1e-4,", "least = [1e-1,", "least: expected 0 <= least <= most"),
     ("least = [1e-4,", "least = [", "errors.least: found"),
     ("[pose]", "[links]\nsource = 'fea'\n[pose]", "links.surface: missing"),
