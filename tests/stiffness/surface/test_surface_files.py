@@ -60,6 +60,24 @@ def msh4(elements, kind, dimension):
     ])  # fmt: skip
 
 
+def test_vtk_file_of_tetrahedra_and_their_surface_is_read(tmp_path):
+    """Gmsh writes tetrahedra (10), triangles (5) and edges (3) into one grid."""
+    kinds = [(3, [(1, 2)]), (5, TRIANGLES), (10, TETRAHEDRA)]
+    cells = [(kind, cell) for kind, some in kinds for cell in some]
+    size = sum(len(cell) + 1 for _, cell in cells)
+    path = tmp_path / "cube.vtk"
+    path.write_text("\n".join([
+        "# vtk DataFile Version 2.0", "cube", "ASCII", "DATASET UNSTRUCTURED_GRID",
+        "POINTS 8 double", *(f"{x} {y} {z}" for x, y, z in CORNERS),
+        f"CELLS {len(cells)} {size}",
+        *(" ".join(map(str, [len(c), *(k - 1 for k in c)])) for _, c in cells),
+        f"CELL_TYPES {len(cells)}", *(str(kind) for kind, _ in cells), "",
+    ]))  # fmt: skip
+    surface = read_surface(path)
+    assert surface.volume == pytest.approx(1e-3, rel=1e-12)
+    assert len(surface.triangles) == 12
+
+
 @pytest.mark.parametrize(
     "content",
     [
