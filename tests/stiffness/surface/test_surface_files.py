@@ -104,6 +104,7 @@ def test_msh_file_of_a_cube_is_read(tmp_path, content, capfd):
 @pytest.mark.parametrize(("content", "message"), [
     ("no mesh at all", "not a readable MSH file"),
     (msh2(TRIANGLES, 2)[:300], "not a readable MSH file"),
+    (msh2(TRIANGLES, 2).replace("2.2 0 8", "9.9 0 8"), "MSH 2.2 or 4.1"),
     (msh2([(1, 2)], 1), "contains neither triangles nor tetrahedra"),
     (msh2(TRIANGLES[:-1], 2), "the surface is open"),
 ])  # fmt: skip
