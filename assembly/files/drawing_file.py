@@ -64,6 +64,7 @@ def read_drawing(root: Table, name: str, description: str) -> Drawing:
     platform = root.text("platform", expected="the name of a body")
     without_units(root, "platform_at", "length")
     at = root.array("platform_at", (3,), "m", largest=LARGEST_LENGTH)
+    _check_lists(root, ("body", "joint", "leg", "tolerance", "effect"))
     copies = list(_copies(root))
     found = [(body, copied) for copied in copies for body in read_bodies(copied)]
     names = [body.name for body, _ in found]
@@ -99,6 +100,14 @@ def read_drawing(root: Table, name: str, description: str) -> Drawing:
     )  # fmt: skip
 
 
+def _check_lists(table: Table, valid: tuple[str, ...]) -> None:
+    """Raise BadInput for a misspelt list of tables, before its bodies are missed."""
+    for key, value in table.content.items():
+        listed = isinstance(value, list) and value and isinstance(value[0], dict)
+        if listed and key not in valid:
+            raise table.bad("", f"unknown key {quoted(key)}{nearest(key, valid)}")
+
+
 def _copies(root: Table) -> Iterator[Copy]:
     """Yield the copies of the legs, and the bodies outside legs, in file order."""
     order = [key for key in root.content if key in {"leg", "body", "joint"}]
@@ -117,6 +126,7 @@ def _copies(root: Table) -> Iterator[Copy]:
                     "name", "found the same name twice, expected different names"
                 )
             names.append(name)
+            _check_lists(leg, ("body", "joint"))
             yield from _repeated(leg, name)
 
 

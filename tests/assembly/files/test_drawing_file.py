@@ -630,3 +630,23 @@ def test_angle_of_a_bolted_joint_is_not_accepted_in_a_unit_of_length(read):
     text = SLOTTED.replace("LOCKED", '{ joints = { hinge = "90 mm" } }')
     with pytest.raises(BadInput, match=r'"slot".locked_at.joints.hinge: found .90 mm'):
         read(text)
+
+
+@pytest.mark.parametrize(
+    ("word", "wrong", "message"),
+    [
+        ("[[body]]", "[[bodies]]", 'unknown key "bodies"; did you mean "body"?'),
+        ("[[leg.body]]", "[[leg.bodies]]",
+         'leg "leg": unknown key "bodies"; did you mean "body"?'),
+        ("[[leg]]", "[[legs]]", 'unknown key "legs"; did you mean "leg"?'),
+    ],
+)  # fmt: skip
+def test_misspelt_list_of_tables_is_named_instead_of_the_bodies_in_it(
+    read, word, wrong, message
+):
+    text = TSAI.replace(word, wrong)
+    if word == "[[leg]]":
+        text = text.replace("[[leg.", "[[legs.")
+    with pytest.raises(BadInput) as error:
+        read(text)
+    assert message in str(error.value)
