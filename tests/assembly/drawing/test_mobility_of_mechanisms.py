@@ -49,6 +49,16 @@ def thirds():
     return [turn(2 * np.pi * k / 3) for k in range(3)]
 
 
+def four_bar():
+    return mechanism(
+        "coupler", [0.5, 0.4, 0],
+        joint("revolute", "base", "crank", [0, 0, 0], driven=True),
+        joint("revolute", "crank", "coupler", [0.1, 0.3, 0]),
+        joint("revolute", "coupler", "rocker", [0.7, 0.5, 0]),
+        joint("revolute", "base", "rocker", [0.8, 0, 0]),
+    )  # fmt: skip
+
+
 def bennett(turned=0.0):
     """Bennett's linkage of twists 50 and 100 deg, one axis turned [rad] off its own.
 
@@ -86,6 +96,20 @@ def sarrus():
     return mechanism("platform", 0.5 * Z, *legs)
 
 
+def agile_eye():
+    """All axes through one point; arcs of a right angle."""
+    joints = []
+    for k, axis in enumerate(np.eye(3)):
+        middle, last = np.roll(axis, 1), np.roll(axis, 2)
+        near, far = f"near{k}", f"far{k}"
+        joints += [
+            joint("revolute", "base", near, 0.1 * axis, axis, driven=True),
+            joint("revolute", near, far, 0.1 * middle, middle),
+            joint("revolute", far, "platform", 0.1 * last, last),
+        ]
+    return mechanism("platform", [0, 0, 0], *joints)
+
+
 def three_upu(outer, radius=0.08):
     """Outer axes tangential (Tsai) or radial (SNU); radius of the platform [m]."""
     joints = []
@@ -99,6 +123,31 @@ def three_upu(outer, radius=0.08):
             joint("universal", rod, "platform", R @ high, R @ inner, R @ outer),
         ]
     return mechanism("platform", [0, 0, 0.45], *joints)
+
+
+def delta(rods):
+    """Rods between balls; or parallelograms of four hinges at the arms' ends."""
+    joints = []
+    for k, R in enumerate(thirds()):
+        foot, elbow, end = ([0.2, 0, 0], [0.5, 0, -0.3], [0.1, 0, -0.9])
+        arm, along = f"arm{k}", np.subtract(end, elbow)
+        joints.append(joint("revolute", "base", arm, R @ foot, R @ Y, driven=True))
+        upper, lower = arm, "platform"
+        if not rods:
+            upper, lower = f"upper{k}", f"lower{k}"
+            joints += [
+                joint("revolute", arm, upper, R @ elbow, R @ Y),
+                joint("revolute", lower, "platform", R @ end, R @ Y),
+            ]
+        across = np.cross(along, Y)
+        kind, axis = ("spherical", Z) if rods else ("revolute", across)
+        for side, shift in (("a", 0.05 * Y), ("b", -0.05 * Y)):
+            rod = f"rod{side}{k}"
+            joints += [
+                joint(kind, upper, rod, R @ (elbow + shift), R @ axis),
+                joint(kind, rod, lower, R @ (end + shift), R @ axis),
+            ]
+    return mechanism("platform", [0, 0, -0.9], *joints)
 
 
 def gough(first, shift=(0, 0, 0), rotation=np.eye(3), axis_along=False):  # noqa: B008
@@ -125,11 +174,15 @@ def gough(first, shift=(0, 0, 0), rotation=np.eye(3), axis_along=False):  # noqa
 
 # freedoms, of the platform, with drives locked, of the platform, redundant constraints
 MECHANISMS = {
+    "four_bar": (four_bar, (1, 1, 0, 0, 3)),
     "bennett": (bennett, (1, 1, 0, 0, 3)),
     "sarrus": (sarrus, (1, 1, 0, 0, 1)),
+    "agile_eye": (agile_eye, (3, 3, 0, 0, 6)),
     "tsai": (lambda: three_upu(Y), (3, 3, 0, 0, 0)),
     "snu": (lambda: three_upu(X, 0.24), (5, 5, 2, 2, 2)),
     "snu, smaller platform": (lambda: three_upu(X), (5, 5, 2, 2, 2)),
+    "delta of rods": (lambda: delta(True), (9, 3, 6, 0, 0)),
+    "delta of parallelograms": (lambda: delta(False), (3, 3, 0, 0, 12)),
     "6-UPS": (lambda: gough("universal"), (6, 6, 0, 0, 0)),
     "6-SPS": (lambda: gough("spherical"), (12, 6, 6, 0, 0)),
 }
