@@ -24,7 +24,13 @@ from types import CodeType, FunctionType
 import pytest
 
 from benchmarks.faults import Fault
-from benchmarks.traced_tests import MEMORY, WORDS, places_of_tests, sources
+from benchmarks.traced_tests import (
+    MEMORY,
+    WORDS,
+    module_of,
+    places_of_tests,
+    sources,
+)
 
 PASSED, FAILED, BROKEN = 0, 1, 2
 WAITS = 10  # largest ratio of wall time to processor time of a test
@@ -50,8 +56,7 @@ class Session:
         self.items = {item.nodeid: item for item in session.items}
         for path in sources():
             if path.name not in {"__main__.py", "mesh_worker.py"}:
-                names = path.with_suffix("").parts
-                importlib.import_module(".".join(names).removesuffix(".__init__"))
+                importlib.import_module(module_of(path))
         self.functions = defaultdict[str, list[FunctionType]](list)
         for found in gc.get_objects():
             if type(found) is FunctionType:  # isinstance fails for dead weak proxies
@@ -115,7 +120,9 @@ class Session:
 
     def exchange(self, fault: Fault) -> None:
         """Replace the code of a file's functions by the code with the fault."""
-        name = str(self.tree / fault.path)
+        # Python loads assembly, stiffness and validation by the links in forcefit
+        name = str(self.tree / Path(*module_of(fault.path).split(".")))
+        name += "/__init__.py" if fault.path.name == "__init__.py" else ".py"
         right = (self.tree / fault.path).read_text("utf-8")
         before, after = (
             list(within(compile(source, name, "exec", dont_inherit=True)))

@@ -22,7 +22,8 @@ CHAPTERS = (
     "stiffness/beam", "stiffness/surface", "stiffness/mesh", "stiffness/fem",
     "assembly/solvers", "assembly/kinematics", "assembly/linear",
     "assembly/exact", "assembly/measurement", "assembly/effects",
-    "assembly/statistics", "validation/diagnosis",
+    "assembly/platform_stiffness", "assembly/drawing", "assembly/callouts",
+    "assembly/steps", "assembly/path", "assembly/statistics", "validation/diagnosis",
 )  # fmt: skip
 SWAPS: dict[type, type] = {
     ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult,

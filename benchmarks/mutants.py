@@ -138,7 +138,7 @@ def main() -> None:
         tree = Path(scratch) / "forcefit"
         # the copy contains the compiled modules
         left_out = shutil.ignore_patterns(".git", ".venv", ".*_cache", "*_study")
-        shutil.copytree(ROOT, tree, ignore=left_out)
+        shutil.copytree(ROOT, tree, symlinks=True, ignore=left_out)
         kept = asked.traced or Path(scratch)
         kept.mkdir(parents=True, exist_ok=True)
         trace = traced(tree, kept)

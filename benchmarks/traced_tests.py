@@ -88,8 +88,8 @@ class Tracer:
         self.took = 0.0
 
     def start(self) -> None:
-        """Start the trace."""
-        self.coverage = Coverage(str(self.data), source=["forcefit"])
+        """Start the trace in the working directory, the source tree."""
+        self.coverage = Coverage(str(self.data), source=[*FOLDERS])
         self.coverage.start()
 
     def stop(self) -> None:
@@ -173,11 +173,15 @@ def sources() -> Iterator[Path]:
             yield path.relative_to(ROOT)
 
 
+def module_of(path: Path) -> str:
+    """Return the name of the module of a source file."""
+    name = ".".join(path.with_suffix("").parts).removesuffix(".__init__")
+    return name if path.parts[0] == "forcefit" else f"forcefit.{name}"
+
+
 def importers(path: Path) -> list[Path]:
     """Return the files of the packages that import names from a file."""
-    module = "forcefit." + ".".join(path.with_suffix("").parts).removeprefix(
-        "forcefit."
-    )
+    module = module_of(path)
     text = re.compile(rf"^from {re.escape(module)} import", re.MULTILINE)
     return [p for p in sources() if text.search((ROOT / p).read_text("utf-8"))]
 
