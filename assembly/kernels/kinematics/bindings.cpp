@@ -1,11 +1,12 @@
-// Python binding of the continuation to several targets.
+// Python binding of the continuation to several targets (continuation.cpp).
 #include "../arrays.h"
 #include "../bindings.h"
 #include "../kernels.h"
 
 namespace {
 
-// A robot's joints and closures; the object keeps the arrays alive.
+// The addresses of a robot's joints and closures, and the Python object that keeps
+// their arrays alive.
 struct KeptTree {
     nb::object arrays;
     Tree tree;

@@ -1,5 +1,5 @@
-// Residuals of a robot's closures and of its platform's pose in every lane, and the step
-// of Newton's method that reduces them.
+// Residuals of a robot's closures and of its platform's pose in every lane, and the
+// step of Newton's method that reduces them.
 #pragma once
 
 #include "../records.h"
@@ -8,17 +8,19 @@
 
 namespace LANE_SPACE {
 
-// factor between a pivot and the damping from which a step is determined
+// least ratio of a pivot to the damping with which a step is determined
 constexpr double CLEAR = 1e4;
 
 namespace {
 
-// An unknown joint that moves a closure: its row of J and its column of N.
+// An unknown joint that moves a closure: its row of the Jacobian J and its column of N.
 struct Mover {
     int row, column;
 };
 
-// Poses of all frames, residuals, and a step that reduces them.
+// Poses of all frames, the residuals r, their Jacobian J, and the step x that reduces
+// r.  N is the normal matrix J^T J.  R and p are rotations and origins of the frames
+// before the motion of their own joints; after_R and after_p those after it.
 class Motion {
 public:
     Motion(const Tree &tree, const Targets &targets);
@@ -28,15 +30,19 @@ protected:
     const Targets &targets;
     const int n, closures;
     const bool posed;
-    std::vector<int> joints, columns;  // unknown joints; -1 for the others
+    // unknown joints; column of each frame's joint or -1
+    std::vector<int> joints, columns;
     std::vector<double> unit;
-    std::vector<std::vector<int>> coupled;  // later columns coupled with a row of N
-    std::vector<std::vector<Mover>> movers;  // of each closure, then of the platform
-    std::vector<bool> straight;             // frames that are not turned in their parents
+    // columns after i that are coupled with row i of N
+    std::vector<std::vector<int>> coupled;
+    // unknown joints of each closure, then of the platform
+    std::vector<std::vector<Mover>> movers;
+    std::vector<bool> straight;  // frames that are not rotated in their parents
     bool asked[6], all_turns, turns;
     Row q, R, p, after_R, after_p, r, J, x;
     Table N;
-    Real pose[6] = {}, turn[9] = {};  // required pose of the platform on the path
+    // required pose of the platform: vector, rotation matrix
+    Real pose[6] = {}, turn[9] = {};
 
     void forward();
     void equations();
@@ -72,7 +78,9 @@ Motion::Motion(const Tree &tree, const Targets &targets)
     }
 }
 
-// Joints that move the same closure, and those coupled by elimination.
+// Find the unknown joints that move each closure, and the entries of N that can differ
+// from zero: joints of one closure are coupled, and the elimination couples further
+// ones.
 void Motion::couple() {
     const int m = joints.size();
     std::vector<std::vector<char>> entered(m, std::vector<char>(m, 0));
@@ -93,7 +101,7 @@ void Motion::couple() {
     }
 }
 
-// Rotations and origins of all frames before their own motion.
+// Compute the rotations and origins of all frames, before and after their own motion.
 void Motion::forward() {
     for (int i = 0; i < n; ++i) {
         const double *fixed = tree.fixed + 16 * i;
@@ -134,7 +142,8 @@ void Motion::forward() {
     }
 }
 
-// Scaled residuals and their derivatives, six numbers for each move of the tree.
+// Compute the scaled residuals and their derivatives, six numbers for each row of
+// `moves`. Lengths are divided by the reference length.
 void Motion::equations() {
     const double scale = 1.0 / tree.size;
     for (int g = 0; g < closures + posed; ++g) {
@@ -178,8 +187,9 @@ void Motion::equations() {
         }
 }
 
-// Rotation that the platform still needs; regular near half a turn if all three rotations
-// are required.
+// Compute the rotation from the required to the current orientation of the platform,
+// and its derivatives.  If all three rotations are required, the residual is regular
+// near half a turn, too.
 void Motion::platform_turn(int first, int last, Real *out) {
     const Real *own = &R[9 * tree.platform];
     if (all_turns) {
@@ -204,7 +214,8 @@ void Motion::platform_turn(int first, int last, Real *out) {
     }
 }
 
-// Least-squares step x, of least norm by damping; mask of lanes where it is determined.
+// Compute the least-squares step x; the damping selects the one of least norm.
+// Return the lanes in which all joints are determined.
 Whole Motion::least_step(Real damped) {
     const int m = joints.size();
     for (int i = 0; i < m; ++i) {
@@ -233,7 +244,7 @@ Whole Motion::least_step(Real damped) {
     Real damping = real(1e-30);
     for (int i = 0; i < m; ++i) damping += damped * N[i][i];
     Whole determined = whole(-1);
-    for (int i = 0; i < m; ++i) {  // U^T D U
+    for (int i = 0; i < m; ++i) {  // N = U^T D U
         Real *row = N[i];
         const Real pivot = row[i] + damping;
         determined &= pivot > CLEAR * damping;

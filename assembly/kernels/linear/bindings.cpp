@@ -5,7 +5,7 @@
 
 namespace {
 
-// A robot's arrays; the object keeps them alive.
+// A robot's addresses, and the Python object that keeps its arrays alive.
 struct KeptRobot {
     nb::object structure;
     Robot robot;
@@ -43,8 +43,8 @@ KeptRobot robot_of(nb::object s) {
     return {std::move(s), r};
 }
 
-// Frames, their nominal closure error and their geometric errors: of each point, or one
-// row for all.
+// Read frames, nominal closure errors and geometric errors.  Each array has one row
+// for each point or one row for all points.
 Points points_of(
     const Robot &r, nb::handle T, nb::handle errors, nb::handle mismatch, Size &k) {
     Size postures, sets;

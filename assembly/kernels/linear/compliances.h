@@ -1,12 +1,15 @@
-// The classical compliance at several postures in parallel.  For a unit wrench e on the
-// platform the closures carry lambda = lambda_e + Z^T mu: the first lets no free motion
-// work, the second makes the springs' energy
+// The classical compliance of the platform at several postures in parallel.
 //
-//     |y|^2 / 2,   y = B e + Y^T mu,    Y = Z A_y,   B e = the springs under e and lambda_e
+// Under a unit wrench e on the platform the closures carry the wrench
+// lambda = lambda_e + Z^T mu.  lambda_e balances e: lambda does no work on any free
+// motion.  mu minimises the energy of the springs,
 //
-// least.  Every spring's y under the six unit wrenches is its part of the compliance, C =
-// sum of y y^T (Castigliano).  As exact as problem (22): no compliances are added before
-// anything is eliminated.
+//     |y|^2 / 2,   y = B e + Y^T mu,    Y = Z A_y,
+//
+// where B e are the deformations of the springs under e and lambda_e.  By Castigliano's
+// theorem the compliance C is the sum of y y^T over the springs, with y for the six
+// unit wrenches.  No compliances are added before free motions and springs are
+// eliminated.  The result is therefore as accurate as that of problem (22).
 #pragma once
 
 #include "reduction.h"
@@ -14,10 +17,10 @@
 namespace LANE_SPACE {
 
 enum { COMPLIANT, LOOSE, UNCLEAR };
-// share of a unit wrench's work on a free motion that counts as zero
+// work of a unit wrench on a unit free motion that counts as zero
 constexpr double STILL = 1e-9;
 
-// Blocks of points of one robot, in sequence.
+// Solver of blocks of points of one robot, in sequence.
 class Compliance : public Reduction {
 public:
     using Reduction::Reduction;
@@ -25,9 +28,9 @@ public:
     Whole comply(const Points &points, const Block &block, Whole asked, Compliances &out);
 };
 
-// The classical compliance of the lanes asked for that have the ranks of the first of
-// them; returns the others.  Of the springs y = B e + Y^T mu under a unit wrench e, the
-// closures' wrenches mu make |y| least.
+// Compute the deformations y of the springs under six unit wrenches on the platform.
+// It solves the requested lanes that have the same ranks as the first of them.  Return
+// the requested lanes that remain.
 inline Whole Compliance::comply(
     const Points &points, const Block &block, Whole asked, Compliances &out) {
     const auto settle = [&](Whole where, int64_t status) {

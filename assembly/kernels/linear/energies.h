@@ -1,22 +1,25 @@
-// Problem (22) at several postures in parallel, from the frames' poses to the certified
-// solution.
+// Problem (22) at several postures in parallel, from the poses of the frames to the
+// certified solution.
 //
-// Points that this code cannot solve are solved by the reference; a code gives the
-// reason.  A point counts as solved only if its certificate proves the required gap.  The
-// certificate is computed from the wrenches, on the problem before any elimination.
+// assembly/linear/reference solves the points that this code cannot solve; the outcome
+// contains the reason.  A point is solved only if its certificate proves the required
+// gap.  The certificate is computed from the wrenches, on the problem before any
+// elimination.
 #pragma once
 
 #include "loads.h"
 
 namespace LANE_SPACE {
 
+// accepted gap, relative to the energy and to the energy without clearance:
 // assembly/solvers/conic.py
 constexpr double GAP = 1e-8, GAP_WITHOUT_CLEARANCE = 1e-12;
-// assembly/kinematics/ranks.py
+// [rad, lengths] accepted closure error of a solution
 constexpr double OPEN = 1e-11;
-// assembly/linear/assemblies.py
+// outcome codes; assembly/linear/energy.py has the same
 enum Outcome { NEWTON, INTERIOR, RIGID, AMBIGUOUS, UNCERTIFIED, BOUNDED, DRIVEN };
-constexpr double STOP = 3e-3;  // the solvers stop at this fraction of the accepted gap
+// gap at which the solvers stop, as a share of the accepted gap
+constexpr double STOP = 3e-3;
 
 // Solver of blocks of points of one robot, in sequence.
 class Energies : public Loaded {
@@ -25,8 +28,9 @@ public:
         : Loaded(s, points), postpones(!points.own_posture), solver(cones, m), v(m),
           G(m, nu), unfelt(m, m) {}
 
-    // If all points have one posture, points that need the interior-point method wait for
-    // others, unless all points of a block need it: no lane is idle.
+    // If all points have one posture, points that need the interior-point method are
+    // solved later, in full blocks.  They are solved at once if all points of a block
+    // need it, because no lane is then unused.
     bool postpones;
     std::vector<int64_t> waiting;
 
@@ -35,11 +39,11 @@ public:
 private:
     Solver solver;
     Row v;  // G u + h
-    // kept while the posture does not change
-    int64_t prepared = -1;  // at which change of it
-    Table G, unfelt;  // unfelt: other rows of Z, orthonormal, which no spring enters
-    Real largest_column;    // |G's columns|^2
-    Whole stuck;            // lanes where clearances enter rows that no spring enters
+    // quantities that are stored while the posture does not change
+    int64_t prepared = -1;  // value of `changes` when they were computed
+    Table G, unfelt;  // unfelt: orthonormal rows of Z to which no spring contributes
+    Real largest_column;    // largest square of the norm of a column of G
+    Whole stuck;            // lanes where clearances contribute to such rows
 
     void prepare(int r, int count);
     Whole stuck_clearances(int rank, int count);
@@ -55,7 +59,7 @@ private:
         int r, const Row &grouped, const Row &motions, const Row &multipliers);
 };
 
-// Lanes where clearances enter rows that no spring enters.
+// Return the lanes where clearances contribute to rows to which no spring contributes.
 inline Whole Energies::stuck_clearances(int rank, int count) {
     Array<Real> most(np), sizes(nu);
     for (int g = 0; g < np; ++g)
@@ -69,7 +73,7 @@ inline Whole Energies::stuck_clearances(int rank, int count) {
     for (int c = 0; c < nu; ++c) {
         const int64_t g = s.pattern_of[s.cone_frame[c]];
         const Whole near = 6.0 * sizes[c] * most[g] > limit;
-        if (!any(near)) continue;  // as nearly all are
+        if (!any(near)) continue;  // nearly all columns are certainly below the limit
         for (int i = rank; i < count; ++i) {
             const Real total = enters(c, parts[i] + 6 * slot[g]);
             worst = near ? larger(magnitude(total), worst) : worst;
@@ -78,16 +82,17 @@ inline Whole Energies::stuck_clearances(int rank, int count) {
     return worst > limit;
 }
 
-// Lanes where clearances or errors enter rows that no spring enters.
+// Return the lanes where clearances or errors contribute to rows to which no spring
+// contributes.
 inline Whole Energies::rigid_rows(int rank, int count, Real tolerance) {
     Whole rigid = stuck;
     const Real allowed = 1e-12 / CLEAR + tolerance * largest_error;
-    for (int i = rank; i < count; ++i)  // written so that NaN is rigid
+    for (int i = rank; i < count; ++i)  // the comparison makes NaN rigid
         rigid |= ~(magnitude(inner(known.data(), Z[i], m)) <= allowed);
     return rigid;
 }
 
-// Quantities that depend only on the posture, and G and h.
+// Compute the quantities that depend only on the posture, and G and h.
 inline void Energies::prepare(int r, int count) {
     if (!posture.empty() && prepared == changes) return right_sides(r);
     prepared = changes;
@@ -112,9 +117,10 @@ inline void Energies::prepare(int r, int count) {
     }
 }
 
-// Minimum of |G u + h|^2 / 2 - d.u: u, v = G u + h, and the multipliers y.  Newton's
-// method alone if all constraints are active, else after the interior-point method,
-// unless these points wait. Returns the outcomes.
+// Minimise |G u + h|^2 / 2 - d.u.  Compute u, v = G u + h and the multipliers y.
+// Newton's method alone converges if all cone constraints are active.  In the other
+// lanes Newton's method follows the interior-point method, unless these points are
+// solved later.  Return the outcomes.
 inline Whole Energies::minimise(int r, Whole asked) {
     Programme &q = programme;
     const Real square = inner(q.h.data(), q.h.data(), r);
@@ -156,7 +162,7 @@ inline Whole Energies::minimise(int r, Whole asked) {
     return left ? whole(INTERIOR) : whole(NEWTON);
 }
 
-// Multipliers of the closures; those of least size if they are not unique.
+// Return the multipliers of the closures; if they are not unique, those of least norm.
 inline Row Energies::least_multipliers(int r, int count) {
     Row multipliers = loaded ? holding : Row(m);
     combine(Z.data(), r, programme.y.data(), m, multipliers.data());
@@ -168,7 +174,7 @@ inline Row Energies::least_multipliers(int r, int count) {
     return multipliers;
 }
 
-// Deformation of every spring, from the six of its group.
+// Write the deformation of every spring from those of its group's equivalent springs.
 inline void Energies::own_springs(
     const Row &grouped, const Block &block, double *elastic, Whole where) {
     Triangle rows(6, widest);
@@ -189,7 +195,8 @@ inline void Energies::own_springs(
         block.write(elastic, s.ny, s.spring_order[c], tight[int(c)], where);
 }
 
-// Wrenches times f prove f gain - f^2 cost / 2, on the problem before elimination.
+// Compute the bound that the multipliers prove on the problem before elimination: for
+// any factor f the energy is at least f gain - f^2 cost / 2.
 inline Energies::Proof Energies::complementary(const Row &motions, const Row &multipliers) {
     Real gain = -inner(multipliers.data(), known.data(), m), cost = {};
     Row at_platform(6 * np);
@@ -217,10 +224,11 @@ inline Energies::Proof Energies::complementary(const Row &motions, const Row &mu
     return {gain, cost};
 }
 
-// Difference of energy minus work from the bound that the wrenches prove, on the problem
-// before elimination:  |y - s|^2 / 2  with s the springs' strains in balance with the
-// wrenches, plus the largest gain that clearances could still give.  Loads change both y
-// and s by t, which cancels.
+// Return the difference between the objective, energy minus work, and the lower bound
+// that the multipliers prove on the problem before elimination.  It is |y - s|^2 / 2,
+// with the strains s of the springs in balance with the wrenches, plus the largest
+// additional work on the clearances and on the free motions.  Loads change both y and s
+// by t, which cancels.
 inline Real Energies::loaded_gap(
     int r, const Row &grouped, const Row &motions, const Row &multipliers) {
     Row closing(m);
@@ -253,8 +261,8 @@ inline Real Energies::loaded_gap(
     return gap;
 }
 
-// Solves the requested lanes that have the same ranks as the first of them, and writes
-// their rows; returns the other lanes.
+// Solve the requested lanes that have the same ranks as the first of them, and write
+// their results.  Return the requested lanes that remain.
 inline Whole Energies::solve(
     const Points &points, const Block &block, Whole asked, Solutions &out) {
     const auto settle = [&](Whole where, int64_t outcome) {
@@ -284,7 +292,7 @@ inline Whole Energies::solve(
             if (open[l]) waiting.push_back(block.point[l]);
         if (!any(asked &= ~open)) return all & ~settled;
     }
-    // back to the full problem
+    // solution of the full problem from that of the small one
     Row multipliers = least_multipliers(r, count);
     for (int i = 0; loaded && i < r; ++i) v[i] -= left[i];
     const Row grouped = spring_strains(r, v);
@@ -314,19 +322,20 @@ inline Whole Energies::solve(
     if (loaded) {
         energy += stored + inner(v.data(), left.data(), r);
         bound = energy - loaded_gap(r, grouped, motions, multipliers) - slip;
-        // t is orthogonal to the closure columns of the springs; `known` is the error that
-        // they have to close
+        // t is orthogonal to the closure columns of the springs; `known` is the error
+        // that they have to close
         work = 2.0 * stored + inner(programme.d.data(), programme.u.data(), nu) +
                inner(holding.data(), known.data(), m);
     } else {
         const Proof proof = complementary(motions, multipliers);
-        // any multiple of the wrenches proves a bound: the best one, zero inside a zone
+        // any multiple of the multipliers proves a bound; `factor` gives the best one,
+        // which is zero where no deformation is needed
         const Real gain = proof.gain - slip, cost = proof.cost;
         const Whole some = (gain > 0.0) & (cost > 0.0);
         factor = some ? gain / cost : Real{};
         bound = 0.5 * factor * factor * cost;
     }
-    // written so that NaN fails
+    // both comparisons are false for NaN
     const Real allowed =
         GAP * energy + GAP_WITHOUT_CLEARANCE * (without + magnitude(work));
     const Whole proved = (energy - bound <= allowed) & (residual <= OPEN);

@@ -1,4 +1,4 @@
-// Problems (22), (21) and (27), and the classical compliance, several postures in
+// Problems (22), (21) and (27), and the classical compliance, at several postures in
 // parallel.
 #include "assembled.h"
 #include "compliances.h"
@@ -6,7 +6,7 @@
 
 using namespace LANE_SPACE;
 
-// points whose reachable sets are stored at the same time
+// largest number of points whose bodies are in memory at the same time
 constexpr size_t AT_ONCE = 1024;
 
 void bound_all(

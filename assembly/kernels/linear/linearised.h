@@ -1,13 +1,18 @@
-// The linear model of a robot, (16)-(20), at several postures in parallel: motions of the
-// platform and of the closures.
+// The linear model of a robot, (16)-(20), at several postures in parallel: small screws
+// of the platform and of the closures.
+//
+// A virtual joint is a small screw of one frame that a geometric error, a clearance, a
+// spring or a free motion of a passive joint causes.  Its column contains the effect of
+// a unit motion, in base axes, at the platform's origin.  Frames with equal signs in
+// all closures have the same pattern.
 //
 // ========  =============  ============================================================
 // symbol    shape          meaning
 // ========  =============  ============================================================
-// P         (n, 6, 6)      row `axis`: unit screw of frame j along it, read at the
-//                          platform in base axes, translations by the reference length;
-//                          of the slides only what the turns say is kept
-// m                        6 closures, the rows A of (16)-(20)
+// P         (n, 18)        three unit rotations of each frame about its axes, as screws
+//                          of the platform in base axes; translations are divided by
+//                          the reference length
+// m                        6 closures, the number of rows A of (16)-(20)
 // known     (m,)           closure error that the geometric errors cause
 // ========  =============  ============================================================
 #pragma once
@@ -17,16 +22,16 @@
 
 namespace LANE_SPACE {
 
-// assembly/kinematics/ranks.py
+// thresholds of ranks: assembly/kinematics/ranks.py
 constexpr double RANK = 1e-10, MISMATCH_FACTOR = 30.0, NOISE = 1e-12;
 
-// A closure of a frame, and the sign.
+// A closure in which a frame occurs, and the sign of the frame's screw in it.
 struct Entry {
     int closure;
     double sign;
 };
 
-// Reader of blocks of points of one robot, in sequence.
+// The linear model of one robot.  It reads one block of points after another.
 class Linearised {
 public:
     Linearised(const Robot &s, const Points &points);
@@ -35,11 +40,12 @@ protected:
     const Robot &s;
     const int n, m, np, ng, nu, nq;
     Array<Array<Entry>> patterns;
-    Array<bool> felt, erring;  // frames
-    Table P;                       // (n, 18) the three turns of each frame: `column`
-    Table motion, play, elastic;   // (.., 6) columns of free motions, clearances, springs
+    Array<bool> felt, erring;  // frames that have virtual joints; frames with errors
+    Table P;                       // see the table; `column` reads it
+    // (.., 6) columns of free motions, clearances and springs
+    Table motion, play, elastic;
     Row known;
-    Real screw[6];  // screw of the platform
+    Real screw[6];  // platform screw due to all motions added by `move`
     Real largest_error, largest_spring;
 
     bool stays(const Points &points, const Block &block);
@@ -51,7 +57,8 @@ protected:
     Real tolerance(const Points &points, const Block &block) const;
     Real largest_clearance() const;
 
-    // posture of all lanes, if it is the same: frames and closure error
+    // frames and nominal closure error, if all lanes have the same posture; otherwise
+    // empty
     std::vector<double> posture;
     int64_t changes = 0;          // number of changes of the posture
 
@@ -72,7 +79,7 @@ inline Linearised::Linearised(const Robot &s, const Points &points)
     for (int c = 0; c < nu; ++c) felt[s.cone_frame[c]] = true;
     for (int c = 0; c < nq; ++c) felt[s.free_frame[c]] = true;
     for (int c = 0; c < s.ny; ++c) felt[s.spring_frame[c]] = true;
-    // a frame without errors at any point adds exact zeros
+    // a frame without errors at any point is skipped: it would add exact zeros
     const int64_t sets = points.own_errors ? points.count : 1;
     const double *own = points.errors;
     for (int64_t i = 0; i < sets; ++i)
@@ -81,8 +88,8 @@ inline Linearised::Linearised(const Robot &s, const Points &points)
                 erring[j] = std::any_of(own, own + 6, [](double e) { return e != 0.0; });
 }
 
-// Whether all lanes have the same posture as in the block before: quantities that depend
-// only on the frames are then known.
+// Return whether all lanes have the same posture as in the previous block.  Quantities
+// that depend only on the frames are then known.
 inline bool Linearised::stays(const Points &points, const Block &block) {
     if (!points.own_posture && !posture.empty()) return true;
     const size_t count = 16 * size_t(n);
@@ -108,8 +115,8 @@ inline bool Linearised::stays(const Points &points, const Block &block) {
     return false;
 }
 
-// Columns from the frames' poses, unless the posture is the same, and the closure error
-// and the platform's screw due to the frames' errors.
+// Compute the columns from the poses of the frames, unless the posture is the same.
+// Compute the closure error and the platform screw that the frames' errors cause.
 inline void Linearised::read(const Points &points, const Block &block, bool stay) {
     if (!stay) {
         Real origin[3];
@@ -126,7 +133,7 @@ inline void Linearised::read(const Points &points, const Block &block, bool stay
         if (erring[j]) read_errors(points, block, j);
 }
 
-// Rotations of a frame: unit screws about its axes.
+// Compute the unit screws of a frame's rotations about its axes.
 inline void Linearised::read_frame(
     const Points &points, const Block &block, int j, const Real *origin) {
     const auto entry = [&](int a, int b) {
@@ -143,7 +150,7 @@ inline void Linearised::read_frame(
     }
 }
 
-// Adds the motions due to a frame's errors.
+// Add the closure error and the platform screw that the errors of a frame cause.
 inline void Linearised::read_errors(const Points &points, const Block &block, int j) {
     Real own[6] = {}, step[6];
     for (int axis = 0; axis < 6; ++axis) {
@@ -159,7 +166,8 @@ inline void Linearised::read_errors(const Points &points, const Block &block, in
     move(s.pattern_of[j], s.on_path[j], own, known);
 }
 
-// P's row `axis` of frame j.
+// Compute the unit screw of frame j along `axis`: rotation for 0 to 2, translation for
+// 3 to 5.
 inline void Linearised::column(int64_t j, int64_t axis, Real *out) const {
     const Real *turned = P[int(j)] + 6 * (axis % 3);
     for (int a = 0; a < 3; ++a) {
@@ -168,7 +176,7 @@ inline void Linearised::column(int64_t j, int64_t axis, Real *out) const {
     }
 }
 
-// Columns of free motions, clearances and springs.
+// Compute the columns of free motions, clearances and springs.
 inline void Linearised::columns() {
     Real step[6];
     for (int c = 0; c < nq; ++c) {
@@ -195,7 +203,7 @@ inline void Linearised::columns() {
     }
 }
 
-// Adds a step of a frame to the platform's screw and to the closure error.
+// Add a small screw of a frame to the platform screw and to the closure error.
 inline void Linearised::move(int64_t pattern, double on_path, const Real *step, Row &open) {
     if (on_path)
         for (int a = 0; a < 6; ++a) screw[a] += on_path * step[a];
@@ -203,7 +211,7 @@ inline void Linearised::move(int64_t pattern, double on_path, const Real *step, 
         for (int a = 0; a < 6; ++a) open[6 * e.closure + a] += e.sign * step[a];
 }
 
-// Value of a screw of this pattern in a row over the closures.
+// Compute the wrench on frames of a pattern from wrenches `row` (m,) on the closures.
 inline void Linearised::part(const Real *row, int64_t pattern, Real *out) const {
     Real own[6] = {};
     for (const Entry &e : patterns[pattern])
@@ -211,19 +219,21 @@ inline void Linearised::part(const Real *row, int64_t pattern, Real *out) const 
     std::copy(own, own + 6, out);
 }
 
-// Value of clearance c in a row, from the screws `part` of its pattern.
+// Return the scalar product of the column of clearance c with `part`, a result of the
+// function `part` for the clearance's pattern.
 inline Real Linearised::enters(int c, const Real *part) const {
     Real total = {};
     for (int a = s.cone_axis[c] < 3 ? 0 : 3; a < 6; ++a) total += play[c][a] * part[a];
     return total;
 }
 
-// Relative rounding error of rows, including the nominal closure error of the frames.
+// Return the relative threshold of ranks.  It contains the nominal closure error of
+// the frames.
 inline Real Linearised::tolerance(const Points &points, const Block &block) const {
     return RANK + MISMATCH_FACTOR * block.read(points.mismatch, points.own_posture, 0);
 }
 
-// Largest entry of the clearances' closure columns, for the noise floor.
+// Return the largest entry of the clearances' closure columns, for the noise floor.
 inline Real Linearised::largest_clearance() const {
     Real largest = {};
     for (int c = 0; c < nu; ++c)

@@ -1,22 +1,25 @@
 // Effects of loads on a robot without clearances and errors, at several postures in
-// parallel.  In problem (22) under loads,
+// parallel.  Problem (22) under loads is
 //
 //     minimise  |y|^2 / 2 - f.y - c.u - g.q   subject to  A_q q + A_u u + A_y y = -known,
 //
-// the closures' wrenches w that balance the free motions, A_q^T w = -g, with the least
-// energy of the springs make  t = f + A_y^T w  orthogonal to all closure columns of
-// springs.  With y = t + ..,
+// with loads f on the springs, c on the clearances and g on the free motions.  The
+// closures carry wrenches w that balance the free motions, A_q^T w = -g.  Those with
+// the least energy of the springs make the deformations t = f + A_y^T w orthogonal to
+// the closure columns of the springs.  With y = t + y', where t and y' are orthogonal,
+// the energy and the objective are
 //
-//     |t|^2 / 2 is stored beside  |G u + h|^2 / 2 - d.u,   d = c + A_u^T w:
+//     |t|^2 / 2 + |G u + h|^2 / 2   and   |G u + h|^2 / 2 - d.u + constant
 //
-// G and h are those without loads; d contains the forces of the loads on clearances.
+// with d = c + A_u^T w.  G and h are those of the robot without loads.  d are the
+// forces that the loads exert on the clearances.
 #pragma once
 
 #include "reduction.h"
 
 namespace LANE_SPACE {
 
-// share of the largest force on a free motion that counts as zero
+// force on a free motion that counts as zero, as a share of the largest such force
 constexpr double STILL_OF_DRIVE = 1e-9;
 
 class Loaded : public Reduction {
@@ -30,12 +33,12 @@ public:
 
 protected:
     const bool loaded;
-    Row tight;     // (ny,) t
-    Row holding;   // (m,) w
-    Row drive;     // (nq,) g
-    Row on_play;   // (nu,) c, in the robot's order
-    Row left;      // (r,) rounding error of t in the springs of closures
-    Real stored;   // |t|^2 / 2
+    Row tight;     // (ny,) t, deformations by the loads alone
+    Row holding;   // (m,) w, wrenches on the closures
+    Row drive;     // (nq,) g, forces on the free motions
+    Row on_play;   // (nu,) c, forces on the clearances, robot's order
+    Row left;      // (r,) rounding error of t along the springs' closure columns
+    Real stored;   // |t|^2 / 2, energy of the loads alone
 
     Whole balance(const Points &points, const Block &block, int rank, int r);
     Whole bring_into_balance(const Points &points, const Block &block, int rank, int r);
@@ -43,29 +46,30 @@ protected:
     Row on_patterns(const Row &closing) const;
 
 private:
-    std::vector<double> acting;  // of all lanes, if they are equal
-    int64_t balanced = -1;       // number of the posture's change
-    Row pull;                    // (nu,) d
+    std::vector<double> acting;  // loads of all lanes, if equal; otherwise empty
+    int64_t balanced = -1;       // value of `changes` at the last balance
+    Row pull;                    // (nu,) d, solver's order
     Whole driven;
 
     Row bent_groups();
 };
 
-// The work of a wrench on a column.
+// Return the work of a wrench on a unit motion along a column.
 inline Real Loaded::along(const Real *column, const Real *wrench) const {
     Real total = {};
     for (int a = 0; a < 6; ++a) total += column[a] * wrench[a];
     return total;
 }
 
-// (6 np,) closures' wrenches on frames of each pattern.
+// Return the wrenches (6 np,) that the wrenches `closing` on the closures exert on
+// frames of each pattern.
 inline Row Loaded::on_patterns(const Row &closing) const {
     Row on(6 * np);
     for (int g = 0; g < np; ++g) part(closing.data(), g, &on[6 * g]);
     return on;
 }
 
-// t in the six springs of each group.
+// Return t in the six equivalent springs of each group.
 inline Row Loaded::bent_groups() {
     Row bent(6 * ng);
     Triangle rows(6, widest);
@@ -80,8 +84,9 @@ inline Row Loaded::bent_groups() {
     return bent;
 }
 
-// Springs, closures and clearances of the tight robot under its loads; returns the lanes
-// where these drive a motion that nothing resists.
+// Compute the deformations of the springs, the wrenches on the closures and the forces
+// on the clearances for the robot without clearances and errors under its loads.
+// Return the lanes where the loads move a free motion that no spring resists.
 inline Whole Loaded::balance(
     const Points &points, const Block &block, int rank, int r) {
     const auto load = [&](int64_t half, int64_t j, int64_t axis) {
@@ -122,7 +127,8 @@ inline Whole Loaded::balance(
     return loose;
 }
 
-// The same, which is kept while the posture and the loads of all lanes are.
+// Do the same, or use the stored result if neither the posture nor the loads of any
+// lane have changed.
 inline Whole Loaded::bring_into_balance(
     const Points &points, const Block &block, int rank, int r) {
     const size_t count = 12 * size_t(n);

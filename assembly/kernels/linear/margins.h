@@ -1,5 +1,5 @@
-// Problem (21) at several postures in parallel, from the frames' poses to the certified
-// margin.
+// Problem (21) for robots without springs at several postures in parallel, from the
+// poses of the frames to the certified margin.
 #pragma once
 
 #include "../solvers/least_factor.h"
@@ -7,9 +7,9 @@
 
 namespace LANE_SPACE {
 
-// assembly/kinematics/ranks.py
+// residual of a row without clearances that counts as zero
 constexpr double INFEASIBLE = 1e-13;
-// assembly/linear/lanes.py: COMPILED, REFERENCE
+// outcome codes of assembly/linear/lanes.py
 enum { COMPILED, REFERENCE };
 
 // Solver of blocks of points of one robot, in sequence.
@@ -22,15 +22,15 @@ public:
 
 private:
     Solver solver;
-    Table B;               // orthonormal rows, before the solver turns them
-    Ranks kept;            // of the last elimination ..
-    int left;              // .. and of its rows
-    int64_t reduced = -1;  // at which change of the posture
+    Table B;               // orthonormal rows, before the solver rotates them
+    Ranks kept;            // ranks of the last elimination of free motions
+    int left;              // rank of the rows that remained
+    int64_t reduced = -1;  // value of `changes` at the last elimination
 
     void reduce(Real tolerance, Whole asked);
 };
 
-// All quantities of the requested lanes that do not depend on the errors.
+// Compute, for the requested lanes, all quantities that do not depend on the errors.
 inline void ZoneMargins::reduce(Real tolerance, Whole asked) {
     kept = eliminate_free(tolerance, asked);
     if (!any(kept.same)) return;
@@ -45,8 +45,9 @@ inline void ZoneMargins::reduce(Real tolerance, Whole asked) {
         std::copy(programme.M[i], programme.M[i] + nu, B[i]);
 }
 
-// Margins of the requested lanes that have the same ranks as the first of them; returns
-// the other lanes.  With every link and joint rigid, B u = w must hold (least_factor.h).
+// Compute the margins of the requested lanes that have the same ranks as the first of
+// them.  Return the requested lanes that remain.  All links and joints are rigid, so
+// that B u = w must hold (least_factor.h).
 inline Whole ZoneMargins::margins(
     const Points &points, const Block &block, Whole asked, Margins &out) {
     const auto settle = [&](Whole where, Real margin, Real bound, Whole proved) {
@@ -63,7 +64,7 @@ inline Whole ZoneMargins::margins(
     const Whole closed = asked & (inner(known.data(), known.data(), m) == 0.0);
     others &= settle(closed, Real{}, Real{}, closed);  // no clearance is needed
     if (!any(asked = others)) return others;
-    if (stay && reduced == changes) {  // in all lanes alike
+    if (stay && reduced == changes) {  // all lanes have the same posture
         const Whole unclear = any(kept.unclear) ? asked : Whole{};
         kept.unclear = unclear, kept.same = asked & ~unclear;
     } else {
@@ -83,12 +84,12 @@ inline Whole ZoneMargins::margins(
         for (int l = 0; l < std::min(i, left); ++l) total -= rows.F[i][l] * w[l];
         if (i < left)
             w[i] = total / rows.diagonal[i];
-        else  // rows that no clearance enters; written so that NaN is not possible
+        else  // rows without clearances; the next comparison is false for NaN
             possible &= magnitude(total) <= INFEASIBLE;
     }
     const Real size = root(inner(w.data(), w.data(), left));
     possible &= size >= 0.0;
-    const Whole some = asked & possible & (size > 0.0);  // others need no clearance
+    const Whole some = asked & possible & (size > 0.0);  // the others need no clearance
     Real reach = real(1.0), most = real(1.0);
     std::fill(programme.u.begin(), programme.u.end(), Real{});
     Row forces(nu);
@@ -102,7 +103,7 @@ inline Whole ZoneMargins::margins(
     for (int c = 0; c < nu; ++c)
         block.write(
             out.forces, nu, cones.column[c], some ? forces[c] / most : Real{}, asked);
-    // motions of passive joints must stay within their ranges
+    // the motions of passive joints must stay within their ranges
     for (Real &own : programme.u) own = some ? own * margin : Real{};
     const Row motions = least_motions(kept.free, moved_by(Row()));
     for (int c = 0; c < nq; ++c) possible &= magnitude(motions[c]) <= s.free_bound[c];

@@ -1,21 +1,26 @@
-// Elimination of free motions and springs at several postures in parallel, the problem
-// that remains for the solvers, and the way back: assembly/linear/reference/reduction.py
-// in another order.
+// Elimination of the free motions and of the springs at several postures in parallel.
+// It leaves a small cone programme, and computes the solution of the full problem from
+// that of the small one.  assembly/linear/reference/reduction.py does the same in
+// another order.
 //
-// Vectors are stored as rows, one Householder triangulation with pivoting serves the free
-// motions, the springs and the least motions, and springs that enter the same closures are
-// first combined into six.  Springs enter by the square roots of their compliances
-// throughout.
+// Vectors are stored as rows.  One function, a Householder triangulation with pivoting,
+// eliminates free motions, eliminates springs and computes free motions of least norm.
+// Springs that occur in the same closures are first combined into six equivalent
+// springs.  Each spring column is multiplied by the square root of the spring's
+// compliance.
 //
 // ========  =============  ============================================================
 // symbol    shape          meaning
 // ========  =============  ============================================================
-// F         (nq, m)        columns of the free motions as rows
-// L         (ng, 6, 6)     each group's springs as six, lower triangular but for pivoting
-// Y         (.., 6 ng)     Z times the springs' columns
-// Z         (m - rank, m)  orthonormal, orthogonal to all free motions, in one table
-//                          with Y; later L^-1 Z, and the rows that no spring enters
-// G, h      (r, nu), (r,)  strains by clearances and by errors
+// F         (nq, m)        closure columns of the free motions, as rows
+// L         (ng, 6, 6)     columns of the six equivalent springs of each group, lower
+//                          triangular except for pivoting
+// Y         (.., 6 ng)     Z times the closure columns of the equivalent springs
+// Z         (m - rank, m)  orthonormal rows, orthogonal to all free motions, stored in
+//                          one table with Y; after the elimination of the springs
+//                          L_Y^-1 Z, with the triangle L_Y of Y, and then the rows to
+//                          which no spring contributes
+// G, h      (r, nu), (r,)  strains due to the clearances and due to the errors
 // u, v, y                  clearances, strains G u + h, multipliers of the springs
 // ========  =============  ============================================================
 #pragma once
@@ -26,14 +31,15 @@
 
 namespace LANE_SPACE {
 
-// Rank in the first of these lanes.
+// Return the rank in the first of these lanes.
 inline int rank_of_first(Whole ranks, Whole lanes) {
     int l = 0;
     while (!lanes[l]) ++l;
     return int(ranks[l]);
 }
 
-// Positions of the patterns with clearances; -1 for the others.
+// Number the patterns of frames with clearances.  Return the number of each pattern,
+// -1 for the others.
 inline Array<int> loose_patterns(const Robot &s) {
     Array<int> slot(s.np, -1);
     int next = 0;
@@ -44,19 +50,19 @@ inline Array<int> loose_patterns(const Robot &s) {
     return slot;
 }
 
-// The linear model, reduced.
+// The linear model after the elimination of free motions and springs.
 class Reduction : public Linearised {
 public:
     Reduction(const Robot &s, const Points &points);
 
 protected:
     const Cones cones;
-    Array<int> slot;  // of the patterns with clearances, in parts; else -1
-    Triangle free, springs;  // F; Y with Z beside it
-    Table L, parts;          // parts: Z's rows, for a screw of each pattern
+    Array<int> slot;  // positions of the patterns in `parts`, or -1
+    Triangle free, springs;  // F; Y and Z
+    Table L, parts;          // parts: values of Z's rows for screws of each pattern
     Programme programme;
-    Array<Real *> Z;  // rows beside Y's
-    int widest;             // most springs of a group, at least six
+    Array<Real *> Z;  // rows of Z; Y is in the same table
+    int widest;             // largest number of springs in a group, at least six
 
     Whole triangulate_free(Real tolerance);
     void orthogonal_rows(int rank, int count);
@@ -75,7 +81,7 @@ protected:
     int spring_group(int g, Triangle &rows);
 
 private:
-    Ranks kept;  // of the last elimination
+    Ranks kept;  // result of the last elimination
 
     void grouped_springs();
     void spring_rows(int count);
@@ -91,7 +97,8 @@ inline Reduction::Reduction(const Robot &s, const Points &points)
         widest = std::max(widest, int(s.groups[g + 1] - s.groups[g]));
 }
 
-// Triangulates the free motions; returns the rank of each lane, -1 if it is ambiguous.
+// Triangulate the free motions.  Return the rank in each lane, -1 where it is
+// ambiguous.
 inline Whole Reduction::triangulate_free(Real tolerance) {
     for (int c = 0; c < nq; ++c) {
         std::fill(free.F[c], free.F[c] + m, Real{});
@@ -102,7 +109,8 @@ inline Whole Reduction::triangulate_free(Real tolerance) {
     return triangulate(free, nq, m, tolerance, Real{}, 1e-11, m);
 }
 
-// (6, springs) columns of a group's springs; returns their number, at least six.
+// Copy the columns of a group's springs into `rows` (6, springs).  Return the number
+// of columns, at least six.
 inline int Reduction::spring_group(int g, Triangle &rows) {
     const int count = int(s.groups[g + 1] - s.groups[g]);
     for (int i = 0; i < 6; ++i)
@@ -111,7 +119,8 @@ inline int Reduction::spring_group(int g, Triangle &rows) {
     return std::max(6, count);
 }
 
-// Springs that act together, combined into six with the same sum of squares.
+// Combine the springs of each group into six equivalent springs, which have the same
+// sum of column products.
 inline void Reduction::grouped_springs() {
     Triangle rows(6, widest);
     for (int g = 0; g < ng; ++g) {
@@ -128,7 +137,7 @@ inline void Reduction::grouped_springs() {
     }
 }
 
-// Z, orthogonal to the free motions.
+// Compute Z, whose rows are orthogonal to the free motions.
 inline void Reduction::orthogonal_rows(int rank, int count) {
     for (int i = 0; i < count; ++i) {
         Z[i] = springs.F[i] + 6 * ng;
@@ -138,7 +147,7 @@ inline void Reduction::orthogonal_rows(int rank, int count) {
     turn_all(free, rank, m, Z.data(), count);
 }
 
-// Y = Z times the grouped springs' columns.
+// Compute Y = Z times the columns of the equivalent springs.
 inline void Reduction::spring_rows(int count) {
     for (int i = 0; i < count; ++i)
         for (int g = 0; g < ng; ++g) {
@@ -150,7 +159,8 @@ inline void Reduction::spring_rows(int count) {
         }
 }
 
-// Divides Z, ordered like Y's triangle, by it: rows that springs enter are first.
+// Replace Z, in the order of Y's rows, by L_Y^-1 Z.  Rows to which springs contribute
+// come first.
 inline void Reduction::eliminate_springs(int rank, int count) {
     Row weights(rank);
     for (int i = 0; i < count; ++i) {
@@ -159,16 +169,16 @@ inline void Reduction::eliminate_springs(int rank, int count) {
         const int before = std::min(i, rank);
         for (int l = 0; l < before; ++l) weights[l] = -Y[l];
         combine(Z.data(), before, weights.data(), m, Z[i]);
-        // rows that no spring enters have length 1: rounding errors there are of that
-        // size
+        // rows to which no spring contributes are scaled to length 1; their rounding
+        // errors are then relative to that length
         const Real size = i < rank ? springs.diagonal[i] : root(inner(Z[i], Z[i], m));
         const Real over = 1.0 / size;
         for (int a = 0; a < m; ++a) Z[i][a] *= over;
     }
 }
 
-// Triangulates free motions, then springs, in the requested lanes that have the same
-// ranks as the first of them.
+// Triangulate the free motions, then the springs.  Lanes are eliminated together if
+// they have the same ranks as the first requested lane.
 inline Reduction::Ranks Reduction::eliminate(Real tolerance, Whole asked) {
     Ranks ranks = {};
     const Whole free_rank = triangulate_free(tolerance);
@@ -190,13 +200,13 @@ inline Reduction::Ranks Reduction::eliminate(Real tolerance, Whole asked) {
     return ranks;
 }
 
-// All quantities of the requested lanes that do not depend on errors and loads; they are
-// kept while the posture does not change.
+// Compute, for the requested lanes, all quantities that do not depend on errors and
+// loads.  While the posture does not change, the stored quantities are used.
 inline Reduction::Ranks Reduction::read_and_eliminate(
     const Points &points, const Block &block, Whole asked) {
     const bool stay = stays(points, block);
     read(points, block, stay);
-    if (stay) {  // in all lanes alike
+    if (stay) {  // all lanes have the same posture
         const bool unclear = any(kept.unclear);
         return {kept.free, kept.springs, unclear ? Whole{} : asked, unclear ? asked : Whole{}};
     }
@@ -205,19 +215,20 @@ inline Reduction::Ranks Reduction::read_and_eliminate(
     return kept;
 }
 
-// Value of a screw of each pattern in Z's rows.
+// Compute the values of Z's rows for screws of each pattern with clearances.
 inline void Reduction::clearance_parts(int count) {
     for (int i = 0; i < count; ++i)
         for (int g = 0; g < np; ++g)
             if (slot[g] >= 0) part(Z[i], g, parts[i] + 6 * slot[g]);
 }
 
-// h.
+// Compute h, the strains due to the errors.
 inline void Reduction::right_sides(int r) {
     for (int i = 0; i < r; ++i) programme.h[i] = -inner(known.data(), Z[i], m);
 }
 
-// G and h, in the solver's order of columns.
+// Compute G and h of the small cone programme.  Its columns are in the order that the
+// solver requires.
 inline void Reduction::small_problem(int r) {
     programme.r = r;
     right_sides(r);
@@ -233,7 +244,7 @@ inline void Reduction::small_problem(int r) {
     }
 }
 
-// Deformation of the grouped springs.
+// Compute the deformations of the equivalent springs from the strains v.
 inline Row Reduction::spring_strains(int r, const Row &v) {
     Row spring(6 * ng);
     std::copy(v.begin(), v.begin() + r, spring.begin());
@@ -242,7 +253,8 @@ inline Row Reduction::spring_strains(int r, const Row &v) {
     return spring;
 }
 
-// Closure error by errors, clearances and grouped springs, which move the platform.
+// Compute the closure error that errors, clearances and equivalent springs cause, and
+// add the motions of clearances and springs to the platform screw.
 inline Row Reduction::moved_by(const Row &grouped) {
     Row total = known;
     Real step[6];
@@ -258,7 +270,7 @@ inline Row Reduction::moved_by(const Row &grouped) {
     return total;
 }
 
-// Free motions of least size that close the remaining error.
+// Compute the free motions of least norm that close the remaining closure error.
 inline Row Reduction::least_motions(int rank, const Row &moved) {
     Row right(std::max(m, nq)), least(nq), motions(nq);
     for (int a = 0; a < m; ++a) right[a] = -moved[a];
@@ -270,7 +282,8 @@ inline Row Reduction::least_motions(int rank, const Row &moved) {
             least[i] /= free.diagonal[i];
         }
     } else {
-        // the triangle's columns, as rows, triangulated again
+        // for dependent free motions the columns of the triangle are triangulated, too;
+        // this gives the solution of least norm
         Triangle R(rank, nq);
         for (int i = 0; i < rank; ++i) {
             R.F[i][i] = free.diagonal[i];
@@ -290,8 +303,9 @@ inline Row Reduction::least_motions(int rank, const Row &moved) {
     return motions;
 }
 
-// The closures' least wrenches that balance forces `drive` on the free motions, except
-// for `still`; returns the lanes that have none.
+// Compute the wrenches of least norm on the closures that balance the forces `drive`
+// on the free motions.  A force of at most `still` counts as balanced.  Return the
+// lanes where a force cannot be balanced.
 inline Whole Reduction::hold_free_motions(
     int rank, const Row &drive, Real still, Row &closing) {
     Whole loose = {};
@@ -310,7 +324,7 @@ inline Whole Reduction::hold_free_motions(
     return loose;
 }
 
-// The same for a unit wrench on the platform.
+// Compute the same wrenches for a unit wrench on the platform, component `row`.
 inline Whole Reduction::hold_free_motions(
     int rank, int row, double still, Row &closing) {
     Row drive(nq);
@@ -319,9 +333,9 @@ inline Whole Reduction::hold_free_motions(
     return hold_free_motions(rank, drive, real(still), closing);
 }
 
-// Adds to the closures' wrenches those that give the springs the least energy; `bent`,
-// the deformation of the groups' springs by the other wrenches, is overwritten with their
-// part in Z's first rows.
+// Add wrenches on the closures that minimise the energy of the springs.  `bent`
+// contains the deformations of the equivalent springs due to the other wrenches.  Its
+// first r entries are overwritten with the coefficients of Z's first r rows.
 inline void Reduction::bend_least(int r, Row &bent, Row &closing) {
     turn_back(springs, r, 6 * ng, bent.data());
     for (int i = 0; i < r; ++i) bent[i] = -bent[i];

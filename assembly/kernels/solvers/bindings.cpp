@@ -1,11 +1,11 @@
-// Python bindings of one cone programme and of one body's farthest screw.
+// Python bindings of the functions in assembly/kernels/solvers.
 #include "../arrays.h"
 #include "../bindings.h"
 #include "../kernels.h"
 
 namespace {
 
-// Problem of u and y, the first guess; cones of any size.
+// Read a problem; its cones can have any number of columns.
 ConeProblem problem_of(
     nb::handle G, nb::handle h, nb::handle d, nb::handle H, nb::handle k,
     nb::handle cones) {

@@ -1,16 +1,17 @@
-// Points of small convex sets closest to given ones, in parallel; symbols as in cones.h:
+// Points of small convex sets that are closest to given points, in parallel.  cones.h
+// defines the symbols.  The problem
 //
 //     minimise  |u - a|^2 / 2   subject to  M u = e,  |u_k| <= 1, each cone k
 //
-// by Newton's method on the dual, which is smooth:
+// is solved by Newton's method on its dual, which is smooth:
 //
-//     maximise  y.(M u - e) + |u - a|^2 / 2  with u the point of the cones closest to
-//     a - M^T y.
+//     maximise  y.(M u - e) + |u - a|^2 / 2,  where u is the point of the cones that is
+//     closest to a - M^T y.
 //
-// The value of the rows, e, is that of a point of the set that is known.
+// A point of the set is known.  Its value of M u is e.
 //
-// Source: Li, Sun, Toh (2018), A highly efficient semismooth Newton augmented Lagrangian
-// method for solving lasso problems.
+// Source: Li, Sun, Toh (2018), A highly efficient semismooth Newton augmented
+// Lagrangian method for solving lasso problems.
 #pragma once
 
 #include "cones.h"
@@ -18,12 +19,13 @@
 namespace LANE_SPACE {
 
 constexpr int STEPS_CLOSEST = 40;  // largest number of Newton steps
-// added to the curvature, whose largest possible value is 1: rows that only cones without
-// freedom enter have none
+// added to the negative second derivative, whose largest possible value is 1.  Rows
+// that contain only cones without freedom have a second derivative of 0
 constexpr double CURVATURE = 1e-13;
 
-// The point of the cones closest to a - z1: u, and D of the curvature M D M^T.  Cones that
-// are kept remain at `fixed`.  Returns the value of the dual without its rows' part.
+// Compute u, the point of the cones that is closest to a - z1, and D, which determines
+// the negative second derivative M D M^T.  The positions of the cones in `kept` remain
+// at `fixed`.  Return the value of the dual without the terms of the rows.
 inline Real Solver::project(const Row &a, const Row &kept, const Row &fixed) {
     Real value = {};
     k.each([&](auto size, int c, int first) {
@@ -41,7 +43,7 @@ inline Real Solver::project(const Row &a, const Row &kept, const Row &fixed) {
             D[1] = inside ? Real{} : D[0];
         } else if (size == 1) {
             D[0] = stays | ~inside ? Real{} : real(1.0);
-        } else {  // on the disc's edge only rotation is free
+        } else {  // on the boundary of the disc only rotation is free
             D[0] = inside ? real(1.0) : shorter * own[1] * own[1];
             D[1] = inside ? Real{} : -shorter * own[0] * own[1];
             D[2] = inside ? real(1.0) : shorter * own[0] * own[0];
@@ -55,8 +57,9 @@ inline Real Solver::project(const Row &a, const Row &kept, const Row &fixed) {
     return value;
 }
 
-// Finds the points closest to `a` in the requested lanes, from the point q.u of each set,
-// which is overwritten in lanes that are solved; returns these.
+// Find the point of each set that is closest to `a`, in the requested lanes.  q.u is a
+// point of the set; it is overwritten in the lanes that are solved.  Return these
+// lanes.
 inline Whole Solver::closest(Programme &q, const Row &a, const Row &kept, Whole asked) {
     const int m = q.p;
     const Row fixed = q.u;

@@ -1,5 +1,5 @@
-// Farthest points of one set {|u_k| <= 1 for each cone k, H u = e} along many directions,
-// several in parallel.
+// Farthest points of sets {|u_k| <= 1 for each cone k, H u = e} that share H, along
+// many directions, several in parallel.
 #include "../kernels.h"
 #include "block.h"
 #include "cones.h"

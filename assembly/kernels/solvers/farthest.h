@@ -1,15 +1,16 @@
-// The farthest points of convex bodies of platform screws, bracketed: problem (27) by
+// Bounds of the farthest points of convex bodies of platform screws: problem (27) by
 // outer approximation (search.h).
 //
-// A body's support function along d is a small cone programme.  Any multipliers n of its
-// rows prove an upper bound,
+// The support function of a body along d is the maximum of a small cone programme.  Any
+// multipliers n of the rows H prove an upper bound,
 //
-//     d.(centre - X start) + n.H start + sum_k |(X^T d - H^T n)_k|,
+//     d.(centre - X start) + n.H start + sum_k |(X^T d - H^T n)_k|.
 //
-// and its point is projected into the body: both are valid for any result of the solver.
+// The point that the solver returns is projected into the body.  Both the bound and the
+// point are therefore valid for any result of the solver.
 //
-// Each lane searches one body in one half of the screw, and takes the next one at the
-// end.
+// Each lane searches one half of the screw in one body.  A lane that has finished
+// starts the next search.
 #pragma once
 
 #include <functional>
@@ -18,18 +19,22 @@
 
 namespace LANE_SPACE {
 
+// largest number of support functions in a search
 constexpr int MOST_SUPPORTS = 400;
-// accepted gap of a support function, as a share of the tolerance ..
+// accepted gap of a support function, as a share of the tolerance
 constexpr double SHARE = 0.1;
-constexpr double POOR = 0.5;   // .. and the gap with which the search still continues
-constexpr double SYMMETRIC = 1e-14;  // H start counts as zero
-constexpr double ROUNDING = 1e-14;   // accepted excess over a cone
+constexpr double POOR = 0.5;   // largest gap with which the search continues
+// size below which an entry of H start counts as zero
+constexpr double SYMMETRIC = 1e-14;
+constexpr double ROUNDING = 1e-14;   // accepted excess of |v_k|^2 over 1
 
-// Search of bodies with cones as those of the first one, of at most p rows.
+// A search of bodies that have at most p rows, and cones of the same sizes as those of
+// the first body.
 class Farthest {
 public:
-    // If a support function is not found here: of a direction its certified height, the
-    // screw that attains it and the gradient X^T d - H^T n.
+    // Alternative that is called if a support function cannot be computed here.  From a
+    // direction it computes a certified value of the support function, a screw that
+    // attains it, and the gradient X^T d - H^T n.
     typedef std::function<void(const Point &, double *, double *, double *)> Support;
 
     Farthest(const Body &first, int p, Support other = {})
@@ -37,7 +42,7 @@ public:
           solver(cones, p), majorant(cones.nu, p), other(std::move(other)),
           gradient(cones.nu), v(cones.nu) {}
 
-    // Does all tasks; calls settle(search, solved) at the end of each.
+    // Carry out all tasks.  Call settle(search, solved) at the end of each search.
     template <typename Settle> void search(const std::vector<Task> &tasks, Settle settle) {
         size_t next = 0;
         Whole busy = {};
@@ -63,7 +68,7 @@ public:
                 if (busy[l]) {
                     found[l] = close(l) ? -1 : 0;
                     if (found[l]) continue;
-                    again[l] = 0;  // of another's support no opposite follows
+                    again[l] = 0;  // the alternative gives no opposite support
                     found[l] = ask(l) ? -1 : 0;
                 }
             double least[LANES];
@@ -100,13 +105,13 @@ public:
 private:
     const Cones cones;
     Projection body;
-    Table whole_map;  // X, all six components
+    Table whole_map;  // X, all six components of the screw
     Programme q;
     Solver solver;
     Majorant majorant;
     const Support other;
     Search searches[LANES];
-    Whole symmetric = {};   // v -> -v leaves the rows satisfied
+    Whole symmetric = {};   // lanes in which -v satisfies the rows, too
     Real centre[6], tolerances = {};
     // results of `support` and `opposite`
     Real height, screw[6];
@@ -117,13 +122,15 @@ private:
         return d[0] * own[0][l] + d[1] * own[1][l] + d[2] * own[2][l];
     }
 
-    // Whether the screw of a lane nearly attains its height; written so that NaN does not.
+    // Return whether the screw of a lane nearly attains its height.  The comparison is
+    // false for NaN.
     bool close(int l) const {
         const double reached = along(searches[l].direction, screw, l);
         return height[l] - reached <= POOR * searches[l].tolerance;
     }
 
-    // A lane's support from the alternative; whether there is one.
+    // Compute the support function of a lane by the alternative.  Return whether
+    // there is an alternative.
     bool ask(int l) {
         if (!other) return false;
         double own_height, attains[6];
@@ -135,7 +142,7 @@ private:
         return true;
     }
 
-    // A support of a lane's body, its screw and its plane.
+    // Add the screw and the plane of a support function to a search.
     void take(Search &own, int l, const Point &normal, double support) {
         double of_lane[6];
         for (int a = 0; a < 6; ++a) of_lane[a] = screw[a][l];
@@ -150,7 +157,7 @@ private:
     void screw_at(const Row &v);
 };
 
-// The body of a lane's search.
+// Copy the body of a search into its lane.
 inline void Farthest::load(int l) {
     const Search &own = searches[l];
     const Body &b = *own.body;
@@ -187,8 +194,8 @@ inline void Farthest::load(int l) {
     tolerances[l] = own.tolerance;
 }
 
-// Support functions along the searches' directions: a certified height, a screw that
-// nearly attains it, and the gradient X^T d - H^T n.
+// Compute support functions along the directions of the searches: a certified height,
+// a screw that nearly attains it, and the gradient X^T d - H^T n.
 inline void Farthest::support(Whole asked) {
     const int nv = cones.nu, p = body.p;
     Real d[3];
@@ -229,7 +236,7 @@ inline void Farthest::support(Whole asked) {
     screw_at(v);
 }
 
-// The same along the opposite directions, if the body is symmetric.
+// Compute the support functions of symmetric bodies along the opposite directions.
 inline void Farthest::opposite() {
     Row mirrored(cones.nu);
     for (int j = 0; j < cones.nu; ++j) mirrored[j] = -v[j];
@@ -244,7 +251,8 @@ inline void Farthest::opposite() {
     });
 }
 
-// A nearby v that satisfies rows and cones to rounding.
+// Move v to a nearby point that satisfies the rows and the cones except for rounding
+// errors.
 inline void Farthest::within(Row &v) {
     const int nv = cones.nu;
     for (int j = 0; j < nv; ++j) v[j] -= body.start[j];
@@ -252,7 +260,8 @@ inline void Farthest::within(Row &v) {
         const Real residual = inner(body.H[i], v.data(), nv);
         for (int j = 0; j < nv; ++j) v[j] -= residual * body.H[i][j];
     }
-    // the largest part of the step, from a start inside, that remains in all cones
+    // the largest share of the step from `start`, which is inside, that remains in all
+    // cones
     Real share = real(1.0);
     cones.each([&](auto of, int, int at) {
         Real aa = {}, ab = {}, bb = real(-1.0 - ROUNDING);
@@ -270,7 +279,7 @@ inline void Farthest::within(Row &v) {
     for (int j = 0; j < nv; ++j) v[j] = body.start[j] + share * v[j];
 }
 
-// Platform screws at v.
+// Compute the platform screws at v.
 inline void Farthest::screw_at(const Row &v) {
     Row step(cones.nu);
     for (int j = 0; j < cones.nu; ++j) step[j] = v[j] - body.start[j];

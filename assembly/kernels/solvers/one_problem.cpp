@@ -1,5 +1,5 @@
-// One cone programme, and one body's farthest screw, with cones of any size: for callers
-// with a single problem.
+// One cone programme, and the farthest screw of one body, with cones of any size.
+// Python calls these functions for a single problem.
 #define FEW_LANES
 #include "../kernels.h"
 #include "block.h"
@@ -10,8 +10,9 @@ using namespace LANE_SPACE;
 
 namespace {
 
-// Overwrites a first guess u (nu,) and the multipliers y (r + p,), those of H's rows
-// last, with the result of a method.  All lanes contain the same problem.
+// Apply `method` to one problem.  u (nu,) and the multipliers y (r + p,), those of
+// H's rows last, contain an initial guess and are overwritten with the result.  All
+// lanes contain the same problem.
 template <typename Method>
 void solve(const ConeProblem &given, double *u, double *y, Method method) {
     const Cones cones(given.starts, int(given.cones));

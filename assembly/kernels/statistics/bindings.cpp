@@ -1,11 +1,11 @@
-// Python binding of the billiard walk.
+// Python bindings of the billiard walk.
 #include "../arrays.h"
 #include "../bindings.h"
 #include "../kernels.h"
 
 namespace {
 
-// Unit cones, and the axes of Dikin's ellipsoid in them.
+// Read unit cones, and the axes of Dikin's ellipsoid in them.
 Ellipsoid ellipsoid_of(nb::handle axes, nb::handle gram, nb::handle cones) {
     Size nu, n, ends;
     Ellipsoid own;
@@ -16,7 +16,7 @@ Ellipsoid ellipsoid_of(nb::handle axes, nb::handle gram, nb::handle cones) {
     return own;
 }
 
-// From the capsule of a bit generator, whose lock the caller holds.
+// Return the bit generator of a capsule; the caller holds the generator's lock.
 bitgen *bits_of(const nb::capsule &random) {
     return static_cast<bitgen *>(random.data("BitGenerator"));
 }
