@@ -32,10 +32,13 @@ inline std::string text(int64_t size) { return std::to_string(size); }
 [[noreturn]] inline void refuse(
     nb::handle given, const char *name, std::string dtype, bool written,
     std::initializer_list<std::string> sizes) {
-    const auto said = [](nb::object object) { return std::string(nb::str(object).c_str()); };
-    std::string found = said(given.type().attr("__name__")), wanted;
+    const auto string_of = [](nb::object object) {
+        return std::string(nb::str(object).c_str());
+    };
+    std::string found = string_of(given.type().attr("__name__")), wanted;
     if (nb::hasattr(given, "shape") && nb::hasattr(given, "dtype")) {
-        found = said(given.attr("dtype")) + " of shape " + said(given.attr("shape"));
+        found = string_of(given.attr("dtype")) + " of shape " +
+                string_of(given.attr("shape"));
         if (nb::hasattr(given, "flags")) {
             const nb::object flags = given.attr("flags");
             if (!nb::cast<bool>(flags.attr("c_contiguous"))) found += ", not contiguous";

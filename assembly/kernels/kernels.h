@@ -21,7 +21,7 @@ void all_margins(const Robot &robot, const Points &points, Margins &out);
 // Bounds of the largest pose errors, (27), at the points whose outcome is 0.
 void bound_all(
     const Robot &robot, const Points &points, const Centres &centres,
-    const ClearanceLoads &loads, const Asked &asked, Bounds &out);
+    const ClearanceLoads &loads, const PoseErrorRequest &requested, Bounds &out);
 
 // Springs' deformations that determine the classical compliance of the platform, at
 // every point.
@@ -39,7 +39,7 @@ void newton(const ConeProblem &given, const Limits &limits, double *u, double *y
 // upper bound, and `screw` (6,), which attains the lower bound.  Return the number of
 // support functions computed.  If that number reaches its limit, the bounds differ by
 // more than the required width.
-int64_t farthest(const AskedBody &asked, double *bounds, double *screw);
+int64_t farthest(const BodyRequest &requested, double *bounds, double *screw);
 
 // Solve cone programmes that share G and H.  Overwrite the positions u (count, nu)
 // and the multipliers y (count, r + p) of the rows of G and H.
@@ -54,7 +54,7 @@ void closest_points(const Projections &given, double *u, int64_t *solved);
 void follow_all(const Tree &tree, const Targets &targets, Tracks &out);
 
 // Find the farthest points of a set along given directions.
-void farthest_points(const Directions &asked, FarthestPoints &out);
+void farthest_points(const Directions &requested, FarthestPoints &out);
 
 // Find the start of every chain: a point (nu,) near the boundary, in a random
 // direction from u (nu,).  Overwrite `walks` (chains, nu).
@@ -64,5 +64,5 @@ void start_chains(
 // Continue a billiard walk from u (nu,), which is overwritten with the last point.
 // Overwrite `trace` (kept, 6) with platform screws.
 void billiard_walk(
-    const Ellipsoid &given, const Trajectories &asked, bitgen *random, double *u,
+    const Ellipsoid &given, const Trajectories &requested, bitgen *random, double *u,
     double *trace);

@@ -80,7 +80,7 @@ struct ClearanceLoads {
 
 // Request of (27): the vector [m] from the platform's origin to the point whose error
 // is bounded, and the required differences [rad, m] between upper and lower bound.
-struct Asked {
+struct PoseErrorRequest {
     const double *offset, *tolerance;  // (3,), (2,)
 };
 
@@ -126,7 +126,7 @@ struct Limits {
 // A convex body of platform screws (search.h).  `half` is 0 if the rotation is bounded
 // and 3 if the translation is bounded.  `tolerance` is the required difference between
 // upper and lower bound.
-struct AskedBody {
+struct BodyRequest {
     int64_t p, cones, half;
     const int64_t *starts;                      // (cones + 1,)
     const double *centre, *map, *rows, *start;  // (6,), (6, nv), (p, nv), (nv,)

@@ -38,7 +38,7 @@ protected:
     // unknown joints of each closure, then of the platform
     std::vector<std::vector<Mover>> movers;
     std::vector<bool> straight;  // frames that are not rotated in their parents
-    bool asked[6], all_turns, turns;
+    bool requested[6], all_turns, turns;
     Row q, R, p, after_R, after_p, r, J, x;
     Table N;
     // required pose of the platform: vector, rotation matrix
@@ -66,9 +66,9 @@ Motion::Motion(const Tree &tree, const Targets &targets)
         }
     x.resize(joints.size());
     for (int k = 0; k < 6; ++k)
-        asked[k] = posed && targets.count && std::isfinite(targets.poses[k]);
-    all_turns = asked[3] && asked[4] && asked[5];
-    turns = asked[3] || asked[4] || asked[5];
+        requested[k] = posed && targets.count && std::isfinite(targets.poses[k]);
+    all_turns = requested[3] && requested[4] && requested[5];
+    turns = requested[3] || requested[4] || requested[5];
     couple();
     for (int i = 0; i < n; ++i) {
         bool identity = true;
@@ -181,7 +181,7 @@ void Motion::equations() {
     platform_turn(first, last, out);
     for (int k = 0; k < 3; ++k) out[3 + k] = (p[3 * tree.platform + k] - pose[k]) * scale;
     for (int k = 0; k < 6; ++k)
-        if (!asked[(k + 3) % 6]) {
+        if (!requested[(k + 3) % 6]) {
             out[k] = Real{};
             for (int e = first; e < last; ++e) J[6 * e + k] = Real{};
         }

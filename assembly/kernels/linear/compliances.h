@@ -25,49 +25,50 @@ class Compliance : public Reduction {
 public:
     using Reduction::Reduction;
 
-    Whole comply(const Points &points, const Block &block, Whole asked, Compliances &out);
+    Whole comply(
+        const Points &points, const Block &block, Whole requested, Compliances &out);
 };
 
 // Compute the deformations y of the springs under six unit wrenches on the platform.
 // It solves the requested lanes that have the same ranks as the first of them.  Return
 // the requested lanes that remain.
 inline Whole Compliance::comply(
-    const Points &points, const Block &block, Whole asked, Compliances &out) {
+    const Points &points, const Block &block, Whole requested, Compliances &out) {
     const auto settle = [&](Whole where, int64_t status) {
         for (int l = 0; l < LANES; ++l)
             if (where[l]) out.status[block.point[l]] = status;
         return ~where;
     };
-    Whole others = asked;
+    Whole others = requested;
     read(points, block);
-    const Ranks ranks = eliminate(tolerance(points, block), asked);
+    const Ranks ranks = eliminate(tolerance(points, block), requested);
     others &= settle(ranks.unclear, UNCLEAR);
-    if (!any(asked = ranks.same)) return others;
+    if (!any(requested = ranks.same)) return others;
     const int rank = ranks.free, r = ranks.springs;
-    Row closing(m), bent(6 * ng), on(6 * np);
+    Row closing(m), deformation(6 * ng), on(6 * np);
     for (int row = 0; row < 6; ++row) {
-        const Whole loose = hold_free_motions(rank, row, STILL, closing);
-        others &= settle(asked & loose, LOOSE);
-        if (!any(asked &= ~loose)) return others;
+        const Whole loose = balance_free_motions(rank, row, STILL, closing);
+        others &= settle(requested & loose, LOOSE);
+        if (!any(requested &= ~loose)) return others;
         for (int g = 0; g < np; ++g) part(closing.data(), g, &on[6 * g]);
         for (int g = 0; g < ng; ++g)
             for (int b = 0; b < 6; ++b) {
                 Real total = s.group_on_path[g] * L[6 * g + row][b];
                 for (int a = 0; a < 6; ++a)
                     total += L[6 * g + a][b] * on[6 * s.group_pattern[g] + a];
-                bent[6 * g + b] = total;
+                deformation[6 * g + b] = total;
             }
-        bend_least(r, bent, closing);
+        minimise_spring_energy(r, deformation, closing);
         for (int g = 0; g < np; ++g) part(closing.data(), g, &on[6 * g]);
         for (int c = 0; c < s.ny; ++c) {
             const int64_t j = s.spring_frame[c];
             Real total = s.on_path[j] * elastic[c][row];
             for (int a = 0; a < 6; ++a)
                 total += elastic[c][a] * on[6 * s.pattern_of[j] + a];
-            block.write(out.springs, 6 * s.ny, row * s.ny + c, total, asked);
+            block.write(out.springs, 6 * s.ny, row * s.ny + c, total, requested);
         }
     }
-    return others & settle(asked, COMPLIANT);
+    return others & settle(requested, COMPLIANT);
 }
 
 }  // namespace LANE_SPACE

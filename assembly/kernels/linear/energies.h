@@ -26,7 +26,7 @@ class Energies : public Loaded {
 public:
     Energies(const Robot &s, const Points &points)
         : Loaded(s, points), postpones(!points.own_posture), solver(cones, m), v(m),
-          G(m, nu), unfelt(m, m) {}
+          G(m, nu), springless(m, m) {}
 
     // If all points have one posture, points that need the interior-point method are
     // solved later, in full blocks.  They are solved at once if all points of a block
@@ -34,22 +34,26 @@ public:
     bool postpones;
     std::vector<int64_t> waiting;
 
-    Whole solve(const Points &points, const Block &block, Whole asked, Solutions &out);
+    Whole solve(
+        const Points &points, const Block &block, Whole requested, Solutions &out);
 
 private:
     Solver solver;
     Row v;  // G u + h
     // quantities that are stored while the posture does not change
     int64_t prepared = -1;  // value of `changes` when they were computed
-    Table G, unfelt;  // unfelt: orthonormal rows of Z to which no spring contributes
+    // springless: orthonormal rows of Z to which no spring contributes
+    Table G, springless;
     Real largest_column;    // largest square of the norm of a column of G
-    Whole stuck;            // lanes where clearances contribute to such rows
+    Whole rigid_clearance;  // lanes where clearances contribute to such rows
 
     void prepare(int r, int count);
-    Whole stuck_clearances(int rank, int count);
+    Whole rigid_clearances(int rank, int count);
     Whole rigid_rows(int rank, int count, Real tolerance);
-    bool waits(Whole left, Whole asked) const { return postpones && any(asked & ~left); }
-    Whole minimise(int r, Whole asked);
+    bool waits(Whole left, Whole requested) const {
+        return postpones && any(requested & ~left);
+    }
+    Whole minimise(int r, Whole requested);
     Row least_multipliers(int r, int count);
     void own_springs(
         const Row &grouped, const Block &block, double *elastic, Whole where);
@@ -60,7 +64,7 @@ private:
 };
 
 // Return the lanes where clearances contribute to rows to which no spring contributes.
-inline Whole Energies::stuck_clearances(int rank, int count) {
+inline Whole Energies::rigid_clearances(int rank, int count) {
     Array<Real> most(np), sizes(nu);
     for (int g = 0; g < np; ++g)
         for (int i = rank; slot[g] >= 0 && i < count; ++i)
@@ -68,7 +72,8 @@ inline Whole Energies::stuck_clearances(int rank, int count) {
                 most[g] = larger(magnitude(parts[i][6 * slot[g] + a]), most[g]);
     Real worst = {};
     for (int c = 0; c < nu; ++c)
-        for (int a = 0; a < 6; ++a) sizes[c] = larger(magnitude(play[c][a]), sizes[c]);
+        for (int a = 0; a < 6; ++a)
+            sizes[c] = larger(magnitude(clearance[c][a]), sizes[c]);
     const Real limit = largest_clearance() * (NOISE / CLEAR);
     for (int c = 0; c < nu; ++c) {
         const int64_t g = s.pattern_of[s.cone_frame[c]];
@@ -85,7 +90,7 @@ inline Whole Energies::stuck_clearances(int rank, int count) {
 // Return the lanes where clearances or errors contribute to rows to which no spring
 // contributes.
 inline Whole Energies::rigid_rows(int rank, int count, Real tolerance) {
-    Whole rigid = stuck;
+    Whole rigid = rigid_clearance;
     const Real allowed = 1e-12 / CLEAR + tolerance * largest_error;
     for (int i = rank; i < count; ++i)  // the comparison makes NaN rigid
         rigid |= ~(magnitude(inner(known.data(), Z[i], m)) <= allowed);
@@ -96,7 +101,7 @@ inline Whole Energies::rigid_rows(int rank, int count, Real tolerance) {
 inline void Energies::prepare(int r, int count) {
     if (!posture.empty() && prepared == changes) return right_sides(r);
     prepared = changes;
-    stuck = stuck_clearances(r, count);
+    rigid_clearance = rigid_clearances(r, count);
     small_problem(r);
     largest_column = Real{};
     for (int i = 0; i < r; ++i) std::copy(programme.M[i], programme.M[i] + nu, G[i]);
@@ -106,11 +111,11 @@ inline void Energies::prepare(int r, int count) {
         largest_column = larger(column, largest_column);
     }
     for (int i = 0; i < count - r; ++i) {
-        Real *own = unfelt[i];
+        Real *own = springless[i];
         std::copy(Z[r + i], Z[r + i] + m, own);
         for (int l = 0; l < i; ++l) {
-            const Real along = inner(unfelt[l], own, m);
-            for (int a = 0; a < m; ++a) own[a] -= along * unfelt[l][a];
+            const Real along = inner(springless[l], own, m);
+            for (int a = 0; a < m; ++a) own[a] -= along * springless[l][a];
         }
         const Real over = 1.0 / root(inner(own, own, m));
         for (int a = 0; a < m; ++a) own[a] *= over;
@@ -121,22 +126,22 @@ inline void Energies::prepare(int r, int count) {
 // Newton's method alone converges if all cone constraints are active.  In the other
 // lanes Newton's method follows the interior-point method, unless these points are
 // solved later.  Return the outcomes.
-inline Whole Energies::minimise(int r, Whole asked) {
+inline Whole Energies::minimise(int r, Whole requested) {
     Programme &q = programme;
     const Real square = inner(q.h.data(), q.h.data(), r);
     Real size = larger(largest_column, square);
-    Whole some = square > 0.0;
+    Whole deformed = square > 0.0;
     for (int c = 0; loaded && c < nu; ++c) {
         size = larger(magnitude(q.d[c]), size);
-        some |= q.d[c] != 0.0;
+        deformed |= q.d[c] != 0.0;
     }
     size = root(size);
     std::fill(q.u.begin(), q.u.end(), Real{});
     std::copy(q.h.begin(), q.h.begin() + r, q.y.begin());
     std::copy(q.h.begin(), q.h.begin() + r, v.begin());
-    asked &= some;
-    if (nu == 0 || !any(asked)) return Whole{};
-    const Real over = 1.0 / (some ? size : real(1.0));
+    requested &= deformed;
+    if (nu == 0 || !any(requested)) return Whole{};
+    const Real over = 1.0 / (deformed ? size : real(1.0));
     for (int i = 0; i < r; ++i) {
         q.h[i] *= over;
         for (int c = 0; c < nu; ++c) q.M[i][c] = G[i][c] * over;
@@ -145,17 +150,19 @@ inline Whole Energies::minimise(int r, Whole asked) {
     Real absolute = STOP * GAP_WITHOUT_CLEARANCE * without;
     Real near = NEAR_WITHOUT_CLEARANCE * without;
     if (loaded) {
-        const Real bent = stored * over * over;
-        absolute += STOP * (GAP + GAP_WITHOUT_CLEARANCE) * bent;
-        near += (NEAR + NEAR_WITHOUT_CLEARANCE) * bent;
+        const Real scaled = stored * over * over;
+        absolute += STOP * (GAP + GAP_WITHOUT_CLEARANCE) * scaled;
+        near += (NEAR + NEAR_WITHOUT_CLEARANCE) * scaled;
         for (int c = 0; c < nu; ++c) q.d[c] *= over * over;
     }
-    const Whole left = asked & ~solver.newton_alone(q, STOP * GAP, absolute, asked);
-    if (!waits(left, asked)) solver.interior_then_newton(q, STOP * GAP, absolute, near, left);
+    const Whole left =
+        requested & ~solver.newton_alone(q, STOP * GAP, absolute, requested);
+    if (!waits(left, requested))
+        solver.interior_then_newton(q, STOP * GAP, absolute, near, left);
     multiply(q.M.rows(), r, q.u.data(), nu, v.data());
     for (int i = 0; i < r; ++i) {
         v[i] = (v[i] + q.h[i]) * size;
-        q.y[i] = asked ? q.y[i] * size : q.y[i];
+        q.y[i] = requested ? q.y[i] * size : q.y[i];
         q.h[i] *= size;
     }
     for (int c = 0; loaded && c < nu; ++c) q.d[c] *= size * size;
@@ -164,10 +171,10 @@ inline Whole Energies::minimise(int r, Whole asked) {
 
 // Return the multipliers of the closures; if they are not unique, those of least norm.
 inline Row Energies::least_multipliers(int r, int count) {
-    Row multipliers = loaded ? holding : Row(m);
+    Row multipliers = loaded ? closure_wrench : Row(m);
     combine(Z.data(), r, programme.y.data(), m, multipliers.data());
     for (int i = 0; i < count - r; ++i) {
-        const Real *own = unfelt[i];
+        const Real *own = springless[i];
         const Real along = inner(own, multipliers.data(), m);
         for (int a = 0; a < m; ++a) multipliers[a] -= along * own[a];
     }
@@ -187,12 +194,12 @@ inline void Energies::own_springs(
         turn_all(rows, 6, count, &x, 1);
         for (int64_t c = s.groups[g]; c < s.groups[g + 1]; ++c) {
             Real strain = own[c - s.groups[g]];
-            if (loaded) strain += tight[c];
+            if (loaded) strain += load_strain[c];
             block.write(elastic, s.ny, s.spring_order[c], strain, where);
         }
     }
     for (int64_t c = s.groups[ng]; loaded && c < s.ny; ++c)
-        block.write(elastic, s.ny, s.spring_order[c], tight[int(c)], where);
+        block.write(elastic, s.ny, s.spring_order[c], load_strain[int(c)], where);
 }
 
 // Compute the bound that the multipliers prove on the problem before elimination: for
@@ -248,7 +255,8 @@ inline Real Energies::loaded_gap(
         Real squares = {}, work = {};
         for (int i = at; i < at + size; ++i) {
             const int c = int(cones.column[i]);
-            const Real force = on_play[c] + enters(c, &on[6 * s.pattern_of[s.cone_frame[c]]]);
+            const Real force =
+                clearance_load[c] + enters(c, &on[6 * s.pattern_of[s.cone_frame[c]]]);
             squares += force * force, work += force * programme.u[i];
         }
         gap += larger(root(squares) - work, Real{});
@@ -264,43 +272,44 @@ inline Real Energies::loaded_gap(
 // Solve the requested lanes that have the same ranks as the first of them, and write
 // their results.  Return the requested lanes that remain.
 inline Whole Energies::solve(
-    const Points &points, const Block &block, Whole asked, Solutions &out) {
+    const Points &points, const Block &block, Whole requested, Solutions &out) {
     const auto settle = [&](Whole where, int64_t outcome) {
         for (int l = 0; l < LANES; ++l)
             if (where[l]) out.outcome[block.point[l]] = outcome;
     };
-    const Whole all = asked;
-    const Ranks ranks = read_and_eliminate(points, block, asked);
+    const Whole all = requested;
+    const Ranks ranks = read_and_eliminate(points, block, requested);
     settle(ranks.unclear, AMBIGUOUS);
     const Whole settled = ranks.unclear | ranks.same;
-    if (!any(asked = ranks.same)) return all & ~settled;
+    if (!any(requested = ranks.same)) return all & ~settled;
     const int rank = ranks.free, count = m - rank, r = ranks.springs;
     prepare(r, count);
     const Whole rigid = rigid_rows(r, count, tolerance(points, block));
-    settle(asked & rigid, RIGID);
-    if (!any(asked &= ~rigid)) return all & ~settled;
+    settle(requested & rigid, RIGID);
+    if (!any(requested &= ~rigid)) return all & ~settled;
     Real without = 0.5 * inner(programme.h.data(), programme.h.data(), r);
     if (loaded) {
         const Whole driven = bring_into_balance(points, block, rank, r);
-        settle(asked & driven, DRIVEN);
-        if (!any(asked &= ~driven)) return all & ~settled;
+        settle(requested & driven, DRIVEN);
+        if (!any(requested &= ~driven)) return all & ~settled;
         without += stored;
     }
-    const Whole solved = minimise(r, asked), open = asked & (solved == whole(INTERIOR));
-    if (waits(open, asked)) {
+    const Whole solved = minimise(r, requested);
+    const Whole open = requested & (solved == whole(INTERIOR));
+    if (waits(open, requested)) {
         for (int l = 0; l < LANES; ++l)
             if (open[l]) waiting.push_back(block.point[l]);
-        if (!any(asked &= ~open)) return all & ~settled;
+        if (!any(requested &= ~open)) return all & ~settled;
     }
     // solution of the full problem from that of the small one
     Row multipliers = least_multipliers(r, count);
-    for (int i = 0; loaded && i < r; ++i) v[i] -= left[i];
+    for (int i = 0; loaded && i < r; ++i) v[i] -= strain_error[i];
     const Row grouped = spring_strains(r, v);
     Row moved = moved_by(grouped);
     for (int c = 0; loaded && c < s.ny; ++c) {
         const int64_t j = s.spring_frame[c];
         Real step[6];
-        for (int a = 0; a < 6; ++a) step[a] = elastic[c][a] * tight[c];
+        for (int a = 0; a < 6; ++a) step[a] = elastic[c][a] * load_strain[c];
         move(s.pattern_of[j], s.on_path[j], step, moved);
     }
     const Row motions = least_motions(rank, moved);
@@ -320,19 +329,19 @@ inline Whole Energies::solve(
     }
     Real energy = 0.5 * inner(v.data(), v.data(), r), bound, work = {}, factor = real(1.0);
     if (loaded) {
-        energy += stored + inner(v.data(), left.data(), r);
+        energy += stored + inner(v.data(), strain_error.data(), r);
         bound = energy - loaded_gap(r, grouped, motions, multipliers) - slip;
         // t is orthogonal to the closure columns of the springs; `known` is the error
         // that they have to close
         work = 2.0 * stored + inner(programme.d.data(), programme.u.data(), nu) +
-               inner(holding.data(), known.data(), m);
+               inner(closure_wrench.data(), known.data(), m);
     } else {
         const Proof proof = complementary(motions, multipliers);
         // any multiple of the multipliers proves a bound; `factor` gives the best one,
         // which is zero where no deformation is needed
         const Real gain = proof.gain - slip, cost = proof.cost;
-        const Whole some = (gain > 0.0) & (cost > 0.0);
-        factor = some ? gain / cost : Real{};
+        const Whole positive = (gain > 0.0) & (cost > 0.0);
+        factor = positive ? gain / cost : Real{};
         bound = 0.5 * factor * factor * cost;
     }
     // both comparisons are false for NaN
@@ -341,20 +350,21 @@ inline Whole Energies::solve(
     const Whole proved = (energy - bound <= allowed) & (residual <= OPEN);
     outcome = (outcome == whole(BOUNDED)) | proved ? outcome : whole(UNCERTIFIED);
     for (int l = 0; l < LANES; ++l)
-        if (asked[l]) out.outcome[block.point[l]] = outcome[l];
-    block.write(out.energy, 1, 0, energy, asked);
-    block.write(out.bound, 1, 0, bound, asked);
-    block.write(out.without_clearance, 1, 0, without, asked);
-    block.write(out.work, 1, 0, work, asked);
-    block.write(out.residual, 1, 0, residual, asked);
+        if (requested[l]) out.outcome[block.point[l]] = outcome[l];
+    block.write(out.energy, 1, 0, energy, requested);
+    block.write(out.bound, 1, 0, bound, requested);
+    block.write(out.without_clearance, 1, 0, without, requested);
+    block.write(out.work, 1, 0, work, requested);
+    block.write(out.residual, 1, 0, residual, requested);
     for (int a = 0; a < 6; ++a)
-        block.write(out.platform_screw, 6, a, a < 3 ? screw[a] : screw[a] * s.size, asked);
+        block.write(
+            out.platform_screw, 6, a, a < 3 ? screw[a] : screw[a] * s.size, requested);
     for (int c = 0; c < nu; ++c)
-        block.write(out.clearances, nu, cones.column[c], programme.u[c], asked);
-    for (int c = 0; c < nq; ++c) block.write(out.motions, nq, c, motions[c], asked);
+        block.write(out.clearances, nu, cones.column[c], programme.u[c], requested);
+    for (int c = 0; c < nq; ++c) block.write(out.motions, nq, c, motions[c], requested);
     for (int a = 0; a < m; ++a)
-        block.write(out.multipliers, m, a, factor * multipliers[a], asked);
-    if (out.elastic) own_springs(grouped, block, out.elastic, asked);
+        block.write(out.multipliers, m, a, factor * multipliers[a], requested);
+    if (out.elastic) own_springs(grouped, block, out.elastic, requested);
     return all & ~settled;
 }
 

@@ -40,16 +40,16 @@ protected:
     const Robot &s;
     const int n, m, np, ng, nu, nq;
     Array<Array<Entry>> patterns;
-    Array<bool> felt, erring;  // frames that have virtual joints; frames with errors
-    Table P;                       // see the table; `column` reads it
+    Array<bool> has_joints, has_errors;  // (n,) virtual joints and errors of a frame
+    Table P;                             // see the table; `column` reads it
     // (.., 6) columns of free motions, clearances and springs
-    Table motion, play, elastic;
+    Table motion, clearance, elastic;
     Row known;
     Real screw[6];  // platform screw due to all motions added by `move`
     Real largest_error, largest_spring;
 
-    bool stays(const Points &points, const Block &block);
-    void read(const Points &points, const Block &block, bool stay = false);
+    bool same_posture(const Points &points, const Block &block);
+    void read(const Points &points, const Block &block, bool unchanged = false);
     void column(int64_t j, int64_t axis, Real *out) const;
     void move(int64_t pattern, double on_path, const Real *step, Row &open);
     void part(const Real *row, int64_t pattern, Real *out) const;
@@ -70,45 +70,45 @@ private:
 
 inline Linearised::Linearised(const Robot &s, const Points &points)
     : s(s), n(int(s.n)), m(int(6 * s.closures)), np(int(s.np)), ng(int(s.ng)),
-      nu(int(s.nu)), nq(int(s.nq)), patterns(np), felt(n), erring(n), P(n, 18),
-      motion(nq, 6), play(nu, 6), elastic(int(s.ny), 6), known(m) {
+      nu(int(s.nu)), nq(int(s.nq)), patterns(np), has_joints(n), has_errors(n), P(n, 18),
+      motion(nq, 6), clearance(nu, 6), elastic(int(s.ny), 6), known(m) {
     for (int g = 0; g < np; ++g)
         for (int k = 0; k < s.closures; ++k)
             if (const double sign = s.patterns[g * s.closures + k])
                 patterns[g].push_back({k, sign});
-    for (int c = 0; c < nu; ++c) felt[s.cone_frame[c]] = true;
-    for (int c = 0; c < nq; ++c) felt[s.free_frame[c]] = true;
-    for (int c = 0; c < s.ny; ++c) felt[s.spring_frame[c]] = true;
+    for (int c = 0; c < nu; ++c) has_joints[s.cone_frame[c]] = true;
+    for (int c = 0; c < nq; ++c) has_joints[s.free_frame[c]] = true;
+    for (int c = 0; c < s.ny; ++c) has_joints[s.spring_frame[c]] = true;
     // a frame without errors at any point is skipped: it would add exact zeros
     const int64_t sets = points.own_errors ? points.count : 1;
     const double *own = points.errors;
     for (int64_t i = 0; i < sets; ++i)
         for (int j = 0; j < n; ++j, own += 6)
-            if (!erring[j])
-                erring[j] = std::any_of(own, own + 6, [](double e) { return e != 0.0; });
+            if (!has_errors[j])
+                has_errors[j] = std::any_of(own, own + 6, [](double e) { return e != 0.0; });
 }
 
 // Return whether all lanes have the same posture as in the previous block.  Quantities
 // that depend only on the frames are then known.
-inline bool Linearised::stays(const Points &points, const Block &block) {
+inline bool Linearised::same_posture(const Points &points, const Block &block) {
     if (!points.own_posture && !posture.empty()) return true;
     const size_t count = 16 * size_t(n);
     const auto frames = [&](int l) {
         return points.T + points.own_posture * block.point[l] * count;
     };
-    const auto off = [&](int l) {
+    const auto mismatch_of = [&](int l) {
         return points.mismatch[points.own_posture * block.point[l]];
     };
-    const double *own = frames(0), mismatch = off(0);
-    const auto stand = [&](const double *T, double off) {
-        return off == mismatch && std::equal(own, own + count, T);
+    const double *own = frames(0), mismatch = mismatch_of(0);
+    const auto same = [&](const double *T, double other) {
+        return other == mismatch && std::equal(own, own + count, T);
     };
     for (int l = 1; l < LANES; ++l)
-        if (!stand(frames(l), off(l))) {
+        if (!same(frames(l), mismatch_of(l))) {
             posture.clear(), ++changes;
             return false;
         }
-    if (!posture.empty() && stand(posture.data(), posture.back())) return true;
+    if (!posture.empty() && same(posture.data(), posture.back())) return true;
     ++changes;
     posture.assign(own, own + count);
     posture.push_back(mismatch);
@@ -117,20 +117,20 @@ inline bool Linearised::stays(const Points &points, const Block &block) {
 
 // Compute the columns from the poses of the frames, unless the posture is the same.
 // Compute the closure error and the platform screw that the frames' errors cause.
-inline void Linearised::read(const Points &points, const Block &block, bool stay) {
-    if (!stay) {
+inline void Linearised::read(const Points &points, const Block &block, bool unchanged) {
+    if (!unchanged) {
         Real origin[3];
         for (int a = 0; a < 3; ++a)
             origin[a] = block.read(points.T, points.own_posture * n * 16, s.platform * 16 + 4 * a + 3);
         for (int j = 0; j < n; ++j)
-            if (felt[j] || erring[j]) read_frame(points, block, j, origin);
+            if (has_joints[j] || has_errors[j]) read_frame(points, block, j, origin);
         columns();
     }
     std::fill(known.begin(), known.end(), Real{});
     std::fill(screw, screw + 6, Real{});
     largest_error = Real{};
     for (int j = 0; j < n; ++j)
-        if (erring[j]) read_errors(points, block, j);
+        if (has_errors[j]) read_errors(points, block, j);
 }
 
 // Compute the unit screws of a frame's rotations about its axes.
@@ -187,8 +187,8 @@ inline void Linearised::columns() {
         }
     }
     for (int c = 0; c < nu; ++c) {
-        column(s.cone_frame[c], s.cone_axis[c], play[c]);
-        for (int a = 0; a < 6; ++a) play[c][a] *= s.cone_size[c];
+        column(s.cone_frame[c], s.cone_axis[c], clearance[c]);
+        for (int a = 0; a < 6; ++a) clearance[c][a] *= s.cone_size[c];
     }
     largest_spring = Real{};
     for (int c = 0; c < s.ny; ++c) {
@@ -223,7 +223,7 @@ inline void Linearised::part(const Real *row, int64_t pattern, Real *out) const 
 // function `part` for the clearance's pattern.
 inline Real Linearised::enters(int c, const Real *part) const {
     Real total = {};
-    for (int a = s.cone_axis[c] < 3 ? 0 : 3; a < 6; ++a) total += play[c][a] * part[a];
+    for (int a = s.cone_axis[c] < 3 ? 0 : 3; a < 6; ++a) total += clearance[c][a] * part[a];
     return total;
 }
 
@@ -239,7 +239,7 @@ inline Real Linearised::largest_clearance() const {
     for (int c = 0; c < nu; ++c)
         for (const Entry &e : patterns[s.pattern_of[s.cone_frame[c]]])
             for (int a = 0; a < 6; ++a)
-                largest = larger(magnitude(e.sign * play[c][a]), largest);
+                largest = larger(magnitude(e.sign * clearance[c][a]), largest);
     return largest;
 }
 

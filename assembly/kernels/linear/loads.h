@@ -25,20 +25,21 @@ constexpr double STILL_OF_DRIVE = 1e-9;
 class Loaded : public Reduction {
 public:
     Loaded(const Robot &s, const Points &points)
-        : Reduction(s, points), loaded(points.loads), tight(loaded ? s.ny : 0),
-          holding(loaded ? m : 0), drive(loaded ? nq : 0), on_play(loaded ? nu : 0),
-          left(loaded ? 6 * ng : 0), pull(loaded ? nu : 0) {
+        : Reduction(s, points), loaded(points.loads), load_strain(loaded ? s.ny : 0),
+          closure_wrench(loaded ? m : 0), drive(loaded ? nq : 0),
+          clearance_load(loaded ? nu : 0), strain_error(loaded ? 6 * ng : 0),
+          clearance_force(loaded ? nu : 0) {
         programme.loaded = loaded;
     }
 
 protected:
     const bool loaded;
-    Row tight;     // (ny,) t, deformations by the loads alone
-    Row holding;   // (m,) w, wrenches on the closures
-    Row drive;     // (nq,) g, forces on the free motions
-    Row on_play;   // (nu,) c, forces on the clearances, robot's order
-    Row left;      // (r,) rounding error of t along the springs' closure columns
-    Real stored;   // |t|^2 / 2, energy of the loads alone
+    Row load_strain;     // (ny,) t, deformations by the loads alone
+    Row closure_wrench;  // (m,) w, wrenches on the closures
+    Row drive;           // (nq,) g, forces on the free motions
+    Row clearance_load;  // (nu,) c, forces on the clearances, robot's order
+    Row strain_error;    // (r,) rounding error of t along the springs' closure columns
+    Real stored;         // |t|^2 / 2, energy of the loads alone
 
     Whole balance(const Points &points, const Block &block, int rank, int r);
     Whole bring_into_balance(const Points &points, const Block &block, int rank, int r);
@@ -48,10 +49,10 @@ protected:
 private:
     std::vector<double> acting;  // loads of all lanes, if equal; otherwise empty
     int64_t balanced = -1;       // value of `changes` at the last balance
-    Row pull;                    // (nu,) d, solver's order
+    Row clearance_force;         // (nu,) d, solver's order
     Whole driven;
 
-    Row bent_groups();
+    Row group_deformation();
 };
 
 // Return the work of a wrench on a unit motion along a column.
@@ -70,18 +71,20 @@ inline Row Loaded::on_patterns(const Row &closing) const {
 }
 
 // Return t in the six equivalent springs of each group.
-inline Row Loaded::bent_groups() {
-    Row bent(6 * ng);
+inline Row Loaded::group_deformation() {
+    Row deformation(6 * ng);
     Triangle rows(6, widest);
     for (int g = 0; g < ng; ++g) {
         const int count = spring_group(g, rows), first = int(s.groups[g]);
         triangulate(rows, 6, count, Real{}, Real{}, -1.0, count);
         Row own(count);
-        std::copy(&tight[first], &tight[first] + (s.groups[g + 1] - first), own.begin());
+        std::copy(
+            &load_strain[first], &load_strain[first] + (s.groups[g + 1] - first),
+            own.begin());
         turn_back(rows, 6, count, own.data());
-        std::copy(own.begin(), own.begin() + 6, &bent[6 * g]);
+        std::copy(own.begin(), own.begin() + 6, &deformation[6 * g]);
     }
-    return bent;
+    return deformation;
 }
 
 // Compute the deformations of the springs, the wrenches on the closures and the forces
@@ -100,29 +103,31 @@ inline Whole Loaded::balance(
             drive[c] += lead * load(1, s.free_frame[c], 5);
         most = larger(magnitude(drive[c]), most);
     }
-    const Whole loose = hold_free_motions(rank, drive, STILL_OF_DRIVE * most, holding);
+    const Whole loose =
+        balance_free_motions(rank, drive, STILL_OF_DRIVE * most, closure_wrench);
     for (int c = 0; c < s.ny; ++c)
         for (int axis = 0; axis < 6; ++axis)
             if (const double weight = s.springs[6 * c + axis])
                 own[c] += weight * load(s.of_joint[c], s.spring_frame[c], axis);
-    const auto bend = [&] {
-        const Row on = on_patterns(holding);
+    const auto deform = [&] {
+        const Row on = on_patterns(closure_wrench);
         for (int c = 0; c < s.ny; ++c)
-            tight[c] = own[c] + along(elastic[c], &on[6 * s.pattern_of[s.spring_frame[c]]]);
+            load_strain[c] =
+                own[c] + along(elastic[c], &on[6 * s.pattern_of[s.spring_frame[c]]]);
         return on;
     };
-    bend();
-    Row bent = bent_groups();
-    bend_least(r, bent, holding);
-    const Row on = bend();
-    stored = 0.5 * inner(tight.data(), tight.data(), int(s.ny));
-    left = bent_groups();
-    turn_back(springs, r, 6 * ng, left.data());
+    deform();
+    Row deformation = group_deformation();
+    minimise_spring_energy(r, deformation, closure_wrench);
+    const Row on = deform();
+    stored = 0.5 * inner(load_strain.data(), load_strain.data(), int(s.ny));
+    strain_error = group_deformation();
+    turn_back(springs, r, 6 * ng, strain_error.data());
     for (int c = 0; c < nu; ++c) {
         const int k = int(cones.column[c]);
         const int64_t j = s.cone_frame[k];
-        on_play[k] = s.cone_size[k] * load(1, j, s.cone_axis[k]);
-        pull[c] = on_play[k] + enters(k, &on[6 * s.pattern_of[j]]);
+        clearance_load[k] = s.cone_size[k] * load(1, j, s.cone_axis[k]);
+        clearance_force[c] = clearance_load[k] + enters(k, &on[6 * s.pattern_of[j]]);
     }
     return loose;
 }
@@ -147,7 +152,7 @@ inline Whole Loaded::bring_into_balance(
         acting.assign(own, own + (alike ? count : 0));
         balanced = changes;
     }
-    std::copy(pull.begin(), pull.end(), programme.d.begin());
+    std::copy(clearance_force.begin(), clearance_force.end(), programme.d.begin());
     return driven;
 }
 

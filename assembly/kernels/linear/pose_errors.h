@@ -33,8 +33,8 @@ public:
     }
 
     Whole read_bodies(
-        const Points &points, const Block &block, Whole asked, std::vector<Body> &bodies,
-        int64_t *outcome);
+        const Points &points, const Block &block, Whole requested,
+        std::vector<Body> &bodies, int64_t *outcome);
 
 private:
     const Centres &centres;
@@ -100,13 +100,14 @@ inline Whole ReachableSets::follow(int rank) {
     Whole still = whole(-1);
     Row closing(m), on(6 * np);
     for (int a = 0; a < 6; ++a) {
-        still &= ~hold_free_motions(rank, a, UNBOUNDED / CLEAR, closing);
+        still &= ~balance_free_motions(rank, a, UNBOUNDED / CLEAR, closing);
         for (int g = 0; g < np; ++g) part(closing.data(), g, &on[6 * g]);
         for (int c = 0; c < nu; ++c) {
             const int own = int(cones.column[c]);
             const int64_t j = s.cone_frame[own];
             const Real moved =
-                s.on_path[j] * play[own][a] + inner(play[own], &on[6 * s.pattern_of[j]], 6);
+                s.on_path[j] * clearance[own][a] +
+                inner(clearance[own], &on[6 * s.pattern_of[j]], 6);
             X[a][c] = a < 3 ? moved : moved * s.size;
         }
     }
@@ -130,7 +131,8 @@ inline Whole ReachableSets::within_bounds(int rank, const Block &block) {
             std::fill(moved.begin(), moved.end(), Real{});
             for (const Entry &e : patterns[s.pattern_of[s.cone_frame[own]]])
                 for (int a = 0; a < 6; ++a)
-                    moved[6 * e.closure + a] = held[c] ? Real{} : e.sign * play[own][a];
+                    moved[6 * e.closure + a] =
+                        held[c] ? Real{} : e.sign * clearance[own][a];
             const Row step = least_motions(rank, moved);
             for (int q = 0; q < nq; ++q) {
                 middle[q] -= step[q] * start[c];
@@ -181,20 +183,20 @@ inline Body ReachableSets::body_of(int l, int64_t point, int p, const Real *cent
 // Compute the bodies of platform screws in the requested lanes that have the same
 // ranks as the first of them.  Return the requested lanes that remain.
 inline Whole ReachableSets::read_bodies(
-    const Points &points, const Block &block, Whole asked, std::vector<Body> &bodies,
+    const Points &points, const Block &block, Whole requested, std::vector<Body> &bodies,
     int64_t *outcome) {
     const auto leave = [&](Whole where) {
         for (int l = 0; l < LANES; ++l)
             if (where[l]) outcome[block.point[l]] = REFERENCE;
         return ~where;
     };
-    Whole others = asked;
+    Whole others = requested;
     read(points, block);
-    others &= leave(asked & ~held_cones(block));
-    if (!any(asked = others)) return others;
-    const Ranks ranks = eliminate_free(tolerance(points, block), asked);
+    others &= leave(requested & ~held_cones(block));
+    if (!any(requested = others)) return others;
+    const Ranks ranks = eliminate_free(tolerance(points, block), requested);
     others &= leave(ranks.unclear);
-    if (!any(asked = ranks.same)) return others;
+    if (!any(requested = ranks.same)) return others;
     const int count = m - ranks.free;
     for (int c = 0; c < nu; ++c) {
         const Real own = block.read(centres.clearances, nu, cones.column[c]);
@@ -207,13 +209,13 @@ inline Whole ReachableSets::read_bodies(
     });
     Whole valid = follow(ranks.free);
     if (bounded) valid &= within_bounds(ranks.free, block);
-    others &= leave(asked & ~valid);
-    if (!any(asked &= valid)) return others;
+    others &= leave(requested & ~valid);
+    if (!any(requested &= valid)) return others;
     const Whole clear = triangulate_rows(count, &held);
-    others &= leave(asked & (clear < 0));
-    if (!any(asked &= clear >= 0)) return others;
-    const int p = rank_of_first(clear, asked);
-    asked &= clear == p;
+    others &= leave(requested & (clear < 0));
+    if (!any(requested &= clear >= 0)) return others;
+    const int p = rank_of_first(clear, requested);
+    requested &= clear == p;
     orthonormal_rows(p);
     Real centre[6];
     for (int a = 0; a < 6; ++a) centre[a] = block.read(centres.screws, 6, a);
@@ -222,8 +224,8 @@ inline Whole ReachableSets::read_bodies(
         centre[3 + a] += centre[b] * offset[d] - centre[d] * offset[b];
     }
     for (int l = 0; l < LANES; ++l)
-        if (asked[l]) bodies.push_back(body_of(l, block.point[l], p, centre));
-    return others & ~asked;
+        if (requested[l]) bodies.push_back(body_of(l, block.point[l], p, centre));
+    return others & ~requested;
 }
 
 // Return the searches of all bodies in both halves of the screw, sorted into groups.

@@ -67,17 +67,17 @@ protected:
     Whole triangulate_free(Real tolerance);
     void orthogonal_rows(int rank, int count);
     struct Ranks { int free, springs; Whole same, unclear; };
-    Ranks eliminate(Real tolerance, Whole asked);
-    Ranks read_and_eliminate(const Points &points, const Block &block, Whole asked);
+    Ranks eliminate(Real tolerance, Whole requested);
+    Ranks read_and_eliminate(const Points &points, const Block &block, Whole requested);
     void clearance_parts(int count);
     void right_sides(int r);
     void small_problem(int r);
     Row spring_strains(int r, const Row &v);
     Row moved_by(const Row &grouped);
     Row least_motions(int rank, const Row &moved);
-    Whole hold_free_motions(int rank, const Row &drive, Real still, Row &closing);
-    Whole hold_free_motions(int rank, int row, double still, Row &closing);
-    void bend_least(int r, Row &bent, Row &closing);
+    Whole balance_free_motions(int rank, const Row &drive, Real still, Row &closing);
+    Whole balance_free_motions(int rank, int row, double still, Row &closing);
+    void minimise_spring_energy(int r, Row &deformation, Row &closing);
     int spring_group(int g, Triangle &rows);
 
 private:
@@ -179,23 +179,23 @@ inline void Reduction::eliminate_springs(int rank, int count) {
 
 // Triangulate the free motions, then the springs.  Lanes are eliminated together if
 // they have the same ranks as the first requested lane.
-inline Reduction::Ranks Reduction::eliminate(Real tolerance, Whole asked) {
+inline Reduction::Ranks Reduction::eliminate(Real tolerance, Whole requested) {
     Ranks ranks = {};
     const Whole free_rank = triangulate_free(tolerance);
-    ranks.unclear = asked & (free_rank < 0);
-    if (!any(asked &= free_rank >= 0)) return ranks;
-    ranks.free = rank_of_first(free_rank, asked);
+    ranks.unclear = requested & (free_rank < 0);
+    if (!any(requested &= free_rank >= 0)) return ranks;
+    ranks.free = rank_of_first(free_rank, requested);
     const int count = m - ranks.free;
-    asked &= free_rank == ranks.free;
+    requested &= free_rank == ranks.free;
     grouped_springs();
     orthogonal_rows(ranks.free, count);
     spring_rows(count);
     const Whole spring_rank = triangulate(
         springs, count, 6 * ng, tolerance, NOISE * largest_spring, -1.0, 6 * ng + m);
-    ranks.unclear |= asked & (spring_rank < 0);
-    if (!any(asked &= spring_rank >= 0)) return ranks;
-    ranks.springs = rank_of_first(spring_rank, asked);
-    ranks.same = asked & (spring_rank == ranks.springs);
+    ranks.unclear |= requested & (spring_rank < 0);
+    if (!any(requested &= spring_rank >= 0)) return ranks;
+    ranks.springs = rank_of_first(spring_rank, requested);
+    ranks.same = requested & (spring_rank == ranks.springs);
     eliminate_springs(ranks.springs, count);
     return ranks;
 }
@@ -203,14 +203,16 @@ inline Reduction::Ranks Reduction::eliminate(Real tolerance, Whole asked) {
 // Compute, for the requested lanes, all quantities that do not depend on errors and
 // loads.  While the posture does not change, the stored quantities are used.
 inline Reduction::Ranks Reduction::read_and_eliminate(
-    const Points &points, const Block &block, Whole asked) {
-    const bool stay = stays(points, block);
-    read(points, block, stay);
-    if (stay) {  // all lanes have the same posture
+    const Points &points, const Block &block, Whole requested) {
+    const bool unchanged = same_posture(points, block);
+    read(points, block, unchanged);
+    if (unchanged) {  // all lanes have the same posture
         const bool unclear = any(kept.unclear);
-        return {kept.free, kept.springs, unclear ? Whole{} : asked, unclear ? asked : Whole{}};
+        return {
+            kept.free, kept.springs, unclear ? Whole{} : requested,
+            unclear ? requested : Whole{}};
     }
-    kept = eliminate(tolerance(points, block), asked);
+    kept = eliminate(tolerance(points, block), requested);
     if (any(kept.same)) clearance_parts(m - kept.free);
     return kept;
 }
@@ -235,7 +237,7 @@ inline void Reduction::small_problem(int r) {
     for (int c = 0; c < nu; ++c) {
         const int own = int(cones.column[c]), g = slot[s.pattern_of[s.cone_frame[own]]];
         Real screw[6];
-        for (int a = 0; a < 6; ++a) screw[a] = -play[own][a];
+        for (int a = 0; a < 6; ++a) screw[a] = -clearance[own][a];
         for (int i = 0; i < r; ++i) {
             Real total = {};
             for (int a = 0; a < 6; ++a) total += screw[a] * parts[i][6 * g + a];
@@ -260,7 +262,7 @@ inline Row Reduction::moved_by(const Row &grouped) {
     Real step[6];
     for (int c = 0; c < nu; ++c) {
         const int64_t own = cones.column[c], j = s.cone_frame[own];
-        for (int a = 0; a < 6; ++a) step[a] = play[int(own)][a] * programme.u[c];
+        for (int a = 0; a < 6; ++a) step[a] = clearance[int(own)][a] * programme.u[c];
         move(s.pattern_of[j], s.on_path[j], step, total);
     }
     for (int g = 0; g < ng; ++g) {
@@ -306,7 +308,7 @@ inline Row Reduction::least_motions(int rank, const Row &moved) {
 // Compute the wrenches of least norm on the closures that balance the forces `drive`
 // on the free motions.  A force of at most `still` counts as balanced.  Return the
 // lanes where a force cannot be balanced.
-inline Whole Reduction::hold_free_motions(
+inline Whole Reduction::balance_free_motions(
     int rank, const Row &drive, Real still, Row &closing) {
     Whole loose = {};
     std::fill(closing.begin(), closing.end(), Real{});
@@ -325,21 +327,21 @@ inline Whole Reduction::hold_free_motions(
 }
 
 // Compute the same wrenches for a unit wrench on the platform, component `row`.
-inline Whole Reduction::hold_free_motions(
+inline Whole Reduction::balance_free_motions(
     int rank, int row, double still, Row &closing) {
     Row drive(nq);
     for (int c = 0; c < nq; ++c)
         drive[c] = s.on_path[s.free_frame[c]] * motion[c][row];
-    return hold_free_motions(rank, drive, real(still), closing);
+    return balance_free_motions(rank, drive, real(still), closing);
 }
 
-// Add wrenches on the closures that minimise the energy of the springs.  `bent`
+// Add wrenches on the closures that minimise the energy of the springs.  `deformation`
 // contains the deformations of the equivalent springs due to the other wrenches.  Its
 // first r entries are overwritten with the coefficients of Z's first r rows.
-inline void Reduction::bend_least(int r, Row &bent, Row &closing) {
-    turn_back(springs, r, 6 * ng, bent.data());
-    for (int i = 0; i < r; ++i) bent[i] = -bent[i];
-    combine(Z.data(), r, bent.data(), m, closing.data());
+inline void Reduction::minimise_spring_energy(int r, Row &deformation, Row &closing) {
+    turn_back(springs, r, 6 * ng, deformation.data());
+    for (int i = 0; i < r; ++i) deformation[i] = -deformation[i];
+    combine(Z.data(), r, deformation.data(), m, closing.data());
 }
 
 }  // namespace LANE_SPACE

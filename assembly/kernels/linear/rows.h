@@ -11,9 +11,9 @@
 
 namespace LANE_SPACE {
 
-constexpr double ROWS_RANK = 1e-9;  // assembly/kinematics/ranks.py
+constexpr double ROWS_RANK = 1e-9;  // threshold of ranks: assembly/kinematics/ranks.py
 
-// Robots without springs.
+// The linear model of a robot without springs, and the rows for its clearances.
 class Rows : public Reduction {
 public:
     Rows(const Robot &s, const Points &points)
@@ -23,7 +23,7 @@ protected:
     Triangle rows;  // the rows, and in the last column their right sides
 
     struct Ranks { int free; Whole same, unclear; };
-    Ranks eliminate_free(Real tolerance, Whole asked);
+    Ranks eliminate_free(Real tolerance, Whole requested);
     Whole triangulate_rows(int count, const Array<Whole> *held);
     void orthonormal_rows(int count);
 };
@@ -31,9 +31,9 @@ protected:
 // Eliminate the free motions in the requested lanes that have the same rank as the
 // first of them.  G and h of the small programme are then the rows and their right
 // sides.
-inline Rows::Ranks Rows::eliminate_free(Real tolerance, Whole asked) {
+inline Rows::Ranks Rows::eliminate_free(Real tolerance, Whole requested) {
     const Whole found = triangulate_free(tolerance);
-    Ranks ranks = {0, asked & (found >= 0), asked & (found < 0)};
+    Ranks ranks = {0, requested & (found >= 0), requested & (found < 0)};
     if (!any(ranks.same)) return ranks;
     ranks.free = rank_of_first(found, ranks.same);
     ranks.same &= found == ranks.free;

@@ -60,13 +60,14 @@ inline Real Solver::project(const Row &a, const Row &kept, const Row &fixed) {
 // Find the point of each set that is closest to `a`, in the requested lanes.  q.u is a
 // point of the set; it is overwritten in the lanes that are solved.  Return these
 // lanes.
-inline Whole Solver::closest(Programme &q, const Row &a, const Row &kept, Whole asked) {
+inline Whole Solver::closest(
+    Programme &q, const Row &a, const Row &kept, Whole requested) {
     const int m = q.p;
     const Row fixed = q.u;
     multiply(q.M.rows(), m, fixed.data(), k.nu, q.e.data());
     std::fill(y.begin(), y.end(), Real{});
     Real before = real(-INFINITY);
-    Whole going = asked, done = {}, halvings = {}, taken = {};
+    Whole going = requested, done = {}, halvings = {}, taken = {};
     Row step(m);
     while (true) {
         std::fill(z1.begin(), z1.end(), Real{});

@@ -62,16 +62,16 @@ public:
           f(cones.nu), y(rows), right(rows), residual(rows), start(rows), old(cones.nu),
           wide(3, cones.balls.empty() ? 0 : cones.nu) {}
 
-    Whole newton_alone(Programme &q, double relative, Real absolute, Whole asked) {
-        return dual_newton(q, STEPS_ALONE, 0.0, relative, absolute, asked);
+    Whole newton_alone(Programme &q, double relative, Real absolute, Whole requested) {
+        return dual_newton(q, STEPS_ALONE, 0.0, relative, absolute, requested);
     }
     void interior_then_newton(
-        Programme &q, double relative, Real absolute, Real near, Whole asked);
-    Whole interior_point(Programme &q, Real tolerance, double relative, Whole asked);
+        Programme &q, double relative, Real absolute, Real near, Whole requested);
+    Whole interior_point(Programme &q, Real tolerance, double relative, Whole requested);
     Whole dual_newton(
         Programme &q, int steps, double first_sigma, double relative, Real absolute,
-        Whole asked);
-    Whole closest(Programme &q, const Row &a, const Row &kept, Whole asked);
+        Whole requested);
+    Whole closest(Programme &q, const Row &a, const Row &kept, Whole requested);
 
 private:
     // Scaling of Nesterov and Todd for one cone.  Values that two products compute are
@@ -291,7 +291,7 @@ inline void Solver::correct(Real target) {
 // for the rows of H, with the last iterate.  Return the lanes whose gap is at most
 // tolerance + relative |G u + h|^2 / 2.
 inline Whole Solver::interior_point(
-    Programme &q, Real tolerance, double relative, Whole asked) {
+    Programme &q, Real tolerance, double relative, Whole requested) {
     const int r = q.r, p = q.p, m = r + p;
     const auto dual = [&] {  // z1 = M^T y - d
         for (int j = 0; j < k.nu; ++j) z1[j] = q.loaded ? -q.d[j] : Real{};
@@ -303,7 +303,7 @@ inline Whole Solver::interior_point(
     k.each([&](auto size, int c, int at) {
         z0[c] = root(inner(&z1[at], &z1[at], size)) + START;
     });
-    Whole going = asked, done = {};
+    Whole going = requested, done = {};
     for (int iteration = 0; iteration < ITERATIONS; ++iteration) {
         Real gap = inner(z1.data(), u.data(), k.nu), energy = 0.5 * inner(y.data(), y.data(), r);
         for (const Real &head : z0) gap += head;
@@ -348,8 +348,8 @@ inline Whole Solver::interior_point(
         for (int i = r; i < m; ++i) y[i] = going ? y[i] + length * right[i] : y[i];
         dual();
     }
-    for (int j = 0; j < k.nu; ++j) q.u[j] = asked ? u[j] : q.u[j];
-    for (int i = r; i < m; ++i) q.y[i] = asked ? y[i] : q.y[i];
+    for (int j = 0; j < k.nu; ++j) q.u[j] = requested ? u[j] : q.u[j];
+    for (int i = r; i < m; ++i) q.y[i] = requested ? y[i] : q.y[i];
     return done;
 }
 

@@ -101,7 +101,7 @@ inline Solver::Slopes Solver::slopes(const Programme &q, Real sigma, const Real 
 // Return the lanes that converged.
 inline Whole Solver::dual_newton(
     Programme &q, int steps, double first_sigma, double relative, Real absolute,
-    Whole asked) {
+    Whole requested) {
     const int r = q.r, m = r + q.p;
     old = q.u;
     for (int i = 0; i < m; ++i) y[i] = i < r ? q.h[i] : q.y[i];
@@ -115,7 +115,7 @@ inline Whole Solver::dual_newton(
         sigma = first_sigma / larger(mean / double(k.nu), real(1e-12));
     }
     Real before = real(-INFINITY);
-    Whole going = asked, done = {}, halvings = {}, taken = {};
+    Whole going = requested, done = {}, halvings = {}, taken = {};
     Row step(m);
     while (true) {
         forces(q, m, y.data());
@@ -155,8 +155,8 @@ inline Whole Solver::dual_newton(
             y[i] = ahead ? y[i] + step[i] : y[i];
         }
     }
-    for (int j = 0; j < k.nu; ++j) q.u[j] = asked ? u[j] : q.u[j];
-    for (int i = 0; i < m; ++i) q.y[i] = asked ? y[i] : q.y[i];
+    for (int j = 0; j < k.nu; ++j) q.u[j] = requested ? u[j] : q.u[j];
+    for (int i = 0; i < m; ++i) q.y[i] = requested ? y[i] : q.y[i];
     return done;
 }
 
@@ -164,22 +164,22 @@ inline Whole Solver::dual_newton(
 // Newton's method starts when the gap of the interior-point method is at most
 // near + NEAR |G u + h|^2 / 2.
 inline void Solver::interior_then_newton(
-    Programme &q, double relative, Real absolute, Real near, Whole asked) {
+    Programme &q, double relative, Real absolute, Real near, Whole requested) {
     // near the edge of a zone without deformations the interior-point method can stop
     // before it reaches the final gap; Newton's method then needs more steps
-    for (int attempt = 0; attempt < 2 && any(asked); ++attempt) {
+    for (int attempt = 0; attempt < 2 && any(requested); ++attempt) {
         if (attempt == 0)
-            interior_point(q, near, NEAR, asked);
+            interior_point(q, near, NEAR, requested);
         else
-            interior_point(q, absolute, relative, asked);
+            interior_point(q, absolute, relative, requested);
         // rounding can move points out of their cones
         k.each([&](auto size, int, int at) {
             const Real length = root(inner(&q.u[at], &q.u[at], size));
-            const Real shorter = asked ? larger(length, real(1.0)) : real(1.0);
+            const Real shorter = requested ? larger(length, real(1.0)) : real(1.0);
             for (int i = at; i < at + size; ++i) q.u[i] /= shorter;
         });
         const int steps = attempt == 0 ? STEPS : STEPS_LAST;
-        asked &= ~dual_newton(q, steps, FIRST_SIGMA, relative, absolute, asked);
+        requested &= ~dual_newton(q, steps, FIRST_SIGMA, relative, absolute, requested);
     }
 }
 

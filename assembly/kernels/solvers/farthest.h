@@ -151,7 +151,7 @@ private:
     }
 
     void load(int l);
-    void support(Whole asked);
+    void support(Whole requested);
     void opposite();
     void within(Row &v);
     void screw_at(const Row &v);
@@ -196,7 +196,7 @@ inline void Farthest::load(int l) {
 
 // Compute support functions along the directions of the searches: a certified height,
 // a screw that nearly attains it, and the gradient X^T d - H^T n.
-inline void Farthest::support(Whole asked) {
+inline void Farthest::support(Whole requested) {
     const int nv = cones.nu, p = body.p;
     Real d[3];
     for (int l = 0; l < LANES; ++l)
@@ -206,7 +206,7 @@ inline void Farthest::support(Whole asked) {
     height = -inner(gradient.data(), body.start.data(), nv);
     for (int a = 0; a < 3; ++a) height += d[a] * body.centre[a];
     const Real size = root(inner(gradient.data(), gradient.data(), nv));
-    const Whole moves = asked & (size > 0.0);
+    const Whole moves = requested & (size > 0.0);
     if (p) {
         const Real over = 1.0 / (moves ? size : real(1.0));
         for (int j = 0; j < nv; ++j) q.d[j] = gradient[j] * over;

@@ -37,14 +37,14 @@ inline void first_along(Programme &q, int count, Real *w, Real size) {
 // `reach` is this largest value, `most` its upper bound from the multipliers.  Return
 // g - B_rest^T n.
 inline Row reach_along_first(
-    Solver &solver, Programme &q, int count, Whole asked, Real &reach, Real &most) {
+    Solver &solver, Programme &q, int count, Whole requested, Real &reach, Real &most) {
     const int nu = q.cones.nu;
     Real **B = q.M.rows();
     std::rotate(B, B + 1, B + count);  // the rows H u = 0 come first
     q.r = 0, q.p = count - 1, q.loaded = true;
     const Real *along = B[q.p];
     std::copy(along, along + nu, q.d.begin());
-    solver.interior_point(q, real(MARGIN_STOP), 0.0, asked);
+    solver.interior_point(q, real(MARGIN_STOP), 0.0, requested);
     Row gradient = q.d, against(q.p);
     for (int i = 0; i < q.p; ++i) against[i] = -q.y[i];
     combine(B, q.p, against.data(), nu, gradient.data());

@@ -109,14 +109,14 @@ public:
     Majorant(int nv, int p)
         : scaled(1, nv), S(p, p), right(4, p), A(3, nv), sizes(nv), fixed(nv) {}
 
-    void bound(const Projection &body, const Row &w, Whole asked, double *out) {
+    void bound(const Projection &body, const Row &w, Whole requested, double *out) {
         const int nv = body.cones.nu;
         Real largest = {}, total = {};
         body.cones.each([&](auto of, int, int at) {
             sizes[at] = root(inner(&w[at], &w[at], of));
             largest = larger(sizes[at], largest);
         });
-        asked &= largest > 1e-150;  // a zero gradient gives no bound
+        requested &= largest > 1e-150;  // a zero gradient gives no bound
         body.cones.each([&](auto of, int c, int at) {
             const Real size = larger(sizes[at], LEAST_SIZE * largest);
             total += body.present[c] ? size : Real{};
@@ -124,7 +124,7 @@ public:
         });
         std::fill(fixed.begin(), fixed.end(), Real{});
         for (int a = 0; a < 3; ++a) std::copy(body.X[a], body.X[a] + nv, A[a]);
-        asked &= follow_rows(body);
+        requested &= follow_rows(body);
         // n minimises sum_j w_j^2 / (2 s_j) - w.start; then H (w / s - start) = 0, and
         // w is a linear function A d + fixed of d
         Real Q[3][3] = {}, linear[3], constant = 0.5 * total;
@@ -139,7 +139,7 @@ public:
         }
         for (int l = 0; l < LANES; ++l) {
             out[l] = INFINITY;
-            if (!asked[l]) continue;
+            if (!requested[l]) continue;
             Point quadratic[3], slope;
             for (int a = 0; a < 3; ++a) {
                 slope[a] = linear[a][l];

@@ -21,8 +21,8 @@ constexpr int STEPS_POLISHING = 6;
 // scaled so that the largest entries are of order 1.
 class Scaled {
 public:
-    Scaled(const ConeProblems &given, Programme &q) : own(given), q(q) {
-        const int r = int(own.r), p = int(own.p), nu = q.cones.nu;
+    Scaled(const ConeProblems &given, Programme &q) : problems(given), q(q) {
+        const int r = int(problems.r), p = int(problems.p), nu = q.cones.nu;
         q.r = r, q.p = p, q.loaded = true;
         for (int c = 0; c < nu; ++c) {
             double square = 0.0;
@@ -31,17 +31,17 @@ public:
         }
         for (int i = 0; i < p; ++i)
             for (int c = 0; c < nu; ++c)
-                q.M[r + i][c] = real(own.H[i * nu + q.cones.column[c]]);
+                q.M[r + i][c] = real(problems.H[i * nu + q.cones.column[c]]);
     }
 
     // Read the problems of a block.  Return their scaled energy without clearance.
     Real read(const Block &block) {
         const int r = q.r, p = q.p, nu = q.cones.nu;
-        for (int i = 0; i < r; ++i) q.h[i] = block.read(own.h, r, i);
-        for (int i = 0; i < p; ++i) q.e[i] = block.read(own.k, p, i);
+        for (int i = 0; i < r; ++i) q.h[i] = block.read(problems.h, r, i);
+        for (int i = 0; i < p; ++i) q.e[i] = block.read(problems.k, p, i);
         Real square = larger(inner(q.h.data(), q.h.data(), r), real(largest));
         for (int c = 0; c < nu; ++c) {
-            q.d[c] = block.read(own.d, nu, q.cones.column[c]);
+            q.d[c] = block.read(problems.d, nu, q.cones.column[c]);
             square = larger(magnitude(q.d[c]), square);
         }
         size = root(larger(square, real(1e-300)));
@@ -64,8 +64,10 @@ public:
     }
 
 private:
-    double G(int row, int c) const { return own.G[row * q.cones.nu + q.cones.column[c]]; }
-    const ConeProblems &own;
+    double G(int row, int c) const {
+        return problems.G[row * q.cones.nu + q.cones.column[c]];
+    }
+    const ConeProblems &problems;
     Programme &q;
     double largest = 0.0;
     Real size;

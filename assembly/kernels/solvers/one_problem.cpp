@@ -52,25 +52,25 @@ void newton(const ConeProblem &given, const Limits &limits, double *u, double *y
     });
 }
 
-int64_t farthest(const AskedBody &asked, double *bounds, double *screw) {
-    const Cones given(asked.starts, int(asked.cones));
-    const int nv = given.nu, p = int(asked.p);
+int64_t farthest(const BodyRequest &requested, double *bounds, double *screw) {
+    const Cones given(requested.starts, int(requested.cones));
+    const int nv = given.nu, p = int(requested.p);
     Body body = {0, Cones(given.discs, given.intervals, given.balls), given.discs,
                  given.intervals, p, {}, {}, {}, {}};
     const auto ordered = [&](const double *from, int rows, std::vector<double> &to) {
         for (int i = 0; i < rows; ++i)
             for (int64_t column : given.column) to.push_back(from[i * nv + column]);
     };
-    std::copy(asked.centre, asked.centre + 6, body.centre);
-    ordered(asked.map, 6, body.X);
-    ordered(asked.rows, p, body.H);
-    ordered(asked.start, 1, body.start);
+    std::copy(requested.centre, requested.centre + 6, body.centre);
+    ordered(requested.map, 6, body.X);
+    ordered(requested.rows, p, body.H);
+    ordered(requested.start, 1, body.start);
     int64_t supports = 0;
-    const Task task = {&body, int(asked.half), asked.tolerance};
+    const Task task = {&body, int(requested.half), requested.tolerance};
     std::vector<double> gradient(nv);
     const auto support = [&](const Point &direction, double *height, double *attains,
                              double *w) {
-        asked.support(direction.data(), height, attains, gradient.data());
+        requested.support(direction.data(), height, attains, gradient.data());
         for (int j = 0; j < nv; ++j) w[j] = gradient[given.column[j]];
     };
     Farthest(body, p, support).search({task}, [&](const Search &own, bool) {

@@ -119,7 +119,7 @@ inline Real inner(const Real *a, const Real *b, int n) {
     return total;
 }
 
-// out = A x.
+// Compute out = A x.
 inline void multiply(Real *const *A, int count, const Real *x, int columns, Real *out) {
     int i = 0;
     for (; i + 4 <= count; i += 4) inner_tile<4>(A + i, x, 0, columns, out + i);
@@ -138,7 +138,7 @@ inline void combine_tile(Real *const *A, int count, const Real *y, int column, R
     UNROLL for (int j = 0; j < C; ++j) out[column + j] = total[j];
 }
 
-// out += A^T y.
+// Add A^T y to out.
 inline void combine(Real *const *A, int count, const Real *y, int columns, Real *out) {
     int j = 0;
     for (; j + 8 <= columns; j += 8) combine_tile<8>(A, count, y, j, out);

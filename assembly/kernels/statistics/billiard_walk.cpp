@@ -119,15 +119,15 @@ void start_chains(
 }
 
 void billiard_walk(
-    const Ellipsoid &given, const Trajectories &asked, bitgen *random, double *u,
+    const Ellipsoid &given, const Trajectories &requested, bitgen *random, double *u,
     double *trace) {
     Walk walk(given, random);
-    for (int64_t k = 0; k < asked.kept; ++k) {
-        for (int64_t i = 0; i < asked.every; ++i) walk.move(u);
+    for (int64_t k = 0; k < requested.kept; ++k) {
+        for (int64_t i = 0; i < requested.every; ++i) walk.move(u);
         for (int64_t a = 0; a < 6; ++a) {
             double total = 0.0;
             for (int64_t c = 0; c < given.nu; ++c)
-                total += asked.to_screw[a * given.nu + c] * u[c];
+                total += requested.to_screw[a * given.nu + c] * u[c];
             trace[6 * k + a] = total;
         }
     }
