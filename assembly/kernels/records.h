@@ -32,12 +32,12 @@ struct Robot {
 // - errors (k, n, 6) geometric errors,
 // - loads (k, 2, n, 6) wrenches on bodies and on joints, in the frames' axes, or null.
 //
-// An array may have one row that serves all points.  The row's flag, own_posture,
-// own_errors or own_loads, is then 0, otherwise 1.
+// An array may have one row that serves all points.  The row's flag, posture_per_point,
+// errors_per_point or loads_per_point, is then 0, otherwise 1.
 struct Points {
     int64_t count;
     const double *T, *mismatch, *errors, *loads;
-    int64_t own_posture, own_errors, own_loads;
+    int64_t posture_per_point, errors_per_point, loads_per_point;
 };
 
 // Solution of problem (22), one row for each point.  assembly/linear/lanes.py describes

@@ -123,15 +123,16 @@ void Follower::begin(int l) {
         q[j][l] = goal;
     }
     if (!posed) return;
-    double own[6];
+    double target_pose[6];
     for (int k = 0; k < 6; ++k) {
-        own[k] = targets.poses[lane.target * 6 + k];
-        if (lane.goal < 1.0) own[k] = home_pose[k] + lane.goal * (own[k] - home_pose[k]);
-        pose[k][l] = own[k];
+        target_pose[k] = targets.poses[lane.target * 6 + k];
+        if (lane.goal < 1.0)
+            target_pose[k] = home_pose[k] + lane.goal * (target_pose[k] - home_pose[k]);
+        pose[k][l] = target_pose[k];
     }
     if (all_turns) {
         double A[9];
-        rotation_exp(own + 3, A);
+        rotation_exp(target_pose + 3, A);
         for (int k = 0; k < 9; ++k) turn[k][l] = A[k];
     }
 }
@@ -238,8 +239,9 @@ void Follower::frames(Tracks &out) {
         forward();
         for (int j = 0; j < n; ++j)
             for (int k = 0; k < 12; ++k) {
-                const Real own = k % 4 < 3 ? R[9 * j + k / 4 * 3 + k % 4] : p[3 * j + k / 4];
-                block.write(out.transforms, 16 * n, 16 * j + k, own, inside);
+                const Real entry =
+                    k % 4 < 3 ? R[9 * j + k / 4 * 3 + k % 4] : p[3 * j + k / 4];
+                block.write(out.transforms, 16 * n, 16 * j + k, entry, inside);
             }
         for (int c = 0; c < closures; ++c) {
             const int64_t a = tree.pairs[2 * c], b = tree.pairs[2 * c + 1];

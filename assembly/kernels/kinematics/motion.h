@@ -105,9 +105,9 @@ void Motion::couple() {
 void Motion::forward() {
     for (int i = 0; i < n; ++i) {
         const double *fixed = tree.fixed + 16 * i;
-        Real *own = &R[9 * i], *at = &p[3 * i];
+        Real *rotation = &R[9 * i], *at = &p[3 * i];
         if (tree.parents[i] < 0) {
-            for (int k = 0; k < 9; ++k) own[k] = real(fixed[k / 3 * 4 + k % 3]);
+            for (int k = 0; k < 9; ++k) rotation[k] = real(fixed[k / 3 * 4 + k % 3]);
             for (int k = 0; k < 3; ++k) at[k] = real(fixed[4 * k + 3]);
         } else {
             const int64_t parent = tree.parents[i];
@@ -119,25 +119,27 @@ void Motion::forward() {
                 const Real a = A[3 * k], b = A[3 * k + 1], c = A[3 * k + 2];
                 at[k] = o[k] + a * fixed[3] + b * fixed[7] + c * fixed[11];
                 if (straight[i])
-                    own[3 * k] = a, own[3 * k + 1] = b, own[3 * k + 2] = c;
+                    rotation[3 * k] = a, rotation[3 * k + 1] = b, rotation[3 * k + 2] = c;
                 else
                     for (int l = 0; l < 3; ++l)
-                        own[3 * k + l] = a * fixed[l] + b * fixed[4 + l] + c * fixed[8 + l];
+                        rotation[3 * k + l] =
+                            a * fixed[l] + b * fixed[4 + l] + c * fixed[8 + l];
             }
         }
         if (tree.kinds[i] == 1) {
             Real s, c, *A = &after_R[9 * i];
             sine_cosine(q[i], &s, &c);
             for (int k = 0; k < 3; ++k) {
-                const Real a = own[3 * k], b = own[3 * k + 1];
+                const Real a = rotation[3 * k], b = rotation[3 * k + 1];
                 A[3 * k] = c * a + s * b, A[3 * k + 1] = c * b - s * a;
-                A[3 * k + 2] = own[3 * k + 2];
+                A[3 * k + 2] = rotation[3 * k + 2];
             }
             if (const double lead = tree.leads[i])
                 for (int k = 0; k < 3; ++k)
-                    after_p[3 * i + k] = at[k] + lead * q[i] * own[3 * k + 2];
+                    after_p[3 * i + k] = at[k] + lead * q[i] * rotation[3 * k + 2];
         } else if (tree.kinds[i] == 2) {
-            for (int k = 0; k < 3; ++k) after_p[3 * i + k] = at[k] + q[i] * own[3 * k + 2];
+            for (int k = 0; k < 3; ++k)
+                after_p[3 * i + k] = at[k] + q[i] * rotation[3 * k + 2];
         }
     }
 }
@@ -191,16 +193,16 @@ void Motion::equations() {
 // and its derivatives.  If all three rotations are required, the residual is regular
 // near half a turn, too.
 void Motion::platform_turn(int first, int last, Real *out) {
-    const Real *own = &R[9 * tree.platform];
+    const Real *rotation = &R[9 * tree.platform];
     if (all_turns) {
-        rotation_between(own, turn, out);
+        rotation_between(rotation, turn, out);
         return;
     }
     if (!turns) return;
     Real left[9];
     for (int l = 0; l < LANES; ++l) {
         double A[9], vector[3];
-        for (int k = 0; k < 9; ++k) A[k] = own[k][l];
+        for (int k = 0; k < 9; ++k) A[k] = rotation[k][l];
         rotation_log(A, vector);
         for (int k = 0; k < 3; ++k) out[k][l] = vector[k] - pose[3 + k][l];
         inverse_left_jacobian(vector, A);
@@ -225,11 +227,11 @@ Whole Motion::least_step(Real damped) {
     for (int g = 0; g < closures + posed; ++g) {
         const Real *open = &r[6 * g];
         for (size_t a = 0; a < movers[g].size(); ++a) {
-            const Real *own = &J[6 * movers[g][a].row];
+            const Real *row = &J[6 * movers[g][a].row];
             const int i = movers[g][a].column;
             Real number[6];
             for (int k = 0; k < 6; ++k) {
-                number[k] = once(own[k]);
+                number[k] = once(row[k]);
                 x[i] += number[k] * open[k];
             }
             for (size_t b = 0; b <= a; ++b) {

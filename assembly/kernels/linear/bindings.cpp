@@ -52,9 +52,10 @@ Points points_of(
     points.T = reals(T, "T", postures, r.n, 4, 4);
     points.mismatch = reals(mismatch, "mismatch", postures);
     points.errors = reals(errors, "errors", sets, r.n, 6);
-    points.own_posture = postures.value != 1, points.own_errors = sets.value != 1;
-    k = points.own_posture ? postures : sets;
-    if (points.own_errors) reals(errors, "errors", k, r.n, 6);
+    points.posture_per_point = postures.value != 1;
+    points.errors_per_point = sets.value != 1;
+    k = points.posture_per_point ? postures : sets;
+    if (points.errors_per_point) reals(errors, "errors", k, r.n, 6);
     points.count = k.value;
     return points;
 }
@@ -71,8 +72,8 @@ void call_assemble_all(
     if (!loads.is_none()) {
         Size acting;
         points.loads = reals(loads, "loads", acting, 2, r.n, 6);
-        points.own_loads = acting.value != 1;
-        if (points.own_loads) reals(loads, "loads", k, 2, r.n, 6);
+        points.loads_per_point = acting.value != 1;
+        if (points.loads_per_point) reals(loads, "loads", k, 2, r.n, 6);
     }
     Solutions out;
     out.outcome = address<int64_t>(outcome, "outcome", k);

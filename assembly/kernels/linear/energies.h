@@ -25,7 +25,7 @@ constexpr double STOP = 3e-3;
 class Energies : public Loaded {
 public:
     Energies(const Robot &s, const Points &points)
-        : Loaded(s, points), postpones(!points.own_posture), solver(cones, m), v(m),
+        : Loaded(s, points), postpones(!points.posture_per_point), solver(cones, m), v(m),
           G(m, nu), springless(m, m) {}
 
     // If all points have one posture, points that need the interior-point method are
@@ -55,7 +55,7 @@ private:
     }
     Whole minimise(int r, Whole requested);
     Row least_multipliers(int r, int count);
-    void own_springs(
+    void write_springs(
         const Row &grouped, const Block &block, double *elastic, Whole where);
     struct Proof { Real gain, cost; };
     Proof complementary(const Row &motions, const Row &multipliers);
@@ -111,14 +111,14 @@ inline void Energies::prepare(int r, int count) {
         largest_column = larger(column, largest_column);
     }
     for (int i = 0; i < count - r; ++i) {
-        Real *own = springless[i];
-        std::copy(Z[r + i], Z[r + i] + m, own);
+        Real *row = springless[i];
+        std::copy(Z[r + i], Z[r + i] + m, row);
         for (int l = 0; l < i; ++l) {
-            const Real along = inner(springless[l], own, m);
-            for (int a = 0; a < m; ++a) own[a] -= along * springless[l][a];
+            const Real along = inner(springless[l], row, m);
+            for (int a = 0; a < m; ++a) row[a] -= along * springless[l][a];
         }
-        const Real over = 1.0 / root(inner(own, own, m));
-        for (int a = 0; a < m; ++a) own[a] *= over;
+        const Real over = 1.0 / root(inner(row, row, m));
+        for (int a = 0; a < m; ++a) row[a] *= over;
     }
 }
 
@@ -174,26 +174,26 @@ inline Row Energies::least_multipliers(int r, int count) {
     Row multipliers = loaded ? closure_wrench : Row(m);
     combine(Z.data(), r, programme.y.data(), m, multipliers.data());
     for (int i = 0; i < count - r; ++i) {
-        const Real *own = springless[i];
-        const Real along = inner(own, multipliers.data(), m);
-        for (int a = 0; a < m; ++a) multipliers[a] -= along * own[a];
+        const Real *row = springless[i];
+        const Real along = inner(row, multipliers.data(), m);
+        for (int a = 0; a < m; ++a) multipliers[a] -= along * row[a];
     }
     return multipliers;
 }
 
 // Write the deformation of every spring from those of its group's equivalent springs.
-inline void Energies::own_springs(
+inline void Energies::write_springs(
     const Row &grouped, const Block &block, double *elastic, Whole where) {
     Triangle rows(6, widest);
     for (int g = 0; g < ng; ++g) {
         const int count = spring_group(g, rows);
         triangulate(rows, 6, count, Real{}, Real{}, -1.0, count);
-        Row own(count);
-        std::copy(&grouped[6 * g], &grouped[6 * g] + 6, own.begin());
-        Real *x = own.data();
+        Row strains(count);
+        std::copy(&grouped[6 * g], &grouped[6 * g] + 6, strains.begin());
+        Real *x = strains.data();
         turn_all(rows, 6, count, &x, 1);
         for (int64_t c = s.groups[g]; c < s.groups[g + 1]; ++c) {
-            Real strain = own[c - s.groups[g]];
+            Real strain = strains[c - s.groups[g]];
             if (loaded) strain += load_strain[c];
             block.write(elastic, s.ny, s.spring_order[c], strain, where);
         }
@@ -364,7 +364,7 @@ inline Whole Energies::solve(
     for (int c = 0; c < nq; ++c) block.write(out.motions, nq, c, motions[c], requested);
     for (int a = 0; a < m; ++a)
         block.write(out.multipliers, m, a, factor * multipliers[a], requested);
-    if (out.elastic) own_springs(grouped, block, out.elastic, requested);
+    if (out.elastic) write_springs(grouped, block, out.elastic, requested);
     return all & ~settled;
 }
 

@@ -80,28 +80,29 @@ inline Linearised::Linearised(const Robot &s, const Points &points)
     for (int c = 0; c < nq; ++c) has_joints[s.free_frame[c]] = true;
     for (int c = 0; c < s.ny; ++c) has_joints[s.spring_frame[c]] = true;
     // a frame without errors at any point is skipped: it would add exact zeros
-    const int64_t sets = points.own_errors ? points.count : 1;
-    const double *own = points.errors;
+    const int64_t sets = points.errors_per_point ? points.count : 1;
+    const double *error = points.errors;
     for (int64_t i = 0; i < sets; ++i)
-        for (int j = 0; j < n; ++j, own += 6)
+        for (int j = 0; j < n; ++j, error += 6)
             if (!has_errors[j])
-                has_errors[j] = std::any_of(own, own + 6, [](double e) { return e != 0.0; });
+                has_errors[j] =
+                    std::any_of(error, error + 6, [](double e) { return e != 0.0; });
 }
 
 // Return whether all lanes have the same posture as in the previous block.  Quantities
 // that depend only on the frames are then known.
 inline bool Linearised::same_posture(const Points &points, const Block &block) {
-    if (!points.own_posture && !posture.empty()) return true;
+    if (!points.posture_per_point && !posture.empty()) return true;
     const size_t count = 16 * size_t(n);
     const auto frames = [&](int l) {
-        return points.T + points.own_posture * block.point[l] * count;
+        return points.T + points.posture_per_point * block.point[l] * count;
     };
     const auto mismatch_of = [&](int l) {
-        return points.mismatch[points.own_posture * block.point[l]];
+        return points.mismatch[points.posture_per_point * block.point[l]];
     };
-    const double *own = frames(0), mismatch = mismatch_of(0);
+    const double *first = frames(0), mismatch = mismatch_of(0);
     const auto same = [&](const double *T, double other) {
-        return other == mismatch && std::equal(own, own + count, T);
+        return other == mismatch && std::equal(first, first + count, T);
     };
     for (int l = 1; l < LANES; ++l)
         if (!same(frames(l), mismatch_of(l))) {
@@ -110,7 +111,7 @@ inline bool Linearised::same_posture(const Points &points, const Block &block) {
         }
     if (!posture.empty() && same(posture.data(), posture.back())) return true;
     ++changes;
-    posture.assign(own, own + count);
+    posture.assign(first, first + count);
     posture.push_back(mismatch);
     return false;
 }
@@ -121,7 +122,8 @@ inline void Linearised::read(const Points &points, const Block &block, bool unch
     if (!unchanged) {
         Real origin[3];
         for (int a = 0; a < 3; ++a)
-            origin[a] = block.read(points.T, points.own_posture * n * 16, s.platform * 16 + 4 * a + 3);
+            origin[a] = block.read(
+                points.T, points.posture_per_point * n * 16, s.platform * 16 + 4 * a + 3);
         for (int j = 0; j < n; ++j)
             if (has_joints[j] || has_errors[j]) read_frame(points, block, j, origin);
         columns();
@@ -137,7 +139,7 @@ inline void Linearised::read(const Points &points, const Block &block, bool unch
 inline void Linearised::read_frame(
     const Points &points, const Block &block, int j, const Real *origin) {
     const auto entry = [&](int a, int b) {
-        return block.read(points.T, points.own_posture * n * 16, j * 16 + 4 * a + b);
+        return block.read(points.T, points.posture_per_point * n * 16, j * 16 + 4 * a + b);
     };
     const Real x = (entry(0, 3) - origin[0]) / s.size;
     const Real y = (entry(1, 3) - origin[1]) / s.size;
@@ -152,18 +154,18 @@ inline void Linearised::read_frame(
 
 // Add the closure error and the platform screw that the errors of a frame cause.
 inline void Linearised::read_errors(const Points &points, const Block &block, int j) {
-    Real own[6] = {}, step[6];
+    Real total[6] = {}, step[6];
     for (int axis = 0; axis < 6; ++axis) {
         const Real error =
-            block.read(points.errors, points.own_errors * n * 6, j * 6 + axis);
+            block.read(points.errors, points.errors_per_point * n * 6, j * 6 + axis);
         column(j, axis, step);
         for (int a = axis < 3 ? 0 : 3; a < 6; ++a) {
             step[a] *= error;
-            own[a] += step[a];
+            total[a] += step[a];
             largest_error = larger(magnitude(step[a]), largest_error);
         }
     }
-    move(s.pattern_of[j], s.on_path[j], own, known);
+    move(s.pattern_of[j], s.on_path[j], total, known);
 }
 
 // Compute the unit screw of frame j along `axis`: rotation for 0 to 2, translation for
@@ -213,10 +215,10 @@ inline void Linearised::move(int64_t pattern, double on_path, const Real *step, 
 
 // Compute the wrench on frames of a pattern from wrenches `row` (m,) on the closures.
 inline void Linearised::part(const Real *row, int64_t pattern, Real *out) const {
-    Real own[6] = {};
+    Real total[6] = {};
     for (const Entry &e : patterns[pattern])
-        for (int a = 0; a < 6; ++a) own[a] += e.sign * row[6 * e.closure + a];
-    std::copy(own, own + 6, out);
+        for (int a = 0; a < 6; ++a) total[a] += e.sign * row[6 * e.closure + a];
+    std::copy(total, total + 6, out);
 }
 
 // Return the scalar product of the column of clearance c with `part`, a result of the
@@ -230,7 +232,8 @@ inline Real Linearised::enters(int c, const Real *part) const {
 // Return the relative threshold of ranks.  It contains the nominal closure error of
 // the frames.
 inline Real Linearised::tolerance(const Points &points, const Block &block) const {
-    return RANK + MISMATCH_FACTOR * block.read(points.mismatch, points.own_posture, 0);
+    return RANK +
+           MISMATCH_FACTOR * block.read(points.mismatch, points.posture_per_point, 0);
 }
 
 // Return the largest entry of the clearances' closure columns, for the noise floor.

@@ -77,12 +77,12 @@ inline Row Loaded::group_deformation() {
     for (int g = 0; g < ng; ++g) {
         const int count = spring_group(g, rows), first = int(s.groups[g]);
         triangulate(rows, 6, count, Real{}, Real{}, -1.0, count);
-        Row own(count);
+        Row strains(count);
         std::copy(
             &load_strain[first], &load_strain[first] + (s.groups[g + 1] - first),
-            own.begin());
-        turn_back(rows, 6, count, own.data());
-        std::copy(own.begin(), own.begin() + 6, &deformation[6 * g]);
+            strains.begin());
+        turn_back(rows, 6, count, strains.data());
+        std::copy(strains.begin(), strains.begin() + 6, &deformation[6 * g]);
     }
     return deformation;
 }
@@ -93,9 +93,10 @@ inline Row Loaded::group_deformation() {
 inline Whole Loaded::balance(
     const Points &points, const Block &block, int rank, int r) {
     const auto load = [&](int64_t half, int64_t j, int64_t axis) {
-        return block.read(points.loads, points.own_loads * 12 * n, 6 * (n * half + j) + axis);
+        return block.read(
+            points.loads, points.loads_per_point * 12 * n, 6 * (n * half + j) + axis);
     };
-    Row own(s.ny);
+    Row spring_load(s.ny);
     Real most = {};
     for (int c = 0; c < nq; ++c) {
         drive[c] = load(1, s.free_frame[c], s.free_axis[c]);
@@ -108,12 +109,13 @@ inline Whole Loaded::balance(
     for (int c = 0; c < s.ny; ++c)
         for (int axis = 0; axis < 6; ++axis)
             if (const double weight = s.springs[6 * c + axis])
-                own[c] += weight * load(s.of_joint[c], s.spring_frame[c], axis);
+                spring_load[c] += weight * load(s.of_joint[c], s.spring_frame[c], axis);
     const auto deform = [&] {
         const Row on = on_patterns(closure_wrench);
         for (int c = 0; c < s.ny; ++c)
             load_strain[c] =
-                own[c] + along(elastic[c], &on[6 * s.pattern_of[s.spring_frame[c]]]);
+                spring_load[c] +
+                along(elastic[c], &on[6 * s.pattern_of[s.spring_frame[c]]]);
         return on;
     };
     deform();
@@ -138,18 +140,18 @@ inline Whole Loaded::bring_into_balance(
     const Points &points, const Block &block, int rank, int r) {
     const size_t count = 12 * size_t(n);
     const auto of = [&](int l) {
-        return points.loads + points.own_loads * block.point[l] * count;
+        return points.loads + points.loads_per_point * block.point[l] * count;
     };
-    const double *own = of(0);
-    const bool each = points.own_loads;
+    const double *first = of(0);
+    const bool each = points.loads_per_point;
     bool alike = !posture.empty();
     for (int l = 1; alike && each && l < LANES; ++l)
-        alike = std::equal(own, own + count, of(l));
+        alike = std::equal(first, first + count, of(l));
     const bool known = alike && balanced == changes && acting.size() == count &&
-                       (!each || std::equal(own, own + count, acting.data()));
+                       (!each || std::equal(first, first + count, acting.data()));
     if (!known) {
         driven = balance(points, block, rank, r);
-        acting.assign(own, own + (alike ? count : 0));
+        acting.assign(first, first + (alike ? count : 0));
         balanced = changes;
     }
     std::copy(clearance_force.begin(), clearance_force.end(), programme.d.begin());

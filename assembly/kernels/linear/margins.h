@@ -108,7 +108,7 @@ inline Whole ZoneMargins::margins(
             out.forces, nu, cones.column[c], needed ? forces[c] / most : Real{},
             requested);
     // the motions of passive joints must stay within their ranges
-    for (Real &own : programme.u) own = needed ? own * margin : Real{};
+    for (Real &u : programme.u) u = needed ? u * margin : Real{};
     const Row motions = least_motions(kept.free, moved_by(Row()));
     for (int c = 0; c < nq; ++c) possible &= magnitude(motions[c]) <= s.free_bound[c];
     const Whole proved = possible & (margin - bound <= MARGIN_GAP * margin);

@@ -72,8 +72,8 @@ inline Whole ReachableSets::held_cones(const Block &block) {
     Whole decided = whole(-1);
     for (int c = 0; c < s.cones; ++c) {
         Real squares = {}, size = {}, screw[6];
-        const int64_t own = loads.cone_of[c];
-        for (int64_t i = h.starts[own]; i < h.starts[own + 1]; ++i) {
+        const int64_t held_cone = loads.cone_of[c];
+        for (int64_t i = h.starts[held_cone]; i < h.starts[held_cone + 1]; ++i) {
             const int64_t j = h.cone_frame[i];
             column(j, h.cone_axis[i], screw);
             const Real force = inner(screw, &on[6 * h.pattern_of[j]], 6) * h.cone_size[i];
@@ -103,11 +103,11 @@ inline Whole ReachableSets::follow(int rank) {
         still &= ~balance_free_motions(rank, a, UNBOUNDED / CLEAR, closing);
         for (int g = 0; g < np; ++g) part(closing.data(), g, &on[6 * g]);
         for (int c = 0; c < nu; ++c) {
-            const int own = int(cones.column[c]);
-            const int64_t j = s.cone_frame[own];
+            const int index = int(cones.column[c]);
+            const int64_t j = s.cone_frame[index];
             const Real moved =
-                s.on_path[j] * clearance[own][a] +
-                inner(clearance[own], &on[6 * s.pattern_of[j]], 6);
+                s.on_path[j] * clearance[index][a] +
+                inner(clearance[index], &on[6 * s.pattern_of[j]], 6);
             X[a][c] = a < 3 ? moved : moved * s.size;
         }
     }
@@ -127,12 +127,12 @@ inline Whole ReachableSets::within_bounds(int rank, const Block &block) {
     cones.each([&](auto of, int, int at) {
         std::fill(squares.begin(), squares.end(), Real{});
         for (int c = at; c < at + of; ++c) {
-            const int own = int(cones.column[c]);
+            const int index = int(cones.column[c]);
             std::fill(moved.begin(), moved.end(), Real{});
-            for (const Entry &e : patterns[s.pattern_of[s.cone_frame[own]]])
+            for (const Entry &e : patterns[s.pattern_of[s.cone_frame[index]]])
                 for (int a = 0; a < 6; ++a)
                     moved[6 * e.closure + a] =
-                        held[c] ? Real{} : e.sign * clearance[own][a];
+                        held[c] ? Real{} : e.sign * clearance[index][a];
             const Row step = least_motions(rank, moved);
             for (int q = 0; q < nq; ++q) {
                 middle[q] -= step[q] * start[c];
@@ -199,8 +199,8 @@ inline Whole ReachableSets::read_bodies(
     if (!any(requested = ranks.same)) return others;
     const int count = m - ranks.free;
     for (int c = 0; c < nu; ++c) {
-        const Real own = block.read(centres.clearances, nu, cones.column[c]);
-        start[c] = held[c] ? Real{} : own;
+        const Real u = block.read(centres.clearances, nu, cones.column[c]);
+        start[c] = held[c] ? Real{} : u;
     }
     // rounding can move points out of their cones
     cones.each([&](auto of, int, int at) {

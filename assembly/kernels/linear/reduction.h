@@ -44,8 +44,8 @@ inline Array<int> loose_patterns(const Robot &s) {
     Array<int> slot(s.np, -1);
     int next = 0;
     for (int c = 0; c < s.nu; ++c) {
-        int &own = slot[s.pattern_of[s.cone_frame[c]]];
-        if (own < 0) own = next++;
+        int &number = slot[s.pattern_of[s.cone_frame[c]]];
+        if (number < 0) number = next++;
     }
     return slot;
 }
@@ -127,12 +127,12 @@ inline void Reduction::grouped_springs() {
         const int count = spring_group(g, rows);
         const Whole rank = triangulate(rows, 6, count, Real{}, Real{}, -1.0, count);
         for (int i = 0; i < 6; ++i) {
-            Real own[6] = {};
-            for (int b = 0; b < i; ++b) own[b] = rank > b ? rows.F[i][b] : Real{};
-            own[i] = rank > i ? rows.diagonal[i] : Real{};
+            Real row[6] = {};
+            for (int b = 0; b < i; ++b) row[b] = rank > b ? rows.F[i][b] : Real{};
+            row[i] = rank > i ? rows.diagonal[i] : Real{};
             for (int b = 0; b < 6; ++b)
                 for (int l = 0; l < LANES; ++l)
-                    L[int(6 * g + rows.order[i][l])][b][l] = own[b][l];
+                    L[int(6 * g + rows.order[i][l])][b][l] = row[b][l];
         }
     }
 }
@@ -151,11 +151,11 @@ inline void Reduction::orthogonal_rows(int rank, int count) {
 inline void Reduction::spring_rows(int count) {
     for (int i = 0; i < count; ++i)
         for (int g = 0; g < ng; ++g) {
-            Real of_group[6], own[6] = {};
+            Real of_group[6], product[6] = {};
             part(Z[i], s.group_pattern[g], of_group);
             for (int a = 0; a < 6; ++a)
-                for (int b = 0; b < 6; ++b) own[b] += of_group[a] * L[6 * g + a][b];
-            std::copy(own, own + 6, springs.F[i] + 6 * g);
+                for (int b = 0; b < 6; ++b) product[b] += of_group[a] * L[6 * g + a][b];
+            std::copy(product, product + 6, springs.F[i] + 6 * g);
         }
 }
 
@@ -235,9 +235,9 @@ inline void Reduction::small_problem(int r) {
     programme.r = r;
     right_sides(r);
     for (int c = 0; c < nu; ++c) {
-        const int own = int(cones.column[c]), g = slot[s.pattern_of[s.cone_frame[own]]];
+        const int index = int(cones.column[c]), g = slot[s.pattern_of[s.cone_frame[index]]];
         Real screw[6];
-        for (int a = 0; a < 6; ++a) screw[a] = -clearance[own][a];
+        for (int a = 0; a < 6; ++a) screw[a] = -clearance[index][a];
         for (int i = 0; i < r; ++i) {
             Real total = {};
             for (int a = 0; a < 6; ++a) total += screw[a] * parts[i][6 * g + a];
@@ -250,8 +250,8 @@ inline void Reduction::small_problem(int r) {
 inline Row Reduction::spring_strains(int r, const Row &v) {
     Row spring(6 * ng);
     std::copy(v.begin(), v.begin() + r, spring.begin());
-    Real *own = spring.data();
-    turn_all(springs, r, 6 * ng, &own, 1);
+    Real *row = spring.data();
+    turn_all(springs, r, 6 * ng, &row, 1);
     return spring;
 }
 
@@ -261,8 +261,8 @@ inline Row Reduction::moved_by(const Row &grouped) {
     Row total = known;
     Real step[6];
     for (int c = 0; c < nu; ++c) {
-        const int64_t own = cones.column[c], j = s.cone_frame[own];
-        for (int a = 0; a < 6; ++a) step[a] = clearance[int(own)][a] * programme.u[c];
+        const int64_t index = cones.column[c], j = s.cone_frame[index];
+        for (int a = 0; a < 6; ++a) step[a] = clearance[int(index)][a] * programme.u[c];
         move(s.pattern_of[j], s.on_path[j], step, total);
     }
     for (int g = 0; g < ng; ++g) {
@@ -297,8 +297,8 @@ inline Row Reduction::least_motions(int rank, const Row &moved) {
             for (int l = 0; l < i; ++l) least[i] -= R.F[i][l] * least[l];
             least[i] /= R.diagonal[i];
         }
-        Real *own = least.data();
-        turn_all(R, rank, nq, &own, 1);
+        Real *row = least.data();
+        turn_all(R, rank, nq, &row, 1);
     }
     for (int i = 0; i < nq; ++i)
         for (int l = 0; l < LANES; ++l) motions[free.order[i][l]][l] = least[i][l];
@@ -321,8 +321,8 @@ inline Whole Reduction::balance_free_motions(
         else
             loose |= magnitude(left) > still;
     }
-    Real *own = closing.data();
-    turn_all(free, rank, m, &own, 1);
+    Real *row = closing.data();
+    turn_all(free, rank, m, &row, 1);
     return loose;
 }
 

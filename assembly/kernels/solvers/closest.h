@@ -29,24 +29,24 @@ constexpr double CURVATURE = 1e-13;
 inline Real Solver::project(const Row &a, const Row &kept, const Row &fixed) {
     Real value = {};
     k.each([&](auto size, int c, int first) {
-        Real *own = &u[first], *D = heads[c].D;
+        Real *u_k = &u[first], *D = heads[c].D;
         const Whole stays = kept[first] != 0.0;
-        for (int i = 0; i < size; ++i) own[i] = a[first + i] - z1[first + i];
-        const Real length = root(inner(own, own, size));
+        for (int i = 0; i < size; ++i) u_k[i] = a[first + i] - z1[first + i];
+        const Real length = root(inner(u_k, u_k, size));
         const Whole inside = length <= 1.0;
         const Real shorter = 1.0 / (inside ? real(1.0) : length);
         for (int i = 0; i < size; ++i)
-            own[i] = stays ? fixed[first + i] : own[i] * shorter;
+            u_k[i] = stays ? fixed[first + i] : u_k[i] * shorter;
         if (size.ball) {
-            for (int i = 0; i < size; ++i) wide[0][first + i] = own[i];
+            for (int i = 0; i < size; ++i) wide[0][first + i] = u_k[i];
             D[0] = stays ? Real{} : shorter;
             D[1] = inside ? Real{} : D[0];
         } else if (size == 1) {
             D[0] = stays | ~inside ? Real{} : real(1.0);
         } else {  // on the boundary of the disc only rotation is free
-            D[0] = inside ? real(1.0) : shorter * own[1] * own[1];
-            D[1] = inside ? Real{} : -shorter * own[0] * own[1];
-            D[2] = inside ? real(1.0) : shorter * own[0] * own[0];
+            D[0] = inside ? real(1.0) : shorter * u_k[1] * u_k[1];
+            D[1] = inside ? Real{} : -shorter * u_k[0] * u_k[1];
+            D[2] = inside ? real(1.0) : shorter * u_k[0] * u_k[0];
             for (int i = 0; i < 3; ++i) D[i] = stays ? Real{} : D[i];
         }
         for (int i = first; i < first + size; ++i) {

@@ -197,8 +197,8 @@ inline void Solver::fill_system(const Programme &q) {
 // W^-1 t - W^-2 ds cancels.
 inline void Solver::direction(Programme &q) {
     const int m = q.r + q.p;
-    Real *own = f.data(), *squared = du.data();
-    square_scaled<1>(&own, &squared);
+    Real *row = f.data(), *squared = du.data();
+    square_scaled<1>(&row, &squared);
     multiply(q.M.rows(), m, squared, k.nu, right.data());
     for (int i = 0; i < q.p; ++i) right[q.r + i] -= residual[i];
     system.solve(m, right.data());

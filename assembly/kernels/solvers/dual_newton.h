@@ -36,36 +36,36 @@ inline Solver::Slopes Solver::slopes(const Programme &q, Real sigma, const Real 
     const Real over_twice = 0.5 / sigma;
     Slopes at = {{}, {}, {}, {}, whole(-1)};
     k.each([&](auto size, int c, int first) {
-        Real *own = &u[first], *z = &z1[first], *kept = &old[first];
+        Real *u_k = &u[first], *z = &z1[first], *kept = &old[first];
         Real *D = heads[c].D, along = {}, moved = {}, force;
-        for (int i = 0; i < size; ++i) own[i] = kept[i] - sigma * z[i];
+        for (int i = 0; i < size; ++i) u_k[i] = kept[i] - sigma * z[i];
         if (size.ball) {
-            const Real length = root(inner(own, own, size));
+            const Real length = root(inner(u_k, u_k, size));
             const Whole inside = length <= 1.0;
             const Real shorter = 1.0 / (inside ? real(1.0) : length);
-            for (int i = 0; i < size; ++i) wide[0][first + i] = own[i] *= shorter;
+            for (int i = 0; i < size; ++i) wide[0][first + i] = u_k[i] *= shorter;
             D[0] = sigma * shorter, D[1] = inside ? Real{} : D[0];
             force = root(inner(z, z, size));
         } else if (size == 1) {
-            const Whole inside = magnitude(own[0]) <= 1.0;
-            own[0] = inside ? own[0] : own[0] > 0.0 ? real(1.0) : real(-1.0);
+            const Whole inside = magnitude(u_k[0]) <= 1.0;
+            u_k[0] = inside ? u_k[0] : u_k[0] > 0.0 ? real(1.0) : real(-1.0);
             D[0] = inside ? sigma : Real{};
             force = magnitude(z[0]);
         } else {
-            const Real length = root(own[0] * own[0] + own[1] * own[1]);
+            const Real length = root(u_k[0] * u_k[0] + u_k[1] * u_k[1]);
             const Whole inside = length <= 1.0;
             const Real shorter = 1.0 / (inside ? real(1.0) : length);
-            own[0] *= shorter, own[1] *= shorter;
+            u_k[0] *= shorter, u_k[1] *= shorter;
             // a point on the disc's boundary can only move along the boundary
             const Real across = sigma * shorter;
-            D[0] = inside ? sigma : across * own[1] * own[1];
-            D[1] = inside ? Real{} : -across * own[0] * own[1];
-            D[2] = inside ? sigma : across * own[0] * own[0];
+            D[0] = inside ? sigma : across * u_k[1] * u_k[1];
+            D[1] = inside ? Real{} : -across * u_k[0] * u_k[1];
+            D[2] = inside ? sigma : across * u_k[0] * u_k[0];
             force = root(z[0] * z[0] + z[1] * z[1]);
         }
         for (int i = 0; i < size; ++i) {
-            along += z[i] * own[i];
-            moved += (own[i] - kept[i]) * (own[i] - kept[i]);
+            along += z[i] * u_k[i];
+            moved += (u_k[i] - kept[i]) * (u_k[i] - kept[i]);
         }
         at.smooth += along + moved * over_twice;
         at.kink += larger(force + along, Real{});

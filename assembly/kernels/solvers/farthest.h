@@ -49,15 +49,15 @@ public:
         while (true) {
             for (int l = 0; l < LANES; ++l)
                 while (true) {
-                    Search &own = searches[l];
+                    Search &state = searches[l];
                     if (busy[l]) {
-                        const bool done = own.high - own.low <= own.tolerance;
-                        if (!done && own.supports < MOST_SUPPORTS) break;
-                        settle(own, done);
+                        const bool done = state.high - state.low <= state.tolerance;
+                        if (!done && state.supports < MOST_SUPPORTS) break;
+                        settle(state, done);
                         busy[l] = 0;
                     }
                     if (next == tasks.size()) break;
-                    own.begin(tasks[next++]);
+                    state.begin(tasks[next++]);
                     load(l);
                     busy[l] = -1;
                 }
@@ -75,26 +75,28 @@ public:
             majorant.bound(body, gradient, busy, least);
             for (int l = 0; l < LANES; ++l) {
                 if (!busy[l]) continue;
-                Search &own = searches[l];
-                const double reached = along(own.direction, screw, l);
+                Search &state = searches[l];
+                const double reached = along(state.direction, screw, l);
                 if (!found[l]) {
-                    settle(own, false);
+                    settle(state, false);
                     busy[l] = again[l] = 0;
                     continue;
                 }
-                ++own.supports;
-                own.gained = false;
-                take(own, l, own.direction, std::max(double(height[l]), reached));
-                own.high = std::max(std::min(own.high, least[l]), own.low);
+                ++state.supports;
+                state.gained = false;
+                take(state, l, state.direction, std::max(double(height[l]), reached));
+                state.high = std::max(std::min(state.high, least[l]), state.low);
             }
             if (any(again)) {
                 opposite();
                 for (int l = 0; l < LANES; ++l) {
                     if (!again[l]) continue;
-                    Search &own = searches[l];
+                    Search &state = searches[l];
                     Point back;
-                    for (int a = 0; a < 3; ++a) back[a] = -own.direction[a];
-                    take(own, l, back, std::max(double(height[l]), along(back, screw, l)));
+                    for (int a = 0; a < 3; ++a) back[a] = -state.direction[a];
+                    take(
+                        state, l, back,
+                        std::max(double(height[l]), along(back, screw, l)));
                 }
             }
             for (int l = 0; l < LANES; ++l)
@@ -118,8 +120,8 @@ private:
     Row gradient, v;
 
     double along(const Point &d, const Real *of, int l) const {
-        const Real *own = of + searches[l].half;
-        return d[0] * own[0][l] + d[1] * own[1][l] + d[2] * own[2][l];
+        const Real *part = of + searches[l].half;
+        return d[0] * part[0][l] + d[1] * part[1][l] + d[2] * part[2][l];
     }
 
     // Return whether the screw of a lane nearly attains its height.  The comparison is
@@ -133,21 +135,21 @@ private:
     // there is an alternative.
     bool ask(int l) {
         if (!other) return false;
-        double own_height, attains[6];
+        double found_height, attains[6];
         std::vector<double> w(cones.nu);
-        other(searches[l].direction, &own_height, attains, w.data());
-        height[l] = own_height;
+        other(searches[l].direction, &found_height, attains, w.data());
+        height[l] = found_height;
         for (int a = 0; a < 6; ++a) screw[a][l] = attains[a];
         for (int j = 0; j < cones.nu; ++j) gradient[j][l] = w[j];
         return true;
     }
 
     // Add the screw and the plane of a support function to a search.
-    void take(Search &own, int l, const Point &normal, double support) {
+    void take(Search &state, int l, const Point &normal, double support) {
         double of_lane[6];
         for (int a = 0; a < 6; ++a) of_lane[a] = screw[a][l];
-        own.improve(of_lane);
-        own.add_plane(normal, support);
+        state.improve(of_lane);
+        state.add_plane(normal, support);
     }
 
     void load(int l);
@@ -159,8 +161,8 @@ private:
 
 // Copy the body of a search into its lane.
 inline void Farthest::load(int l) {
-    const Search &own = searches[l];
-    const Body &b = *own.body;
+    const Search &state = searches[l];
+    const Body &b = *state.body;
     const int nv = cones.nu;
     const auto column = [&](Real *row, const double *from) {
         for (int j = 0; j < nv; ++j) row[j][l] = from ? from[j] : 0.0;
@@ -170,8 +172,8 @@ inline void Farthest::load(int l) {
         column(whole_map[a], &b.X[a * nv]);
     }
     for (int a = 0; a < 3; ++a) {
-        body.centre[a][l] = b.centre[own.half + a];
-        column(body.X[a], &b.X[(own.half + a) * nv]);
+        body.centre[a][l] = b.centre[state.half + a];
+        column(body.X[a], &b.X[(state.half + a) * nv]);
     }
     column(body.start.data(), b.start.data());
     bool even = true;
@@ -186,12 +188,12 @@ inline void Farthest::load(int l) {
     body.rows[l] = b.p;
     for (int c = 0; c < cones.count; ++c) {
         const int interval = c - cones.discs;
-        const bool there = interval < 0                 ? c < b.own_discs
-                           : interval < cones.intervals ? interval < b.own_intervals
+        const bool there = interval < 0                 ? c < b.unpadded_discs
+                           : interval < cones.intervals ? interval < b.unpadded_intervals
                                                         : true;
         body.present[c][l] = there ? -1 : 0;
     }
-    tolerances[l] = own.tolerance;
+    tolerances[l] = state.tolerance;
 }
 
 // Compute support functions along the directions of the searches: a certified height,
@@ -228,8 +230,9 @@ inline void Farthest::support(Whole requested) {
         height += length;
         const Real over = 1.0 / (length > 0.0 ? length : real(1.0));
         for (int j = at; j < at + of; ++j) {
-            const Real own = p ? q.u[j] : length > 0.0 ? gradient[j] * over : body.start[j];
-            v[j] = moves ? own : body.start[j];
+            const Real point =
+                p ? q.u[j] : length > 0.0 ? gradient[j] * over : body.start[j];
+            v[j] = moves ? point : body.start[j];
         }
     });
     if (p) within(v);

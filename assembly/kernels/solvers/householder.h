@@ -23,19 +23,19 @@ struct Triangle {
         : F(rows, columns), turns(rows), diagonal(rows), order(rows) {}
 };
 
-// Reflect R rows: row -= turn (own.row) own, over the columns from .. to - 1.  If
-// `sized`, also compute the sum of squares of each row beyond column `from`.
+// Reflect R rows: row -= turn (reflector.row) reflector, over the columns from .. to - 1.
+// If `sized`, also compute the sum of squares of each row beyond column `from`.
 template <int R, bool sized>
 inline void reflect(
-    const Real *own, Real turn, Real *const *rows, int from, int to, Real *sizes) {
+    const Real *reflector, Real turn, Real *const *rows, int from, int to, Real *sizes) {
     Real along[R], size[R] = {};
-    inner_tile<R>(rows, own, from, to, along);
+    inner_tile<R>(rows, reflector, from, to, along);
     for (int i = 0; i < R; ++i) {
         along[i] *= turn;
-        rows[i][from] -= along[i] * own[from];
+        rows[i][from] -= along[i] * reflector[from];
     }
     for (int a = from + 1; a < to; ++a) {
-        const Real weight = once(own[a]);
+        const Real weight = once(reflector[a]);
         for (int i = 0; i < R; ++i) {
             const Real left = rows[i][a] - along[i] * weight;
             rows[i][a] = left;
@@ -47,14 +47,14 @@ inline void reflect(
 
 template <bool sized>
 inline void reflect_all(
-    const Real *own, Real turn, Real *const *rows, int count, int from, int to,
+    const Real *reflector, Real turn, Real *const *rows, int count, int from, int to,
     Real *sizes) {
     int i = 0;
     for (; i + 4 <= count; i += 4)
-        reflect<4, sized>(own, turn, rows + i, from, to, sizes + i);
+        reflect<4, sized>(reflector, turn, rows + i, from, to, sizes + i);
     for (; i + 2 <= count; i += 2)
-        reflect<2, sized>(own, turn, rows + i, from, to, sizes + i);
-    if (i < count) reflect<1, sized>(own, turn, rows + i, from, to, sizes + i);
+        reflect<2, sized>(reflector, turn, rows + i, from, to, sizes + i);
+    if (i < count) reflect<1, sized>(reflector, turn, rows + i, from, to, sizes + i);
 }
 
 // Exchange row `step` and row `at`, which can differ between lanes.
@@ -119,13 +119,14 @@ inline Whole triangulate(
             T.order[step][l] = T.order[at[l]][l];
             T.order[at[l]][l] = kept;
         }
-        Real *own = F[step];
-        const Real diagonal = own[step] > 0.0 ? -best : best;
-        own[step] -= going ? diagonal : Real{};
-        const Real turn = going ? -1.0 / (diagonal * own[step]) : Real{};
+        Real *reflector = F[step];
+        const Real diagonal = reflector[step] > 0.0 ? -best : best;
+        reflector[step] -= going ? diagonal : Real{};
+        const Real turn = going ? -1.0 / (diagonal * reflector[step]) : Real{};
         T.diagonal[step] = going ? diagonal : real(1.0);
         T.turns[step] = turn;
-        reflect_all<true>(own, turn, F + step + 1, p - step - 1, step, m, &sizes[step] + 1);
+        reflect_all<true>(
+            reflector, turn, F + step + 1, p - step - 1, step, m, &sizes[step] + 1);
     }
     return rank;
 }

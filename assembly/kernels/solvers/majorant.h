@@ -170,11 +170,11 @@ private:
             for (int l = 0; l < i; ++l)
                 S[i][l] = (S[i][l] - inner(S[i], S[l], l)) * S[l][l];
             const Real pivot = S[i][i] - inner(S[i], S[i], i);
-            const Whole own = body.rows > i;
-            good &= ~own | (pivot > 0.0);
+            const Whole present = body.rows > i;
+            good &= ~present | (pivot > 0.0);
             // the diagonal is replaced by its inverse; rows that a lane does not have
             // stay zero
-            S[i][i] = own ? 1.0 / root(pivot) : real(1.0);
+            S[i][i] = present ? 1.0 / root(pivot) : real(1.0);
         }
         for (int a = 0; a < 4; ++a) {
             Real *x = right[a];

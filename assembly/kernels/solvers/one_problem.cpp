@@ -20,11 +20,11 @@ void solve(const ConeProblem &given, double *u, double *y, Method method) {
     Programme q(cones, r + p);
     q.r = r, q.p = p, q.loaded = true;
     for (int c = 0; c < nu; ++c) {
-        const int64_t own = cones.column[c];
-        for (int i = 0; i < r; ++i) q.M[i][c] = real(given.G[i * nu + own]);
-        for (int i = 0; i < p; ++i) q.M[r + i][c] = real(given.H[i * nu + own]);
-        q.d[c] = real(given.d[own]);
-        q.u[c] = real(u[own]);
+        const int64_t column = cones.column[c];
+        for (int i = 0; i < r; ++i) q.M[i][c] = real(given.G[i * nu + column]);
+        for (int i = 0; i < p; ++i) q.M[r + i][c] = real(given.H[i * nu + column]);
+        q.d[c] = real(given.d[column]);
+        q.u[c] = real(u[column]);
     }
     for (int i = 0; i < r; ++i) q.h[i] = real(given.h[i]);
     for (int i = 0; i < p; ++i) q.e[i] = real(given.k[i]);
@@ -73,10 +73,10 @@ int64_t farthest(const BodyRequest &requested, double *bounds, double *screw) {
         requested.support(direction.data(), height, attains, gradient.data());
         for (int j = 0; j < nv; ++j) w[j] = gradient[given.column[j]];
     };
-    Farthest(body, p, support).search({task}, [&](const Search &own, bool) {
-        bounds[0] = own.low, bounds[1] = own.high;
-        std::copy(own.best, own.best + 6, screw);
-        supports = own.supports;
+    Farthest(body, p, support).search({task}, [&](const Search &found, bool) {
+        bounds[0] = found.low, bounds[1] = found.high;
+        std::copy(found.best, found.best + 6, screw);
+        supports = found.supports;
     });
     return supports;
 }

@@ -55,11 +55,11 @@ public:
                 const Corner &other = corners[j];
                 if (other.above > limit) continue;
                 int shared[2] = {-1, -1}, common = 0;  // the common planes
-                for (int own : one.planes)
-                    if (own == other.planes[0] || own == other.planes[1] ||
-                        own == other.planes[2]) {
+                for (int candidate : one.planes)
+                    if (candidate == other.planes[0] || candidate == other.planes[1] ||
+                        candidate == other.planes[2]) {
                         ++common;
-                        shared[1] = shared[0], shared[0] = own;
+                        shared[1] = shared[0], shared[0] = candidate;
                     }
                 if (common < 2) continue;
                 if (count + int(fresh.size()) == MOST) return;

@@ -79,10 +79,10 @@ public:
             S[j][j] = clear ? 1.0 / pivot : real(1e-128);
             good &= replace ? clear | ((pivot == pivot) & (size[j] >= 0.0)) : clear;
             for (int i = j + 1; i < m; ++i) {
-                const Real own = S[i][j], weight = own * S[j][j];
+                const Real entry = S[i][j], weight = entry * S[j][j];
                 for (int l = j + 1; l < i; ++l) S[i][l] -= weight * S[j][l];
-                S[i][i] -= weight * own;
-                S[j][i] = own, S[i][j] = weight;  // D L^T above the diagonal, L below
+                S[i][i] -= weight * entry;
+                S[j][i] = entry, S[i][j] = weight;  // D L^T above the diagonal, L below
             }
         }
         return good;

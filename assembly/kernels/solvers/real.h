@@ -99,12 +99,12 @@ inline void inner_tile(Real *const *rows, const Real *x, int from, int to, Real 
     int a = from;
     for (; a + PARTS <= to; a += PARTS)
         UNROLL for (int b = 0; b < PARTS; ++b) {
-            const Real own = once(x[a + b]);
-            UNROLL for (int i = 0; i < R; ++i) total[i][b] += rows[i][a + b] * own;
+            const Real factor = once(x[a + b]);
+            UNROLL for (int i = 0; i < R; ++i) total[i][b] += rows[i][a + b] * factor;
         }
     for (; a < to; ++a) {
-        const Real own = once(x[a]);
-        UNROLL for (int i = 0; i < R; ++i) total[i][0] += rows[i][a] * own;
+        const Real factor = once(x[a]);
+        UNROLL for (int i = 0; i < R; ++i) total[i][0] += rows[i][a] * factor;
     }
     UNROLL for (int i = 0; i < R; ++i) {
         UNROLL for (int half = PARTS / 2; half > 0; half /= 2)
@@ -132,8 +132,8 @@ inline void combine_tile(Real *const *A, int count, const Real *y, int column, R
     Real total[C];
     UNROLL for (int j = 0; j < C; ++j) total[j] = out[column + j];
     for (int i = 0; i < count; ++i) {
-        const Real own = once(y[i]), *row = A[i] + column;
-        UNROLL for (int j = 0; j < C; ++j) total[j] += own * row[j];
+        const Real weight = once(y[i]), *row = A[i] + column;
+        UNROLL for (int j = 0; j < C; ++j) total[j] += weight * row[j];
     }
     UNROLL for (int j = 0; j < C; ++j) out[column + j] = total[j];
 }
@@ -153,11 +153,11 @@ inline void product_tile(
     UNROLL for (int i = 0; i < R; ++i)
         UNROLL for (int j = 0; j < C; ++j) total[i][j] = Real{};
     for (int a = 0; a < width; ++a) {
-        Real own[R];
-        UNROLL for (int i = 0; i < R; ++i) own[i] = once(B[i][a]);
+        Real first[R];
+        UNROLL for (int i = 0; i < R; ++i) first[i] = once(B[i][a]);
         UNROLL for (int j = 0; j < C; ++j) {
             const Real other = once(M[column + j][a]);
-            UNROLL for (int i = 0; i < R; ++i) total[i][j] += own[i] * other;
+            UNROLL for (int i = 0; i < R; ++i) total[i][j] += first[i] * other;
         }
     }
     UNROLL for (int i = 0; i < R; ++i)

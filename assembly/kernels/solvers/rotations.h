@@ -83,12 +83,12 @@ inline void rotation_between(const Real *A, const Real *B, Real *turn) {
     const Real sine = root(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]);
     for (int l = 0; l < LANES; ++l) {
         if (trace[l] < 1.0) {  // beyond a quarter turn the sine loses accuracy
-            double C[9] = {}, own[3];
+            double C[9] = {}, vector[3];
             for (int i = 0; i < 9; ++i)
                 for (int k = 0; k < 3; ++k)
                     C[i] += A[i / 3 * 3 + k][l] * B[i % 3 * 3 + k][l];
-            rotation_log(C, own);
-            for (int k = 0; k < 3; ++k) turn[k][l] = own[k];
+            rotation_log(C, vector);
+            for (int k = 0; k < 3; ++k) turn[k][l] = vector[k];
             continue;
         }
         const double angle = std::atan2(sine[l], trace[l] - 1.0);

@@ -33,7 +33,7 @@ constexpr double GAIN = 1e-3;
 struct Body {
     int64_t point;
     Cones cones;                   // cones of the padded columns
-    int own_discs, own_intervals;  // numbers of cones without padding
+    int unpadded_discs, unpadded_intervals;  // numbers of cones without padding
     int p;
     double centre[6];
     std::vector<double> X, H, start;  // (6, nv), (p, nv), (nv,)
@@ -89,8 +89,8 @@ private:
 inline void Search::begin(const Task &task) {
     body = task.body, half = task.half, tolerance = task.tolerance;
     std::copy(body->centre, body->centre + 6, best);
-    const double *own = best + half;
-    low = std::sqrt(own[0] * own[0] + own[1] * own[1] + own[2] * own[2]);
+    const double *part = best + half;
+    low = std::sqrt(part[0] * part[0] + part[1] * part[1] + part[2] * part[2]);
     high = INFINITY;
     stage = CLIMBING, supports = 0, gained = false;
     heights[0].fill(NAN), heights[1].fill(NAN);
@@ -131,10 +131,10 @@ inline void Search::first_direction() {
         b.cones.each([&](int columns, int, int at) {
             double length = 0.0;
             for (int j = at; j < at + columns; ++j) {
-                const double own =
+                const double component =
                     d[0] * free[j] + d[1] * free[nv + j] + d[2] * free[2 * nv + j];
-                length += own * own;
-                middle -= own * b.start[j];
+                length += component * component;
+                middle -= component * b.start[j];
             }
             height += std::sqrt(length);
         });
@@ -147,8 +147,9 @@ inline void Search::first_direction() {
 
 // Store a screw that is farther from the origin than the best one.
 inline void Search::improve(const double *screw) {
-    const double *own = screw + half;
-    const double size = std::sqrt(own[0] * own[0] + own[1] * own[1] + own[2] * own[2]);
+    const double *part = screw + half;
+    const double size =
+        std::sqrt(part[0] * part[0] + part[1] * part[1] + part[2] * part[2]);
     if (!(size > low)) return;
     if (size > low + GAIN * tolerance) gained = true;
     low = size;
@@ -210,17 +211,17 @@ inline void Search::choose() {
 // Start a box along the current direction; its planes are not known yet.
 inline void Search::start_boxing() {
     stage = BOXING;
-    const Point own = direction;
+    const Point first = direction;
     int least = 0;
     for (int a = 1; a < 3; ++a)
-        if (std::fabs(own[a]) < std::fabs(own[least])) least = a;
-    axes[0] = own;
-    for (int a = 0; a < 3; ++a) axes[1][a] = (a == least) - own[least] * own[a];
+        if (std::fabs(first[a]) < std::fabs(first[least])) least = a;
+    axes[0] = first;
+    for (int a = 0; a < 3; ++a) axes[1][a] = (a == least) - first[least] * first[a];
     const double size = std::sqrt(inner(axes[1], axes[1]));
     for (double &x : axes[1]) x /= size;
     for (int a = 0; a < 3; ++a) {
         const int b = (a + 1) % 3, c = (a + 2) % 3;
-        axes[2][a] = own[b] * axes[1][c] - own[c] * axes[1][b];
+        axes[2][a] = first[b] * axes[1][c] - first[c] * axes[1][b];
     }
     for (const Plane &plane : planes) set_side(plane);
 }
