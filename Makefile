@@ -1,12 +1,14 @@
-# make study   set everything up and run the main job
-# make test    set everything up and run the tests
-# make docs    set everything up and build the site, build/site/index.html
-# PYTHON=python3.13 takes another Python, VENV=PATH another folder for the environment
+# make study   install everything and run the main study
+# make test    install everything and run the fast tests
+# make docs    install everything and build the site, build/site/index.html
+#
+# Variables: PYTHON=python3.13 selects another Python; VENV=PATH selects another folder
+# for the environment.
 
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
-# an environment of another Python is made again, not taken for ready
+# an environment of another Python version is created again
 VERSION := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 EMPTY := $(VENV)/empty-$(VERSION)
 READY := $(VENV)/ready-$(VERSION)
@@ -44,7 +46,7 @@ $(EMPTY): pyproject.toml
 	$(BIN)/python -m pip install --quiet --upgrade pip
 	@touch $@
 
-# C++ is compiled when the package is installed
+# installing the package compiles the C++ code
 $(READY): $(EMPTY) $(CPP)
 	$(BIN)/python -m pip install --quiet -e ".[all,mkl,dev]"
 	@touch $@

@@ -1,4 +1,5 @@
-// Addresses of Python arrays; their number type, shape and order are checked.
+// Read the addresses of the numbers in Python arrays.  The number type, the shape and
+// the memory order of each array are checked.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -9,8 +10,8 @@
 
 namespace nb = nanobind;
 
-// Numbers of rows of arrays that must have equal numbers of rows: that of the first
-// array.
+// A number of rows that several arrays share.  The first array sets the value; -1 means
+// that no array has been read.
 struct Size {
     int64_t value = -1;
 };
@@ -26,14 +27,18 @@ inline std::string text(const Size &size) {
 }
 inline std::string text(int64_t size) { return std::to_string(size); }
 
-// One line that names the argument, the value found and the value expected.
+// Raise a ValueError.  Its message names the argument, the array that was found and the
+// array that was expected.
 [[noreturn]] inline void refuse(
     nb::handle given, const char *name, std::string dtype, bool written,
     std::initializer_list<std::string> sizes) {
-    const auto said = [](nb::object object) { return std::string(nb::str(object).c_str()); };
-    std::string found = said(given.type().attr("__name__")), wanted;
+    const auto string_of = [](nb::object object) {
+        return std::string(nb::str(object).c_str());
+    };
+    std::string found = string_of(given.type().attr("__name__")), wanted;
     if (nb::hasattr(given, "shape") && nb::hasattr(given, "dtype")) {
-        found = said(given.attr("dtype")) + " of shape " + said(given.attr("shape"));
+        found = string_of(given.attr("dtype")) + " of shape " +
+                string_of(given.attr("shape"));
         if (nb::hasattr(given, "flags")) {
             const nb::object flags = given.attr("flags");
             if (!nb::cast<bool>(flags.attr("c_contiguous"))) found += ", not contiguous";
@@ -48,8 +53,8 @@ inline std::string text(int64_t size) { return std::to_string(size); }
             .c_str());
 }
 
-// Address of an array's numbers; null for an empty array.  Numbers of a T that is not
-// const may be written.
+// Return the address of an array's numbers; null for an empty array.  The array must be
+// writable unless T is const.
 template <typename T, typename... Sizes>
 T *address(nb::handle given, const char *name, Sizes &&...sizes) {
     nb::ndarray<T, nb::c_contig, nb::device::cpu> found;
@@ -71,7 +76,7 @@ const int64_t *integers(nb::handle given, const char *name, Sizes &&...sizes) {
     return address<const int64_t>(given, name, std::forward<Sizes>(sizes)...);
 }
 
-// Indices, each at least 0 and below the limit.
+// Read indices; each index must be at least 0 and below the limit.
 inline const int64_t *indices(
     nb::handle given, const char *name, int64_t limit, Size &size) {
     const int64_t *all = integers(given, name, size);
@@ -85,8 +90,9 @@ inline const int64_t *indices(
     return all;
 }
 
-// First rows of groups, and the end of the last group: from 0, increasing and at most the
-// limit; if `whole`, the last one equals the limit.
+// Read the first row of each group; the last number is the end of the last group.  The
+// numbers must begin at 0, must not decrease and must not exceed the limit.  If
+// `whole`, the last number must equal the limit.
 inline const int64_t *starts(
     nb::handle given, const char *name, int64_t limit, bool whole, Size &size) {
     const int64_t *all = integers(given, name, size);

@@ -1,5 +1,5 @@
-// Python's interface to the compiled functions.  Only the bindings check arrays.  While a
-// function runs, other Python threads may run.
+// Functions that add the compiled functions to the Python module.  Only the bindings
+// check arrays.  They release Python's global lock while a compiled function runs.
 #pragma once
 
 #include <nanobind/nanobind.h>

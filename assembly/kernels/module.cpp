@@ -1,9 +1,9 @@
-// One module of compiled functions, for one level of instructions.
+// Python module of the compiled functions, for one level of the instruction set.
 #include "bindings.h"
 #include "solvers/real.h"
 
 NB_MODULE(MODULE, m) {
-    nanobind::set_leak_warnings(false);  // robots remain until the program ends
+    nanobind::set_leak_warnings(false);  // Python caches robots until the program ends
     m.attr("lanes") = LANE_SPACE::LANES;
     m.attr("sources") = SOURCES;  // digest of the source files
     bind_linear(m);

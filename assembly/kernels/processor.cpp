@@ -1,4 +1,5 @@
-// Level of x86-64 that the processor has and the system allows: x86-64 psABI, table 3.1.
+// Level of the x86-64 instruction set that the processor has and that the operating
+// system allows.  Source: x86-64 psABI, table 3.1.
 #include <cpuid.h>
 #include <nanobind/nanobind.h>
 
@@ -18,7 +19,8 @@ Registers cpuid(unsigned leaf) {
 
 bool all(unsigned found, unsigned wanted) { return (found & wanted) == wanted; }
 
-// Registers that the system saves: 1 and 2 of SSE and AVX, 5 to 7 of AVX-512.
+// Bits of the register sets that the operating system saves: 1 for SSE, 2 for AVX, 5 to
+// 7 for AVX-512.
 unsigned saved() {
     unsigned low = 0, high = 0;
     asm volatile("xgetbv" : "=a"(low), "=d"(high) : "c"(0));

@@ -1,10 +1,11 @@
-// Makes fTetWild's meshes reproducible.  It shuffles what it inserts by a generator that
-// it seeds from std::random_device; loaded before it, for all libraries to see, this
-// returns the same number always.
+// Makes fTetWild's meshes reproducible.  fTetWild inserts triangles in a random order;
+// it seeds its generator from std::random_device.  This library replaces that function.
+// It must be loaded before fTetWild, with its symbols visible to all libraries.  The
+// function then always returns the same number.
 #include <random>
 
 #define EXPORTED __attribute__((visibility("default")))
 
 EXPORTED std::random_device::result_type std::random_device::_M_getval() {
-    return 5489;  // the standard generator's own default
+    return 5489;  // the default seed of the C++ standard's std::mt19937
 }

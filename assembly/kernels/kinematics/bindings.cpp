@@ -1,11 +1,12 @@
-// Python binding of the continuation to several targets.
+// Python binding of the continuation to several targets (continuation.cpp).
 #include "../arrays.h"
 #include "../bindings.h"
 #include "../kernels.h"
 
 namespace {
 
-// A robot's joints and closures; the object keeps the arrays alive.
+// The addresses of a robot's joints and closures, and the Python object that keeps
+// their arrays alive.
 struct KeptTree {
     nb::object arrays;
     Tree tree;
@@ -16,28 +17,28 @@ KeptTree tree_of(
     nb::handle pairs, nb::handle moves, nb::handle groups, int64_t platform,
     double size) {
     Size n, closures, count, ends;
-    Tree own = {};
-    own.size = size, own.platform = platform;
-    own.parents = integers(parents, "parents", n);
+    Tree tree = {};
+    tree.size = size, tree.platform = platform;
+    tree.parents = integers(parents, "parents", n);
     for (int64_t i = 0; i < n.value; ++i)
-        if (own.parents[i] >= i) throw nb::value_error("parents: expected frames before");
-    own.kinds = indices(kinds, "kinds", 3, n);
-    own.fixed = reals(fixed, "fixed", n, 4, 4);
-    own.leads = reals(leads, "leads", n);
-    own.pairs = integers(pairs, "pairs", closures, 2);
+        if (tree.parents[i] >= i) throw nb::value_error("parents: expected frames before");
+    tree.kinds = indices(kinds, "kinds", 3, n);
+    tree.fixed = reals(fixed, "fixed", n, 4, 4);
+    tree.leads = reals(leads, "leads", n);
+    tree.pairs = integers(pairs, "pairs", closures, 2);
     for (int64_t i = 0; i < 2 * closures.value; ++i)
-        if (own.pairs[i] < 0 || own.pairs[i] >= n.value)
+        if (tree.pairs[i] < 0 || tree.pairs[i] >= n.value)
             throw nb::value_error("pairs: expected rows of frames");
-    own.moves = integers(moves, "moves", count, 2);
+    tree.moves = integers(moves, "moves", count, 2);
     for (int64_t i = 0; i < count.value; ++i)
-        if (own.moves[2 * i] < 0 || own.moves[2 * i] >= n.value)
+        if (tree.moves[2 * i] < 0 || tree.moves[2 * i] >= n.value)
             throw nb::value_error("moves: expected rows of frames");
     ends.value = closures.value + 2;
-    own.groups = starts(groups, "groups", count.value, true, ends);
+    tree.groups = starts(groups, "groups", count.value, true, ends);
     if (platform < 0 || platform >= n.value)
         throw nb::value_error("platform: expected the row of a frame");
-    own.n = n.value, own.closures = closures.value;
-    return {nb::make_tuple(parents, kinds, fixed, leads, pairs, moves, groups), own};
+    tree.n = n.value, tree.closures = closures.value;
+    return {nb::make_tuple(parents, kinds, fixed, leads, pairs, moves, groups), tree};
 }
 
 void call_follow_all(

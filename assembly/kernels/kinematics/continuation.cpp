@@ -1,35 +1,48 @@
-// Continuation to several targets in parallel.  Each lane follows one target, and takes
-// the next target at the end.  A round is one iteration of Newton's method in every lane;
-// each lane decides on its result independently.
+// Continuation of a robot's configuration to several targets in parallel.
+//
+// A target prescribes joint coordinates or a platform pose.  The path to it is a
+// straight line from the home configuration; its share that is done grows from 0 to 1
+// in steps.  At the end of each step Newton's method solves the closures.  Each lane
+// follows one target, and starts the next target when it has finished.  One round is
+// one iteration of Newton's method in every lane; what follows from its result is
+// decided in each lane separately.
 #include "../kernels.h"
 #include "motion.h"
 
 using namespace LANE_SPACE;
 
-constexpr double SOLVED = 1e-10;  // scaled residual of a configuration that is solved
-constexpr double ROUNDED = 1e-5;  // accepted residual if it does not decrease further
-constexpr double NEAR = 1e-4;     // accepted residual before the last step
-constexpr double JUMP = 0.4;  // [rad or lengths] largest step: keeps the assembly mode
-constexpr double FAR = 1.0;   // largest step if the tangent predicts the whole step
-constexpr double LONG = 0.7;  // step tried by the tangent, as a share of the largest
-constexpr double SHORT = 0.03;  // share of the path: below it steps are short
-// first step on difficult paths, and if the target does not determine all joints
+constexpr double SOLVED = 1e-10;  // largest scaled residual of a solved configuration
+constexpr double ROUNDED = 1e-5;  // largest residual if it does not decrease further
+// largest residual at the end of a step that is not the last
+constexpr double NEAR = 1e-4;
+// [rad or lengths] largest step that keeps the assembly mode
+constexpr double JUMP = 0.4;
+constexpr double FAR = 1.0;  // [rad or lengths] largest step if the tangent predicts it
+// step predicted by the tangent, as a share of the largest step
+constexpr double LONG = 0.7;
+// share of the path; a path with smaller steps is difficult
+constexpr double SHORT = 0.03;
+// first step, as a share of the path, on difficult paths and where the target does not
+// determine all joints
 constexpr double FIRST_STEP = 0.125;
-constexpr double CURVED = 0.25;  // largest correction, as a share of the tangent's step
-// damping, as a share of the normal matrix' trace: if all joints are determined, and if
-// some are not. Rounding errors move undetermined joints by their size over the damping;
-// with less damping their positions would depend on the processor
+constexpr double CURVED = 0.25;  // largest correction, as a share of the predicted step
+// damping, as a share of the trace of the normal matrix: LEAST if the target determines
+// all joints, SPREAD if not.  Rounding errors move an undetermined joint by their size
+// divided by the damping.  With less damping its position would depend on the processor
 constexpr double LEAST = 1e-13, SPREAD = 1e-9;
+// share of the path below which a step fails
 constexpr double SMALLEST_STEP = 1e-5;
-constexpr int NEWTON = 12;  // iterations; quadratic convergence needs about 4
+// largest number of iterations; quadratic convergence needs about 4
+constexpr int NEWTON = 12;
 constexpr double ENDLESS = HUGE_VAL;
 
 namespace {
 
-// After an iteration Newton's method continues, begins another step, or the track ends.
+// State of a lane after an iteration: Newton's method continues, another step begins,
+// or the lane has finished its target.
 enum Next { GOES_ON, BEGINS, ENDED };
 
-// Largest absolute number, NaN if one is NaN.
+// Return the largest absolute value, or NaN if a number is NaN.
 inline Real largest_of(const Real *v, int count) {
     Real largest = {}, total = {};
     for (int i = 0; i < count; ++i) {
@@ -40,12 +53,18 @@ inline Real largest_of(const Real *v, int count) {
 }
 
 // Target and progress of one lane.
+//
+// - done, step, goal: share of the path that is done, step, and share at the step's
+//   end,
+// - jump: largest change of a joint coordinate in a step, ahead: predicted change,
+// - before: previous residual, first: largest change in the first iteration,
+// - careful: the path is difficult and its steps are short.
 struct Lane {
     int64_t target = -1;
     double done, step, goal, jump, ahead, before, first;
     bool careful;
     int iteration;
-    std::vector<double> q;  // coordinates reached
+    std::vector<double> q;  // joint coordinates that are reached
 };
 
 class Follower : Motion {
@@ -87,7 +106,8 @@ void Follower::start(int l, int64_t target) {
     begin(l);
 }
 
-// Newton's method from the lane's coordinates to the end of its step.
+// Start Newton's method at the lane's coordinates, for the configuration at the end of
+// its step.
 void Follower::begin(int l) {
     Lane &lane = lanes[l];
     lane.goal = std::fmin(1.0, lane.done + lane.step);
@@ -103,33 +123,35 @@ void Follower::begin(int l) {
         q[j][l] = goal;
     }
     if (!posed) return;
-    double own[6];
+    double target_pose[6];
     for (int k = 0; k < 6; ++k) {
-        own[k] = targets.poses[lane.target * 6 + k];
-        if (lane.goal < 1.0) own[k] = home_pose[k] + lane.goal * (own[k] - home_pose[k]);
-        pose[k][l] = own[k];
+        target_pose[k] = targets.poses[lane.target * 6 + k];
+        if (lane.goal < 1.0)
+            target_pose[k] = home_pose[k] + lane.goal * (target_pose[k] - home_pose[k]);
+        pose[k][l] = target_pose[k];
     }
     if (all_turns) {
         double A[9];
-        rotation_exp(own + 3, A);
+        rotation_exp(target_pose + 3, A);
         for (int k = 0; k < 9; ++k) turn[k][l] = A[k];
     }
 }
 
-// Result of Newton's method: a completed step, or a shorter one.
+// Accept a step, if `fine`, or shorten it.  If not all joints are determined, the path
+// starts again with short steps.
 Next Follower::next(int l, bool fine, bool determined) {
     Lane &lane = lanes[l];
     if (!lane.careful && (!determined || lane.step < SHORT)) {
-        // the path is difficult: short steps from here on
+        // the path is difficult: all further steps are short
         lane.careful = true, lane.jump = JUMP * longest;
         if (!determined) {
-            // and the result depends on the whole path
+            // the result depends on the whole path, which starts again
             lane.q.assign(targets.start, targets.start + n);
             lane.done = 0.0, lane.step = FIRST_STEP;
         }
     } else {
         for (int j = 0; j < n; ++j)
-            // a jump, or a coordinate that is NaN: another assembly mode
+            // a large change or a NaN means another assembly mode
             fine = fine && std::fabs(q[j][l] - lane.q[j]) < lane.jump;
         if (fine || targets.guess)
             for (int j = 0; j < n; ++j) lane.q[j] = q[j][l];
@@ -146,7 +168,8 @@ Next Follower::next(int l, bool fine, bool determined) {
     return lane.done < 1.0 && lane.step > SMALLEST_STEP ? BEGINS : ENDED;
 }
 
-// Use of an iteration's result in one lane; GOES_ON continues Newton's method.
+// Decide in one lane what follows from the result of an iteration: the largest
+// residual `worst` and the largest change `largest`.
 Next Follower::iterate(int l, double worst, double largest, bool determined) {
     Lane &lane = lanes[l];
     if (lane.goal < 1.0 && !lane.careful && worst < NEAR) return next(l, true, true);
@@ -156,18 +179,18 @@ Next Follower::iterate(int l, double worst, double largest, bool determined) {
         if (lane.ahead > lane.jump || !determined) return next(l, false, determined);
     }
     if (lane.iteration == 1 && !lane.careful && largest > CURVED * lane.first)
-        return next(l, false, true);  // the tangent predicts badly: a shorter step
+        return next(l, false, true);  // the tangent predicts badly: use a shorter step
     lane.first = std::fmax(lane.first, largest);
     const double part = 0.5 / std::fmax(0.5, largest);
     const bool still = largest < 1e-9;
     for (size_t i = 0; i < joints.size(); ++i)
         q[joints[i]][l] -= x[i][l] * part * unit[i];
     if (worst < 1e-14 || still || !std::isfinite(worst))
-        // solved, or as well as an overconstrained robot from a file with rounded numbers
-        // can be
+        // solved, or the residual does not decrease further: an overconstrained robot
+        // from a file with rounded numbers cannot close exactly
         return next(l, worst < SOLVED || (still && worst < ROUNDED), true);
     if (worst > ROUNDED && worst > 0.7 * lane.before)
-        return next(l, false, true);  // no convergence: try a smaller step
+        return next(l, false, true);  // no convergence: use a smaller step
     lane.before = worst;
     return ++lane.iteration < NEWTON ? GOES_ON : next(l, worst < SOLVED, true);
 }
@@ -208,15 +231,17 @@ void Follower::follow(Tracks &out) {
     }
 }
 
-// Results at the ends of the tracks: rotations and origins of frames, open closures.
+// Compute the results at the ends of the paths: rotations and origins of the frames,
+// and the remaining closure errors.
 void Follower::frames(Tracks &out) {
     in_blocks(all_of(targets.count), [&](const Block &block, Whole inside) {
         for (int j = 0; j < n; ++j) q[j] = block.read(out.ends, n, j);
         forward();
         for (int j = 0; j < n; ++j)
             for (int k = 0; k < 12; ++k) {
-                const Real own = k % 4 < 3 ? R[9 * j + k / 4 * 3 + k % 4] : p[3 * j + k / 4];
-                block.write(out.transforms, 16 * n, 16 * j + k, own, inside);
+                const Real entry =
+                    k % 4 < 3 ? R[9 * j + k / 4 * 3 + k % 4] : p[3 * j + k / 4];
+                block.write(out.transforms, 16 * n, 16 * j + k, entry, inside);
             }
         for (int c = 0; c < closures; ++c) {
             const int64_t a = tree.pairs[2 * c], b = tree.pairs[2 * c + 1];

@@ -1,5 +1,5 @@
-// Residuals of a robot's closures and of its platform's pose in every lane, and the step
-// of Newton's method that reduces them.
+// Residuals of a robot's closures and of its platform's pose in every lane, and the
+// step of Newton's method that reduces them.
 #pragma once
 
 #include "../records.h"
@@ -8,17 +8,19 @@
 
 namespace LANE_SPACE {
 
-// factor between a pivot and the damping from which a step is determined
+// least ratio of a pivot to the damping with which a step is determined
 constexpr double CLEAR = 1e4;
 
 namespace {
 
-// An unknown joint that moves a closure: its row of J and its column of N.
+// An unknown joint that moves a closure: its row of the Jacobian J and its column of N.
 struct Mover {
     int row, column;
 };
 
-// Poses of all frames, residuals, and a step that reduces them.
+// Poses of all frames, the residuals r, their Jacobian J, and the step x that reduces
+// r.  N is the normal matrix J^T J.  R and p are rotations and origins of the frames
+// before the motion of their own joints; after_R and after_p those after it.
 class Motion {
 public:
     Motion(const Tree &tree, const Targets &targets);
@@ -28,15 +30,19 @@ protected:
     const Targets &targets;
     const int n, closures;
     const bool posed;
-    std::vector<int> joints, columns;  // unknown joints; -1 for the others
+    // unknown joints; column of each frame's joint or -1
+    std::vector<int> joints, columns;
     std::vector<double> unit;
-    std::vector<std::vector<int>> coupled;  // later columns coupled with a row of N
-    std::vector<std::vector<Mover>> movers;  // of each closure, then of the platform
-    std::vector<bool> straight;             // frames that are not turned in their parents
-    bool asked[6], all_turns, turns;
+    // columns after i that are coupled with row i of N
+    std::vector<std::vector<int>> coupled;
+    // unknown joints of each closure, then of the platform
+    std::vector<std::vector<Mover>> movers;
+    std::vector<bool> straight;  // frames that are not rotated in their parents
+    bool requested[6], all_turns, turns;
     Row q, R, p, after_R, after_p, r, J, x;
     Table N;
-    Real pose[6] = {}, turn[9] = {};  // required pose of the platform on the path
+    // required pose of the platform: vector, rotation matrix
+    Real pose[6] = {}, turn[9] = {};
 
     void forward();
     void equations();
@@ -60,9 +66,9 @@ Motion::Motion(const Tree &tree, const Targets &targets)
         }
     x.resize(joints.size());
     for (int k = 0; k < 6; ++k)
-        asked[k] = posed && targets.count && std::isfinite(targets.poses[k]);
-    all_turns = asked[3] && asked[4] && asked[5];
-    turns = asked[3] || asked[4] || asked[5];
+        requested[k] = posed && targets.count && std::isfinite(targets.poses[k]);
+    all_turns = requested[3] && requested[4] && requested[5];
+    turns = requested[3] || requested[4] || requested[5];
     couple();
     for (int i = 0; i < n; ++i) {
         bool identity = true;
@@ -72,7 +78,9 @@ Motion::Motion(const Tree &tree, const Targets &targets)
     }
 }
 
-// Joints that move the same closure, and those coupled by elimination.
+// Find the unknown joints that move each closure, and the entries of N that can differ
+// from zero: joints of one closure are coupled, and the elimination couples further
+// ones.
 void Motion::couple() {
     const int m = joints.size();
     std::vector<std::vector<char>> entered(m, std::vector<char>(m, 0));
@@ -93,13 +101,13 @@ void Motion::couple() {
     }
 }
 
-// Rotations and origins of all frames before their own motion.
+// Compute the rotations and origins of all frames, before and after their own motion.
 void Motion::forward() {
     for (int i = 0; i < n; ++i) {
         const double *fixed = tree.fixed + 16 * i;
-        Real *own = &R[9 * i], *at = &p[3 * i];
+        Real *rotation = &R[9 * i], *at = &p[3 * i];
         if (tree.parents[i] < 0) {
-            for (int k = 0; k < 9; ++k) own[k] = real(fixed[k / 3 * 4 + k % 3]);
+            for (int k = 0; k < 9; ++k) rotation[k] = real(fixed[k / 3 * 4 + k % 3]);
             for (int k = 0; k < 3; ++k) at[k] = real(fixed[4 * k + 3]);
         } else {
             const int64_t parent = tree.parents[i];
@@ -111,30 +119,33 @@ void Motion::forward() {
                 const Real a = A[3 * k], b = A[3 * k + 1], c = A[3 * k + 2];
                 at[k] = o[k] + a * fixed[3] + b * fixed[7] + c * fixed[11];
                 if (straight[i])
-                    own[3 * k] = a, own[3 * k + 1] = b, own[3 * k + 2] = c;
+                    rotation[3 * k] = a, rotation[3 * k + 1] = b, rotation[3 * k + 2] = c;
                 else
                     for (int l = 0; l < 3; ++l)
-                        own[3 * k + l] = a * fixed[l] + b * fixed[4 + l] + c * fixed[8 + l];
+                        rotation[3 * k + l] =
+                            a * fixed[l] + b * fixed[4 + l] + c * fixed[8 + l];
             }
         }
         if (tree.kinds[i] == 1) {
             Real s, c, *A = &after_R[9 * i];
             sine_cosine(q[i], &s, &c);
             for (int k = 0; k < 3; ++k) {
-                const Real a = own[3 * k], b = own[3 * k + 1];
+                const Real a = rotation[3 * k], b = rotation[3 * k + 1];
                 A[3 * k] = c * a + s * b, A[3 * k + 1] = c * b - s * a;
-                A[3 * k + 2] = own[3 * k + 2];
+                A[3 * k + 2] = rotation[3 * k + 2];
             }
             if (const double lead = tree.leads[i])
                 for (int k = 0; k < 3; ++k)
-                    after_p[3 * i + k] = at[k] + lead * q[i] * own[3 * k + 2];
+                    after_p[3 * i + k] = at[k] + lead * q[i] * rotation[3 * k + 2];
         } else if (tree.kinds[i] == 2) {
-            for (int k = 0; k < 3; ++k) after_p[3 * i + k] = at[k] + q[i] * own[3 * k + 2];
+            for (int k = 0; k < 3; ++k)
+                after_p[3 * i + k] = at[k] + q[i] * rotation[3 * k + 2];
         }
     }
 }
 
-// Scaled residuals and their derivatives, six numbers for each move of the tree.
+// Compute the scaled residuals and their derivatives, six numbers for each row of
+// `moves`. Lengths are divided by the reference length.
 void Motion::equations() {
     const double scale = 1.0 / tree.size;
     for (int g = 0; g < closures + posed; ++g) {
@@ -172,25 +183,26 @@ void Motion::equations() {
     platform_turn(first, last, out);
     for (int k = 0; k < 3; ++k) out[3 + k] = (p[3 * tree.platform + k] - pose[k]) * scale;
     for (int k = 0; k < 6; ++k)
-        if (!asked[(k + 3) % 6]) {
+        if (!requested[(k + 3) % 6]) {
             out[k] = Real{};
             for (int e = first; e < last; ++e) J[6 * e + k] = Real{};
         }
 }
 
-// Rotation that the platform still needs; regular near half a turn if all three rotations
-// are required.
+// Compute the rotation from the required to the current orientation of the platform,
+// and its derivatives.  If all three rotations are required, the residual is regular
+// near half a turn, too.
 void Motion::platform_turn(int first, int last, Real *out) {
-    const Real *own = &R[9 * tree.platform];
+    const Real *rotation = &R[9 * tree.platform];
     if (all_turns) {
-        rotation_between(own, turn, out);
+        rotation_between(rotation, turn, out);
         return;
     }
     if (!turns) return;
     Real left[9];
     for (int l = 0; l < LANES; ++l) {
         double A[9], vector[3];
-        for (int k = 0; k < 9; ++k) A[k] = own[k][l];
+        for (int k = 0; k < 9; ++k) A[k] = rotation[k][l];
         rotation_log(A, vector);
         for (int k = 0; k < 3; ++k) out[k][l] = vector[k] - pose[3 + k][l];
         inverse_left_jacobian(vector, A);
@@ -204,7 +216,8 @@ void Motion::platform_turn(int first, int last, Real *out) {
     }
 }
 
-// Least-squares step x, of least norm by damping; mask of lanes where it is determined.
+// Compute the least-squares step x; the damping selects the one of least norm.
+// Return the lanes in which all joints are determined.
 Whole Motion::least_step(Real damped) {
     const int m = joints.size();
     for (int i = 0; i < m; ++i) {
@@ -214,11 +227,11 @@ Whole Motion::least_step(Real damped) {
     for (int g = 0; g < closures + posed; ++g) {
         const Real *open = &r[6 * g];
         for (size_t a = 0; a < movers[g].size(); ++a) {
-            const Real *own = &J[6 * movers[g][a].row];
+            const Real *row = &J[6 * movers[g][a].row];
             const int i = movers[g][a].column;
             Real number[6];
             for (int k = 0; k < 6; ++k) {
-                number[k] = once(own[k]);
+                number[k] = once(row[k]);
                 x[i] += number[k] * open[k];
             }
             for (size_t b = 0; b <= a; ++b) {
@@ -233,7 +246,7 @@ Whole Motion::least_step(Real damped) {
     Real damping = real(1e-30);
     for (int i = 0; i < m; ++i) damping += damped * N[i][i];
     Whole determined = whole(-1);
-    for (int i = 0; i < m; ++i) {  // U^T D U
+    for (int i = 0; i < m; ++i) {  // N = U^T D U
         Real *row = N[i];
         const Real pivot = row[i] + damping;
         determined &= pivot > CLEAR * damping;

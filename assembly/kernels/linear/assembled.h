@@ -1,4 +1,5 @@
-// Problems (22) and (21) of all points, with two lanes or with many.
+// Problems (22) and (21) at all points, with two lanes or with as many as a register
+// holds.
 #pragma once
 
 #include "../kernels.h"
@@ -22,7 +23,7 @@ void assemble_all(const Robot &robot, const Points &points, Solutions &out) {
     in_blocks(energies.waiting, solve);
 }
 
-// For robots without springs.
+// The robot must not have springs.
 void all_margins(const Robot &robot, const Points &points, Margins &out) {
     ZoneMargins zone(robot, points);
     in_blocks(all_of(points.count), [&](const Block &block, Whole pending) {

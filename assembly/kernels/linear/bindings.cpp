@@ -5,46 +5,46 @@
 
 namespace {
 
-// A robot's arrays; the object keeps them alive.
+// A robot's addresses, and the Python object that keeps its arrays alive.
 struct KeptRobot {
     nb::object structure;
     Robot robot;
 };
 
 KeptRobot robot_of(nb::object s) {
-    const auto own = [&](const char *name) { return s.attr(name); };
+    const auto array = [&](const char *name) { return s.attr(name); };
     Robot r = {};
     Size n, closures, np, ny, ends, ng, nu, cone_ends, nq;
-    r.size = nb::cast<double>(own("size"));
-    r.platform = nb::cast<int64_t>(own("platform"));
-    r.on_path = reals(own("on_path"), "on_path", n);
+    r.size = nb::cast<double>(array("size"));
+    r.platform = nb::cast<int64_t>(array("platform"));
+    r.on_path = reals(array("on_path"), "on_path", n);
     if (r.platform < 0 || r.platform >= n.value)
         throw nb::value_error("platform: expected the row of a frame");
-    r.patterns = reals(own("patterns"), "patterns", np, closures);
-    r.pattern_of = indices(own("pattern_of"), "pattern_of", np.value, n);
-    r.springs = reals(own("springs"), "springs", ny, 6);
-    r.spring_frame = indices(own("spring_frame"), "spring_frame", n.value, ny);
-    r.spring_order = indices(own("spring_order"), "spring_order", ny.value, ny);
-    r.of_joint = indices(own("of_joint"), "of_joint", 2, ny);
-    r.groups = starts(own("groups"), "groups", ny.value, false, ends);
+    r.patterns = reals(array("patterns"), "patterns", np, closures);
+    r.pattern_of = indices(array("pattern_of"), "pattern_of", np.value, n);
+    r.springs = reals(array("springs"), "springs", ny, 6);
+    r.spring_frame = indices(array("spring_frame"), "spring_frame", n.value, ny);
+    r.spring_order = indices(array("spring_order"), "spring_order", ny.value, ny);
+    r.of_joint = indices(array("of_joint"), "of_joint", 2, ny);
+    r.groups = starts(array("groups"), "groups", ny.value, false, ends);
     ng.value = ends.value - 1;
-    r.group_pattern = indices(own("group_pattern"), "group_pattern", np.value, ng);
-    r.group_on_path = reals(own("group_on_path"), "group_on_path", ng);
-    r.cone_frame = indices(own("cone_frame"), "cone_frame", n.value, nu);
-    r.cone_axis = indices(own("cone_axis"), "cone_axis", 6, nu);
-    r.cone_size = reals(own("cone_size"), "cone_size", nu);
-    r.starts = starts(own("starts"), "starts", nu.value, true, cone_ends);
-    r.free_frame = indices(own("free_frame"), "free_frame", n.value, nq);
-    r.free_axis = indices(own("free_axis"), "free_axis", 6, nq);
-    r.free_lead = reals(own("free_lead"), "free_lead", nq);
-    r.free_bound = reals(own("free_bound"), "free_bound", nq);
+    r.group_pattern = indices(array("group_pattern"), "group_pattern", np.value, ng);
+    r.group_on_path = reals(array("group_on_path"), "group_on_path", ng);
+    r.cone_frame = indices(array("cone_frame"), "cone_frame", n.value, nu);
+    r.cone_axis = indices(array("cone_axis"), "cone_axis", 6, nu);
+    r.cone_size = reals(array("cone_size"), "cone_size", nu);
+    r.starts = starts(array("starts"), "starts", nu.value, true, cone_ends);
+    r.free_frame = indices(array("free_frame"), "free_frame", n.value, nq);
+    r.free_axis = indices(array("free_axis"), "free_axis", 6, nq);
+    r.free_lead = reals(array("free_lead"), "free_lead", nq);
+    r.free_bound = reals(array("free_bound"), "free_bound", nq);
     r.n = n.value, r.closures = closures.value, r.np = np.value, r.ny = ny.value;
     r.ng = ng.value, r.nu = nu.value, r.cones = cone_ends.value - 1, r.nq = nq.value;
     return {std::move(s), r};
 }
 
-// Frames, their nominal closure error and their geometric errors: of each point, or one
-// row for all.
+// Read frames, nominal closure errors and geometric errors.  Each array has one row
+// for each point or one row for all points.
 Points points_of(
     const Robot &r, nb::handle T, nb::handle errors, nb::handle mismatch, Size &k) {
     Size postures, sets;
@@ -52,9 +52,10 @@ Points points_of(
     points.T = reals(T, "T", postures, r.n, 4, 4);
     points.mismatch = reals(mismatch, "mismatch", postures);
     points.errors = reals(errors, "errors", sets, r.n, 6);
-    points.own_posture = postures.value != 1, points.own_errors = sets.value != 1;
-    k = points.own_posture ? postures : sets;
-    if (points.own_errors) reals(errors, "errors", k, r.n, 6);
+    points.posture_per_point = postures.value != 1;
+    points.errors_per_point = sets.value != 1;
+    k = points.posture_per_point ? postures : sets;
+    if (points.errors_per_point) reals(errors, "errors", k, r.n, 6);
     points.count = k.value;
     return points;
 }
@@ -71,8 +72,8 @@ void call_assemble_all(
     if (!loads.is_none()) {
         Size acting;
         points.loads = reals(loads, "loads", acting, 2, r.n, 6);
-        points.own_loads = acting.value != 1;
-        if (points.own_loads) reals(loads, "loads", k, 2, r.n, 6);
+        points.loads_per_point = acting.value != 1;
+        if (points.loads_per_point) reals(loads, "loads", k, 2, r.n, 6);
     }
     Solutions out;
     out.outcome = address<int64_t>(outcome, "outcome", k);
@@ -130,7 +131,8 @@ void call_bound_all(
         reals(held_clearances, "held_clearances", k, h.nu), reals(energy, "energy", k),
         reals(without_clearance, "without_clearance", k),
         indices(cone_of, "cone_of", h.cones, cones)};
-    const Asked asked = {reals(offset, "offset", 3), reals(tolerance, "tolerance", 2)};
+    const PoseErrorRequest requested = {
+        reals(offset, "offset", 3), reals(tolerance, "tolerance", 2)};
     Bounds out = {
         {address<double>(rotation, "rotation", k, 2),
          address<double>(translation, "translation", k, 2)},
@@ -139,7 +141,7 @@ void call_bound_all(
         address<int64_t>(supports, "supports", k),
         address<int64_t>(outcome, "outcome", k)};
     const nb::gil_scoped_release others;
-    bound_all(r, points, centres, loads, asked, out);
+    bound_all(r, points, centres, loads, requested, out);
 }
 
 void call_comply_all(

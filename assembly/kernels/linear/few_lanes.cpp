@@ -1,3 +1,3 @@
-// Problems (22) and (21) of one or two postures.
+// Problems (22) and (21) at one or two postures.
 #define FEW_LANES
 #include "assembled.h"

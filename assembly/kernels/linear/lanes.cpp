@@ -1,4 +1,4 @@
-// Problems (22), (21) and (27), and the classical compliance, several postures in
+// Problems (22), (21) and (27), and the classical compliance, at several postures in
 // parallel.
 #include "assembled.h"
 #include "compliances.h"
@@ -6,13 +6,13 @@
 
 using namespace LANE_SPACE;
 
-// points whose reachable sets are stored at the same time
+// largest number of points whose bodies are in memory at the same time
 constexpr size_t AT_ONCE = 1024;
 
 void bound_all(
     const Robot &robot, const Points &points, const Centres &centres,
-    const ClearanceLoads &loads, const Asked &asked, Bounds &out) {
-    ReachableSets sets(robot, points, centres, loads, asked.offset);
+    const ClearanceLoads &loads, const PoseErrorRequest &requested, Bounds &out) {
+    ReachableSets sets(robot, points, centres, loads, requested.offset);
     std::vector<int64_t> left;
     for (int64_t i = 0; i < points.count; ++i)
         if (out.outcome[i] == COMPILED) left.push_back(i);
@@ -29,7 +29,7 @@ void bound_all(
         in_blocks({&left[first], &left[first] + last - first}, [&](const Block &block, Whole pending) {
             return sets.read_bodies(points, block, pending, bodies, out.outcome);
         });
-        for (const auto &[size, tasks] : searches_of(bodies, asked.tolerance))
+        for (const auto &[size, tasks] : searches_of(bodies, requested.tolerance))
             Farthest(*tasks.front().body, size[0]).search(tasks, settle);
     }
 }

@@ -1,41 +1,45 @@
 // Effects of loads on a robot without clearances and errors, at several postures in
-// parallel.  In problem (22) under loads,
+// parallel.  Problem (22) under loads is
 //
 //     minimise  |y|^2 / 2 - f.y - c.u - g.q   subject to  A_q q + A_u u + A_y y = -known,
 //
-// the closures' wrenches w that balance the free motions, A_q^T w = -g, with the least
-// energy of the springs make  t = f + A_y^T w  orthogonal to all closure columns of
-// springs.  With y = t + ..,
+// with loads f on the springs, c on the clearances and g on the free motions.  The
+// closures carry wrenches w that balance the free motions, A_q^T w = -g.  Those with
+// the least energy of the springs make the deformations t = f + A_y^T w orthogonal to
+// the closure columns of the springs.  With y = t + y', where t and y' are orthogonal,
+// the energy and the objective are
 //
-//     |t|^2 / 2 is stored beside  |G u + h|^2 / 2 - d.u,   d = c + A_u^T w:
+//     |t|^2 / 2 + |G u + h|^2 / 2   and   |G u + h|^2 / 2 - d.u + constant
 //
-// G and h are those without loads; d contains the forces of the loads on clearances.
+// with d = c + A_u^T w.  G and h are those of the robot without loads.  d are the
+// forces that the loads exert on the clearances.
 #pragma once
 
 #include "reduction.h"
 
 namespace LANE_SPACE {
 
-// share of the largest force on a free motion that counts as zero
+// force on a free motion that counts as zero, as a share of the largest such force
 constexpr double STILL_OF_DRIVE = 1e-9;
 
 class Loaded : public Reduction {
 public:
     Loaded(const Robot &s, const Points &points)
-        : Reduction(s, points), loaded(points.loads), tight(loaded ? s.ny : 0),
-          holding(loaded ? m : 0), drive(loaded ? nq : 0), on_play(loaded ? nu : 0),
-          left(loaded ? 6 * ng : 0), pull(loaded ? nu : 0) {
+        : Reduction(s, points), loaded(points.loads), load_strain(loaded ? s.ny : 0),
+          closure_wrench(loaded ? m : 0), drive(loaded ? nq : 0),
+          clearance_load(loaded ? nu : 0), strain_error(loaded ? 6 * ng : 0),
+          clearance_force(loaded ? nu : 0) {
         programme.loaded = loaded;
     }
 
 protected:
     const bool loaded;
-    Row tight;     // (ny,) t
-    Row holding;   // (m,) w
-    Row drive;     // (nq,) g
-    Row on_play;   // (nu,) c, in the robot's order
-    Row left;      // (r,) rounding error of t in the springs of closures
-    Real stored;   // |t|^2 / 2
+    Row load_strain;     // (ny,) t, deformations by the loads alone
+    Row closure_wrench;  // (m,) w, wrenches on the closures
+    Row drive;           // (nq,) g, forces on the free motions
+    Row clearance_load;  // (nu,) c, forces on the clearances, robot's order
+    Row strain_error;    // (r,) rounding error of t along the springs' closure columns
+    Real stored;         // |t|^2 / 2, energy of the loads alone
 
     Whole balance(const Points &points, const Block &block, int rank, int r);
     Whole bring_into_balance(const Points &points, const Block &block, int rank, int r);
@@ -43,51 +47,56 @@ protected:
     Row on_patterns(const Row &closing) const;
 
 private:
-    std::vector<double> acting;  // of all lanes, if they are equal
-    int64_t balanced = -1;       // number of the posture's change
-    Row pull;                    // (nu,) d
+    std::vector<double> acting;  // loads of all lanes, if equal; otherwise empty
+    int64_t balanced = -1;       // value of `changes` at the last balance
+    Row clearance_force;         // (nu,) d, solver's order
     Whole driven;
 
-    Row bent_groups();
+    Row group_deformation();
 };
 
-// The work of a wrench on a column.
+// Return the work of a wrench on a unit motion along a column.
 inline Real Loaded::along(const Real *column, const Real *wrench) const {
     Real total = {};
     for (int a = 0; a < 6; ++a) total += column[a] * wrench[a];
     return total;
 }
 
-// (6 np,) closures' wrenches on frames of each pattern.
+// Return the wrenches (6 np,) that the wrenches `closing` on the closures exert on
+// frames of each pattern.
 inline Row Loaded::on_patterns(const Row &closing) const {
     Row on(6 * np);
     for (int g = 0; g < np; ++g) part(closing.data(), g, &on[6 * g]);
     return on;
 }
 
-// t in the six springs of each group.
-inline Row Loaded::bent_groups() {
-    Row bent(6 * ng);
+// Return t in the six equivalent springs of each group.
+inline Row Loaded::group_deformation() {
+    Row deformation(6 * ng);
     Triangle rows(6, widest);
     for (int g = 0; g < ng; ++g) {
         const int count = spring_group(g, rows), first = int(s.groups[g]);
         triangulate(rows, 6, count, Real{}, Real{}, -1.0, count);
-        Row own(count);
-        std::copy(&tight[first], &tight[first] + (s.groups[g + 1] - first), own.begin());
-        turn_back(rows, 6, count, own.data());
-        std::copy(own.begin(), own.begin() + 6, &bent[6 * g]);
+        Row strains(count);
+        std::copy(
+            &load_strain[first], &load_strain[first] + (s.groups[g + 1] - first),
+            strains.begin());
+        turn_back(rows, 6, count, strains.data());
+        std::copy(strains.begin(), strains.begin() + 6, &deformation[6 * g]);
     }
-    return bent;
+    return deformation;
 }
 
-// Springs, closures and clearances of the tight robot under its loads; returns the lanes
-// where these drive a motion that nothing resists.
+// Compute the deformations of the springs, the wrenches on the closures and the forces
+// on the clearances for the robot without clearances and errors under its loads.
+// Return the lanes where the loads move a free motion that no spring resists.
 inline Whole Loaded::balance(
     const Points &points, const Block &block, int rank, int r) {
     const auto load = [&](int64_t half, int64_t j, int64_t axis) {
-        return block.read(points.loads, points.own_loads * 12 * n, 6 * (n * half + j) + axis);
+        return block.read(
+            points.loads, points.loads_per_point * 12 * n, 6 * (n * half + j) + axis);
     };
-    Row own(s.ny);
+    Row spring_load(s.ny);
     Real most = {};
     for (int c = 0; c < nq; ++c) {
         drive[c] = load(1, s.free_frame[c], s.free_axis[c]);
@@ -95,53 +104,57 @@ inline Whole Loaded::balance(
             drive[c] += lead * load(1, s.free_frame[c], 5);
         most = larger(magnitude(drive[c]), most);
     }
-    const Whole loose = hold_free_motions(rank, drive, STILL_OF_DRIVE * most, holding);
+    const Whole loose =
+        balance_free_motions(rank, drive, STILL_OF_DRIVE * most, closure_wrench);
     for (int c = 0; c < s.ny; ++c)
         for (int axis = 0; axis < 6; ++axis)
             if (const double weight = s.springs[6 * c + axis])
-                own[c] += weight * load(s.of_joint[c], s.spring_frame[c], axis);
-    const auto bend = [&] {
-        const Row on = on_patterns(holding);
+                spring_load[c] += weight * load(s.of_joint[c], s.spring_frame[c], axis);
+    const auto deform = [&] {
+        const Row on = on_patterns(closure_wrench);
         for (int c = 0; c < s.ny; ++c)
-            tight[c] = own[c] + along(elastic[c], &on[6 * s.pattern_of[s.spring_frame[c]]]);
+            load_strain[c] =
+                spring_load[c] +
+                along(elastic[c], &on[6 * s.pattern_of[s.spring_frame[c]]]);
         return on;
     };
-    bend();
-    Row bent = bent_groups();
-    bend_least(r, bent, holding);
-    const Row on = bend();
-    stored = 0.5 * inner(tight.data(), tight.data(), int(s.ny));
-    left = bent_groups();
-    turn_back(springs, r, 6 * ng, left.data());
+    deform();
+    Row deformation = group_deformation();
+    minimise_spring_energy(r, deformation, closure_wrench);
+    const Row on = deform();
+    stored = 0.5 * inner(load_strain.data(), load_strain.data(), int(s.ny));
+    strain_error = group_deformation();
+    turn_back(springs, r, 6 * ng, strain_error.data());
     for (int c = 0; c < nu; ++c) {
         const int k = int(cones.column[c]);
         const int64_t j = s.cone_frame[k];
-        on_play[k] = s.cone_size[k] * load(1, j, s.cone_axis[k]);
-        pull[c] = on_play[k] + enters(k, &on[6 * s.pattern_of[j]]);
+        clearance_load[k] = s.cone_size[k] * load(1, j, s.cone_axis[k]);
+        clearance_force[c] = clearance_load[k] + enters(k, &on[6 * s.pattern_of[j]]);
     }
     return loose;
 }
 
-// The same, which is kept while the posture and the loads of all lanes are.
+// Do the same, or use the stored result if neither the posture nor the loads of any
+// lane have changed.
 inline Whole Loaded::bring_into_balance(
     const Points &points, const Block &block, int rank, int r) {
     const size_t count = 12 * size_t(n);
     const auto of = [&](int l) {
-        return points.loads + points.own_loads * block.point[l] * count;
+        return points.loads + points.loads_per_point * block.point[l] * count;
     };
-    const double *own = of(0);
-    const bool each = points.own_loads;
+    const double *first = of(0);
+    const bool each = points.loads_per_point;
     bool alike = !posture.empty();
     for (int l = 1; alike && each && l < LANES; ++l)
-        alike = std::equal(own, own + count, of(l));
+        alike = std::equal(first, first + count, of(l));
     const bool known = alike && balanced == changes && acting.size() == count &&
-                       (!each || std::equal(own, own + count, acting.data()));
+                       (!each || std::equal(first, first + count, acting.data()));
     if (!known) {
         driven = balance(points, block, rank, r);
-        acting.assign(own, own + (alike ? count : 0));
+        acting.assign(first, first + (alike ? count : 0));
         balanced = changes;
     }
-    std::copy(pull.begin(), pull.end(), programme.d.begin());
+    std::copy(clearance_force.begin(), clearance_force.end(), programme.d.begin());
     return driven;
 }
 

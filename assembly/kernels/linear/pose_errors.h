@@ -1,7 +1,8 @@
-// Problem (27), assumptions frozen and free, at several postures in parallel, from the
-// frames' poses to the certified bounds: deformations do not change, unloaded clearances
-// move, passive joints follow.  The reference solves points with a numerically ambiguous
-// rank, or where a passive joint could exceed the bound of its motion.
+// Problem (27) with the assumptions `frozen` and `free`, at several postures in
+// parallel, from the poses of the frames to the convex bodies whose farthest points
+// farthest.h bounds.  Deformations do not change, unloaded clearances move, and passive
+// joints follow.  assembly/linear/reference solves points with a numerically ambiguous
+// rank, and points where a passive joint could exceed its range.
 #pragma once
 
 #include <map>
@@ -11,13 +12,14 @@
 
 namespace LANE_SPACE {
 
-constexpr double UNBOUNDED = 1e-8;  // assembly/kinematics/ranks.py
-constexpr double APART = 100.0;  // factor by which load and slack of a cone must differ
+constexpr double UNBOUNDED = 1e-8;  // least motion by a free motion: ranks.py
+constexpr double APART = 100.0;  // least ratio of load and slack, or its inverse
 
-// Columns are padded to a multiple of this many cones, to solve bodies in parallel.
+// Numbers of cones and of rows are padded to a multiple of this number, so that more
+// bodies have equal sizes and can be solved together.
 constexpr int FILLED = 2;
 
-// Blocks of points of one robot without springs, in sequence.
+// Reader of blocks of points of one robot without springs, in sequence.
 class ReachableSets : public Rows {
 public:
     ReachableSets(
@@ -31,18 +33,18 @@ public:
     }
 
     Whole read_bodies(
-        const Points &points, const Block &block, Whole asked, std::vector<Body> &bodies,
-        int64_t *outcome);
+        const Points &points, const Block &block, Whole requested,
+        std::vector<Body> &bodies, int64_t *outcome);
 
 private:
     const Centres &centres;
     const ClearanceLoads &loads;
     const double *offset;
     std::vector<int> of_cone;  // (nu,) the cone of each column
-    bool bounded = false;      // some free motion
-    Table X;                   // (6, nu) [rad, m] columns in the solver's order
-    Row start;                 // (nu,) likewise
-    std::vector<Whole> held, cone;  // columns in the solver's order; cones
+    bool bounded = false;      // a free motion has a limit
+    Table X;                   // (6, nu) [rad, m] platform screws by unit clearances
+    Row start;                 // (nu,) clearances of the solution of (22)
+    std::vector<Whole> held, cone;  // held columns, solver's order; held cones
 
     Whole held_cones(const Block &block);
     Whole follow(int rank);
@@ -50,8 +52,10 @@ private:
     Body body_of(int l, int64_t point, int p, const Real *centre) const;
 };
 
-// Lanes where the loaded clearances are unambiguous; these are held.  Load times slack is
-// about the solver's gap, so one of the two is nearly zero.
+// Find the loaded clearances, which are held.  Return the lanes where they are
+// unambiguous.  The load of a cone is the scaled force on its clearances; the slack is
+// the remaining distance 1 - |u_k|.  Their product is about the gap of the solver, so
+// that one of them is nearly zero.
 inline Whole ReachableSets::held_cones(const Block &block) {
     const Robot &h = *loads.robot;
     const int closures = int(h.closures);
@@ -68,8 +72,8 @@ inline Whole ReachableSets::held_cones(const Block &block) {
     Whole decided = whole(-1);
     for (int c = 0; c < s.cones; ++c) {
         Real squares = {}, size = {}, screw[6];
-        const int64_t own = loads.cone_of[c];
-        for (int64_t i = h.starts[own]; i < h.starts[own + 1]; ++i) {
+        const int64_t held_cone = loads.cone_of[c];
+        for (int64_t i = h.starts[held_cone]; i < h.starts[held_cone + 1]; ++i) {
             const int64_t j = h.cone_frame[i];
             column(j, h.cone_axis[i], screw);
             const Real force = inner(screw, &on[6 * h.pattern_of[j]], 6) * h.cone_size[i];
@@ -78,9 +82,10 @@ inline Whole ReachableSets::held_cones(const Block &block) {
             size += u * u;
         }
         const Real load = root(squares) / scale, left = 1.0 - root(size);
-        const Real slack = left <= 0.0 ? Real{} : left;  // in this order NaN stays NaN
+        // the order of the cases keeps NaN
+        const Real slack = left <= 0.0 ? Real{} : left;
         cone[c] = (load > slack) & (load > 1e-9);
-        // written so that NaN is ambiguous
+        // NaN is ambiguous, because all comparisons are false
         decided &= (load > APART * slack) | (slack > APART * load) |
                    ((load <= 1e-9) & (slack <= 1e-9));
     }
@@ -88,19 +93,21 @@ inline Whole ReachableSets::held_cones(const Block &block) {
     return decided;
 }
 
-// X: motions of the platform by clearances and the free motions that follow, at the
-// requested point; returns the lanes where no free motion alone moves it.
+// Compute X, the motions of the platform at the requested point by the clearances and
+// by the free motions that follow them.  Return the lanes where no free motion alone
+// moves the platform.
 inline Whole ReachableSets::follow(int rank) {
     Whole still = whole(-1);
     Row closing(m), on(6 * np);
     for (int a = 0; a < 6; ++a) {
-        still &= ~hold_free_motions(rank, a, UNBOUNDED / CLEAR, closing);
+        still &= ~balance_free_motions(rank, a, UNBOUNDED / CLEAR, closing);
         for (int g = 0; g < np; ++g) part(closing.data(), g, &on[6 * g]);
         for (int c = 0; c < nu; ++c) {
-            const int own = int(cones.column[c]);
-            const int64_t j = s.cone_frame[own];
+            const int index = int(cones.column[c]);
+            const int64_t j = s.cone_frame[index];
             const Real moved =
-                s.on_path[j] * play[own][a] + inner(play[own], &on[6 * s.pattern_of[j]], 6);
+                s.on_path[j] * clearance[index][a] +
+                inner(clearance[index], &on[6 * s.pattern_of[j]], 6);
             X[a][c] = a < 3 ? moved : moved * s.size;
         }
     }
@@ -112,18 +119,20 @@ inline Whole ReachableSets::follow(int rank) {
     return still;
 }
 
-// Lanes where no passive joint exceeds its bound for any position of the clearances.
+// Return the lanes where no passive joint exceeds its range, for any positions of the
+// clearances.
 inline Whole ReachableSets::within_bounds(int rank, const Block &block) {
     Row middle(nq), most(nq), squares(nq), moved(m);
     for (int q = 0; q < nq; ++q) middle[q] = block.read(centres.motions, nq, q);
     cones.each([&](auto of, int, int at) {
         std::fill(squares.begin(), squares.end(), Real{});
         for (int c = at; c < at + of; ++c) {
-            const int own = int(cones.column[c]);
+            const int index = int(cones.column[c]);
             std::fill(moved.begin(), moved.end(), Real{});
-            for (const Entry &e : patterns[s.pattern_of[s.cone_frame[own]]])
+            for (const Entry &e : patterns[s.pattern_of[s.cone_frame[index]]])
                 for (int a = 0; a < 6; ++a)
-                    moved[6 * e.closure + a] = held[c] ? Real{} : e.sign * play[own][a];
+                    moved[6 * e.closure + a] =
+                        held[c] ? Real{} : e.sign * clearance[index][a];
             const Row step = least_motions(rank, moved);
             for (int q = 0; q < nq; ++q) {
                 middle[q] -= step[q] * start[c];
@@ -134,12 +143,12 @@ inline Whole ReachableSets::within_bounds(int rank, const Block &block) {
     });
     Whole within = whole(-1);
     for (int q = 0; q < nq; ++q)
-        if (s.free_bound[q] < INFINITY)  // written so that NaN is not within
+        if (s.free_bound[q] < INFINITY)  // the next comparison is false for NaN
             within &= magnitude(middle[q]) + most[q] <= s.free_bound[q];
     return within;
 }
 
-// A lane's body: the columns that are not held, padded.
+// Return the body of a lane: the columns that are not held, padded with zeros.
 inline Body ReachableSets::body_of(int l, int64_t point, int p, const Real *centre) const {
     const auto filled = [](int count) { return (count + FILLED - 1) / FILLED * FILLED; };
     std::vector<int> columns;
@@ -171,41 +180,42 @@ inline Body ReachableSets::body_of(int l, int64_t point, int p, const Real *cent
     return body;
 }
 
-// Sets of platform screws of the requested lanes that have the same ranks as the first of
-// them; returns the other lanes.
+// Compute the bodies of platform screws in the requested lanes that have the same
+// ranks as the first of them.  Return the requested lanes that remain.
 inline Whole ReachableSets::read_bodies(
-    const Points &points, const Block &block, Whole asked, std::vector<Body> &bodies,
+    const Points &points, const Block &block, Whole requested, std::vector<Body> &bodies,
     int64_t *outcome) {
     const auto leave = [&](Whole where) {
         for (int l = 0; l < LANES; ++l)
             if (where[l]) outcome[block.point[l]] = REFERENCE;
         return ~where;
     };
-    Whole others = asked;
+    Whole others = requested;
     read(points, block);
-    others &= leave(asked & ~held_cones(block));
-    if (!any(asked = others)) return others;
-    const Ranks ranks = eliminate_free(tolerance(points, block), asked);
+    others &= leave(requested & ~held_cones(block));
+    if (!any(requested = others)) return others;
+    const Ranks ranks = eliminate_free(tolerance(points, block), requested);
     others &= leave(ranks.unclear);
-    if (!any(asked = ranks.same)) return others;
+    if (!any(requested = ranks.same)) return others;
     const int count = m - ranks.free;
     for (int c = 0; c < nu; ++c) {
-        const Real own = block.read(centres.clearances, nu, cones.column[c]);
-        start[c] = held[c] ? Real{} : own;
+        const Real u = block.read(centres.clearances, nu, cones.column[c]);
+        start[c] = held[c] ? Real{} : u;
     }
-    cones.each([&](auto of, int, int at) {  // rounding may have left the cones
+    // rounding can move points out of their cones
+    cones.each([&](auto of, int, int at) {
         const Real shorter = larger(root(inner(&start[at], &start[at], of)), real(1.0));
         for (int c = at; c < at + of; ++c) start[c] /= shorter;
     });
     Whole valid = follow(ranks.free);
     if (bounded) valid &= within_bounds(ranks.free, block);
-    others &= leave(asked & ~valid);
-    if (!any(asked &= valid)) return others;
+    others &= leave(requested & ~valid);
+    if (!any(requested &= valid)) return others;
     const Whole clear = triangulate_rows(count, &held);
-    others &= leave(asked & (clear < 0));
-    if (!any(asked &= clear >= 0)) return others;
-    const int p = rank_of_first(clear, asked);
-    asked &= clear == p;
+    others &= leave(requested & (clear < 0));
+    if (!any(requested &= clear >= 0)) return others;
+    const int p = rank_of_first(clear, requested);
+    requested &= clear == p;
     orthonormal_rows(p);
     Real centre[6];
     for (int a = 0; a < 6; ++a) centre[a] = block.read(centres.screws, 6, a);
@@ -214,12 +224,13 @@ inline Whole ReachableSets::read_bodies(
         centre[3 + a] += centre[b] * offset[d] - centre[d] * offset[b];
     }
     for (int l = 0; l < LANES; ++l)
-        if (asked[l]) bodies.push_back(body_of(l, block.point[l], p, centre));
-    return others & ~asked;
+        if (requested[l]) bodies.push_back(body_of(l, block.point[l], p, centre));
+    return others & ~requested;
 }
 
-// Searches of all bodies in both halves; bodies padded to the same numbers of rows and
-// columns, and of the same balls, are searched together.
+// Return the searches of all bodies in both halves of the screw, sorted into groups.
+// A group has equal padded numbers of rows and columns and equal balls; its searches
+// run together.
 typedef std::map<std::vector<int>, std::vector<Task>> Groups;
 
 inline Groups searches_of(const std::vector<Body> &bodies, const double *tolerance) {

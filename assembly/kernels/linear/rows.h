@@ -1,8 +1,9 @@
-// Rows that only clearances can satisfy, at several postures in parallel: the closures'
-// rows that no free motion of a robot without springs enters.
+// Closure conditions that only the clearances can satisfy, for robots without springs,
+// at several postures in parallel: rows of the closures that are orthogonal to all free
+// motions.
 //
 // ========  =============  ============================================================
-// B, w      (p, nu), (p,)  B u = w must hold, B's rows orthonormal
+// B, w      (p, nu), (p,)  B u = w must hold; the rows of B are orthonormal
 // ========  =============  ============================================================
 #pragma once
 
@@ -10,28 +11,29 @@
 
 namespace LANE_SPACE {
 
-constexpr double ROWS_RANK = 1e-9;  // assembly/kinematics/ranks.py
+constexpr double ROWS_RANK = 1e-9;  // threshold of ranks: assembly/kinematics/ranks.py
 
-// Robots without springs.
+// The linear model of a robot without springs, and the rows for its clearances.
 class Rows : public Reduction {
 public:
     Rows(const Robot &s, const Points &points)
         : Reduction(s, points), rows(m, nu + 1) {}
 
 protected:
-    Triangle rows;  // with their right sides
+    Triangle rows;  // the rows, and in the last column their right sides
 
     struct Ranks { int free; Whole same, unclear; };
-    Ranks eliminate_free(Real tolerance, Whole asked);
+    Ranks eliminate_free(Real tolerance, Whole requested);
     Whole triangulate_rows(int count, const Array<Whole> *held);
     void orthonormal_rows(int count);
 };
 
-// Eliminates free motions in the requested lanes that have the same rank as the first of
-// them: G and h of the small problem are the rows.
-inline Rows::Ranks Rows::eliminate_free(Real tolerance, Whole asked) {
+// Eliminate the free motions in the requested lanes that have the same rank as the
+// first of them.  G and h of the small programme are then the rows and their right
+// sides.
+inline Rows::Ranks Rows::eliminate_free(Real tolerance, Whole requested) {
     const Whole found = triangulate_free(tolerance);
-    Ranks ranks = {0, asked & (found >= 0), asked & (found < 0)};
+    Ranks ranks = {0, requested & (found >= 0), requested & (found < 0)};
     if (!any(ranks.same)) return ranks;
     ranks.free = rank_of_first(found, ranks.same);
     ranks.same &= found == ranks.free;
@@ -41,8 +43,8 @@ inline Rows::Ranks Rows::eliminate_free(Real tolerance, Whole asked) {
     return ranks;
 }
 
-// Triangulates the rows without the held columns; returns the rank of each lane, -1 if it
-// is ambiguous.
+// Triangulate the rows without the columns in `held`.  Return the rank in each lane,
+// -1 where it is ambiguous.
 inline Whole Rows::triangulate_rows(int count, const Array<Whole> *held) {
     for (int i = 0; i < count; ++i) {
         std::copy(programme.M[i], programme.M[i] + nu, rows.F[i]);
@@ -54,7 +56,7 @@ inline Whole Rows::triangulate_rows(int count, const Array<Whole> *held) {
         rows, count, nu, real(ROWS_RANK), NOISE * largest_clearance(), -1.0, nu + 1);
 }
 
-// B, in the first rows of the programme's M.
+// Compute B in the first rows of the programme's M.
 inline void Rows::orthonormal_rows(int count) {
     Real *const *B = programme.M.rows();
     for (int i = 0; i < count; ++i) {

@@ -1,47 +1,47 @@
-// Python bindings of one cone programme and of one body's farthest screw.
+// Python bindings of the functions in assembly/kernels/solvers.
 #include "../arrays.h"
 #include "../bindings.h"
 #include "../kernels.h"
 
 namespace {
 
-// Problem of u and y, the first guess; cones of any size.
+// Read a problem; its cones can have any number of columns.
 ConeProblem problem_of(
     nb::handle G, nb::handle h, nb::handle d, nb::handle H, nb::handle k,
     nb::handle cones) {
     Size r, p, nu, ends;
-    ConeProblem own;
-    own.h = reals(h, "h", r);
-    own.d = reals(d, "d", nu);
-    own.k = reals(k, "k", p);
-    own.G = reals(G, "G", r, nu);
-    own.H = reals(H, "H", p, nu);
-    own.starts = starts(cones, "starts", nu.value, true, ends);
-    own.r = r.value, own.p = p.value, own.cones = ends.value - 1;
-    return own;
+    ConeProblem problem;
+    problem.h = reals(h, "h", r);
+    problem.d = reals(d, "d", nu);
+    problem.k = reals(k, "k", p);
+    problem.G = reals(G, "G", r, nu);
+    problem.H = reals(H, "H", p, nu);
+    problem.starts = starts(cones, "starts", nu.value, true, ends);
+    problem.r = r.value, problem.p = p.value, problem.cones = ends.value - 1;
+    return problem;
 }
 
 void call_interior_point(
     nb::handle G, nb::handle h, nb::handle d, nb::handle H, nb::handle k,
     nb::handle cones, double tolerance, nb::handle u, nb::handle y) {
-    const ConeProblem own = problem_of(G, h, d, H, k, cones);
-    double *guess = address<double>(u, "u", own.starts[own.cones]);
-    double *multipliers = address<double>(y, "y", own.r + own.p);
+    const ConeProblem problem = problem_of(G, h, d, H, k, cones);
+    double *guess = address<double>(u, "u", problem.starts[problem.cones]);
+    double *multipliers = address<double>(y, "y", problem.r + problem.p);
     const Limits limits = {0.0, tolerance, 0.0, 0};
     const nb::gil_scoped_release others;
-    interior_point(own, limits, guess, multipliers);
+    interior_point(problem, limits, guess, multipliers);
 }
 
 void call_newton(
     nb::handle G, nb::handle h, nb::handle d, nb::handle H, nb::handle k,
     nb::handle cones, double relative, double absolute, double first_sigma, int64_t steps,
     nb::handle u, nb::handle y) {
-    const ConeProblem own = problem_of(G, h, d, H, k, cones);
-    double *guess = address<double>(u, "u", own.starts[own.cones]);
-    double *multipliers = address<double>(y, "y", own.r + own.p);
+    const ConeProblem problem = problem_of(G, h, d, H, k, cones);
+    double *guess = address<double>(u, "u", problem.starts[problem.cones]);
+    double *multipliers = address<double>(y, "y", problem.r + problem.p);
     const Limits limits = {relative, absolute, first_sigma, steps};
     const nb::gil_scoped_release others;
-    newton(own, limits, guess, multipliers);
+    newton(problem, limits, guess, multipliers);
 }
 
 int64_t call_farthest(
@@ -49,18 +49,19 @@ int64_t call_farthest(
     int64_t half, double tolerance, const nb::callable &support, nb::handle bounds,
     nb::handle screw) {
     Size p, nv, ends;
-    AskedBody own;
+    BodyRequest body;
     if (half != 0 && half != 3) throw nb::value_error("half: expected 0 or 3");
-    own.start = reals(start, "start", nv);
-    own.centre = reals(centre, "centre", 6);
-    own.map = reals(X, "X", 6, nv);
-    own.rows = reals(H, "H", p, nv);
-    own.starts = starts(cones, "starts", nv.value, true, ends);
-    own.p = p.value, own.cones = ends.value - 1, own.half = half;
-    own.tolerance = tolerance;
+    body.start = reals(start, "start", nv);
+    body.centre = reals(centre, "centre", 6);
+    body.map = reals(X, "X", 6, nv);
+    body.rows = reals(H, "H", p, nv);
+    body.starts = starts(cones, "starts", nv.value, true, ends);
+    body.p = p.value, body.cones = ends.value - 1, body.half = half;
+    body.tolerance = tolerance;
     double *low_and_high = address<double>(bounds, "bounds", 2);
     double *best = address<double>(screw, "screw", 6);
-    own.support = [&](const double *direction, double *height, double *attains, double *w) {
+    body.support = [&](const double *direction, double *height, double *attains,
+                       double *w) {
         const nb::gil_scoped_acquire ours;
         const nb::tuple found = nb::cast<nb::tuple>(
             support(nb::make_tuple(direction[0], direction[1], direction[2])));
@@ -71,61 +72,62 @@ int64_t call_farthest(
         std::copy(from, from + nv.value, w);
     };
     const nb::gil_scoped_release others;
-    return farthest(own, low_and_high, best);
+    return farthest(body, low_and_high, best);
 }
 
 void call_farthest_points(
     nb::handle H, nb::handle cones, nb::handle d, nb::handle right, nb::handle tolerance,
     nb::handle points, nb::handle multipliers, nb::handle solved) {
     Size k, p, nu, ends;
-    Directions own;
-    own.rows = reals(H, "H", p, nu);
-    own.starts = starts(cones, "starts", nu.value, true, ends);
-    own.directions = reals(d, "d", k, nu);
-    own.right = reals(right, "right", k, p);
-    own.tolerance = reals(tolerance, "tolerance", k);
-    own.count = k.value, own.p = p.value, own.cones = ends.value - 1;
+    Directions request;
+    request.rows = reals(H, "H", p, nu);
+    request.starts = starts(cones, "starts", nu.value, true, ends);
+    request.directions = reals(d, "d", k, nu);
+    request.right = reals(right, "right", k, p);
+    request.tolerance = reals(tolerance, "tolerance", k);
+    request.count = k.value, request.p = p.value, request.cones = ends.value - 1;
     FarthestPoints out = {
         address<double>(points, "points", k, nu),
         address<double>(multipliers, "multipliers", k, p),
         address<int64_t>(solved, "solved", k)};
     const nb::gil_scoped_release others;
-    farthest_points(own, out);
+    farthest_points(request, out);
 }
 
 void call_minimise_all(
     nb::handle G, nb::handle h, nb::handle d, nb::handle H, nb::handle k,
     nb::handle cones, nb::handle u, nb::handle y) {
     Size count, r, p, nu, ends;
-    ConeProblems own;
-    own.h = reals(h, "h", count, r);
-    own.d = reals(d, "d", count, nu);
-    own.k = reals(k, "k", count, p);
-    own.G = reals(G, "G", r, nu);
-    own.H = reals(H, "H", p, nu);
-    own.starts = starts(cones, "starts", nu.value, true, ends);
-    own.count = count.value, own.r = r.value, own.p = p.value;
-    own.cones = ends.value - 1;
+    ConeProblems problems;
+    problems.h = reals(h, "h", count, r);
+    problems.d = reals(d, "d", count, nu);
+    problems.k = reals(k, "k", count, p);
+    problems.G = reals(G, "G", r, nu);
+    problems.H = reals(H, "H", p, nu);
+    problems.starts = starts(cones, "starts", nu.value, true, ends);
+    problems.count = count.value, problems.r = r.value, problems.p = p.value;
+    problems.cones = ends.value - 1;
     double *points = address<double>(u, "u", count, nu);
-    double *multipliers = address<double>(y, "y", count.value, own.r + own.p);
+    double *multipliers = address<double>(y, "y", count.value, problems.r + problems.p);
     const nb::gil_scoped_release others;
-    minimise_all(own, points, multipliers);
+    minimise_all(problems, points, multipliers);
 }
 
 void call_closest_points(
     nb::handle rows, nb::handle cones, nb::handle from, nb::handle kept, nb::handle u,
     nb::handle solved) {
     Size count, p, nu, ends;
-    Projections own;
-    own.rows = reals(rows, "rows", p, nu);
-    own.starts = starts(cones, "starts", nu.value, true, ends);
-    own.from = reals(from, "from", count, nu);
-    own.kept = reals(kept, "kept", count, nu);
-    own.count = count.value, own.p = p.value, own.cones = ends.value - 1;
+    Projections projections;
+    projections.rows = reals(rows, "rows", p, nu);
+    projections.starts = starts(cones, "starts", nu.value, true, ends);
+    projections.from = reals(from, "from", count, nu);
+    projections.kept = reals(kept, "kept", count, nu);
+    projections.count = count.value, projections.p = p.value;
+    projections.cones = ends.value - 1;
     double *points = address<double>(u, "u", count, nu);
     int64_t *done = address<int64_t>(solved, "solved", count);
     const nb::gil_scoped_release others;
-    closest_points(own, points, done);
+    closest_points(projections, points, done);
 }
 
 }  // namespace

@@ -1,11 +1,13 @@
-// Blocks of problems that are solved in parallel.
+// Blocks of problems that are solved in parallel.  A block assigns one problem, called
+// a point, to each lane (real.h).
 #pragma once
 
 #include "real.h"
 
 namespace LANE_SPACE {
 
-// The points of one block of lanes.
+// The index of the point in each lane.  `stride` is the number of array entries per
+// point.
 struct Block {
     int64_t point[LANES];
 
@@ -20,16 +22,16 @@ struct Block {
     }
 };
 
-// 0 .. count - 1.
+// Return the indices 0 .. count - 1.
 inline std::vector<int64_t> all_of(int64_t count) {
     std::vector<int64_t> all(count);
     std::iota(all.begin(), all.end(), 0);
     return all;
 }
 
-// Solves these points in blocks of lanes.  `solve` returns the lanes that it has not
-// solved, which are tried again.  Unused lanes repeat the last point, and are not
-// requested.
+// Solve the points in blocks.  `solve` receives a block and a mask of the lanes to
+// solve.  It returns the mask of the lanes that it has not solved; these are tried
+// again.  Unused lanes contain the last point, and their mask is 0.
 template <typename Solve>
 inline void in_blocks(const std::vector<int64_t> &points, Solve solve) {
     for (size_t first = 0; first < points.size(); first += LANES) {

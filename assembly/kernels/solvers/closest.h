@@ -1,16 +1,17 @@
-// Points of small convex sets closest to given ones, in parallel; symbols as in cones.h:
+// Points of small convex sets that are closest to given points, in parallel.  cones.h
+// defines the symbols.  The problem
 //
 //     minimise  |u - a|^2 / 2   subject to  M u = e,  |u_k| <= 1, each cone k
 //
-// by Newton's method on the dual, which is smooth:
+// is solved by Newton's method on its dual, which is smooth:
 //
-//     maximise  y.(M u - e) + |u - a|^2 / 2  with u the point of the cones closest to
-//     a - M^T y.
+//     maximise  y.(M u - e) + |u - a|^2 / 2,  where u is the point of the cones that is
+//     closest to a - M^T y.
 //
-// The value of the rows, e, is that of a point of the set that is known.
+// A point of the set is known.  Its value of M u is e.
 //
-// Source: Li, Sun, Toh (2018), A highly efficient semismooth Newton augmented Lagrangian
-// method for solving lasso problems.
+// Source: Li, Sun, Toh (2018), A highly efficient semismooth Newton augmented
+// Lagrangian method for solving lasso problems.
 #pragma once
 
 #include "cones.h"
@@ -18,33 +19,34 @@
 namespace LANE_SPACE {
 
 constexpr int STEPS_CLOSEST = 40;  // largest number of Newton steps
-// added to the curvature, whose largest possible value is 1: rows that only cones without
-// freedom enter have none
+// added to the negative second derivative, whose largest possible value is 1.  Rows
+// that contain only cones without freedom have a second derivative of 0
 constexpr double CURVATURE = 1e-13;
 
-// The point of the cones closest to a - z1: u, and D of the curvature M D M^T.  Cones that
-// are kept remain at `fixed`.  Returns the value of the dual without its rows' part.
+// Compute u, the point of the cones that is closest to a - z1, and D, which determines
+// the negative second derivative M D M^T.  The positions of the cones in `kept` remain
+// at `fixed`.  Return the value of the dual without the terms of the rows.
 inline Real Solver::project(const Row &a, const Row &kept, const Row &fixed) {
     Real value = {};
     k.each([&](auto size, int c, int first) {
-        Real *own = &u[first], *D = heads[c].D;
+        Real *u_k = &u[first], *D = heads[c].D;
         const Whole stays = kept[first] != 0.0;
-        for (int i = 0; i < size; ++i) own[i] = a[first + i] - z1[first + i];
-        const Real length = root(inner(own, own, size));
+        for (int i = 0; i < size; ++i) u_k[i] = a[first + i] - z1[first + i];
+        const Real length = root(inner(u_k, u_k, size));
         const Whole inside = length <= 1.0;
         const Real shorter = 1.0 / (inside ? real(1.0) : length);
         for (int i = 0; i < size; ++i)
-            own[i] = stays ? fixed[first + i] : own[i] * shorter;
+            u_k[i] = stays ? fixed[first + i] : u_k[i] * shorter;
         if (size.ball) {
-            for (int i = 0; i < size; ++i) wide[0][first + i] = own[i];
+            for (int i = 0; i < size; ++i) wide[0][first + i] = u_k[i];
             D[0] = stays ? Real{} : shorter;
             D[1] = inside ? Real{} : D[0];
         } else if (size == 1) {
             D[0] = stays | ~inside ? Real{} : real(1.0);
-        } else {  // on the disc's edge only rotation is free
-            D[0] = inside ? real(1.0) : shorter * own[1] * own[1];
-            D[1] = inside ? Real{} : -shorter * own[0] * own[1];
-            D[2] = inside ? real(1.0) : shorter * own[0] * own[0];
+        } else {  // on the boundary of the disc only rotation is free
+            D[0] = inside ? real(1.0) : shorter * u_k[1] * u_k[1];
+            D[1] = inside ? Real{} : -shorter * u_k[0] * u_k[1];
+            D[2] = inside ? real(1.0) : shorter * u_k[0] * u_k[0];
             for (int i = 0; i < 3; ++i) D[i] = stays ? Real{} : D[i];
         }
         for (int i = first; i < first + size; ++i) {
@@ -55,15 +57,17 @@ inline Real Solver::project(const Row &a, const Row &kept, const Row &fixed) {
     return value;
 }
 
-// Finds the points closest to `a` in the requested lanes, from the point q.u of each set,
-// which is overwritten in lanes that are solved; returns these.
-inline Whole Solver::closest(Programme &q, const Row &a, const Row &kept, Whole asked) {
+// Find the point of each set that is closest to `a`, in the requested lanes.  q.u is a
+// point of the set; it is overwritten in the lanes that are solved.  Return these
+// lanes.
+inline Whole Solver::closest(
+    Programme &q, const Row &a, const Row &kept, Whole requested) {
     const int m = q.p;
     const Row fixed = q.u;
     multiply(q.M.rows(), m, fixed.data(), k.nu, q.e.data());
     std::fill(y.begin(), y.end(), Real{});
     Real before = real(-INFINITY);
-    Whole going = asked, done = {}, halvings = {}, taken = {};
+    Whole going = requested, done = {}, halvings = {}, taken = {};
     Row step(m);
     while (true) {
         std::fill(z1.begin(), z1.end(), Real{});

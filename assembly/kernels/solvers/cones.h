@@ -1,23 +1,28 @@
-// Small cone programmes in parallel:
+// Interior-point method for small cone programmes in parallel:
 //
 //     minimise  |G u + h|^2 / 2 - d.u   subject to  H u = e,  |u_k| <= 1, each cone k
 //
-// by Nesterov and Todd's scaling with Mehrotra's predictor and corrector.  The start, u = 0
-// with its multipliers, satisfies everything but H u = e, and so do all iterates: the gap
-// is the sum of s.z over the cones, s = (1, u).  Each step solves one symmetric system of
-// the size of G's and H's rows together, about 10 by 10, whatever the number of
-// clearances.  And by Newton's method on the dual (dual_newton.h); n, last of y, are H's
-// multipliers:
+// The method uses the scaling of Nesterov and Todd with Mehrotra's predictor and
+// corrector.  The start u = 0, with its multipliers, satisfies all conditions except
+// H u = e.  All iterates satisfy the same conditions.  The gap is then the sum of s.z
+// over the cones, with s = (1, u).  Each step solves one symmetric system with one
+// unknown for each row of G and H.  Its size, about 10, does not depend on the number
+// of clearances.
+//
+// dual_newton.h solves the dual problem by Newton's method.  The multipliers n of H are
+// the last entries of y:
 //
 //     maximise  y.h - |y|^2 / 2 - n.e - sum_k |(G^T y + H^T n - d)_k|
 //
 // ========  ===========================================================================
-// M         (r + p, nu) rows of G, then of H
-// y         their multipliers: G u + h, and those of H u = e
-// z         (z0, z1), the cones' multipliers: z1 = M^T y - d
-// w, rho    Nesterov and Todd's points, W = rho^1/2 (w); here l = (w) z, and right sides
-//           of the scaled complementarity are rho^1/2 t: no root of rho is taken
-// D         W^2 without its heads, of each cone; of a ball a - b w w^T
+// M         (r + p, nu) rows of G, then rows of H
+// y         (r + p,) their multipliers: G u + h, then those of H u = e
+// z         (z0, z1), the multipliers of the cones, with z1 = M^T y - d
+// w, rho    scaling point of Nesterov and Todd: W = rho^1/2 (w), where (w) is the
+//           matrix that belongs to w
+// l, t      l = (w) z; rho^1/2 t are the right sides of the scaled complementarity.
+//           With these symbols no square root of rho is needed
+// D         W^2 without its first row and column, for each cone; of a ball a - b w w^T
 // S         M D M^T + diag(1 .. 1, 0 .. 0)
 // ========  ===========================================================================
 //
@@ -32,16 +37,21 @@ namespace LANE_SPACE {
 
 // largest number of iterations of the interior-point method
 constexpr int ITERATIONS = 60;
-// relative distance of z's heads from the boundary at the start
+// distance of the start from the boundary of the cones: z0 = |z1| + START
 constexpr double START = 0.03;
-constexpr double BACK_OFF = 0.99;   // share of the step to the nearest boundary of a cone
-constexpr int HALVINGS = 12;        // largest number of halvings of a Newton step
+// step, as a share of the step to the nearest boundary of a cone
+constexpr double BACK_OFF = 0.99;
+constexpr int HALVINGS = 12;        // largest number of reductions of a Newton step
+// factor by which sigma grows; largest share of the residual in the gap at which u_old
+// is replaced (dual_newton.h)
 constexpr double SIGMA_GROWTH = 10.0, INNER_SHARE = 0.1;
-constexpr double ON_ROWS = 1e-13;   // accepted residual of H u = e
+constexpr double ON_ROWS = 1e-13;   // accepted residual of each row of H u = e
 
-// gap at which Newton's method begins, relative to the energy and to that without
-// clearance; its number of steps; its first sigma
+// gap at which Newton's method follows the interior-point method, relative to the
+// energy and to the energy without clearance; factor of the first sigma (dual_newton.h)
 constexpr double NEAR = 1e-8, NEAR_WITHOUT_CLEARANCE = 1e-9, FIRST_SIGMA = 1e6;
+// largest numbers of Newton steps: without the interior-point method, after it, and in
+// the last attempt
 constexpr int STEPS_ALONE = 6, STEPS = 20, STEPS_LAST = 150;
 
 class Solver {
@@ -52,24 +62,26 @@ public:
           f(cones.nu), y(rows), right(rows), residual(rows), start(rows), old(cones.nu),
           wide(3, cones.balls.empty() ? 0 : cones.nu) {}
 
-    Whole newton_alone(Programme &q, double relative, Real absolute, Whole asked) {
-        return dual_newton(q, STEPS_ALONE, 0.0, relative, absolute, asked);
+    Whole newton_alone(Programme &q, double relative, Real absolute, Whole requested) {
+        return dual_newton(q, STEPS_ALONE, 0.0, relative, absolute, requested);
     }
     void interior_then_newton(
-        Programme &q, double relative, Real absolute, Real near, Whole asked);
-    Whole interior_point(Programme &q, Real tolerance, double relative, Whole asked);
+        Programme &q, double relative, Real absolute, Real near, Whole requested);
+    Whole interior_point(Programme &q, Real tolerance, double relative, Whole requested);
     Whole dual_newton(
         Programme &q, int steps, double first_sigma, double relative, Real absolute,
-        Whole asked);
-    Whole closest(Programme &q, const Row &a, const Row &kept, Whole asked);
+        Whole requested);
+    Whole closest(Programme &q, const Row &a, const Row &kept, Whole requested);
 
 private:
-    // Nesterov and Todd's scaling of a cone.  What two products give is not kept: all
-    // that an iteration touches has to fit into the fastest cache.
+    // Scaling of Nesterov and Todd for one cone.  Values that two products compute are
+    // not stored, because all data of an iteration have to fit into the first-level
+    // cache.
     struct Head {
         Real rho, w0, w[2];
-        Real D[3];                                    // 11, 12, 22; of a ball a, b
-        Real over_s2, over_z0, over_l0, over_head;    // 1 / (1 - u.u) ..  1 / (1 + w0)
+        Real D[3];  // entries 11, 12, 22 of D; a, b of a ball
+        // 1/s^2, 1/z0, 1/l0, 1/(1 + w0); s^2 = 1 - u.u
+        Real over_s2, over_z0, over_l0, over_head;
     };
 
     const Cones &k;
@@ -77,7 +89,7 @@ private:
     Table B;
     Array<Head> heads;
     Row z0, z1, u, du, dz0, dz1, f, y, right, residual, start, old;
-    Table wide;  // of the balls: w, and room for l and t of the correction
+    Table wide;  // for balls: w, and l and t of the corrector
 
     template <typename Size> Real *turn_of(Size, Head &head, int at) {
         if constexpr (Size::ball)
@@ -98,8 +110,8 @@ private:
     Real project(const Row &a, const Row &kept, const Row &fixed);
 };
 
-// Overwrites the scaling with that of (u, z) in lanes where all points are inside the
-// cones.
+// Compute the scaling at (u, z).  Return the lanes in which u and z are inside all
+// cones; the scaling is valid only there.
 inline Whole Solver::scale() {
     Whole inside = whole(-1);
     k.each([&](auto size, int c, int at) {
@@ -111,11 +123,11 @@ inline Whole Solver::scale() {
             sz += u[i] * z1[i];
         }
         inside &= (s2 > 0.0) & (z2 > 0.0);
-        // divisions take as long as ten products: one for three
+        // a division takes as long as ten products: one division serves three quotients
         const Real both = s2 * z2, over = 1.0 / (both * z0[c]), heads_over = z0[c] * over;
         o.over_z0 = both * over, o.over_s2 = z2 * heads_over;
         o.rho = root(s2 * s2 * heads_over);
-        // (1, u) / |s| and (z0, -z1) / |z|, halfway between
+        // the scaling point lies halfway between (1, u) / |s| and (z0, -z1) / |z|
         const Real half = 1.0 / root(2.0 * (s2 + o.rho * sz));
         o.w0 = (1.0 + o.rho * z0[c]) * half;
         Real ww = {}, wz = {};
@@ -127,7 +139,8 @@ inline Whole Solver::scale() {
         const Real l0 = o.w0 * z0[c] + wz, head = 1.0 + o.w0, wide = 1.0 + 2.0 * ww;
         const Real most = head * l0, once = 1.0 / (most * wide), fewer = wide * once;
         o.over_head = l0 * fewer, o.over_l0 = head * fewer;
-        const Real along = o.rho * most * once;  // of D, which is rho across w
+        // the eigenvalue of D along w; across w it is rho
+        const Real along = o.rho * most * once;
         o.D[0] = along;
         if (size == 2) {
             o.D[0] = along * (1.0 + 2.0 * w[1] * w[1]);
@@ -139,7 +152,7 @@ inline Whole Solver::scale() {
     return inside;
 }
 
-// D x of R rows x.
+// Compute D x for R rows x.
 template <int R>
 inline void Solver::square_scaled(Real *const *x, Real *const *out) const {
     k.each([&](auto size, int c, int at) {
@@ -161,7 +174,8 @@ inline void Solver::square_scaled(Real *const *x, Real *const *out) const {
     });
 }
 
-// S's lower half, two rows at a time: B = D M stays near the processor.
+// Compute the lower triangle of S, two rows at a time, so that B = D M remains in the
+// first-level cache.
 inline void Solver::fill_system(const Programme &q) {
     const int m = q.r + q.p;
     Real *const *M = q.M.rows(), **S = system.S.rows();
@@ -177,13 +191,14 @@ inline void Solver::fill_system(const Programme &q) {
     for (i = 0; i < q.r; ++i) S[i][i] += 1.0;
 }
 
-// Step for f = (W^-1 t)_1 of the scaled right sides t, M's rows eliminated.  dz0, which
-// comes as r0, follows from s.dz + z.ds = r0, the first row of the scaled
-// complementarity: W^-1 t - W^-2 ds cancels.
+// Compute the step du, dz for f = (W^-1 t)_1, where t are the scaled right sides,
+// after eliminating the rows of M.  On entry dz0 contains r0.  It is overwritten by
+// means of the first row of the scaled complementarity, s.dz + z.ds = r0, in which
+// W^-1 t - W^-2 ds cancels.
 inline void Solver::direction(Programme &q) {
     const int m = q.r + q.p;
-    Real *own = f.data(), *squared = du.data();
-    square_scaled<1>(&own, &squared);
+    Real *row = f.data(), *squared = du.data();
+    square_scaled<1>(&row, &squared);
     multiply(q.M.rows(), m, squared, k.nu, right.data());
     for (int i = 0; i < q.p; ++i) right[q.r + i] -= residual[i];
     system.solve(m, right.data());
@@ -208,10 +223,10 @@ inline void Solver::direction(Programme &q) {
     });
 }
 
-// The inverse of the longest step that keeps every s and z in its cone.
+// Return the inverse of the longest step that keeps every s and z in its cone.
 inline Real Solver::fastest() const {
     Real most = {};
-    // 1 / t for the smallest t > 0 with a t^2 + 2 b t + c = 0, c < 0
+    // returns 1 / t for the smallest t > 0 with a t^2 + 2 b t + c = 0, where c < 0
     const auto crossing = [](Real a, Real b, Real minus_c, Real over_c) {
         const Real under = b * b + a * minus_c;
         const Real below = b + root(under > 0.0 ? under : Real{});
@@ -232,7 +247,9 @@ inline Real Solver::fastest() const {
     return most;
 }
 
-// Solves l o t = r = target e - l o l - (W^-1 ds) o (W dz) for t; f = (W^-1 t)_1.
+// Solve l o t = r with r = target e - l o l - (W^-1 ds) o (W dz) for t, where o is the
+// Jordan product of the cone and e its unit element.  Overwrite f with (W^-1 t)_1, and
+// dz0 with r0, the first component of r.
 inline void Solver::correct(Real target) {
     k.each([&](auto size, int c, int at) {
         Head &o = heads[c];
@@ -257,7 +274,7 @@ inline void Solver::correct(Real target) {
             lt += l[i] * t[i];
         }
         const Real r0 = target - product - o.rho * squares;
-        const Real over_z2 = o.rho * o.rho * o.over_s2;  // and |l| = |z|
+        const Real over_z2 = o.rho * o.rho * o.over_s2;  // since |l| = |z|
         const Real t0 = (l0 * r0 - lt) * over_z2;
         for (int i = 0; i < size; ++i) {
             t[i] = (t[i] - t0 * l[i]) * o.over_l0;
@@ -270,11 +287,11 @@ inline void Solver::correct(Real target) {
     });
 }
 
-// Minimises in the requested lanes, from u = 0; overwrites q.u and q.y of H there with
-// the last iterate.  Returns the lanes whose gap is at most tolerance + relative |G u +
-// h|^2 / 2.
+// Minimise in the requested lanes, from u = 0.  Overwrite q.u, and the entries of q.y
+// for the rows of H, with the last iterate.  Return the lanes whose gap is at most
+// tolerance + relative |G u + h|^2 / 2.
 inline Whole Solver::interior_point(
-    Programme &q, Real tolerance, double relative, Whole asked) {
+    Programme &q, Real tolerance, double relative, Whole requested) {
     const int r = q.r, p = q.p, m = r + p;
     const auto dual = [&] {  // z1 = M^T y - d
         for (int j = 0; j < k.nu; ++j) z1[j] = q.loaded ? -q.d[j] : Real{};
@@ -286,7 +303,7 @@ inline Whole Solver::interior_point(
     k.each([&](auto size, int c, int at) {
         z0[c] = root(inner(&z1[at], &z1[at], size)) + START;
     });
-    Whole going = asked, done = {};
+    Whole going = requested, done = {};
     for (int iteration = 0; iteration < ITERATIONS; ++iteration) {
         Real gap = inner(z1.data(), u.data(), k.nu), energy = 0.5 * inner(y.data(), y.data(), r);
         for (const Real &head : z0) gap += head;
@@ -304,7 +321,7 @@ inline Whole Solver::interior_point(
         fill_system(q);
         going &= system.factor(m, true);
         if (!any(going)) break;
-        // predictor: no centring, no correction; t = -l, W^-1 l = z
+        // predictor, without centring and correction: t = -l and W^-1 l = z
         k.each([&](auto size, int c, int at) {
             dz0[c] = -z0[c];
             for (int i = at; i < at + size; ++i) {
@@ -314,23 +331,25 @@ inline Whole Solver::interior_point(
         });
         direction(q);
         Real length = 1.0 / larger(fastest(), real(1.0));
-        // 1.5 where 3 is usual: a sixth less iterations on these problems
+        // exponent 1.5 instead of the usual 3: on these problems it needs a sixth fewer
+        // iterations
         const Real sigma = (1.0 - length) * root(1.0 - length);
         correct(sigma * gap / double(k.count));
         direction(q);
         length = BACK_OFF / larger(fastest(), real(BACK_OFF));
         going &= length >= 1e-10;
-        // lanes that have ended do not change
+        // the values of finished lanes do not change
         for (int j = 0; j < k.nu; ++j) u[j] = going ? u[j] + length * du[j] : u[j];
         for (int c = 0; c < k.count; ++c) z0[c] = going ? z0[c] + length * dz0[c] : z0[c];
-        // the balance holds by construction; computed again it cannot drift
+        // y = G u + h holds by construction; computing y again prevents drift by
+        // rounding
         multiply(q.M.rows(), r, u.data(), k.nu, y.data());
         for (int i = 0; i < r; ++i) y[i] += q.h[i];
         for (int i = r; i < m; ++i) y[i] = going ? y[i] + length * right[i] : y[i];
         dual();
     }
-    for (int j = 0; j < k.nu; ++j) q.u[j] = asked ? u[j] : q.u[j];
-    for (int i = r; i < m; ++i) q.y[i] = asked ? y[i] : q.y[i];
+    for (int j = 0; j < k.nu; ++j) q.u[j] = requested ? u[j] : q.u[j];
+    for (int i = r; i < m; ++i) q.y[i] = requested ? y[i] : q.y[i];
     return done;
 }
 

@@ -1,15 +1,16 @@
-// The farthest points of convex bodies of platform screws, bracketed: problem (27) by
+// Bounds of the farthest points of convex bodies of platform screws: problem (27) by
 // outer approximation (search.h).
 //
-// A body's support function along d is a small cone programme.  Any multipliers n of its
-// rows prove an upper bound,
+// The support function of a body along d is the maximum of a small cone programme.  Any
+// multipliers n of the rows H prove an upper bound,
 //
-//     d.(centre - X start) + n.H start + sum_k |(X^T d - H^T n)_k|,
+//     d.(centre - X start) + n.H start + sum_k |(X^T d - H^T n)_k|.
 //
-// and its point is projected into the body: both are valid for any result of the solver.
+// The point that the solver returns is projected into the body.  Both the bound and the
+// point are therefore valid for any result of the solver.
 //
-// Each lane searches one body in one half of the screw, and takes the next one at the
-// end.
+// Each lane searches one half of the screw in one body.  A lane that has finished
+// starts the next search.
 #pragma once
 
 #include <functional>
@@ -18,18 +19,22 @@
 
 namespace LANE_SPACE {
 
+// largest number of support functions in a search
 constexpr int MOST_SUPPORTS = 400;
-// accepted gap of a support function, as a share of the tolerance ..
+// accepted gap of a support function, as a share of the tolerance
 constexpr double SHARE = 0.1;
-constexpr double POOR = 0.5;   // .. and the gap with which the search still continues
-constexpr double SYMMETRIC = 1e-14;  // H start counts as zero
-constexpr double ROUNDING = 1e-14;   // accepted excess over a cone
+constexpr double POOR = 0.5;   // largest gap with which the search continues
+// size below which an entry of H start counts as zero
+constexpr double SYMMETRIC = 1e-14;
+constexpr double ROUNDING = 1e-14;   // accepted excess of |v_k|^2 over 1
 
-// Search of bodies with cones as those of the first one, of at most p rows.
+// A search of bodies that have at most p rows, and cones of the same sizes as those of
+// the first body.
 class Farthest {
 public:
-    // If a support function is not found here: of a direction its certified height, the
-    // screw that attains it and the gradient X^T d - H^T n.
+    // Alternative that is called if a support function cannot be computed here.  From a
+    // direction it computes a certified value of the support function, a screw that
+    // attains it, and the gradient X^T d - H^T n.
     typedef std::function<void(const Point &, double *, double *, double *)> Support;
 
     Farthest(const Body &first, int p, Support other = {})
@@ -37,22 +42,22 @@ public:
           solver(cones, p), majorant(cones.nu, p), other(std::move(other)),
           gradient(cones.nu), v(cones.nu) {}
 
-    // Does all tasks; calls settle(search, solved) at the end of each.
+    // Carry out all tasks.  Call settle(search, solved) at the end of each search.
     template <typename Settle> void search(const std::vector<Task> &tasks, Settle settle) {
         size_t next = 0;
         Whole busy = {};
         while (true) {
             for (int l = 0; l < LANES; ++l)
                 while (true) {
-                    Search &own = searches[l];
+                    Search &state = searches[l];
                     if (busy[l]) {
-                        const bool done = own.high - own.low <= own.tolerance;
-                        if (!done && own.supports < MOST_SUPPORTS) break;
-                        settle(own, done);
+                        const bool done = state.high - state.low <= state.tolerance;
+                        if (!done && state.supports < MOST_SUPPORTS) break;
+                        settle(state, done);
                         busy[l] = 0;
                     }
                     if (next == tasks.size()) break;
-                    own.begin(tasks[next++]);
+                    state.begin(tasks[next++]);
                     load(l);
                     busy[l] = -1;
                 }
@@ -63,33 +68,35 @@ public:
                 if (busy[l]) {
                     found[l] = close(l) ? -1 : 0;
                     if (found[l]) continue;
-                    again[l] = 0;  // of another's support no opposite follows
+                    again[l] = 0;  // the alternative gives no opposite support
                     found[l] = ask(l) ? -1 : 0;
                 }
             double least[LANES];
             majorant.bound(body, gradient, busy, least);
             for (int l = 0; l < LANES; ++l) {
                 if (!busy[l]) continue;
-                Search &own = searches[l];
-                const double reached = along(own.direction, screw, l);
+                Search &state = searches[l];
+                const double reached = along(state.direction, screw, l);
                 if (!found[l]) {
-                    settle(own, false);
+                    settle(state, false);
                     busy[l] = again[l] = 0;
                     continue;
                 }
-                ++own.supports;
-                own.gained = false;
-                take(own, l, own.direction, std::max(double(height[l]), reached));
-                own.high = std::max(std::min(own.high, least[l]), own.low);
+                ++state.supports;
+                state.gained = false;
+                take(state, l, state.direction, std::max(double(height[l]), reached));
+                state.high = std::max(std::min(state.high, least[l]), state.low);
             }
             if (any(again)) {
                 opposite();
                 for (int l = 0; l < LANES; ++l) {
                     if (!again[l]) continue;
-                    Search &own = searches[l];
+                    Search &state = searches[l];
                     Point back;
-                    for (int a = 0; a < 3; ++a) back[a] = -own.direction[a];
-                    take(own, l, back, std::max(double(height[l]), along(back, screw, l)));
+                    for (int a = 0; a < 3; ++a) back[a] = -state.direction[a];
+                    take(
+                        state, l, back,
+                        std::max(double(height[l]), along(back, screw, l)));
                 }
             }
             for (int l = 0; l < LANES; ++l)
@@ -100,60 +107,62 @@ public:
 private:
     const Cones cones;
     Projection body;
-    Table whole_map;  // X, all six components
+    Table whole_map;  // X, all six components of the screw
     Programme q;
     Solver solver;
     Majorant majorant;
     const Support other;
     Search searches[LANES];
-    Whole symmetric = {};   // v -> -v leaves the rows satisfied
+    Whole symmetric = {};   // lanes in which -v satisfies the rows, too
     Real centre[6], tolerances = {};
     // results of `support` and `opposite`
     Real height, screw[6];
     Row gradient, v;
 
     double along(const Point &d, const Real *of, int l) const {
-        const Real *own = of + searches[l].half;
-        return d[0] * own[0][l] + d[1] * own[1][l] + d[2] * own[2][l];
+        const Real *part = of + searches[l].half;
+        return d[0] * part[0][l] + d[1] * part[1][l] + d[2] * part[2][l];
     }
 
-    // Whether the screw of a lane nearly attains its height; written so that NaN does not.
+    // Return whether the screw of a lane nearly attains its height.  The comparison is
+    // false for NaN.
     bool close(int l) const {
         const double reached = along(searches[l].direction, screw, l);
         return height[l] - reached <= POOR * searches[l].tolerance;
     }
 
-    // A lane's support from the alternative; whether there is one.
+    // Compute the support function of a lane by the alternative.  Return whether
+    // there is an alternative.
     bool ask(int l) {
         if (!other) return false;
-        double own_height, attains[6];
+        double found_height, attains[6];
         std::vector<double> w(cones.nu);
-        other(searches[l].direction, &own_height, attains, w.data());
-        height[l] = own_height;
+        other(searches[l].direction, &found_height, attains, w.data());
+        height[l] = found_height;
         for (int a = 0; a < 6; ++a) screw[a][l] = attains[a];
         for (int j = 0; j < cones.nu; ++j) gradient[j][l] = w[j];
         return true;
     }
 
-    // A support of a lane's body, its screw and its plane.
-    void take(Search &own, int l, const Point &normal, double support) {
+    // Add the screw and the plane of a support function to a search.
+    void take(Search &state, int l, const Point &normal, double support) {
         double of_lane[6];
         for (int a = 0; a < 6; ++a) of_lane[a] = screw[a][l];
-        own.improve(of_lane);
-        own.add_plane(normal, support);
+        state.improve(of_lane);
+        state.add_plane(normal, support);
     }
 
     void load(int l);
-    void support(Whole asked);
+    void support(Whole requested);
     void opposite();
     void within(Row &v);
     void screw_at(const Row &v);
 };
 
-// The body of a lane's search.
+// Copy the body of a search into its lane.
 inline void Farthest::load(int l) {
-    const Search &own = searches[l];
-    const Body &b = *own.body;
+    const Search &state = searches[l];
+    const Body &b = *state.body;
     const int nv = cones.nu;
     const auto column = [&](Real *row, const double *from) {
         for (int j = 0; j < nv; ++j) row[j][l] = from ? from[j] : 0.0;
@@ -163,8 +172,8 @@ inline void Farthest::load(int l) {
         column(whole_map[a], &b.X[a * nv]);
     }
     for (int a = 0; a < 3; ++a) {
-        body.centre[a][l] = b.centre[own.half + a];
-        column(body.X[a], &b.X[(own.half + a) * nv]);
+        body.centre[a][l] = b.centre[state.half + a];
+        column(body.X[a], &b.X[(state.half + a) * nv]);
     }
     column(body.start.data(), b.start.data());
     bool even = true;
@@ -179,17 +188,17 @@ inline void Farthest::load(int l) {
     body.rows[l] = b.p;
     for (int c = 0; c < cones.count; ++c) {
         const int interval = c - cones.discs;
-        const bool there = interval < 0                 ? c < b.own_discs
-                           : interval < cones.intervals ? interval < b.own_intervals
+        const bool there = interval < 0                 ? c < b.unpadded_discs
+                           : interval < cones.intervals ? interval < b.unpadded_intervals
                                                         : true;
         body.present[c][l] = there ? -1 : 0;
     }
-    tolerances[l] = own.tolerance;
+    tolerances[l] = state.tolerance;
 }
 
-// Support functions along the searches' directions: a certified height, a screw that
-// nearly attains it, and the gradient X^T d - H^T n.
-inline void Farthest::support(Whole asked) {
+// Compute support functions along the directions of the searches: a certified height,
+// a screw that nearly attains it, and the gradient X^T d - H^T n.
+inline void Farthest::support(Whole requested) {
     const int nv = cones.nu, p = body.p;
     Real d[3];
     for (int l = 0; l < LANES; ++l)
@@ -199,7 +208,7 @@ inline void Farthest::support(Whole asked) {
     height = -inner(gradient.data(), body.start.data(), nv);
     for (int a = 0; a < 3; ++a) height += d[a] * body.centre[a];
     const Real size = root(inner(gradient.data(), gradient.data(), nv));
-    const Whole moves = asked & (size > 0.0);
+    const Whole moves = requested & (size > 0.0);
     if (p) {
         const Real over = 1.0 / (moves ? size : real(1.0));
         for (int j = 0; j < nv; ++j) q.d[j] = gradient[j] * over;
@@ -221,15 +230,16 @@ inline void Farthest::support(Whole asked) {
         height += length;
         const Real over = 1.0 / (length > 0.0 ? length : real(1.0));
         for (int j = at; j < at + of; ++j) {
-            const Real own = p ? q.u[j] : length > 0.0 ? gradient[j] * over : body.start[j];
-            v[j] = moves ? own : body.start[j];
+            const Real point =
+                p ? q.u[j] : length > 0.0 ? gradient[j] * over : body.start[j];
+            v[j] = moves ? point : body.start[j];
         }
     });
     if (p) within(v);
     screw_at(v);
 }
 
-// The same along the opposite directions, if the body is symmetric.
+// Compute the support functions of symmetric bodies along the opposite directions.
 inline void Farthest::opposite() {
     Row mirrored(cones.nu);
     for (int j = 0; j < cones.nu; ++j) mirrored[j] = -v[j];
@@ -244,7 +254,8 @@ inline void Farthest::opposite() {
     });
 }
 
-// A nearby v that satisfies rows and cones to rounding.
+// Move v to a nearby point that satisfies the rows and the cones except for rounding
+// errors.
 inline void Farthest::within(Row &v) {
     const int nv = cones.nu;
     for (int j = 0; j < nv; ++j) v[j] -= body.start[j];
@@ -252,7 +263,8 @@ inline void Farthest::within(Row &v) {
         const Real residual = inner(body.H[i], v.data(), nv);
         for (int j = 0; j < nv; ++j) v[j] -= residual * body.H[i][j];
     }
-    // the largest part of the step, from a start inside, that remains in all cones
+    // the largest share of the step from `start`, which is inside, that remains in all
+    // cones
     Real share = real(1.0);
     cones.each([&](auto of, int, int at) {
         Real aa = {}, ab = {}, bb = real(-1.0 - ROUNDING);
@@ -270,7 +282,7 @@ inline void Farthest::within(Row &v) {
     for (int j = 0; j < nv; ++j) v[j] = body.start[j] + share * v[j];
 }
 
-// Platform screws at v.
+// Compute the platform screws at v.
 inline void Farthest::screw_at(const Row &v) {
     Row step(cones.nu);
     for (int j = 0; j < cones.nu; ++j) step[j] = v[j] - body.start[j];

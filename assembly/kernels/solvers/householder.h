@@ -1,7 +1,8 @@
-// Householder triangulation with pivoting, the transpose of a QR factorisation with
-// column pivoting: rows F[order] = L Q^T with L lower triangular, Q a product of reflectors.
+// Householder triangulation of rows with pivoting.  It is the transpose of a QR
+// factorisation with column pivoting: F[order] = L Q^T, where L is lower triangular and
+// Q is a product of reflectors.
 //
-// Sources: Golub, Van Loan, Matrix Computations, 4th ed., sections 5.2-5.4 (Householder
+// Source: Golub, Van Loan, Matrix Computations, 4th ed., sections 5.2-5.4 (Householder
 // QR with column pivoting, complete orthogonal factorisation).
 #pragma once
 
@@ -9,30 +10,32 @@
 
 namespace LANE_SPACE {
 
-constexpr double CLEAR = 10.0;  // a rank is ambiguous within this factor of the threshold
+// a pivot within this factor of the threshold makes the rank ambiguous
+constexpr double CLEAR = 10.0;
 
-// Result of a triangulation: reflectors above the diagonal, the triangle below it.
+// Result of a triangulation.  F contains the reflectors on and above the diagonal, and
+// L below it.
 struct Triangle {
     Table F;
-    Row turns, diagonal;  // factors of the reflectors; of the triangle
-    Array<Whole> order;  // original rows in their new order
+    Row turns, diagonal;  // factors of the reflectors; diagonal of L
+    Array<Whole> order;  // indices of the original rows in their new order
     Triangle(int rows, int columns)
         : F(rows, columns), turns(rows), diagonal(rows), order(rows) {}
 };
 
-// Reflects R rows: row -= turn (own.row) own, over the columns from .. to; with sizes,
-// also the remaining squares beyond the first column.
+// Reflect R rows: row -= turn (reflector.row) reflector, over the columns from .. to - 1.
+// If `sized`, also compute the sum of squares of each row beyond column `from`.
 template <int R, bool sized>
 inline void reflect(
-    const Real *own, Real turn, Real *const *rows, int from, int to, Real *sizes) {
+    const Real *reflector, Real turn, Real *const *rows, int from, int to, Real *sizes) {
     Real along[R], size[R] = {};
-    inner_tile<R>(rows, own, from, to, along);
+    inner_tile<R>(rows, reflector, from, to, along);
     for (int i = 0; i < R; ++i) {
         along[i] *= turn;
-        rows[i][from] -= along[i] * own[from];
+        rows[i][from] -= along[i] * reflector[from];
     }
     for (int a = from + 1; a < to; ++a) {
-        const Real weight = once(own[a]);
+        const Real weight = once(reflector[a]);
         for (int i = 0; i < R; ++i) {
             const Real left = rows[i][a] - along[i] * weight;
             rows[i][a] = left;
@@ -44,17 +47,17 @@ inline void reflect(
 
 template <bool sized>
 inline void reflect_all(
-    const Real *own, Real turn, Real *const *rows, int count, int from, int to,
+    const Real *reflector, Real turn, Real *const *rows, int count, int from, int to,
     Real *sizes) {
     int i = 0;
     for (; i + 4 <= count; i += 4)
-        reflect<4, sized>(own, turn, rows + i, from, to, sizes + i);
+        reflect<4, sized>(reflector, turn, rows + i, from, to, sizes + i);
     for (; i + 2 <= count; i += 2)
-        reflect<2, sized>(own, turn, rows + i, from, to, sizes + i);
-    if (i < count) reflect<1, sized>(own, turn, rows + i, from, to, sizes + i);
+        reflect<2, sized>(reflector, turn, rows + i, from, to, sizes + i);
+    if (i < count) reflect<1, sized>(reflector, turn, rows + i, from, to, sizes + i);
 }
 
-// Exchanges rows `step` and `at`, different ones in each lane.
+// Exchange row `step` and row `at`, which can differ between lanes.
 inline void exchange(Real **rows, int step, Whole at, int width) {
     bool same = true;
     for (int l = 1; l < LANES; ++l) same = same && at[l] == at[0];
@@ -68,15 +71,16 @@ inline void exchange(Real **rows, int step, Whole at, int width) {
             }
 }
 
-// Triangulates p rows of m columns, the largest remaining row first.
+// Triangulate p rows of m columns; the largest remaining row is the next pivot.
 //
-// relative  a row this small relative to the first adds nothing new,
-// floor     nor does one this small;
-// clean     where some row adds nothing, its largest size relative to the first;
-//           any if negative;
-// width     of the rows that change places: columns beyond m go along.
+//   relative  threshold of a pivot, as a share of the first pivot,
+//   floor     absolute threshold of a pivot,
+//   clean     largest size of rows that count as zero, as a share of the first pivot; a
+//             larger one makes the rank ambiguous; no limit if negative,
+//   width     number of columns that are exchanged with a row; columns beyond m are not
+//             triangulated.
 //
-// Returns the rank of each lane; -1 where it is numerically ambiguous.
+// Return the rank in each lane; -1 where it is numerically ambiguous.
 inline Whole triangulate(
     Triangle &T, int p, int m, Real relative, Real floor, double clean, int width) {
     Real **F = T.F.rows();
@@ -106,32 +110,34 @@ inline Whole triangulate(
             going &= clear;
             if (!any(going)) break;
         }
-        at = going ? at : whole(step);  // lanes at their end stay as they are
+        at = going ? at : whole(step);  // finished lanes do not change
         exchange(F, step, at, width);
         for (int l = 0; l < LANES; ++l) {
             sizes[at[l]][l] = sizes[step][l];
-            const int64_t kept = T.order[step][l];  // a lane cannot be referred to
+            // std::swap cannot take references to lanes
+            const int64_t kept = T.order[step][l];
             T.order[step][l] = T.order[at[l]][l];
             T.order[at[l]][l] = kept;
         }
-        Real *own = F[step];
-        const Real diagonal = own[step] > 0.0 ? -best : best;
-        own[step] -= going ? diagonal : Real{};
-        const Real turn = going ? -1.0 / (diagonal * own[step]) : Real{};
+        Real *reflector = F[step];
+        const Real diagonal = reflector[step] > 0.0 ? -best : best;
+        reflector[step] -= going ? diagonal : Real{};
+        const Real turn = going ? -1.0 / (diagonal * reflector[step]) : Real{};
         T.diagonal[step] = going ? diagonal : real(1.0);
         T.turns[step] = turn;
-        reflect_all<true>(own, turn, F + step + 1, p - step - 1, step, m, &sizes[step] + 1);
+        reflect_all<true>(
+            reflector, turn, F + step + 1, p - step - 1, step, m, &sizes[step] + 1);
     }
     return rank;
 }
 
-// Every row x becomes Q x.
+// Replace every row x by Q x.
 inline void turn_all(Triangle &T, int rank, int m, Real *const *x, int count) {
     for (int step = rank - 1; step >= 0; --step)
         reflect_all<false>(T.F[step], T.turns[step], x, count, step, m, nullptr);
 }
 
-// x becomes Q^T x.
+// Replace x by Q^T x.
 inline void turn_back(Triangle &T, int rank, int m, Real *x) {
     for (int step = 0; step < rank; ++step)
         reflect<1, false>(T.F[step], T.turns[step], &x, step, m, nullptr);

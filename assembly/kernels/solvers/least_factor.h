@@ -1,6 +1,8 @@
-// The least factor t on unit cones with which B u = w and |u_k| <= t, B's rows orthonormal:
-// |w| over the most that g.u can be with |u_k| <= 1 and the rest of B u zero, g = B^T w /
-// |w|.  The multipliers n of these rows bound it from below,
+// The least factor t of the unit cones for which B u = w and |u_k| <= t can be
+// satisfied, where the rows of B are orthonormal.  With g = B^T w / |w|, it is |w|
+// divided by the largest g.u subject to |u_k| <= 1 and B_rest u = 0.  B_rest are the
+// rows of B after a rotation that makes the first row g.  The multipliers n of B_rest
+// give a lower bound,
 //
 //     t >= |w| / sum_k |(g - B_rest^T n)_k|.
 #pragma once
@@ -9,11 +11,14 @@
 
 namespace LANE_SPACE {
 
-constexpr double MARGIN_GAP = 1e-8;  // assembly/kinematics/ranks.py
+// largest relative gap of a proved margin: assembly/linear/zone.py
+constexpr double MARGIN_GAP = 1e-8;
+// gap at which the interior-point method stops; the largest g.u is of order 1
 constexpr double MARGIN_STOP = 1e-9;
 
-// B, the programme's first rows, turned so that the first is along w, the others across; w
-// is overwritten.
+// Rotate the first `count` rows B of the programme so that the first row becomes
+// g = B^T w / |w|; the other rows become orthogonal to w.  `size` is |w|.  w is
+// overwritten.
 inline void first_along(Programme &q, int count, Real *w, Real size) {
     Real *const *B = q.M.rows();
     const int nu = q.cones.nu;
@@ -28,21 +33,23 @@ inline void first_along(Programme &q, int count, Real *w, Real size) {
     for (int c = 0; c < nu; ++c) B[0][c] *= sign;
 }
 
-// u within the cones with the largest B[0].u, its reach, and B[1:] u = 0; the upper bound
-// of the reach by the multipliers.  Returns g - B_rest^T n.
+// Compute the u inside the cones with the largest B[0].u and with B[1:] u = 0.
+// `reach` is this largest value, `most` its upper bound from the multipliers.  Return
+// g - B_rest^T n.
 inline Row reach_along_first(
-    Solver &solver, Programme &q, int count, Whole asked, Real &reach, Real &most) {
+    Solver &solver, Programme &q, int count, Whole requested, Real &reach, Real &most) {
     const int nu = q.cones.nu;
     Real **B = q.M.rows();
-    std::rotate(B, B + 1, B + count);  // the rows H u = 0 first
+    std::rotate(B, B + 1, B + count);  // the rows H u = 0 come first
     q.r = 0, q.p = count - 1, q.loaded = true;
     const Real *along = B[q.p];
     std::copy(along, along + nu, q.d.begin());
-    solver.interior_point(q, real(MARGIN_STOP), 0.0, asked);
+    solver.interior_point(q, real(MARGIN_STOP), 0.0, requested);
     Row gradient = q.d, against(q.p);
     for (int i = 0; i < q.p; ++i) against[i] = -q.y[i];
     combine(B, q.p, against.data(), nu, gradient.data());
-    // the rounding residual of the rest is removed, then u is scaled into the cones
+    // u is made orthogonal to the other rows, where it had a rounding error, then
+    // scaled into the cones
     for (int i = 0; i < q.p; ++i) {
         const Real residual = inner(B[i], q.u.data(), nu);
         for (int c = 0; c < nu; ++c) q.u[c] -= residual * B[i][c];

@@ -1,18 +1,20 @@
-// A second upper bound for (27), exact where outer approximation is slow: for a round
-// body that needs about 1 / gap cuts, since all directions are nearly equal.  The support
-// function is the least, over n, of linear terms + sum_k |w_k|, w = X^T d - H^T n.  For
-// any sizes s_k > 0,
+// A second upper bound for (27).  Outer approximation by planes is slow for a round
+// body: all directions are nearly equal, and about 1 / gap planes are needed.  For such
+// bodies this bound is exact.  The support function is the minimum, over n, of linear
+// terms plus sum_k |w_k|, with w = X^T d - H^T n.  For any s_k > 0,
 //
 //     |w_k|  <=  |w_k|^2 / (2 s_k)  +  s_k / 2,
 //
-// equal where s_k = |w_k|.  With s taken from one direction, the minimum over n is a
-// quadratic in d, above the support function everywhere and equal to it there; its largest
-// value on the unit sphere is known by an eigenvalue problem.  Where the direction is the
-// farthest point's, the bound usually closes at once: a disc's or an ellipsoid's always.
+// with equality where s_k = |w_k|.  The s_k are computed from one direction.  The
+// minimum over n is then a quadratic function of d.  It is an upper bound of the
+// support function for all directions, with equality for this one.  Its largest value
+// on the unit sphere follows from an eigenvalue problem.  If the direction is that of
+// the farthest point, this value usually equals the distance of that point; for a disc
+// or an ellipsoid it always does.
 //
-// Sources: Conn, Gould, Toint (2000), Trust-Region Methods, section 7.3, for the largest
-// value of a quadratic on a sphere; Golub, Van Loan, Matrix Computations, 4th ed., section
-// 8.5 (Jacobi's method).
+// Sources: Conn, Gould, Toint (2000), Trust-Region Methods, section 7.3, for the
+// largest value of a quadratic function on a sphere; Golub, Van Loan, Matrix
+// Computations, 4th ed., section 8.5 (Jacobi's method).
 #pragma once
 
 #include "cones.h"
@@ -20,9 +22,10 @@
 
 namespace LANE_SPACE {
 
-constexpr double LEAST_SIZE = 1e-9;  // of a cone with zero gradient, to the largest
+constexpr double LEAST_SIZE = 1e-9;  // least s_k, as a share of the largest one
 
-// Eigenvalues of a symmetric matrix, and vectors as columns, by Jacobi's method.
+// Compute the eigenvalues of a symmetric matrix, and its eigenvectors as columns of V,
+// by Jacobi's method.
 inline void eigenvectors(const Point *Q, Point &values, Point *V) {
     Point D[3] = {Q[0], Q[1], Q[2]};
     for (int i = 0; i < 3; ++i)
@@ -50,7 +53,8 @@ inline void eigenvectors(const Point *Q, Point &values, Point *V) {
     for (int i = 0; i < 3; ++i) values[i] = D[i][i];
 }
 
-// Largest value of d.Q d/2 + g.d over unit vectors d, from above by at most rounding.
+// Return an upper bound of the largest value of d.Q d / 2 + g.d over unit vectors d.
+// It exceeds that value by at most the rounding error.
 inline double largest_on_sphere(const Point *Q, const Point &g) {
     Point values, along = {}, V[3];
     eigenvectors(Q, values, V);
@@ -60,8 +64,8 @@ inline double largest_on_sphere(const Point *Q, const Point &g) {
     const double length = std::sqrt(inner(g, g));
     double size = std::max(length, 1e-300);
     for (double value : values) size = std::max(size, std::fabs(value));
-    // any multiplier m > top gives an upper bound, m/2 + sum g_i^2 / (2 (m - q_i)); the
-    // least of them has |g / (m - q)| = 1, or m = top
+    // any multiplier m > top gives the upper bound m / 2 + sum_i g_i^2 / (2 (m - q_i)),
+    // with the eigenvalues q_i; the least bound has |g / (m - q)| = 1 or m = top
     const double high = length + 1e-15 * size;
     double shift = 1e-15 * size;
     for (int step = 0; step < 60; ++step) {
@@ -73,7 +77,8 @@ inline double largest_on_sphere(const Point *Q, const Point &g) {
         }
         first = std::sqrt(first);
         if (!(first > 1.0 + 1e-14)) break;
-        // Newton's method on 1/|.|, concave: it comes from the left and stays there
+        // Newton's method on 1 / |g / (m - q)|, which is concave: from the left of the
+        // root all iterates remain on the left
         shift = std::min(high, shift + first * first / second * (first - 1.0));
     }
     const double m = top + shift;
@@ -82,8 +87,8 @@ inline double largest_on_sphere(const Point *Q, const Point &g) {
     return total;
 }
 
-// Bodies {centre + X (v - start) : |v_k| <= 1, H (v - start) = 0}, three components of
-// the screw: one in each lane.  Rows and cones that a lane does not have are zero.
+// Three components of bodies {centre + X (v - start) : |v_k| <= 1, H (v - start) = 0}
+// of screws, one body in each lane.  Rows and cones that a lane does not have are zero.
 struct Projection {
     const Cones &cones;
     int p;
@@ -91,27 +96,27 @@ struct Projection {
     Real centre[3];
     Row start, right;     // (nv,) within the cones; (p,) H start
     std::vector<Whole> present;  // cones that a lane has
-    Whole rows;           // of each lane
+    Whole rows;           // number of rows in each lane
     Projection(const Cones &cones, int p)
         : cones(cones), p(p), X(3, cones.nu), H(p, cones.nu), start(cones.nu), right(p),
           present(cones.count) {}
 };
 
-// Upper bounds of |centre + X (v - start)| from the gradient w = X^T d - H^T n at some
-// direction d; infinite where it is zero, or rounding dominates.
+// Upper bounds of |centre + X (v - start)| from the gradient w = X^T d - H^T n at a
+// direction d.  A bound is infinite where w is zero or where rounding errors dominate.
 class Majorant {
 public:
     Majorant(int nv, int p)
         : scaled(1, nv), S(p, p), right(4, p), A(3, nv), sizes(nv), fixed(nv) {}
 
-    void bound(const Projection &body, const Row &w, Whole asked, double *out) {
+    void bound(const Projection &body, const Row &w, Whole requested, double *out) {
         const int nv = body.cones.nu;
         Real largest = {}, total = {};
         body.cones.each([&](auto of, int, int at) {
             sizes[at] = root(inner(&w[at], &w[at], of));
             largest = larger(sizes[at], largest);
         });
-        asked &= largest > 1e-150;  // a zero gradient bounds no other direction
+        requested &= largest > 1e-150;  // a zero gradient gives no bound
         body.cones.each([&](auto of, int c, int at) {
             const Real size = larger(sizes[at], LEAST_SIZE * largest);
             total += body.present[c] ? size : Real{};
@@ -119,8 +124,9 @@ public:
         });
         std::fill(fixed.begin(), fixed.end(), Real{});
         for (int a = 0; a < 3; ++a) std::copy(body.X[a], body.X[a] + nv, A[a]);
-        asked &= follow_rows(body);
-        // n minimises w.w/(2s) - w.start:  H (w/s - start) = 0, w = A d + fixed
+        requested &= follow_rows(body);
+        // n minimises sum_j w_j^2 / (2 s_j) - w.start; then H (w / s - start) = 0, and
+        // w is a linear function A d + fixed of d
         Real Q[3][3] = {}, linear[3], constant = 0.5 * total;
         for (int a = 0; a < 3; ++a) linear[a] = body.centre[a];
         for (int j = 0; j < nv; ++j) {
@@ -133,7 +139,7 @@ public:
         }
         for (int l = 0; l < LANES; ++l) {
             out[l] = INFINITY;
-            if (!asked[l]) continue;
+            if (!requested[l]) continue;
             Point quadratic[3], slope;
             for (int a = 0; a < 3; ++a) {
                 slope[a] = linear[a][l];
@@ -146,9 +152,10 @@ public:
 
 private:
     Table scaled, S, right, A;
-    Row sizes, fixed;  // the cones' sizes, inverse; terms of w that no direction changes
+    Row sizes, fixed;  // 1 / s_j; terms of w that do not depend on d
 
-    // Subtracts the terms of the best n from A and fixed; the lanes where that succeeded.
+    // Subtract the terms of the minimising n from A and `fixed`.  Return the lanes in
+    // which the linear system was solved.
     Whole follow_rows(const Projection &body) {
         const int p = body.p, nv = body.cones.nu;
         Whole good = whole(-1);
@@ -163,10 +170,11 @@ private:
             for (int l = 0; l < i; ++l)
                 S[i][l] = (S[i][l] - inner(S[i], S[l], l)) * S[l][l];
             const Real pivot = S[i][i] - inner(S[i], S[i], i);
-            const Whole own = body.rows > i;
-            good &= ~own | (pivot > 0.0);
-            // the inverse of the diagonal; rows that a lane does not have stay zero
-            S[i][i] = own ? 1.0 / root(pivot) : real(1.0);
+            const Whole present = body.rows > i;
+            good &= ~present | (pivot > 0.0);
+            // the diagonal is replaced by its inverse; rows that a lane does not have
+            // stay zero
+            S[i][i] = present ? 1.0 / root(pivot) : real(1.0);
         }
         for (int a = 0; a < 4; ++a) {
             Real *x = right[a];

@@ -1,5 +1,5 @@
-// Cone programmes of the same G and H, and closest points of the same rows, several in
-// parallel.
+// Cone programmes that share G and H, and closest points of sets that share their rows,
+// several in parallel.
 #include "../kernels.h"
 #include "block.h"
 #include "closest.h"
@@ -9,18 +9,20 @@ using namespace LANE_SPACE;
 
 namespace {
 
-// Gap that is required, relative to the energy and to that without clearance; and the one
-// of a few more steps, whose result is kept where they reach it.  Each of the last steps
-// of Newton's method squares the error: strains are then exact to rounding.
+// required gap, relative to the energy and to the energy without clearance.  A few more
+// Newton steps then aim at a smaller gap; their result is used where they reach it.
+// Each of these steps squares the error, so that the strains become exact except for
+// rounding
 constexpr double ENERGY = 1e-11, WITHOUT_CLEARANCE = 1e-17;
-constexpr double POLISHED = 1e-4;  // share of these gaps
+constexpr double POLISHED = 1e-4;  // smaller gap as a share of the required one
 constexpr int STEPS_POLISHING = 6;
 
-// Problems of a block, scaled to size 1 each.
+// The problems of a block, read from arrays and written to arrays.  Each problem is
+// scaled so that the largest entries are of order 1.
 class Scaled {
 public:
-    Scaled(const ConeProblems &given, Programme &q) : own(given), q(q) {
-        const int r = int(own.r), p = int(own.p), nu = q.cones.nu;
+    Scaled(const ConeProblems &given, Programme &q) : problems(given), q(q) {
+        const int r = int(problems.r), p = int(problems.p), nu = q.cones.nu;
         q.r = r, q.p = p, q.loaded = true;
         for (int c = 0; c < nu; ++c) {
             double square = 0.0;
@@ -29,17 +31,17 @@ public:
         }
         for (int i = 0; i < p; ++i)
             for (int c = 0; c < nu; ++c)
-                q.M[r + i][c] = real(own.H[i * nu + q.cones.column[c]]);
+                q.M[r + i][c] = real(problems.H[i * nu + q.cones.column[c]]);
     }
 
-    // Reads the problems of a block.  Returns their energy without clearance.
+    // Read the problems of a block.  Return their scaled energy without clearance.
     Real read(const Block &block) {
         const int r = q.r, p = q.p, nu = q.cones.nu;
-        for (int i = 0; i < r; ++i) q.h[i] = block.read(own.h, r, i);
-        for (int i = 0; i < p; ++i) q.e[i] = block.read(own.k, p, i);
+        for (int i = 0; i < r; ++i) q.h[i] = block.read(problems.h, r, i);
+        for (int i = 0; i < p; ++i) q.e[i] = block.read(problems.k, p, i);
         Real square = larger(inner(q.h.data(), q.h.data(), r), real(largest));
         for (int c = 0; c < nu; ++c) {
-            q.d[c] = block.read(own.d, nu, q.cones.column[c]);
+            q.d[c] = block.read(problems.d, nu, q.cones.column[c]);
             square = larger(magnitude(q.d[c]), square);
         }
         size = root(larger(square, real(1e-300)));
@@ -62,14 +64,16 @@ public:
     }
 
 private:
-    double G(int row, int c) const { return own.G[row * q.cones.nu + q.cones.column[c]]; }
-    const ConeProblems &own;
+    double G(int row, int c) const {
+        return problems.G[row * q.cones.nu + q.cones.column[c]];
+    }
+    const ConeProblems &problems;
     Programme &q;
     double largest = 0.0;
     Real size;
 };
 
-// Shortens positions that rounding has left outside their cones.
+// Shorten positions that rounding has moved out of their cones.
 void into_cones(Programme &q) {
     q.cones.each([&](auto size, int, int at) {
         const Real length = root(inner(&q.u[at], &q.u[at], size));
@@ -85,7 +89,8 @@ void minimise_all(const ConeProblems &given, double *u, double *y) {
     Programme q(cones, rows);
     Solver solver(cones, rows);
     Scaled scaled(given, q);
-    // the interior-point method solves full blocks of the problems left by Newton's method
+    // problems that Newton's method did not solve; the interior-point method solves
+    // them in full blocks
     std::vector<int64_t> left;
     in_blocks(all_of(given.count), [&](const Block &block, Whole pending) {
         const Real without = scaled.read(block);

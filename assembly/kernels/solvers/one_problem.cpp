@@ -1,5 +1,5 @@
-// One cone programme, and one body's farthest screw, with cones of any size: for callers
-// with a single problem.
+// One cone programme, and the farthest screw of one body, with cones of any size.
+// Python calls these functions for a single problem.
 #define FEW_LANES
 #include "../kernels.h"
 #include "block.h"
@@ -10,8 +10,9 @@ using namespace LANE_SPACE;
 
 namespace {
 
-// Overwrites a first guess u (nu,) and the multipliers y (r + p,), those of H's rows
-// last, with the result of a method.  All lanes contain the same problem.
+// Apply `method` to one problem.  u (nu,) and the multipliers y (r + p,), those of
+// H's rows last, contain an initial guess and are overwritten with the result.  All
+// lanes contain the same problem.
 template <typename Method>
 void solve(const ConeProblem &given, double *u, double *y, Method method) {
     const Cones cones(given.starts, int(given.cones));
@@ -19,11 +20,11 @@ void solve(const ConeProblem &given, double *u, double *y, Method method) {
     Programme q(cones, r + p);
     q.r = r, q.p = p, q.loaded = true;
     for (int c = 0; c < nu; ++c) {
-        const int64_t own = cones.column[c];
-        for (int i = 0; i < r; ++i) q.M[i][c] = real(given.G[i * nu + own]);
-        for (int i = 0; i < p; ++i) q.M[r + i][c] = real(given.H[i * nu + own]);
-        q.d[c] = real(given.d[own]);
-        q.u[c] = real(u[own]);
+        const int64_t column = cones.column[c];
+        for (int i = 0; i < r; ++i) q.M[i][c] = real(given.G[i * nu + column]);
+        for (int i = 0; i < p; ++i) q.M[r + i][c] = real(given.H[i * nu + column]);
+        q.d[c] = real(given.d[column]);
+        q.u[c] = real(u[column]);
     }
     for (int i = 0; i < r; ++i) q.h[i] = real(given.h[i]);
     for (int i = 0; i < p; ++i) q.e[i] = real(given.k[i]);
@@ -51,31 +52,31 @@ void newton(const ConeProblem &given, const Limits &limits, double *u, double *y
     });
 }
 
-int64_t farthest(const AskedBody &asked, double *bounds, double *screw) {
-    const Cones given(asked.starts, int(asked.cones));
-    const int nv = given.nu, p = int(asked.p);
+int64_t farthest(const BodyRequest &requested, double *bounds, double *screw) {
+    const Cones given(requested.starts, int(requested.cones));
+    const int nv = given.nu, p = int(requested.p);
     Body body = {0, Cones(given.discs, given.intervals, given.balls), given.discs,
                  given.intervals, p, {}, {}, {}, {}};
     const auto ordered = [&](const double *from, int rows, std::vector<double> &to) {
         for (int i = 0; i < rows; ++i)
             for (int64_t column : given.column) to.push_back(from[i * nv + column]);
     };
-    std::copy(asked.centre, asked.centre + 6, body.centre);
-    ordered(asked.map, 6, body.X);
-    ordered(asked.rows, p, body.H);
-    ordered(asked.start, 1, body.start);
+    std::copy(requested.centre, requested.centre + 6, body.centre);
+    ordered(requested.map, 6, body.X);
+    ordered(requested.rows, p, body.H);
+    ordered(requested.start, 1, body.start);
     int64_t supports = 0;
-    const Task task = {&body, int(asked.half), asked.tolerance};
+    const Task task = {&body, int(requested.half), requested.tolerance};
     std::vector<double> gradient(nv);
     const auto support = [&](const Point &direction, double *height, double *attains,
                              double *w) {
-        asked.support(direction.data(), height, attains, gradient.data());
+        requested.support(direction.data(), height, attains, gradient.data());
         for (int j = 0; j < nv; ++j) w[j] = gradient[given.column[j]];
     };
-    Farthest(body, p, support).search({task}, [&](const Search &own, bool) {
-        bounds[0] = own.low, bounds[1] = own.high;
-        std::copy(own.best, own.best + 6, screw);
-        supports = own.supports;
+    Farthest(body, p, support).search({task}, [&](const Search &found, bool) {
+        bounds[0] = found.low, bounds[1] = found.high;
+        std::copy(found.best, found.best + 6, screw);
+        supports = found.supports;
     });
     return supports;
 }

@@ -1,9 +1,9 @@
-// A convex polytope in three dimensions, cut by planes; its vertices are known.
+// A convex polytope in three dimensions that is cut by planes; its corners are stored.
 //
-// A cut removes the corners above the plane and adds corners where the plane meets an
-// edge. An edge is two corners with two common planes.  Every corner has three planes.  A
-// corner on a cutting plane counts as below it, so where more than three planes meet,
-// several corners coincide.
+// A cut removes the corners above the plane and adds a corner where the plane meets an
+// edge.  Two corners with two common planes form an edge.  Every corner has three
+// planes.  A corner on a cutting plane counts as below it.  Where more than three
+// planes meet, several corners therefore coincide.
 #pragma once
 
 #include <array>
@@ -18,10 +18,10 @@ inline double inner(const Point &a, const Point &b) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-// The points below a growing number of planes.
+// The set of points below all planes so far.
 class Polytope {
 public:
-    // A box with these orthonormal rows as its directions.
+    // Start with a box; `axes` are its orthonormal directions.
     void start_box(const Point *axes, const Point &low, const Point &high) {
         corners.clear();
         for (int i = 0; i < 8; ++i) {
@@ -37,8 +37,8 @@ public:
         planes = 6;
     }
 
-    // Keeps the points x with normal . x <= height; unchanged if there are too many
-    // corners.
+    // Keep the points x with normal.x <= height.  The polytope does not change if it
+    // would have more than MOST corners.
     void cut(const Point &normal, double height) {
         const int plane = planes++, count = int(corners.size());
         double size = 0.0;
@@ -54,16 +54,17 @@ public:
             for (int j = 0; j < count; ++j) {
                 const Corner &other = corners[j];
                 if (other.above > limit) continue;
-                int shared[2] = {-1, -1}, common = 0;  // the planes in common
-                for (int own : one.planes)
-                    if (own == other.planes[0] || own == other.planes[1] ||
-                        own == other.planes[2]) {
+                int shared[2] = {-1, -1}, common = 0;  // the common planes
+                for (int candidate : one.planes)
+                    if (candidate == other.planes[0] || candidate == other.planes[1] ||
+                        candidate == other.planes[2]) {
                         ++common;
-                        shared[1] = shared[0], shared[0] = own;
+                        shared[1] = shared[0], shared[0] = candidate;
                     }
                 if (common < 2) continue;
                 if (count + int(fresh.size()) == MOST) return;
-                // an inner corner above the plane by rounding is itself the new one
+                // a corner below the limit can be above the plane by rounding: it is
+                // then itself the new corner
                 const double share = std::min(1.0, one.above / (one.above - other.above));
                 Corner corner = {{}, {shared[0], shared[1], plane}, 0.0};
                 for (int a = 0; a < 3; ++a)
@@ -76,7 +77,7 @@ public:
         corners.insert(corners.end(), fresh.begin(), fresh.end());
     }
 
-    // The corner farthest from the origin.
+    // Return the corner farthest from the origin.
     Point farthest_corner() const {
         double best = -1.0;
         Point at = {};
@@ -87,11 +88,11 @@ public:
     }
 
 private:
-    static constexpr int MOST = 4096;  // corners; 400 planes make 800
+    static constexpr int MOST = 4096;  // corners; 400 planes give at most about 800
     struct Corner {
         Point at;
         std::array<int, 3> planes;
-        double above;  // the plane of the last cut
+        double above;  // height above the plane of the last cut
     };
     std::vector<Corner> corners, fresh;
     int planes = 0;

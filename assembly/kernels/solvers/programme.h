@@ -1,5 +1,4 @@
-// Cone programmes over plain tables, one in each lane, and the linear systems of their
-// solvers:
+// Cone programmes, one in each lane, and the linear systems of their solvers:
 //
 //     minimise  |G u + h|^2 / 2 - d.u   subject to  H u = e,  |u_k| <= 1, each cone k
 #pragma once
@@ -8,12 +7,12 @@
 
 namespace LANE_SPACE {
 
-// The cones' columns: discs of two columns each first, then intervals of one, then balls
-// of more.
+// The cones, sorted by their numbers of columns: first discs of two columns, then
+// intervals of one, then balls of more.
 struct Cones {
     int discs = 0, intervals = 0, count = 0, nu = 0;
-    Array<int> balls;       // columns of each
-    Array<int64_t> column;  // (nu,) index in the robot's order
+    Array<int> balls;       // number of columns of each ball
+    Array<int64_t> column;  // (nu,) index of each column in the robot's order
 
     Cones(const int64_t *starts, int cones) : count(cones), nu(int(starts[cones])) {
         const auto add = [&](int c) {
@@ -28,48 +27,49 @@ struct Cones {
                 balls.push_back(size), add(c);
     }
 
-    // Given numbers of discs, then intervals, then balls of given numbers of columns.
+    // Cones of given numbers; `balls` contains the number of columns of each ball.
     Cones(int discs, int intervals, const Array<int> &balls)
         : discs(discs), intervals(intervals), count(discs + intervals + int(balls.size())),
           nu(std::accumulate(balls.begin(), balls.end(), 2 * discs + intervals)),
           balls(balls) {}
 
-    // Calls visit(columns, cone, first column) for every cone.
+    // Call visit(columns, cone, first column) for every cone.
     template <typename Visit> void each(Visit visit) const {
         int c = 0, at = 0;
         for (; c < discs; ++c, at += 2) visit(Size<2>{}, c, at);
         for (; c < discs + intervals; ++c, ++at) visit(Size<1>{}, c, at);
         for (int size : balls) visit(Size<0>{size}, c++, at), at += size;
     }
-    template <int width> struct Size {  // of a ball if the width is 0
+    template <int width> struct Size {  // a ball if the width is 0
         static constexpr bool ball = width == 0;
         int columns = width;
         constexpr operator int() const { return ball ? columns : width; }
     };
 };
 
-// A problem in each lane, and its answer.
+// A problem in each lane, and its solution.
 struct Programme {
     const Cones &cones;
-    int r, p;     // rows of G and of H
-    Table M;      // (r + p, nu)
+    int r, p;     // numbers of rows of G and of H
+    Table M;      // (r + p, nu) rows of G, then of H
     Row h, d, e;  // (r,), (nu,), (p,)
-    Row u, y;     // (nu,), (r + p,) the answer
-    bool loaded = false;  // else d is zero
+    Row u, y;     // (nu,), (r + p,) solution
+    bool loaded = false;  // if not, d is zero
     Programme(const Cones &cones, int rows)
         : cones(cones), r(rows), p(0), M(rows, cones.nu), h(rows), d(cones.nu), e(rows),
           u(cones.nu), y(rows) {}
 };
 
-// Symmetric systems S x = right, factored in the lower half of S: S = L D L^T, no roots.
+// Symmetric systems S x = right.  The lower triangle of S is factored as L D L^T,
+// without square roots.
 class System {
 public:
     Table S;
     explicit System(int rows) : S(rows, rows), size(rows) {}
 
-    // Lanes where every pivot is a number.  A pivot lost to rounding is replaced by a
-    // huge one, or, if that is not allowed, the lane fails.  The diagonal is overwritten
-    // with D^-1.
+    // Factor S.  Return the lanes in which every pivot is a number.  If `replace`, a
+    // pivot lost to rounding is replaced by 1e128, so that its unknown becomes nearly
+    // zero; otherwise the lane fails.  The diagonal is overwritten with D^-1.
     Whole factor(int m, bool replace) {
         Whole good = whole(-1);
         for (int j = 0; j < m; ++j) size[j] = S[j][j];
@@ -79,10 +79,10 @@ public:
             S[j][j] = clear ? 1.0 / pivot : real(1e-128);
             good &= replace ? clear | ((pivot == pivot) & (size[j] >= 0.0)) : clear;
             for (int i = j + 1; i < m; ++i) {
-                const Real own = S[i][j], weight = own * S[j][j];
+                const Real entry = S[i][j], weight = entry * S[j][j];
                 for (int l = j + 1; l < i; ++l) S[i][l] -= weight * S[j][l];
-                S[i][i] -= weight * own;
-                S[j][i] = own, S[i][j] = weight;  // D L^T above, L below
+                S[i][i] -= weight * entry;
+                S[j][i] = entry, S[i][j] = weight;  // D L^T above the diagonal, L below
             }
         }
         return good;

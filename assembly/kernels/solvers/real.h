@@ -1,7 +1,11 @@
-// Numbers of several problems in parallel, one in each lane of a vector register.
+// Arithmetic on several problems in parallel.  A lane is one position of a vector
+// register; each lane contains the numbers of one problem.  A `Real` is one vector of
+// LANES numbers, and a block (block.h) is a set of LANES problems that are solved
+// together.
 //
-// Every lane computes independently: nothing sums over lanes, and masks keep the values
-// of a lane that has finished.  So a result does not depend on the other lanes.
+// The lanes compute independently: no operation sums over lanes.  Masks keep the values
+// of a lane whose problem is finished.  A result therefore does not depend on the
+// problems in the other lanes.
 #pragma once
 
 #include <algorithm>
@@ -12,8 +16,9 @@
 #include <utility>
 #include <vector>
 
-// One module has code for two lanes, for few problems, and for as many as the registers
-// have: each in its own namespace.
+// Each module contains two versions of the code, in different namespaces.  One version
+// has two lanes and is used for few problems.  The other has as many lanes as a vector
+// register holds.
 #if defined(FEW_LANES)
 #define LANE_COUNT 2
 #define LANE_SPACE lanes_2
@@ -33,7 +38,8 @@ constexpr int LANES = LANE_COUNT;
 template <typename T> using Array = std::vector<T>;
 
 typedef double Real __attribute__((vector_size(8 * LANES)));
-typedef int64_t Whole __attribute__((vector_size(8 * LANES)));  // or a mask: 0 or -1
+// integers, or a mask: 0 or -1
+typedef int64_t Whole __attribute__((vector_size(8 * LANES)));
 
 inline Real real(double value) { return value - Real{}; }
 inline Whole whole(int64_t value) { return value - Whole{}; }
@@ -43,8 +49,9 @@ inline Real root(Real x) {
     return x;
 }
 
-// A number that is used several times, read once: compilers would read it again for every
-// product, and these loops are limited by reading.
+// Return a number that is used several times, so that it is loaded once.  Compilers
+// would otherwise load it again for every product, and the loads limit the speed of
+// these loops.
 inline Real once(Real x) {
 #if defined(__x86_64__)
     asm("" : "+x"(x));
@@ -52,7 +59,7 @@ inline Real once(Real x) {
     return x;
 }
 
-// Before the loops of a tile over its own sums: these remain in registers.
+// Unroll a loop over the partial sums of a tile, so that these remain in registers.
 #define UNROLL _Pragma("GCC unroll 8")
 
 inline Real magnitude(Real x) { return x < 0.0 ? -x : x; }
@@ -64,7 +71,7 @@ inline bool any(Whole mask) {
     return bits != 0;
 }
 
-// A matrix whose rows can change places.
+// A matrix whose rows can be exchanged without a copy.
 class Table {
 public:
     Table(int rows, int columns) : numbers(size_t(rows) * columns), at(rows) {
@@ -81,8 +88,8 @@ private:
 
 typedef Array<Real> Row;
 
-// Inner products of R rows with x over the columns from .. to, in partial sums that
-// hide the latency of one: 8 / R for each row.
+// Compute inner products of R rows with x over the columns from .. to - 1.  Each row
+// has 8 / R partial sums, so that additions do not wait for each other.
 template <int R>
 inline void inner_tile(Real *const *rows, const Real *x, int from, int to, Real *out) {
     constexpr int PARTS = 8 / R;
@@ -92,12 +99,12 @@ inline void inner_tile(Real *const *rows, const Real *x, int from, int to, Real 
     int a = from;
     for (; a + PARTS <= to; a += PARTS)
         UNROLL for (int b = 0; b < PARTS; ++b) {
-            const Real own = once(x[a + b]);
-            UNROLL for (int i = 0; i < R; ++i) total[i][b] += rows[i][a + b] * own;
+            const Real factor = once(x[a + b]);
+            UNROLL for (int i = 0; i < R; ++i) total[i][b] += rows[i][a + b] * factor;
         }
     for (; a < to; ++a) {
-        const Real own = once(x[a]);
-        UNROLL for (int i = 0; i < R; ++i) total[i][0] += rows[i][a] * own;
+        const Real factor = once(x[a]);
+        UNROLL for (int i = 0; i < R; ++i) total[i][0] += rows[i][a] * factor;
     }
     UNROLL for (int i = 0; i < R; ++i) {
         UNROLL for (int half = PARTS / 2; half > 0; half /= 2)
@@ -112,7 +119,7 @@ inline Real inner(const Real *a, const Real *b, int n) {
     return total;
 }
 
-// out = A x.
+// Compute out = A x.
 inline void multiply(Real *const *A, int count, const Real *x, int columns, Real *out) {
     int i = 0;
     for (; i + 4 <= count; i += 4) inner_tile<4>(A + i, x, 0, columns, out + i);
@@ -125,13 +132,13 @@ inline void combine_tile(Real *const *A, int count, const Real *y, int column, R
     Real total[C];
     UNROLL for (int j = 0; j < C; ++j) total[j] = out[column + j];
     for (int i = 0; i < count; ++i) {
-        const Real own = once(y[i]), *row = A[i] + column;
-        UNROLL for (int j = 0; j < C; ++j) total[j] += own * row[j];
+        const Real weight = once(y[i]), *row = A[i] + column;
+        UNROLL for (int j = 0; j < C; ++j) total[j] += weight * row[j];
     }
     UNROLL for (int j = 0; j < C; ++j) out[column + j] = total[j];
 }
 
-// out += A^T y.
+// Add A^T y to out.
 inline void combine(Real *const *A, int count, const Real *y, int columns, Real *out) {
     int j = 0;
     for (; j + 8 <= columns; j += 8) combine_tile<8>(A, count, y, j, out);
@@ -146,18 +153,18 @@ inline void product_tile(
     UNROLL for (int i = 0; i < R; ++i)
         UNROLL for (int j = 0; j < C; ++j) total[i][j] = Real{};
     for (int a = 0; a < width; ++a) {
-        Real own[R];
-        UNROLL for (int i = 0; i < R; ++i) own[i] = once(B[i][a]);
+        Real first[R];
+        UNROLL for (int i = 0; i < R; ++i) first[i] = once(B[i][a]);
         UNROLL for (int j = 0; j < C; ++j) {
             const Real other = once(M[column + j][a]);
-            UNROLL for (int i = 0; i < R; ++i) total[i][j] += own[i] * other;
+            UNROLL for (int i = 0; i < R; ++i) total[i][j] += first[i] * other;
         }
     }
     UNROLL for (int i = 0; i < R; ++i)
         UNROLL for (int j = 0; j < C; ++j) out[i][column + j] = total[i][j];
 }
 
-// R rows B M^T, of the first rows of M.
+// Compute R rows of B M^T for the first `rows` rows of M.
 template <int R>
 inline void products(
     Real *const *B, Real *const *M, int rows, int width, Real *const *out) {

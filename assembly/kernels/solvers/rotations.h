@@ -1,14 +1,14 @@
-// Rotations of several problems in parallel.
+// Rotation matrices and rotation vectors of several problems in parallel.
 //
-// A rotation matrix is nine numbers, row after row.
+// A rotation matrix is stored as nine numbers, row after row.
 #pragma once
 
 #include "real.h"
 
 namespace LANE_SPACE {
 
-// Rotation vector of a rotation matrix, by its quaternion, the largest component first:
-// Shepperd (1978), Quaternion from rotation matrix.
+// Compute the rotation vector of a rotation matrix from its quaternion, by way of the
+// largest component.  Source: Shepperd (1978), Quaternion from rotation matrix.
 inline void rotation_log(const double *R, double *turn) {
     const double trace = R[0] + R[4] + R[8];
     int best = 3;
@@ -30,13 +30,13 @@ inline void rotation_log(const double *R, double *turn) {
     }
     const double sine = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);
     double factor = 0.0;
-    // q and -q are the same rotation: the one of at most half a turn
+    // q and -q are the same rotation; the vector of at most half a turn is chosen
     if (sine >= 1e-300)
         factor = std::copysign(2.0 * std::atan2(sine, std::fabs(q[3])) / sine, q[3]);
     for (int k = 0; k < 3; ++k) turn[k] = factor * q[k];
 }
 
-// 1 + a S + b S S, S the matrix of the cross product with v.
+// Compute 1 + a S + b S S, where S is the cross-product matrix of v.
 inline void turned(const double *v, double a, double b, double *A) {
     const double x = v[0], y = v[1], z = v[2];
     A[0] = 1.0 - b * (y * y + z * z);
@@ -47,7 +47,7 @@ inline void turned(const double *v, double a, double b, double *A) {
     A[5] = b * y * z - a * x, A[7] = b * y * z + a * x;
 }
 
-// Rotation matrix of a rotation vector (Rodrigues).
+// Compute the rotation matrix of a rotation vector by Rodrigues' formula.
 inline void rotation_exp(const double *v, double *A) {
     const double angle = std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
     double a = 1.0, b = 0.0;
@@ -58,15 +58,16 @@ inline void rotation_exp(const double *v, double *A) {
     turned(v, a, b, A);
 }
 
-// Change of a rotation vector per small turn in fixed axes: Chirikjian, Stochastic
-// Models, Information Theory, and Lie Groups 2, section 10.7.
+// Compute the derivative of a rotation vector with respect to a small rotation about
+// fixed axes.  Source: Chirikjian, Stochastic Models, Information Theory, and Lie
+// Groups 2, section 10.7.
 inline void inverse_left_jacobian(const double *v, double *A) {
     const double size = std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
     const double angle = size > 1e-6 ? size : 1e-6, half = angle / 2.0;
     turned(v, -0.5, (1.0 - half / std::tan(half)) / (angle * angle), A);
 }
 
-// Rotation vectors of A B^T.
+// Compute the rotation vectors of A B^T.
 inline void rotation_between(const Real *A, const Real *B, Real *turn) {
     Real trace = {};
     for (int k = 0; k < 3; ++k) turn[k] = Real{};
@@ -78,16 +79,16 @@ inline void rotation_between(const Real *A, const Real *B, Real *turn) {
         turn[2] += q * l - p * m;
         trace += p * l + q * m + r * n;
     }
-    // twice the sine
+    // twice the sine of the angle
     const Real sine = root(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]);
     for (int l = 0; l < LANES; ++l) {
-        if (trace[l] < 1.0) {  // beyond a quarter turn differences could cancel
-            double C[9] = {}, own[3];
+        if (trace[l] < 1.0) {  // beyond a quarter turn the sine loses accuracy
+            double C[9] = {}, vector[3];
             for (int i = 0; i < 9; ++i)
                 for (int k = 0; k < 3; ++k)
                     C[i] += A[i / 3 * 3 + k][l] * B[i % 3 * 3 + k][l];
-            rotation_log(C, own);
-            for (int k = 0; k < 3; ++k) turn[k][l] = own[k];
+            rotation_log(C, vector);
+            for (int k = 0; k < 3; ++k) turn[k][l] = vector[k];
             continue;
         }
         const double angle = std::atan2(sine[l], trace[l] - 1.0);
@@ -96,11 +97,14 @@ inline void rotation_between(const Real *A, const Real *B, Real *turn) {
     }
 }
 
-// Sines and cosines: the angle less multiples of a quarter turn, in three parts (Cody
-// and Waite), then the polynomials of Moshier's Cephes library.
+// Compute sines and cosines.  A quarter turn, split into three constants, is
+// subtracted from the angle as often as it fits (Cody, Waite).  The polynomials are
+// those of Moshier's Cephes library.
 inline void sine_cosine(Real x, Real *sine, Real *cosine) {
-    constexpr double MAGIC = 6755399441055744.0;  // 1.5 2^52: rounds what is added to it
-    constexpr double LARGE = 1e5;                 // there the three parts end
+    // 1.5 2^52: a number added to it is rounded to an integer
+    constexpr double MAGIC = 6755399441055744.0;
+    // [rad] from here on the three constants are not accurate enough
+    constexpr double LARGE = 1e5;
     const Real moved = x * 0.63661977236758134308 + MAGIC, quarters = moved - MAGIC;
     Real y = x - quarters * 1.57079632673412561417;
     y -= quarters * 6.07710050630396597660e-11;
@@ -118,7 +122,7 @@ inline void sine_cosine(Real x, Real *sine, Real *cosine) {
     c = c * z - 1.38888888888730564116e-3;
     c = c * z + 4.16666666666665929218e-2;
     c = 1.0 - 0.5 * z + z * z * c;
-    const Whole number = (Whole)moved;  // its last bits count quarter turns
+    const Whole number = (Whole)moved;  // the last two bits count quarter turns
     const Whole odd = (number & 1) != 0;
     const Real a = odd ? c : s, b = odd ? s : c;
     *sine = (number & 2) != 0 ? -a : a;

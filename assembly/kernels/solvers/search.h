@@ -1,32 +1,39 @@
-// State of a search of (27): bounds of the farthest point of a convex body of platform
-// screws, from one support function to the next.
+// State of one search for (27): bounds of the farthest point of a convex body of
+// platform screws.  Each support function improves the bounds.
 //
-// A body is {centre + X (v - start) : |v_k| <= 1, H (v - start) = 0}.  The largest rotation,
-// or translation, in it depends on three components: their projection is approximated from
-// outside by planes in three dimensions.
+// A body is {centre + X (v - start) : |v_k| <= 1, H (v - start) = 0}.  The largest
+// rotation, or the largest translation, depends on three components of the screw.
+// Planes approximate the projection onto these three components from outside.
 //
-// - A support function gives a cut on the upper side and a point on the lower; where the
-//   body is symmetric, the same support holds for the opposite direction.
-// - First the search climbs: the direction of the supporting point gains more.
-// - Then a box along that direction, and always the farthest vertex of what remains.
-// - majorant.h bounds round bodies, which would take many cuts.
+// - A support function gives a plane, for the upper bound, and a point, for the lower
+//   bound.  If the body is symmetric, it also gives both for the opposite direction.
+// - In the first stage, the next direction is that of the supporting point; the lower
+//   bound then increases.
+// - Then a box along the best direction is computed.  From then on, the next direction
+//   is that of the farthest corner of the polytope, unless the last support improved
+//   the lower bound.
+// - majorant.h computes an upper bound for round bodies, which would need many planes.
 //
-// Sources: Horst, Tuy (1996), Global Optimization, ch. II (outer approximation of a convex
-// maximisation).
+// Source: Horst, Tuy (1996), Global Optimization, ch. II (outer approximation of a
+// convex maximisation).
 #pragma once
 
 #include "majorant.h"
 
 namespace LANE_SPACE {
 
+// largest number of support functions in the first stage; largest number of planes that
+// are stored before there is a box
 constexpr int CLIMBS = 8, MOST_KEPT = 32;
-constexpr double GAIN = 1e-3;  // [tolerances] smaller gain that ends the climb
+// [1] least gain of the first stage, as a share of the tolerance
+constexpr double GAIN = 1e-3;
 
-// A body; its columns are padded with zeros to a number common to several bodies.
+// A body.  Its columns are padded with zeros, so that several bodies have equal numbers
+// of columns.
 struct Body {
     int64_t point;
-    Cones cones;                   // of the columns
-    int own_discs, own_intervals;  // numbers without padding
+    Cones cones;                   // cones of the padded columns
+    int unpadded_discs, unpadded_intervals;  // numbers of cones without padding
     int p;
     double centre[6];
     std::vector<double> X, H, start;  // (6, nv), (p, nv), (nv,)
@@ -39,7 +46,8 @@ struct Body {
     }
 };
 
-// A search: of a body, in the rotation (0) or the translation (3), to required bounds.
+// The request of a search: a body, the half of the screw (0 for the rotation, 3 for the
+// translation), and the required difference between upper and lower bound.
 struct Task {
     const Body *body;
     int half;
@@ -51,15 +59,15 @@ struct Search {
     const Body *body = nullptr;
     int half = 0;
     double tolerance, low, high;
-    double best[6];          // attains the lower bound
-    Point direction = {};    // of the next support
+    double best[6];          // screw that attains the lower bound
+    Point direction = {};    // direction of the next support function
     enum Stage { CLIMBING, BOXING, CUTTING } stage;
     int supports;
-    bool gained;             // by the last support
-    Point axes[3];           // of the box
-    Point heights[2];        // of the box, low and high, NaN where not known
+    bool gained;             // the last support function raised the lower bound
+    Point axes[3];           // directions of the box
+    Point heights[2];        // lower and upper sides of the box; NaN if unknown
     struct Plane { Point normal; double height; };
-    std::vector<Plane> planes;  // found before there was a box
+    std::vector<Plane> planes;  // planes found before there is a box
     Polytope outer;
 
     void begin(const Task &task);
@@ -81,8 +89,8 @@ private:
 inline void Search::begin(const Task &task) {
     body = task.body, half = task.half, tolerance = task.tolerance;
     std::copy(body->centre, body->centre + 6, best);
-    const double *own = best + half;
-    low = std::sqrt(own[0] * own[0] + own[1] * own[1] + own[2] * own[2]);
+    const double *part = best + half;
+    low = std::sqrt(part[0] * part[0] + part[1] * part[1] + part[2] * part[2]);
     high = INFINITY;
     stage = CLIMBING, supports = 0, gained = false;
     heights[0].fill(NAN), heights[1].fill(NAN);
@@ -93,7 +101,8 @@ inline void Search::begin(const Task &task) {
         high = low;
 }
 
-// Direction of the farthest point without the closures' rows.
+// Choose the direction of the farthest point of an approximation of the body: X is
+// projected orthogonally to the rows H.
 inline void Search::first_direction() {
     const Body &b = *body;
     const int nv = b.nv();
@@ -122,10 +131,10 @@ inline void Search::first_direction() {
         b.cones.each([&](int columns, int, int at) {
             double length = 0.0;
             for (int j = at; j < at + columns; ++j) {
-                const double own =
+                const double component =
                     d[0] * free[j] + d[1] * free[nv + j] + d[2] * free[2 * nv + j];
-                length += own * own;
-                middle -= own * b.start[j];
+                length += component * component;
+                middle -= component * b.start[j];
             }
             height += std::sqrt(length);
         });
@@ -136,17 +145,18 @@ inline void Search::first_direction() {
     }
 }
 
-// Stores a screw that is farther than the best.
+// Store a screw that is farther from the origin than the best one.
 inline void Search::improve(const double *screw) {
-    const double *own = screw + half;
-    const double size = std::sqrt(own[0] * own[0] + own[1] * own[1] + own[2] * own[2]);
+    const double *part = screw + half;
+    const double size =
+        std::sqrt(part[0] * part[0] + part[1] * part[1] + part[2] * part[2]);
     if (!(size > low)) return;
     if (size > low + GAIN * tolerance) gained = true;
     low = size;
     std::copy(screw, screw + 6, best);
 }
 
-// Adds a plane to the box, to the stored planes, or to the polytope.
+// Add a plane to the box, to the stored planes, or to the polytope.
 inline void Search::add_plane(const Point &normal, double height) {
     if (stage == CUTTING)
         outer.cut(normal, height);
@@ -156,7 +166,8 @@ inline void Search::add_plane(const Point &normal, double height) {
         planes.push_back({normal, height});
 }
 
-// A side of the box, if the plane's normal is one of its axes or the opposite.
+// Store the plane as a side of the box if its normal is parallel to an axis of the
+// box.
 inline void Search::set_side(const Plane &plane) {
     for (int axis = 0; axis < 3; ++axis) {
         bool along = true, against = true;
@@ -171,7 +182,7 @@ inline void Search::set_side(const Plane &plane) {
     }
 }
 
-// The next direction, and the stage.
+// Choose the next direction and the stage.
 inline void Search::choose() {
     if (stage == CLIMBING) {
         if (gained && supports < CLIMBS) return towards(best + half);
@@ -191,25 +202,26 @@ inline void Search::choose() {
     }
     const Point corner = outer.farthest_corner();
     high = std::max(low, std::min(high, std::sqrt(inner(corner, corner))));
-    // where the last support gained, the direction of its point gains more, and the
-    // second bound is tightest there; else the farthest vertex
+    // if the last support function raised the lower bound, the direction of its point
+    // is expected to raise it again, and the bound of majorant.h is sharpest there;
+    // otherwise the farthest corner is next
     towards(gained ? best + half : corner.data());
 }
 
-// A box along the best point's direction, its planes not known yet.
+// Start a box along the current direction; its planes are not known yet.
 inline void Search::start_boxing() {
     stage = BOXING;
-    const Point own = direction;
+    const Point first = direction;
     int least = 0;
     for (int a = 1; a < 3; ++a)
-        if (std::fabs(own[a]) < std::fabs(own[least])) least = a;
-    axes[0] = own;
-    for (int a = 0; a < 3; ++a) axes[1][a] = (a == least) - own[least] * own[a];
+        if (std::fabs(first[a]) < std::fabs(first[least])) least = a;
+    axes[0] = first;
+    for (int a = 0; a < 3; ++a) axes[1][a] = (a == least) - first[least] * first[a];
     const double size = std::sqrt(inner(axes[1], axes[1]));
     for (double &x : axes[1]) x /= size;
     for (int a = 0; a < 3; ++a) {
         const int b = (a + 1) % 3, c = (a + 2) % 3;
-        axes[2][a] = own[b] * axes[1][c] - own[c] * axes[1][b];
+        axes[2][a] = first[b] * axes[1][c] - first[c] * axes[1][b];
     }
     for (const Plane &plane : planes) set_side(plane);
 }

@@ -1,7 +1,7 @@
-// The billiard walk through the set of clearance positions: chains of points within unit
-// cones, with the random numbers of one of NumPy's generators.
+// The billiard walk through the set of clearance positions: chains of random points
+// within unit cones.  NumPy's bit generator provides the random numbers.
 //
-// Sources: Gryazina, Polyak (2014), Random sampling: billiard walk algorithm.
+// Source: Gryazina, Polyak (2014), Random sampling: billiard walk algorithm.
 #include <numpy/random/bitgen.h>
 
 #include <algorithm>
@@ -12,32 +12,34 @@
 
 #include "../kernels.h"
 
-// of numpy/random/distributions.h, which would include Python
+// declared here because their header, numpy/random/distributions.h, would include
+// Python's
 extern "C" void random_standard_normal_fill(bitgen_t *, intptr_t, double *);
 extern "C" double random_standard_exponential(bitgen_t *);
 
 namespace {
 
-// share of the distance to the boundary, at which chains start
+// start of a chain, as a share of the distance to the boundary
 constexpr double FRACTION = 0.9;
-constexpr double FLIGHT = 2.0;  // mean time; crossing Dikin's ellipsoid takes about one
-constexpr int64_t REFLECTIONS = 20;  // largest number in a trajectory, for each dimension
+// mean duration of a trajectory; crossing Dikin's ellipsoid takes about 1
+constexpr double FLIGHT = 2.0;
+constexpr int64_t REFLECTIONS = 20;  // largest number in a trajectory per dimension
 
 class Walk {
 public:
     Walk(const Ellipsoid &given, bitgen *random)
         : s(given), random(random), z(given.n), w(given.nu), v(given.nu) {}
 
-    // (nu,) close to the boundary, from a point u in a random direction.
+    // Find a point `to` (nu,) near the boundary, in a random direction from u.
     void start(const double *u, double *to) {
         turn();
         const double reach = to_bound(u, std::numeric_limits<double>::infinity()).reach;
         for (int64_t c = 0; c < s.nu; ++c) to[c] = u[c] + FRACTION * reach * w[c];
     }
 
-    // A trajectory in a random direction, reflected at every bound it meets.  In coordinates
-    // y, u = M y, the ellipsoid is a ball; the reflection at the normals M_k^T u_k of y
-    // needs M M^T only.
+    // Move u along a trajectory in a random direction that is reflected at every
+    // boundary.  In coordinates y with u = M y the ellipsoid is a ball.  The reflection
+    // at the normal M_k^T u_k in these coordinates needs only M M^T.
     void move(double *u) {
         turn();
         double left = FLIGHT * random_standard_exponential(random);
@@ -52,16 +54,17 @@ public:
             left -= nearest.reach;
             reflect(s.starts[nearest.wall], s.starts[nearest.wall + 1]);
         }
-        // after too many reflections, as in a corner, u is kept, which preserves
-        // reversibility
+        // after too many reflections, as in a corner, u does not change; the walk then
+        // remains reversible
     }
 
 private:
     const Ellipsoid &s;
     bitgen *random;
-    std::vector<double> z, w, v;  // w is the direction, v where it is
+    std::vector<double> z, w, v;  // z random, w direction, v current point
 
-    // w = M z, of normal z: its covariance is that of Dikin's ellipsoid.
+    // Draw a random direction w = M z with standard normal z.  Its covariance is that
+    // of Dikin's ellipsoid.
     void turn() {
         random_standard_normal_fill(random, s.n, z.data());
         std::fill(w.begin(), w.end(), 0.0);
@@ -69,6 +72,8 @@ private:
             for (int64_t c = 0; c < s.nu; ++c) w[c] += z[i] * s.axes[c * s.n + i];
     }
 
+    // Reflect the direction w at the boundary of the cone with columns first ..
+    // end - 1.
     void reflect(int64_t first, int64_t end) {
         double across = 0.0, size = 0.0;
         for (int64_t a = first; a < end; ++a) {
@@ -81,7 +86,8 @@ private:
         }
     }
 
-    // Distance along w from a point to the nearest bound, and its cone; -1 if none.
+    // Distance along w, in multiples of w, from a point to the nearest boundary, and
+    // the index of its cone; -1 if no boundary is nearer than the limit.
     struct Bound {
         double reach;
         int64_t wall;
@@ -96,7 +102,7 @@ private:
                 vv += v[c] * v[c];
             }
             if (!(ww > 1e-300)) continue;
-            // a point on the boundary may be outside by rounding
+            // rounding can place a point on the boundary outside the cone
             const double root = std::sqrt(vw * vw + ww * std::max(0.0, 1.0 - vv));
             if (root - vw < nearest.reach * ww) nearest = {(root - vw) / ww, k};
         }
@@ -113,15 +119,15 @@ void start_chains(
 }
 
 void billiard_walk(
-    const Ellipsoid &given, const Trajectories &asked, bitgen *random, double *u,
+    const Ellipsoid &given, const Trajectories &requested, bitgen *random, double *u,
     double *trace) {
     Walk walk(given, random);
-    for (int64_t k = 0; k < asked.kept; ++k) {
-        for (int64_t i = 0; i < asked.every; ++i) walk.move(u);
+    for (int64_t k = 0; k < requested.kept; ++k) {
+        for (int64_t i = 0; i < requested.every; ++i) walk.move(u);
         for (int64_t a = 0; a < 6; ++a) {
             double total = 0.0;
             for (int64_t c = 0; c < given.nu; ++c)
-                total += asked.to_screw[a * given.nu + c] * u[c];
+                total += requested.to_screw[a * given.nu + c] * u[c];
             trace[6 * k + a] = total;
         }
     }

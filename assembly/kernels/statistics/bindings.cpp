@@ -1,22 +1,22 @@
-// Python binding of the billiard walk.
+// Python bindings of the billiard walk.
 #include "../arrays.h"
 #include "../bindings.h"
 #include "../kernels.h"
 
 namespace {
 
-// Unit cones, and the axes of Dikin's ellipsoid in them.
+// Read unit cones, and the axes of Dikin's ellipsoid in them.
 Ellipsoid ellipsoid_of(nb::handle axes, nb::handle gram, nb::handle cones) {
     Size nu, n, ends;
-    Ellipsoid own;
-    own.axes = reals(axes, "axes", nu, n);
-    own.gram = reals(gram, "gram", nu, nu);
-    own.starts = starts(cones, "starts", nu.value, true, ends);
-    own.nu = nu.value, own.n = n.value, own.cones = ends.value - 1;
-    return own;
+    Ellipsoid ellipsoid;
+    ellipsoid.axes = reals(axes, "axes", nu, n);
+    ellipsoid.gram = reals(gram, "gram", nu, nu);
+    ellipsoid.starts = starts(cones, "starts", nu.value, true, ends);
+    ellipsoid.nu = nu.value, ellipsoid.n = n.value, ellipsoid.cones = ends.value - 1;
+    return ellipsoid;
 }
 
-// From the capsule of a bit generator, whose lock the caller holds.
+// Return the bit generator of a capsule; the caller holds the generator's lock.
 bitgen *bits_of(const nb::capsule &random) {
     return static_cast<bitgen *>(random.data("BitGenerator"));
 }
@@ -24,28 +24,28 @@ bitgen *bits_of(const nb::capsule &random) {
 void call_start_chains(
     nb::handle axes, nb::handle gram, nb::handle cones, nb::handle centre,
     const nb::capsule &random, nb::handle walks) {
-    const Ellipsoid own = ellipsoid_of(axes, gram, cones);
+    const Ellipsoid ellipsoid = ellipsoid_of(axes, gram, cones);
     Size chains;
-    const double *from = reals(centre, "centre", own.nu);
-    double *to = address<double>(walks, "walks", chains, own.nu);
+    const double *from = reals(centre, "centre", ellipsoid.nu);
+    double *to = address<double>(walks, "walks", chains, ellipsoid.nu);
     bitgen *bits = bits_of(random);
     const nb::gil_scoped_release others;
-    start_chains(own, from, bits, chains.value, to);
+    start_chains(ellipsoid, from, bits, chains.value, to);
 }
 
 void call_billiard_walk(
     nb::handle axes, nb::handle gram, nb::handle cones, nb::handle to_screw,
     int64_t every, const nb::capsule &random, nb::handle u, nb::handle trace) {
-    const Ellipsoid own = ellipsoid_of(axes, gram, cones);
+    const Ellipsoid ellipsoid = ellipsoid_of(axes, gram, cones);
     Size kept;
-    Trajectories asked;
-    asked.to_screw = reals(to_screw, "to_screw", 6, own.nu);
-    double *point = address<double>(u, "u", own.nu);
+    Trajectories requested;
+    requested.to_screw = reals(to_screw, "to_screw", 6, ellipsoid.nu);
+    double *point = address<double>(u, "u", ellipsoid.nu);
     double *screws = address<double>(trace, "trace", kept, 6);
-    asked.kept = kept.value, asked.every = every;
+    requested.kept = kept.value, requested.every = every;
     bitgen *bits = bits_of(random);
     const nb::gil_scoped_release others;
-    billiard_walk(own, asked, bits, point, screws);
+    billiard_walk(ellipsoid, requested, bits, point, screws);
 }
 
 }  // namespace
