@@ -260,7 +260,7 @@ def _encoding(content: bytes) -> str:
         codecs.decode(b"", known)
     except LookupError:
         return "utf-8-sig"
-    # the declaration is readable as ASCII, hence the text is not UTF-16
+    # a declaration that is readable as ASCII rules out UTF-16
     return "utf-8-sig" if known.startswith("utf") else known
 
 
