@@ -1,8 +1,9 @@
-r"""Changes of the site to pages: mathematics, scenes, tables of numbers, roles.
+r"""Hooks of mkdocs: convert formulas, scenes, tables of numbers and docstring roles.
 
-Mathematics is written as on GitHub: a block of ``math``, or $`x`$ within a line.  It
-becomes MathML when the site is built, which browsers of 2023 and newer show without a
-script or a network.  ``\tag{22}`` at the end of a block is the paper's number.
+Formulas are written as on GitHub, either in a fenced block ``math`` or as $`x`$ within
+a line.  Building the site converts them to MathML, which browsers from 2023 or later
+display without a script or a network.  ``\tag{22}`` at the end of a block sets the
+equation number, which is that of the paper.
 """
 
 import re
@@ -19,10 +20,10 @@ from markdown.inlinepatterns import InlineProcessor
 from mkdocs.plugins import event_priority
 from mkdocs.structure.files import File
 
-# a docstring's ":func:`name`", once its name is code
+# role of ":func:`name`" in a docstring, after the name was converted to code
 _ROLE = re.compile(r"(?<![\w:]):(?:func|mod|class|meth|data|attr|math):(?=<code>)")
 
-# a number of a module, and its reason behind it
+# numeric constant of a module, followed by a comment that explains it
 _NUMBER = re.compile(
     r"^_?([A-Z][A-Z_]*)(?:: .+)? = ([^\"'#\n]*\d[^\"'#\n]*)  # (.+)$", re.M
 )
@@ -30,15 +31,15 @@ _NUMBERS = "<!-- numbers of the code -->"
 _CHANGES = "<!-- CHANGELOG.md -->"
 _ROOT = Path(__file__).parents[1]
 
-# a command that writes a scene
+# command that writes a scene
 _COMMAND = re.compile(r"^forcefit assembly show .*(?:\\\n.*)*\.html$", re.M)
 
-# number of an equation, at the end of a block
+# equation number at the end of a block
 _TAG = re.compile(r"\\tag\{([^}]+)\}\s*$")
 
 
 def on_config(config: Any, **_: Any) -> Any:
-    """Mathematics in blocks and within lines."""
+    """Enable formulas in fenced blocks and within lines."""
     fences = config.mdx_configs.setdefault("pymdownx.superfences", {})
     fences["custom_fences"] = [{"name": "math", "class": "math", "format": equation}]
     config.markdown_extensions.append(_Formulas())
@@ -46,7 +47,7 @@ def on_config(config: Any, **_: Any) -> Any:
 
 
 def on_files(files: Any, config: Any, **_: Any) -> Any:
-    """The notebooks of the examples, to download, and the scenes of the gallery."""
+    """Add the example notebooks for download, and the scenes of the gallery."""
     for path in sorted((_ROOT / "examples" / "notebooks").glob("*.ipynb")):
         name = f"notebooks/{path.name}"
         files.append(File.generated(config, name, abs_src_path=str(path)))
@@ -57,7 +58,7 @@ def on_files(files: Any, config: Any, **_: Any) -> Any:
 
 
 def _scenes(gallery: str) -> dict[str, str]:
-    """The scenes to which the gallery links, made by the commands that it shows."""
+    """Run the commands shown in the gallery, and return the scenes linked there."""
     wanted = re.findall(r"\]\(scenes/([\w.]+)\)", gallery)
     commands = {c.split()[-1]: c for c in _COMMAND.findall(gallery)}
     with TemporaryDirectory() as folder:
@@ -65,7 +66,7 @@ def _scenes(gallery: str) -> dict[str, str]:
 
 
 def _made(command: str, path: Path) -> str:
-    """What a command of forcefit writes as its last word, with another path."""
+    """Return the file that a command writes, with its output path replaced."""
     from typer.main import get_command
 
     from forcefit.commands.app import app
@@ -78,7 +79,7 @@ def _made(command: str, path: Path) -> str:
 
 
 def equation(source: str, *_: Any, **__: Any) -> str:
-    """A block of mathematics, with its number and an anchor of that number."""
+    """Format a fenced formula as HTML, with its number and a corresponding anchor."""
     tag = _TAG.search(source)
     formula = convert(_TAG.sub("", source).strip(), display="block")
     if tag is None:
@@ -89,21 +90,21 @@ def equation(source: str, *_: Any, **__: Any) -> str:
 
 
 class _Formula(InlineProcessor):
-    """Mathematics within a line."""
+    """Inline pattern that converts a formula within a line."""
 
     def handleMatch(self, m: Any, data: str) -> Any:
         return self.md.htmlStash.store(convert(m[1])), m.start(0), m.end(0)
 
 
 class _Formulas(Extension):
-    """Registers mathematics within lines before code, which has the same backticks."""
+    """Extension that matches formulas before inline code, which also uses backticks."""
 
     def extendMarkdown(self, md: Markdown) -> None:
         md.inlinePatterns.register(_Formula(r"\$`([^`]+)`\$", md), "formula", 195)
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """The changelog, and the numbers of a diagnosis from the modules that hold them."""
+    """Insert the changelog, and the table of numeric constants of the diagnosis."""
     if _CHANGES in markdown:
         text = (_ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
         markdown = markdown.replace(_CHANGES, text.replace("](docs/", "]("))
@@ -111,7 +112,7 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
 
 
 def _numbers() -> str:
-    """A table of all numbers of ``validation/diagnosis``."""
+    """Return a table of the numeric constants in ``validation/diagnosis``."""
     rows = ["| module | number | value | what it is |", "|---|---|---|---|"]
     for path in sorted((_ROOT / "validation" / "diagnosis").glob("*.py")):
         for name, value, reason in _NUMBER.findall(path.read_text(encoding="utf-8")):
@@ -121,19 +122,19 @@ def _numbers() -> str:
 
 
 def on_page_content(html: str, **_: Any) -> str:
-    """Names in docstrings without the role that stands before them."""
+    """Remove the roles in front of names in docstrings."""
     return _ROLE.sub("", html)
 
 
 def on_post_page(output: str, **_: Any) -> str:
-    """A name of the search for screen readers, which the theme lacks."""
+    """Label the search for screen readers, because the theme does not."""
     search = 'data-md-component="search" role="dialog"'
     return output.replace(search, f'{search} aria-label="Search"')
 
 
 @event_priority(-100)  # after the search plugin, which writes the index
 def on_post_build(config: Any, **_: Any) -> None:
-    """The index of the search as a script, which pages of a folder may load."""
+    """Write the search index as a script, which pages opened from disk can load."""
     folder = Path(config.site_dir) / "search"
     index = (folder / "search_index.json").read_text(encoding="utf-8")
     (folder / "search_index.js").write_text(f"var __index = {index}", encoding="utf-8")

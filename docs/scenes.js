@@ -1,6 +1,6 @@
 "use strict";
-// Shows the scene of a link below it while it is in view.  Browsers draw about sixteen
-// scenes at once, so those out of view are removed.
+// Show the scene below its link while the link is in view.  Browsers can display only
+// about sixteen scenes simultaneously, so scenes that are out of view are removed.
 const views = new IntersectionObserver(entries => {
   for (const { target, isIntersecting } of entries) {
     const [shown] = target.children;

@@ -1,6 +1,6 @@
 "use strict";
-// A browser starts no worker for a page of a folder.  The search then runs in a hidden
-// frame, which gets and sends the messages of the worker.
+// Browsers start no worker for a page that is opened from disk.  The search then runs in
+// a hidden frame, which receives and sends the messages of the worker.
 if (location.protocol === "file:") {
   window.Worker = class extends EventTarget {
     constructor(url) {
