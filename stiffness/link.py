@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import Figures, html_table, numbers, short_repr
 
-# rounding error of the eigenvalues of a scaled 6 by 6 matrix, relative to its size
+# round-off error of the eigenvalues of a scaled 6 by 6 matrix, relative to its size
 _ROUNDING = 6 * np.finfo(float).eps
 
 

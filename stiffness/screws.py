@@ -100,7 +100,7 @@ def rotation_vector(rotation: ArrayLike) -> NDArray:
     R = np.asarray(rotation, dtype=float)
     trace = np.trace(R, axis1=-2, axis2=-1)[..., None]
     # matrix 4 q q^T of the unit quaternion q = [x y z w]; the row with the largest norm
-    # determines q with the smallest rounding error
+    # determines q with the smallest round-off error
     products = np.empty((*R.shape[:-2], 4, 4))
     products[..., :3, :3] = R + np.swapaxes(R, -1, -2)
     products[..., [0, 1, 2], [0, 1, 2]] += 1.0 - trace

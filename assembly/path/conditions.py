@@ -121,7 +121,7 @@ def path_conditions(
 
 
 def equilibria(conditions: Conditions, loads: InertialLoads) -> Equilibria:
-    """Return the least-energy solutions, problem (22), under loads on the bodies.
+    """Return the minimum-energy solutions, problem (22), under loads on the bodies.
 
     Args:
         conditions: conditions at k instants.
@@ -160,7 +160,7 @@ def _equilibrium(
 def equilibrium_of_row(
     conditions: Conditions, loads: InertialLoads, i: int
 ) -> Assembly:
-    """Return the least-energy solution at one instant under loads on the bodies.
+    """Return the minimum-energy solution at one instant under loads on the bodies.
 
     Args:
         conditions: conditions at k instants.

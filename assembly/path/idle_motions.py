@@ -18,7 +18,7 @@ from forcefit.assembly.kinematics.nominal import motion_screws, size_of
 from forcefit.assembly.path.inertial_loads import InertialLoads, inertial_loads
 from forcefit.assembly.path.motion import Motion, carries_matrix, idle_rates
 
-_MASSLESS = 1e-12  # inertias below this share of the largest inertia count as zero
+_MASSLESS = 1e-12  # inertias below this fraction of the largest inertia count as zero
 _ROUNDING = 1e-20  # share of mass x (longest arm)^2: squared arm error 1e-10
 
 
@@ -117,7 +117,7 @@ def _inverse(inertia: NDArray, least: NDArray) -> NDArray:
     Args:
         inertia: (k, d, d) inertia of the idle motions.
         least: (k,) eigenvalues up to this value count as 0.  Without this limit, a spin
-            without mass, or with masses on its axis, would have a rounding error as
+            without mass, or with masses on its axis, would have a round-off error as
             inertia. Its acceleration would then be arbitrarily large.
 
     Returns:

@@ -75,7 +75,7 @@ class PathErrors:
         state: state in which the compliance is computed.
         frequency: [Hz] least first natural frequency along the path; NaN if unknown.
         free: largest number of joint motions that neither path nor closures prescribe;
-            these are kept at rest.
+            these are preserved at rest.
         arrays: results by name, k rows each; NaN where the status is not ok.
 
             - ``coordinates``, ``rates``, ``second_rates`` (k, n) of all joints

@@ -172,7 +172,7 @@ def _free_motions(errors: PathErrors) -> str:
 
 
 def path_text(summary: dict[str, Any]) -> str:
-    """Return a summary as text: times, largest values and drive forces."""
+    """Format a summary as text: times, largest values and drive forces."""
     lines = lines_of(summary, "status reason")
     periods = summary["periods"]
     in_periods = f", {periods:.3g} periods of {summary['first_frequency']:.4g} Hz"

@@ -32,7 +32,7 @@ from forcefit.inputs.table import BadInput, quoted
 
 _MOST_STEPS, _HALVINGS = 30, 12  # most Gauss-Newton steps, and most halvings of a step
 _STEP = 1e-7  # [rad, reference lengths] step of the finite differences
-# derivatives below this share of the largest one are finite-difference errors
+# derivatives below this fraction of the largest one are finite-difference errors
 _FLAT = 1e-6
 _SETTLED = 1e-7  # relative reduction of the reading below which the search ends
 
@@ -166,7 +166,7 @@ def _check_not_bolted(machine: Machine, state: State, step: Adjust) -> None:
 
 
 def _closing_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
-    """Return the adjustment with which closing a loop needs the least energy.
+    """Return the adjustment with which closing a loop needs the minimum energy.
 
     The changes are treated as free motions of the closed machine, whose energy is
     convex in the changes and the clearances together.  If several changes are equally

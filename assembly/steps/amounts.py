@@ -20,7 +20,7 @@ from forcefit.assembly.steps.run import StepResult, carry_out
 from forcefit.assembly.steps.state import State
 
 _STEP = 1e-7  # [rad, reference lengths] step of the finite differences
-# derivatives below this share of the largest one are finite-difference errors
+# derivatives below this fraction of the largest one are finite-difference errors
 _FLAT = 1e-6
 # largest number of Gauss-Newton steps, and tried shares of each step
 _MOST_STEPS, _SHARES = 20, 0.5 ** np.arange(8)

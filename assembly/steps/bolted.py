@@ -1,9 +1,9 @@
 """Joints that are bolted at one pose and rigid afterwards (``locked_at``).
 
 Without loads, the clearance of a joint that is about to be bolted moves such that the
-closures need the least energy. Among the clearances of least energy, the least sum of
-squares, in units of their bounds, is taken.  Bolting locks this clearance in: at all
-other poses it acts like a geometric error.  Joints are bolted in the order of the
+closures need the minimum energy. Among the clearances of minimum energy, the smallest
+sum of squares, in units of their bounds, is taken.  Bolting locks this clearance in: at
+all other poses it acts like a geometric error.  Joints are bolted in the order of the
 frames; joints with the same pose are bolted together.
 """
 
@@ -30,7 +30,7 @@ from forcefit.inputs.table import BadInput, quoted
 from forcefit.results.display import numbers
 
 BOLT_STREAM = 4  # stream number of the bolted positions, see draw_generator
-_ROUNDED = 1e-12  # clearances below this share of their bound are rounding errors
+_ROUNDED = 1e-12  # clearances below this fraction of their bound are round-off
 _BOLTED = "is bolted at"  # words in the remark on a bolted joint
 _RULES = {
     "least": "",
@@ -112,7 +112,7 @@ def bolted_errors(
             are not used.
         errors: (k, n, 6) [rad, m] errors of the machines, without locked-in screws.
         rngs: k generators for joints with ``left = "uniform"``; if None, these joints
-            are bolted at the least sum of squares.
+            are bolted at the smallest sum of squares.
 
     Returns:
         (k, n, 6) [rad, m] errors with the locked-in screws. If no joint is bolted, the

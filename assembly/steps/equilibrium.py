@@ -1,4 +1,4 @@
-"""Least energy of a partly assembled robot, for many sets of errors at once.
+"""Minimum energy of a partly assembled robot, for many sets of errors at once.
 
 The small screws of all frames are s = e + E y + U u + F q. Here e are the errors, y the
 springs, u the clearances and q the free motions
@@ -33,8 +33,8 @@ from forcefit.assembly.solvers.many_programmes import (
 )
 
 _OPEN = 1e-12  # [rad, reference lengths] closure error that counts as rounding
-_ROUNDING = 1e-14  # rounding error of the equations, relative to the largest right side
-_SOLVED = 1e-11  # strains below this share of their summands are errors of the solver
+_ROUNDING = 1e-14  # round-off error of the equations, relative to the largest right side
+_SOLVED = 1e-11  # strains below this fraction of their summands are errors of the solver
 _DRIVEN = 1e-8  # a smaller share of a load along a free motion counts as rounding
 
 
@@ -77,7 +77,7 @@ class Movable(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """The unknowns of k machines at least energy.
+    """The unknowns of k machines at minimum energy.
 
     Attributes:
         springs: (k, ny) [sqrt(2 J)] scaled deformations of links and joints.
@@ -114,7 +114,7 @@ class _Split(NamedTuple):
 def equilibrium(
     held: Held, movable: Movable, last: tuple[NDArray, NDArray], tolerance: float = RANK
 ) -> Equilibrium:
-    """Return the equilibrium of least energy closest to the last state.
+    """Return the equilibrium of minimum energy closest to the last state.
 
     Args:
         held: rows that hold, with right sides from which fixed screws are subtracted.
@@ -238,7 +238,7 @@ def _closest(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, least: Minima, last: NDArray,
     group: NDArray,
 ) -> NDArray:  # fmt: skip
-    """Return the clearances of least energy that are closest to the preceding ones."""
+    """Return the clearances of minimum energy that are closest to the preceding ones."""
     rows = np.vstack([G, H, d[:1]])  # one row of d: machines have equal loads
     size = np.linalg.norm(rows, axis=1)
     rows = rows[size > 0] / size[size > 0, None]

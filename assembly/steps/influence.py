@@ -30,8 +30,8 @@ from forcefit.assembly.steps.machine import Machine
 from forcefit.assembly.steps.plan import Adjust, Fix, Join, Plan, Step, rows_of
 from forcefit.assembly.steps.state import State
 
-_ZERO = 1e-9  # relative size below which an influence counts as rounding error
-_FREE = 1e-11  # stiffnesses below this share of the largest one count as zero
+_ZERO = 1e-9  # relative size below which an influence counts as round-off error
+_FREE = 1e-11  # stiffnesses below this fraction of the largest one count as zero
 
 
 @dataclass(frozen=True, eq=False)

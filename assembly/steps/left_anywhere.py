@@ -1,6 +1,6 @@
 """Random positions of clearances that no force determines.
 
-At least energy, clearances that transmit force are at their bounds.  The others may
+At minimum energy, clearances that transmit force are at their bounds.  The others may
 move without deforming springs. Their possible positions form a convex set, over which
 the distribution is uniform (:mod:`forcefit.assembly.solvers.uniform_clearance`).
 """
@@ -22,12 +22,12 @@ _LOADED = 1e-9  # a clearance is loaded if its force exceeds this share of the e
 def positions_left_anywhere(
     machine: Machine, state: State, rngs: Sequence[np.random.Generator]
 ) -> NDArray:
-    """Return clearances distributed uniformly over all positions of least energy.
+    """Return clearances distributed uniformly over all positions of minimum energy.
 
     Args:
         machine: columns and rows of the robot.
-        state: state of k machines at least energy, without loads.
-        rngs: k generators of random numbers.
+        state: state of k machines at minimum energy, without loads.
+        rngs: k random number generators.
 
     Returns:
         (k, nu) clearances in units of their bounds.
@@ -56,11 +56,11 @@ def positions_left_anywhere(
 def free_positions(
     machine: Machine, state: State, row: int
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Return how the clearances of one machine may move at least energy.
+    """Return how the clearances of one machine may move at minimum energy.
 
     Args:
         machine: columns and rows of the robot.
-        state: state of k machines at least energy, without loads.
+        state: state of k machines at minimum energy, without loads.
         row: index of the machine.
 
     Returns:

@@ -232,7 +232,7 @@ def _check_join(where: str, step: Join, robot: Robot, held: Mapping) -> None:
 
 
 def _held(held: Mapping) -> str:
-    """Return the names of the steps that may be released, as text."""
+    """Format the names of the steps that may be released, as text."""
     names = ", ".join(map(quoted, held))
     return f"one of {names}" if names else "an earlier step that holds something"
 

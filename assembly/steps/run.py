@@ -46,7 +46,7 @@ from forcefit.assembly.steps.state import (
     without,
 )
 
-_ROUNDED = 1e-13  # smaller relative energy differences are rounding errors
+_ROUNDED = 1e-13  # smaller relative energy differences are round-off
 _HALVINGS = 50  # bisections of the share of an opening that a limited force closes
 
 

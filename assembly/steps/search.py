@@ -1,4 +1,4 @@
-"""Search for the best order of joining: least force, least energy or least error.
+"""Search for the best order of joining: least force, minimum energy or least error.
 
 Only steps that join or adjust are permuted, within each sequence between other steps.
 An adjustment of a closure stays before, or after, the step that joins this closure.  If
@@ -168,7 +168,7 @@ class _Search:
         return float(np.linalg.norm(screw[3:]))
 
     def bound(self, peak: float, state: State, left: tuple[Step, ...]) -> float:
-        """Return a lower bound of the objective after the remaining steps."""
+        """Return a lower bound on the objective after the remaining steps."""
         if self.objective == "force":
             return peak
         joins = [step for step in left if isinstance(step, Join)]

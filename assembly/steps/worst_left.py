@@ -1,6 +1,6 @@
 """Largest pose error over all positions in which a joint may have been bolted.
 
-At the pose where the joint is bolted, all positions of least energy form a convex set
+At the pose where the joint is bolted, all positions of minimum energy form a convex set
 of clearances u.  At another pose, the locked-in clearance acts like an error, and the
 platform's screw is
 
@@ -14,7 +14,7 @@ between a value attained and a certified bound:
 loose clearances        largest error
 ======================  ================================================================
 none, or no springs     attained within the interval: all u and v that close the loops
-with springs            v follows from the least energy, so the maximum over all v is an
+with springs            v follows from the minimum energy, so the maximum over all v is an
                         upper bound; equilibria at its corners are attained
 ======================  ================================================================
 """
@@ -43,7 +43,7 @@ from forcefit.assembly.steps.machine import Machine
 from forcefit.stiffness.screws import skew
 
 _TOLERANCE = 5e-4  # width of an interval relative to the largest support along an axis
-_ROUNDING = 1e-10  # rows below this share of the largest row are rounding errors
+_ROUNDING = 1e-10  # rows below this fraction of the largest row are round-off
 
 CONVEX = "the largest of all positions of least energy; a convex set, certified"
 BRACKET = (

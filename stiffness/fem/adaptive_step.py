@@ -4,7 +4,7 @@ The error indicator (:mod:`forcefit.stiffness.fem.error_indicator`) is multiplie
 effectivity index.  This is the change of the stiffness in the last refinement, divided
 by the change of the indicator.
 
-K_h is an upper bound of the exact stiffness K, and the estimate E bounds the
+K_h is an upper bound on the exact stiffness K, and the estimate E bounds the
 difference. K therefore lies between K_h - E and K_h.  The middle of this interval is
 returned, because its error is at most half of E on the same mesh.
 """

@@ -2,7 +2,7 @@
 
 Each point of a rule is written as a word with a letter for each barycentric coordinate:
 ``aab`` is the point (a, a, b).  Points whose words consist of the same letters have the
-same weight.  All weights are positive, because negative weights would amplify rounding
+same weight.  All weights are positive, because negative weights would amplify round-off
 errors and could make an energy of stresses negative.
 
 Sources: Hammer and Stroud (1956) for degree 2; Radon (1948) for 5 and Dunavant (1985)

@@ -29,7 +29,7 @@ def translations_first(matrix: ArrayLike) -> NDArray:
 
 
 def stiffness_for(program: str, stiffness: ArrayLike, name: str = "link") -> str:
-    """Return K_E as text for another program, in SI units.
+    """Format K_E as text for another program, in SI units.
 
     Args:
         program: ``"exudyn"`` for ``stiffness`` of a RigidBodySpringDamper; ``"adams"``

@@ -162,7 +162,7 @@ def look_up(
 
     Returns:
         (6, 6) stiffness, and (6, 6) estimate of its error.  The estimate is the change
-        when the farthest entry along each axis is left out, plus the entries' errors.
+        when the farthest entry along each axis is omitted, plus the entries' errors.
 
     Raises:
         BadInput: a parameter is unknown, missing or outside the grid, or the entries do

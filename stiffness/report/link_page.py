@@ -146,9 +146,9 @@ def matrix_table(
     """Return a (6, 6) matrix as an HTML table.
 
     Args:
-        values: (6, 6) stiffness or compliance.  Entries that are rounding errors
-            relative to sqrt(K_ii K_jj) are shown as zero; entries that are not finite
-            are shown as ``rigid``.
+        values: (6, 6) stiffness or compliance.  Entries that are round-off relative to
+            sqrt(K_ii K_jj) are shown as zero; entries that are not finite are shown as
+            ``rigid``.
         rows: names of the rows.
         name: name of the table.
         columns: names of the columns.

@@ -119,7 +119,7 @@ def stress_results(peak: "PeakStress") -> dict[str, Any]:
 
 
 def link_text(link: LinkStiffness) -> str:
-    """Return a link as text: its stiffness, estimated error and mesh.
+    """Format a link as text: its stiffness, estimated error and mesh.
 
     Args:
         link: a link.
@@ -164,7 +164,7 @@ def link_text(link: LinkStiffness) -> str:
 
 
 def comparison_text(comparison: LinkComparison) -> str:
-    """Return a comparison of beam and finite elements as text.
+    """Format a comparison of beam and finite elements as text.
 
     Args:
         comparison: comparison of one link by two methods.
@@ -186,7 +186,7 @@ def comparison_text(comparison: LinkComparison) -> str:
 
 
 def sweep_text(sweep: "SlendernessSweep") -> str:
-    """Return a sweep over slenderness as text.
+    """Format a sweep over slenderness as text.
 
     Args:
         sweep: comparisons of one section at several lengths.
@@ -211,7 +211,7 @@ def sweep_text(sweep: "SlendernessSweep") -> str:
 
 
 def stress_text(peak: "PeakStress") -> str:
-    """Return the peak stress of a wrench as text.
+    """Format the peak stress of a wrench as text.
 
     Args:
         peak: peak stress by finite elements, and by the beam formula for a known
@@ -248,7 +248,7 @@ def _megapascals(stress: float, place: NDArray) -> str:
 
 
 def matrix_text(stiffness: NDArray) -> str:
-    """Return a stiffness as text, with named rows and columns.
+    """Format a stiffness as text, with named rows and columns.
 
     Args:
         stiffness: (6, 6) stiffness.
@@ -260,7 +260,7 @@ def matrix_text(stiffness: NDArray) -> str:
 
 
 def _matrix(matrix: NDArray, form: str) -> list[str]:
-    """Return the text lines of a 6 by 6 matrix; rounding errors are shown as zero."""
+    """Return the text lines of a 6 by 6 matrix; round-off errors are shown as zero."""
     head = "   " + "".join(f"{name:>14}" for name in SCREW)
     noise = 1e-12 * np.abs(matrix).max()
     rows = np.where(np.abs(matrix) < noise, 0.0, matrix)

@@ -201,7 +201,7 @@ def check_surface(
 
 
 def _place(point: NDArray) -> str:
-    """Return the coordinates of a point as text for a message."""
+    """Format the coordinates of a point as text for a message."""
     return "(" + ", ".join(f"{v:.4g}" for v in point) + ") m"
 
 
