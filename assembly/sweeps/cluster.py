@@ -239,7 +239,7 @@ def solve_task(
 
 @lru_cache(maxsize=4)
 def _question(content: bytes, digest: str) -> Question:
-    """Return the unpickled quantities, cached so that each worker has one robot object."""
+    """Return the unpickled quantities, cached so that each worker has one robot."""
     asked: Question = pickle.loads(content)
     question = replace(asked, robot=solve_links(asked.robot))
     if question_hash(question) != digest:

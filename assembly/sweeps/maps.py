@@ -84,7 +84,7 @@ def check_axes(sizes: Mapping[str, int]) -> None:
 def part_of_sweep(
     data: "xarray.Dataset", at: Mapping[str, float | str]
 ) -> tuple["xarray.Dataset", str]:
-    """Select part of a sweep: fix the values on some axes, and take the median over draws.
+    """Select part of a sweep by fixing values on axes, and take the median over draws.
 
     Args:
         data: data set of a sweep.

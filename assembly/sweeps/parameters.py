@@ -181,7 +181,7 @@ def load_design(name: str | Path) -> Design:
 
 
 def unit_of(path: str) -> str:
-    """Return the unit of the number at a path, or ``"SI"`` if it depends on other keys."""
+    """Return the unit of the number at a path; ``"SI"`` if it depends on other keys."""
     *_, above, key = path.split(".")
     if above == "dh":
         return _DH_UNITS[key]

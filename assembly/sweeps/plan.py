@@ -1,4 +1,4 @@
-"""Sweep definition: the requested quantities and the points at which to compute them."""
+"""Sweep definition: requested quantities and the points at which to compute them."""
 
 import hashlib
 import json

@@ -61,7 +61,7 @@ def point_conditions(
 
 
 def is_loaded(conditions: Conditions) -> bool:
-    """Return whether loads, weights, elastic effects or elastic contacts are present."""
+    """Return whether any loads, weights, elastic effects or contacts are present."""
     loaded = conditions.load.any() or conditions.gravity.any()
     compliant = conditions.laws or conditions.yields
     return bool(loaded or driven(conditions.robot) or compliant)

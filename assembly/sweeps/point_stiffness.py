@@ -110,7 +110,7 @@ def tangent_stiffnesses(
 
 
 def _tangent(conditions: Conditions, i: int, state: str) -> PlatformStiffness:
-    """Compute the tangent stiffness at a point; at a contact change, the smaller one."""
+    """Compute the tangent stiffness at a point, the smaller one at a contact change."""
     if conditions.laws or any(not place.linear for place in conditions.yields):
         raise SolverFailed(
             "tangent",

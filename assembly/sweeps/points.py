@@ -209,7 +209,7 @@ def _fail(solved: SolvedPoints, rows: range, status: str, reason: str) -> None:
 
 
 def _errors(question: Question, robot: Robot, draws: NDArray) -> NDArray:
-    """Draw the errors (k, n, 6) [rad, m], including locked-in clearances of bolted joints."""
+    """Draw errors (k, n, 6) [rad, m], with locked-in clearances of bolted joints."""
     pages = {page: _page(question, page) for page in np.unique(draws // _PAGE).tolist()}
     own, which = np.unique(draws, return_inverse=True)
     errors = np.array([pages[d // _PAGE][d % _PAGE] for d in own.tolist()])
