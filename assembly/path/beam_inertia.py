@@ -100,7 +100,7 @@ class BeamLoad:
         return wrench
 
     def at_base(self, tip: NDArray) -> NDArray:
-        """Return the wrench (k, 6) [N m, N] at the base, the total load minus tip wrench.
+        """Return the wrench (k, 6) [N m, N] at the base: total load minus tip wrench.
 
         Args:
             tip: equivalent wrench at the tip, from :meth:`at_tip`.

@@ -130,7 +130,7 @@ def _inverse(inertia: NDArray, least: NDArray) -> NDArray:
 
 
 def _largest_inertia(motion: Motion, bodies: list[NDArray]) -> NDArray:
-    """Return the inertia (k,) that would result if all mass moved like the fastest body."""
+    """Return the inertia (k,) that results if all mass moves like the fastest body."""
     along = np.zeros_like(motion.twists)
     along[..., 3] = 1.0
     still = replace(motion, twists=np.zeros_like(along), accelerations=along)
