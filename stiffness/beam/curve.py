@@ -82,7 +82,7 @@ def arc_piece(
     turn: ArrayLike,
     section: Section | Callable[[float], Section],
 ) -> Piece:
-    """Create a piece along a circular arc, with the section's z along the rotation axis.
+    """Create a piece along a circular arc, with the section's z along the arc axis.
 
     Args:
         start: (3,) [m] position of the start.

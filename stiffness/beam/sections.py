@@ -45,7 +45,7 @@ class Section:
 
     @property
     def size(self) -> float:
-        """[m] twice the larger radius of gyration, which is the radius of a solid round bar."""
+        """[m] twice the larger radius of gyration: the radius of a solid round bar."""
         return 2 * math.sqrt(max(self.I_y, self.I_z) / self.area)
 
 

@@ -181,7 +181,7 @@ def _on(interface: Interface, places: NDArray) -> NDArray:
 def condensed(
     matrix: FileMatrix, ends: tuple[tuple[NDArray, NDArray], tuple[NDArray, NDArray]]
 ) -> tuple[NDArray, NDArray]:
-    """Condense a matrix onto two interfaces, with all other degrees of freedom unloaded.
+    """Condense a matrix onto two interfaces; other degrees of freedom are unloaded.
 
     Args:
         matrix: (n, n) stiffness matrix.

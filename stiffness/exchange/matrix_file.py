@@ -323,7 +323,7 @@ def _from_entries(
 def _of_rows(
     entries: Mapping[tuple[Any, Any], float], row: Mapping[Any, int]
 ) -> csr_array:
-    """Build a matrix from entries that name the degrees of freedom of row and column."""
+    """Build a matrix from entries with named degrees of freedom of row and column."""
     # a missing half is the transpose of the other half
     whole = {**{(b, a): v for (a, b), v in entries.items()}, **entries}
     i, j = [row[a] for a, _ in whole], [row[b] for _, b in whole]

@@ -144,7 +144,7 @@ def _from_loads(upper: csr_array, loads: NDArray, free: NDArray) -> Condensed:
 
 
 def _distributed_loads(mesh: Elements, patch: int, center: NDArray) -> NDArray:
-    """Return (n, 3, 6) nodal loads of unit wrenches; the transpose gives mean motions."""
+    """Return (n, 3, 6) nodal loads of unit wrenches; transposed, mean motions."""
     faces = mesh.faces[mesh.patch == patch]
     nodes, index = np.unique(faces, return_inverse=True)
     index = index.reshape(faces.shape)

@@ -234,7 +234,7 @@ def solve_link(
 def solve_bar(
     section: Mapping[str, float], material: Material, options: FemOptions = _STANDARD
 ) -> MeshedLink:
-    """Compute the stiffness of a straight bar of unit length along z, extruded directly.
+    """Compute the stiffness of a bar of unit length along z, extruded directly.
 
     Args:
         section: lengths of the section relative to the bar's length, see
@@ -431,7 +431,7 @@ def _refuse_cost(
 def _wanted_growth(
     history: Sequence[tuple[NDArray, ...]], sizes: Sequence[int], excess: float
 ) -> float:
-    """Return the factor on the number of elements that divides the error by ``excess``."""
+    """Return the factor on the number of elements that divides the error by excess."""
     rate = 1.3  # convergence rate in the number of elements; 2 for a smooth field
     if len(history) > 1:
         before, now = (np.max(np.diag(e) / np.diag(K)) for K, e, _ in history[-2:])

@@ -151,7 +151,7 @@ class StressInfluence:
         return estimated_error(level, motion, node, zone, self.source.left_out)
 
     def relative_error(self) -> float:
-        """Return the largest relative error of the peak stress over six unit wrenches."""
+        """Return the largest relative error of the peaks for six unit wrenches."""
         unit = np.eye(6, self.influence.shape[1])
         return max(self.peak_error(w) / self.peak(w)[0] for w in unit)
 

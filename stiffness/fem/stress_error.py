@@ -164,7 +164,7 @@ def on_inner_edges(level: "Level") -> NDArray:
 
 
 def _meet_at_an_angle(level: "Level", edges: NDArray) -> NDArray:
-    """Return (e,) bool, True for edges at which the adjacent shapes meet at an angle."""
+    """Return (e,) bool, True for edges where the adjacent shapes meet at an angle."""
     solid = level.solid
     count = np.int64(len(solid.points))
     pairs = np.sort(solid.faces[:, [[0, 1], [1, 2], [0, 2]]], axis=2)

@@ -1,4 +1,4 @@
-"""Results for a link's stiffness as plain values and as text."""
+"""Link stiffness results as plain values and as text."""
 
 import math
 from typing import TYPE_CHECKING, Any
@@ -51,7 +51,7 @@ def comparison_results(comparison: LinkComparison) -> dict[str, Any]:
         comparison: comparison of one link by two methods.
 
     Returns:
-        Both links, the difference of each entry, and a text that explains it.
+        Both links, the difference of each entry, and an explanatory text.
     """
     return {
         "beam": link_results(comparison.beam),
@@ -72,7 +72,7 @@ def sweep_results(sweep: "SlendernessSweep") -> dict[str, Any]:
         sweep: comparisons of one section at several lengths.
 
     Returns:
-        Both stiffnesses at each length, their differences, and an explanation as text.
+        Both stiffnesses at each length, their differences, and an explanatory text.
     """
     return {
         "size": sweep.comparisons[0].size,
@@ -234,7 +234,7 @@ def stress_text(peak: "PeakStress") -> str:
 
 
 def _stress_error(peak: "PeakStress") -> str:
-    """Return the estimated error of a stress, or the reason why it is not defined."""
+    """Format the estimated error of a stress, or the reason why it is undefined."""
     if not math.isfinite(peak.error):
         return "none, the peak lies on an inner edge where stress has no finite value"
     share = peak.error / peak.von_mises if peak.von_mises else 0.0
@@ -242,7 +242,7 @@ def _stress_error(peak: "PeakStress") -> str:
 
 
 def _megapascals(stress: float, place: NDArray) -> str:
-    """Return a text with a stress and its position."""
+    """Format a stress and its position as text."""
     where = ", ".join(f"{v:.4g}" for v in np.where(np.abs(place) < 1e-9, 0, place))
     return f"{value_text('von_mises', stress)} at ({where}) m"
 
@@ -260,7 +260,7 @@ def matrix_text(stiffness: NDArray) -> str:
 
 
 def _matrix(matrix: NDArray, form: str) -> list[str]:
-    """Return the text lines of a 6 by 6 matrix; round-off errors are shown as zero."""
+    """Format a 6 by 6 matrix as lines of text, with round-off shown as zero."""
     head = "   " + "".join(f"{name:>14}" for name in SCREW)
     noise = 1e-12 * np.abs(matrix).max()
     rows = np.where(np.abs(matrix) < noise, 0.0, matrix)
