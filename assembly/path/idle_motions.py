@@ -40,7 +40,7 @@ class IdleMotions:
 
 
 def idle_motions(motion: Motion) -> IdleMotions | None:
-    """Find the idle motions of a robot along a path; None if there are none.
+    """Return the idle motions of a robot along a path, or None if there are none.
 
     Args:
         motion: motion at k points, of which only postures and equations are used.
@@ -79,7 +79,7 @@ def momentum_free_rates(motion: Motion, idle: IdleMotions) -> NDArray:
 def with_idle_accelerations(
     motion: Motion, idle: IdleMotions, gravity: NDArray
 ) -> Motion:
-    """Add the accelerations of idle motions under the loads to a motion.
+    """Return a motion with the accelerations of idle motions under the loads.
 
     Args:
         motion: motion at k points.

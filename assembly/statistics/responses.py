@@ -96,7 +96,7 @@ def respond(
 def _by_number(
     robot: Robot, sources: Sources, values: NDArray, slopes: NDArray
 ) -> NDArray:
-    """Convert derivatives by all frame errors to derivatives (k, m) by m sources.
+    """Return derivatives (k, m) by m sources, from derivatives by all frame errors.
 
     The clearance that a bolted joint locks in depends on the errors; its derivatives
     are central differences.

@@ -35,7 +35,9 @@ def prove_worst(
 
     Returns:
         For each limit: the value at the worst corner found, and the proven upper bound,
-        NaN if the limit is not convex. Also the factor, at most 1, by which the tolerances must be scaled so that the upper bounds meet all limits; NaN if a limit is not convex.
+        NaN if the limit is not convex.  Also the factor, at most 1, by which the
+        tolerances must be scaled so that the upper bounds meet all limits; NaN if a
+        limit is not convex.
     """
     plan = requirement.plan
     spread, worst, scale = plan.spread(t), {}, np.inf

@@ -166,7 +166,7 @@ def _check_not_bolted(machine: Machine, state: State, step: Adjust) -> None:
 
 
 def _closing_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
-    """Find the adjustment that minimises the energy of closing a loop.
+    """Return the adjustment that minimises the energy required to close a loop.
 
     The changes are treated as free motions of the closed machine, whose energy is
     convex in the changes and the clearances together.  If several changes are equally

@@ -277,7 +277,7 @@ def _told(
 
 
 def _half_work(machine: Machine, before: State, after: State, step: Step) -> NDArray:
-    """Compute the work (k,) [J] of a linear step from its wrenches and openings.
+    """Return the work (k,) [J] of a linear step from its wrenches and openings.
 
     The work is half the wrench that a step adds, or a release removes, times the motion
     against this wrench. It is NaN for all other kinds of steps.

@@ -224,7 +224,7 @@ def _over_sets(
 def _bottleneck(
     search: _Search, start: State, run: list[Step]
 ) -> tuple[list[Step], float, float]:
-    """Find the order of a sequence with minimum peak force, the force and a bound.
+    """Return the order of a sequence with minimum peak force, the force and a bound.
 
     The search proceeds backwards from the set of all parts, by increasing peak force:
     one equilibrium contains the closing forces of all parts that may have been joined
@@ -266,7 +266,7 @@ def _joined_after(chosen: int, later: dict[int, int]) -> list[int]:
 
 
 def _over_orders(search: _Search, start: State, plan: Plan, given: float) -> BestOrder:
-    """Find the best order by depth-first branch and bound.
+    """Return the best order, found by depth-first branch and bound.
 
     Once the number of states is exhausted, or after Ctrl-C, the bounds of all orders
     not yet searched enter the bound of the result.

@@ -217,8 +217,8 @@ def refine_level(level: Level, growth: float) -> Solid:
     shares = np.maximum(shares, 1e-12 * shares.max())
 
     def halvings(limit: float) -> NDArray:
-        # the error of an element decreases as h^4 to h^7, hence by at least 2^1.5 per
-        # bisection
+        # the error of an element decreases as h^4 to h^7, and thus by at least 2^1.5
+        # per bisection
         return np.clip(np.round(np.log2(shares) / 1.5 - limit), 0, 6).astype(int)
 
     low, high = -200.0, 200.0

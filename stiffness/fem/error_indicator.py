@@ -4,7 +4,7 @@ The stiffness of cubic elements exceeds the exact one by the energy of the
 discretisation error. The stresses in a cubic element are quadratic and are split into a
 constant mean, a linear part of energy s_2, and a quadratic part of energy s_3. Assume
 that the error e_p of elements of degree p decreases as p^-b. Then the decay s_3 / s_2 =
-(e_2 - e_3) / (e_1 - e_2) determines b, and hence the ratio e_3 / (e_2 - e_3) of the
+(e_2 - e_3) / (e_1 - e_2) determines b, and thus the ratio e_3 / (e_2 - e_3) of the
 remaining error to s_3. This ratio is nearly zero in a smooth field, and one or more
 otherwise. For elements at a singular edge it is set to 1.2.
 

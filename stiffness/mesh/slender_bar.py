@@ -81,7 +81,7 @@ def slender_bar(surface: Surface, base: Interface, tip: Interface) -> Solid | No
 
 
 def _prismatic(surface: Surface, axis: NDArray) -> bool:
-    """Check whether all triangles are nearly parallel or normal to the axis.
+    """Return whether all triangles are nearly parallel or normal to the axis.
 
     Triangles on a cylinder are exactly parallel to its axis only if one of their edges
     is, which is not the case in triangulations of STEP files.

@@ -199,7 +199,7 @@ def build_library(
 
 
 def _make_folder(folder: Path, write: bool = True) -> None:
-    """Create the library folder; without ``write``, only check that this is possible."""
+    """Create the library folder; without ``write`` only check that this is possible."""
     try:
         made = [one for one in (folder, *folder.parents) if not one.exists()]
         folder.mkdir(parents=True, exist_ok=True)

@@ -132,7 +132,7 @@ def _lies_on(shape: Shape, points: NDArray, graph: TriangleGraph) -> bool:
 def _is_faceted(shape: Shape, points: NDArray) -> bool:
     """Check whether points on a shape are corners of facets along its curvature."""
     # The corners of any two adjacent flat faces, and of three symmetric ones, lie on a
-    # circle.  Hence either three facets as wide as the widest, or many facets, are
+    # circle.  Either three facets as wide as the widest, or many facets, are therefore
     # required.
     if not isinstance(shape, Cone | Torus):
         return True

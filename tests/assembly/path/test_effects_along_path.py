@@ -85,9 +85,7 @@ def turned(robot, **given):
         ),
     ],
 )
-def test_accelerated_rod_rotates_by_torque_over_effective_stiffness(
-    effects, rotation
-):
+def test_accelerated_rod_rotates_by_torque_over_effective_stiffness(effects, rotation):
     assert turned(arm(effects=effects)) == pytest.approx(-rotation, rel=1e-9)
 
 
@@ -171,7 +169,8 @@ def test_path_at_zero_speed_equals_single_postures_with_the_same_effects(name):
 
 
 def test_path_with_clearances_and_effect_errors_equals_single_postures():
-    """Without loads, clearances leave the pose undetermined, but the energy is unique.
+    """Without loads, clearances leave the pose undetermined, but the energy is
+    unique.
     """
     effects = {name: EFFECTS[name] for name in ERRORS}
     robot = replace(heavy("irsbot2"), effects=effects)

@@ -1,5 +1,4 @@
-"""Compliance along a path under the loads at each instant, and force-controlled drives.
-"""
+"""Compliance along a path under instantaneous loads, and force-controlled drives."""
 
 from dataclasses import replace
 
@@ -101,8 +100,7 @@ def test_drive_with_a_force_unloads_the_other_drive():
 
 
 def test_an_interrupted_path_resumes_with_the_same_results(tmp_path):
-    """After Ctrl-C in the second block, the file equals that of an uninterrupted run.
-    """
+    """Ctrl-C after the first block: the file equals that of an uninterrupted run."""
     table = PathTable(("tx",), np.array([[0.0], [0.1]]))
 
     def compute(file, progress=lambda done, total: None):

@@ -82,7 +82,8 @@ def test_path_with_moving_ends_reproduces_a_quintic_motion():
 
 
 def test_acceleration_of_a_sampled_cosine_converges_with_fourth_order():
-    """The second derivative of a quintic spline has an error of h^4 away from its ends.
+    """The second derivative of a quintic spline has an error of h^4 away from
+    its ends.
     """
     errors = []
     for count in (11, 21, 41):

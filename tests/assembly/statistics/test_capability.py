@@ -40,7 +40,8 @@ def test_intervals_of_cpk_1_33_from_fifty_values_equal_hand_calculation():
 
 
 def test_intervals_cover_the_true_capability_index_at_the_stated_rate():
-    """With 2000 samples of 30 values, a coverage of 0.95 has a standard error of 0.5 %.
+    """With 2000 samples of 30 values, a coverage of 0.95 has a standard error
+    of 0.5 %.
     """
     rng = np.random.default_rng(1)
     found = [capability(x, -4.0, 4.0) for x in rng.normal(size=(2000, 30))]

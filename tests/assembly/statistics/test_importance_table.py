@@ -89,7 +89,8 @@ def test_group_of_angles_and_lengths_has_a_standard_deviation_but_no_gain():
 
 
 def test_draws_without_a_solution_are_reported_with_the_reason():
-    """At most 5 % may be omitted; beyond that, the remaining draws are not independent.
+    """At most 5 % may be omitted; beyond that, the remaining draws are not
+    independent.
     """
     experiment = driven_arm(clearance="least")
     design = importance_design(experiment, ImportanceOptions(100, "source"))

@@ -36,7 +36,8 @@ CORNERS = Samples(np.array([[1.0, -1, 1], [-1, -1, 1]]), 0)
 
 
 def test_minimum_cost_of_two_crossing_limits_is_at_their_intersection():
-    """4 t1 + t2 <= 1 and t1 + 2 t2 <= 1 intersect at (1/7, 3/7), where c/t is minimal.
+    """4 t1 + t2 <= 1 and t1 + 2 t2 <= 1 intersect at (1/7, 3/7), where c/t is
+    minimal.
     """
     t, _ = least_cost(Sums(), CORNERS, np.array([1.0, 1.0]), silent)
     np.testing.assert_allclose(t, [1 / 7, 3 / 7], rtol=5e-3)

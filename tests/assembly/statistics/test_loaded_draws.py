@@ -74,7 +74,8 @@ def test_draws_under_a_load_on_a_free_motion_are_refused():
 
 
 def test_statistics_command_applies_load_and_gravity(tmp_path):
-    """A load a hundred times larger exceeds a force limit that the smaller load meets.
+    """A load a hundred times larger exceeds a force limit that the smaller
+    load meets.
     """
     robot = cantilever().robot
     write_robot(robot, tmp_path / "bar.toml")

@@ -66,7 +66,8 @@ def test_clearance_shares_of_a_closed_loop_sum_to_the_largest_error(name):
 
 
 def test_perfect_parts_include_the_displacement_under_load():
-    """5 N along y press the pin against its rim: displacement of its radius, force 5 N.
+    """5 N along y press the pin against its rim: displacement of its radius,
+    force 5 N.
     """
     parts = perfect_parts(experiment(arm(radial=RADIAL), load=(0, 0, 0, 0, 5.0, 0)))
     assert parts["translation"]["reached"] == pytest.approx(RADIAL, rel=1e-6)

@@ -113,7 +113,8 @@ def test_allocation_identity_changes_with_every_input():
 
 
 def test_singular_postures_of_a_grid_are_omitted_and_counted():
-    """Above the centre of a 3-UPU, the locked platform can rotate; elsewhere it cannot.
+    """Above the centre of a 3-UPU, the locked platform can rotate; elsewhere
+    it cannot.
     """
     postures, left_out = grid_postures(
         three_upu(seed=1), "tx=-0.02:0.02:0.02,ty=0,tz=0.45"

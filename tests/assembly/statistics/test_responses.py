@@ -30,7 +30,8 @@ def stiff():
 @pytest.mark.parametrize("key", QUANTITIES)
 @pytest.mark.parametrize("play", ["least", "worst"])
 def test_slopes_without_clearance_satisfy_eulers_theorem(stiff, key, play):
-    """The energy is homogeneous of degree two, and all other quantities of degree one.
+    """The energy is homogeneous of degree two, and all other quantities of
+    degree one.
     """
     prepared, sources, values = stiff
     size, slopes = respond(prepared, sources, values, key, play)
@@ -78,7 +79,8 @@ def test_slopes_of_the_largest_error_of_an_arm_equal_its_closed_form():
 @pytest.mark.parametrize("play", ["least", "contact", "uniform"])
 @pytest.mark.parametrize("key", ["rotation", "translation"])
 def test_sampled_response_uses_the_random_clearances_of_the_experiment(play, key):
-    """This holds for each draw; the slopes are the direction of the platform's error.
+    """This holds for each draw; the slopes are the direction of the platform's
+    error.
     """
     posture, sources = tip()
     values = sources.draw(0, 12, seed=1)

@@ -225,7 +225,8 @@ def test_allocation_for_the_worst_clearance_has_the_yield_in_new_draws(paper):
 
 
 def parallel(k1, k2):
-    """A platform between two bars along x, which follows errors by relative stiffness.
+    """A platform between two bars along x, which follows errors by relative
+    stiffness.
     """
     frames = (
         Frame("one", translation=[0.5, 0, 0], link=MatrixLink(np.eye(6) * k1)),

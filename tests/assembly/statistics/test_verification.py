@@ -63,7 +63,8 @@ def test_scale_is_set_by_the_tightest_limit_and_not_certified_for_a_force():
 
 
 class Given:
-    """A requirement with two limits at two postures, with given utilisations per draw.
+    """A requirement with two limits at two postures, with given utilisations
+    per draw.
     """
 
     cases = [("a", 0), ("a", 1), ("b", 0), ("b", 1)]

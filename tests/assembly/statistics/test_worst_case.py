@@ -31,7 +31,8 @@ def bars(clearance=None):
 def test_worst_energy_subtracts_the_clearance_from_the_sum_of_errors(
     directions, radial
 ):
-    """k (hypot(t1 + t2, t3 + t4) - p)^2 / 4; the bound uses the sum of all t, less p.
+    """k (hypot(t1 + t2, t3 + t4) - p)^2 / 4; the bound uses the sum of all t,
+    less p.
     """
     posture, sources = bars(Clearance(radial=radial) if radial else None)
     prepared = linear_response(posture)

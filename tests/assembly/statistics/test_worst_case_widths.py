@@ -65,7 +65,8 @@ def allotted(tmp_path, robots, text, fresh=0):
 
 
 def cheapest(bend, limit):
-    """Minimise 1/a + 4/b with |a u + b v| <= limit for u, v at the bend, for any signs.
+    """Minimise 1/a + 4/b with |a u + b v| <= limit for u, v at the bend, for
+    any signs.
     """
     c = abs(np.cos(bend))
 

@@ -97,7 +97,8 @@ def test_yield_falls_to_zero_with_the_worst_clearance():
 
 
 def test_worst_clearance_adds_no_error_if_a_load_closes_all_clearances():
-    """A load presses the pin against one side of its disc, so it cannot move sideways.
+    """A load presses the pin against one side of its disc, so it cannot move
+    sideways.
     """
     robot = arm(radial=RADIAL)
     sources, load = tip_errors(robot, 1e-4), (0, 0, 0, 10.0, 0, 0)

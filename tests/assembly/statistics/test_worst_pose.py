@@ -84,7 +84,8 @@ def test_worst_case_of_two_ball_clearances_is_the_sum_of_their_radii():
 
 
 def test_uniform_draws_of_a_serial_arm_have_the_radius_computed_by_hand():
-    """The rms of 58.9 um follows from the summed variances of uniform errors and discs.
+    """The rms of 58.9 um follows from the summed variances of uniform errors
+    and discs.
     """
     prepared, sources = of_serial()
     draws = prepared.solve(sources.errors(sources.draw(0, 50_000, 1)))
@@ -94,7 +95,8 @@ def test_uniform_draws_of_a_serial_arm_have_the_radius_computed_by_hand():
 
 
 def with_half_of_the_coupler(sources):
-    """Return sources for a platform half way along the coupler, with half of its error.
+    """Return sources for a platform half way along the coupler, with half of
+    its error.
     """
     robot, placed = sources.robot, []
     for one in sources.placed:

@@ -1,4 +1,4 @@
-"""Sweeps on many processes equal those of one process, also when a worker dies."""
+"""Sweeps on many processes equal those of one process, even if a worker dies."""
 
 import os
 import pickle
@@ -32,8 +32,8 @@ def drawn_sweep(grid):
     return Sweep(question, targets, (), 3, block_size=32)
 
 
-def test_worker_refuses_a_task_of_another_robot():
-    """For example, a mesh differs there: its content is part of the hash."""
+def test_worker_rejects_a_task_for_another_robot():
+    """A mesh may differ there, for example; its content is part of the hash."""
     question = drawn_sweep("tx=0,ty=0.13").question
     with pytest.raises(BadInput, match="found another robot on a worker"):
         solve_task(pickle.dumps(question), "0" * 64, [])
@@ -109,7 +109,7 @@ def cluster(tmp_path):
 
 @pytest.mark.slow
 def test_sweep_with_a_killed_worker_writes_the_same_file(cluster, tmp_path):
-    """A scheduler and two workers as processes; one worker gets SIGKILL."""
+    """A scheduler and two workers run as processes; one worker receives SIGKILL."""
     sweep = drawn_sweep("tx=-0.045:0.045:0.003,ty=0.10:0.15:0.003")
     run_sweep(sweep, tmp_path / "one.nc")
     killed = []

@@ -1,4 +1,4 @@
-"""Quantities selected by name are stored with the numbers of the whole sweep."""
+"""Quantities selected by name have the same values as in the full sweep."""
 
 import pytest
 import xarray

@@ -41,7 +41,9 @@ LOAD = (0.0, 0.0, 0.0, 0.0, 0.0, -300.0)
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
 def test_swept_tangent_includes_errors_load_and_clearances(state):
-    """Errors of the varied design; the load changes the tangent."""
+    """The tangent includes the errors of the varied design and changes with
+    the load.
+    """
     options = SweepOptions(
         grid="tx=0.1,tz=-0.5", assumption="none", state=state, load=LOAD,
         vary=["leg1.link_a.geometric_error.rx=0,0.02"],

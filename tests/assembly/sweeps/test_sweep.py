@@ -1,4 +1,4 @@
-"""Data sets over grids."""
+"""Data sets of sweeps over grids."""
 
 import numpy as np
 import pytest
@@ -76,7 +76,9 @@ def test_map_of_a_single_axis_is_refused(data):
 
 
 def test_failed_margin_has_the_status_solver_failed_at_its_point(monkeypatch):
-    """The solver fails at one of two points; the other point keeps its result."""
+    """The solver fails at one of two points; the result at the other point is
+    unaffected.
+    """
     solve = points.zone_margin
 
     def spoilt(postures, reading, errors):

@@ -1,4 +1,4 @@
-"""Grids of joints, and postures listed in a table."""
+"""Grids of joint coordinates, and postures listed in a table."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Isotropic materials: accepted values and refusals."""
+"""Isotropic materials: accepted and rejected values."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Meshes fitted to the patches of a surface, and refusals."""
+"""Meshes fitted to the patches of a surface, and rejected meshes."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def test_a_mesh_without_a_face_on_an_interface_is_refused(other, missing):
         fit_to_patches(made.points, made.cells, SURFACE, patches)
 
 
-def test_fit_turns_cells_of_wrong_orientation_and_drops_unused_points():
+def test_fit_reorients_inverted_cells_and_drops_unused_points():
     """The solid equals that of well-ordered cells; it lies far from the origin."""
     far = np.array([3.0, -2.0, 1.0])
     rng = np.random.default_rng(7)

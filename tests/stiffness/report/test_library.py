@@ -1,4 +1,4 @@
-"""Libraries of links: built, resumed, read, interpolated, exported."""
+"""Link libraries: building, resuming, reading, interpolation and export."""
 
 import csv
 import io
@@ -124,7 +124,7 @@ def test_grid_with_a_missing_entry_is_refused(spec):
 
 
 def test_entry_with_other_parameters_is_refused_by_name(spec):
-    """A key renamed by hand in one file, or entries of two libraries in one folder."""
+    """One key was renamed by hand, or the folder contains entries of two libraries."""
     build_library(spec)
     *others, last = read_library(spec.folder)
     renamed = {"*" if k == "young" else k: v for k, v in last.parameters.items()}
@@ -135,7 +135,7 @@ def test_entry_with_other_parameters_is_refused_by_name(spec):
 
 
 def changed(change):
-    """The text of an entry of which something is otherwise."""
+    """Return the text of an entry with a change."""
 
     def text(whole):
         content = json.loads(whole)
@@ -266,7 +266,9 @@ BETWEEN = {
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_build_file_of_each_shape_is_distributed_with_its_entries(shape):
-    """The keys are those that a build would make; the folder has an entry for each."""
+    """The keys are those that a build would create, and the folder has an entry for
+    each.
+    """
     spec = read_spec(SHIPPED / f"{shape}.toml")
     assert (spec.shape, spec.method) == (shape, "fea")
     entries = read_library(SHIPPED / shape)
@@ -291,8 +293,9 @@ def test_interpolation_error_estimate_bounds_the_error_against_another_stiffness
 
 @pytest.mark.parametrize("shape", ["rectangle", "box"])
 def test_shipped_square_links_are_slightly_stiffer_than_their_beams(shape):
-    """Held ends add up to 0.3 b / L in bending. No entry is softer than Timoshenko's
-    beam but a box in torsion, whose corners Bredt's formula leaves out."""
+    """Held ends add up to 0.3 b / L in bending. No entry is softer than the Timoshenko
+    beam except a box in torsion, whose corners Bredt's formula neglects.
+    """
     K, _ = look_up(read_library(SHIPPED / shape), {"length": 0.37})
     lengths = read_spec(SHIPPED / f"{shape}.toml").grid
     lengths = {k: lengths[k][0] for k in SHAPES[shape]} | {"length": 0.37}

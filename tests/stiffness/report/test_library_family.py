@@ -1,4 +1,4 @@
-"""Families of CAD parts: a table of files and sizes, and entries between them."""
+"""Families of CAD parts: a table of files and sizes, and interpolation."""
 
 import numpy as np
 import pytest
@@ -73,7 +73,7 @@ def test_estimated_error_between_family_sizes_covers_the_closed_form(parts, leng
     assert np.abs(scaled(error, truth)).max() < 0.02
 
 
-def test_estimated_error_covers_an_entry_that_is_left_out(parts):
+def test_estimated_error_covers_an_omitted_entry(parts):
     folder, _ = parts
     build_library(read_spec(folder / "spec.toml"))
     entries = read_library(folder / "links")

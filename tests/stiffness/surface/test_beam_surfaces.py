@@ -1,4 +1,4 @@
-"""Shapes as surfaces and as beams: volumes of prisms, walls, tapers."""
+"""Shapes as surfaces and as beams: volumes of prisms, walls and tapers."""
 
 import math
 

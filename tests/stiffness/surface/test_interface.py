@@ -81,7 +81,9 @@ def test_written_interface_is_read_as_the_same_interface(text, written):
 
 
 def test_interface_distance_is_measured_from_the_plane_or_the_cylinder(rng):
-    """Along the normal, or across the axis beyond the radius; inside and outside."""
+    """Distances are along the normal, or radial from the cylinder, inside and
+    outside.
+    """
     point, d = np.array([1.0, 2.0, 3.0]), np.array([0, 0.6, 0.8])
     u, v = np.array([1.0, 0, 0]), np.array([0, 0.8, -0.6])
     a, b = rng.normal(size=(2, 4, 5))

@@ -1,4 +1,4 @@
-"""OBJ files as programs write them."""
+"""OBJ files as written by common programs."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Surfaces read, checked and repaired."""
+"""Reading, checking and repair of surfaces."""
 
 import struct
 
@@ -27,7 +27,7 @@ def write_stl(path, points, triangles):
 
 @pytest.mark.parametrize("kind", ["stl", "ply", "obj", "vtk", "vtp"])
 def test_every_file_format_has_the_same_surface(tmp_path, kind):
-    """STL and PLY have single precision: 1e-7 of the coordinates."""
+    """STL and PLY have single precision, 1e-7 of the coordinates."""
     pyvista = pytest.importorskip("pyvista")
     points, triangles = cylinder()
     path = tmp_path / f"bar.{kind}"
@@ -89,7 +89,7 @@ def test_units_of_length_equal_those_of_scipy():
 
 
 def test_signed_volume_does_not_change_far_from_the_origin():
-    """Some 40 km away, products of coordinates have no digit left for 1 litre."""
+    """About 40 km away, products of coordinates have no digits left for 1 litre."""
     far = CUBE + np.array([1e4, -2e4, 3e4])
     for points, tolerance in ((CUBE, 1e-12), (far, 1e-8)):
         volume = signed_volume(points, CUBE_TRIANGLES)

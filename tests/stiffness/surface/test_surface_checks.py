@@ -1,4 +1,4 @@
-"""Refusals and repairs of surfaces."""
+"""Rejection and repair of surfaces."""
 
 import re
 
@@ -81,7 +81,7 @@ def test_triangle_of_two_corners_is_dropped_and_reported(pair):
 @pytest.mark.parametrize("turned", [1, 5, 7, 11])
 @pytest.mark.parametrize("hollow", [False, True])
 def test_reversed_triangles_are_repaired_and_reported(rng, turned, hollow):
-    """The smaller number of triangles is turned, then a shell that is inside out."""
+    """The smaller group of triangles is reversed, then a shell that is inside out."""
     mixed = CUBE_TRIANGLES.copy()
     some = rng.choice(12, turned, replace=False)
     mixed[some] = mixed[some][:, ::-1]
@@ -118,7 +118,7 @@ def test_overlapping_body_is_not_read_as_a_cavity():
         check_surface(points, triangles, "cubes")
 
 
-def test_second_body_is_refused_with_the_place_of_its_middle():
+def test_second_body_is_rejected_with_the_position_of_its_centre():
     far = CUBE + [0.3, 0.4, 0.5]
     points = np.concatenate([2 * CUBE, far])
     triangles = np.concatenate([CUBE_TRIANGLES, CUBE_TRIANGLES + 8])
@@ -175,9 +175,11 @@ def test_surface_that_bounds_no_solid_is_refused(points, triangles, message):
         check_surface(points, triangles, "part")
 
 
-def test_place_where_a_surface_intersects_itself_is_reported():
-    """The cube's top drawn up to a spike, or down through its bottom: the middle of two
-    triangles that cross is named, one of the spike's and one of the bottom's."""
+def test_position_of_a_self_intersection_is_reported():
+    """The top of the cube is pulled up to a spike, or down through its bottom. The
+    message names the midpoint of two crossing triangles, one of the spike and one of
+    the bottom.
+    """
     sides = [t for t in CUBE_TRIANGLES if not (CUBE[t][:, 2] == 0.1).all()]
     bottom = [t for t in CUBE_TRIANGLES if (CUBE[t][:, 2] == 0.0).all()]
     ring = [1, 5, 7, 3, 1]
