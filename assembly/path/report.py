@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 _ASSUMED = (
     "Quasi-static: inertia and weight act as loads at each instant. Vibration, damping "
-    "and the inertia of the deflection itself are left out.",
-    "Drives follow the nominal path; their errors of control are left out.",
+    "and the inertia of the deflection itself are neglected.",
+    "Drives follow the nominal path; their control errors are neglected.",
     "Bodies move as the rigid nominal robot; a beam's mass acts along the beam.",
     "Small screws: the closures are linear in errors and deflections.",
 )
@@ -118,7 +118,7 @@ def _verdict(summary: Mapping[str, Any]) -> str:
         size = Value(peak["value"], "m").text
         verdict = f"Acceleration deflects the platform by at most {size}"
     if _good(summary) is None:
-        verdict += "; vibration, which is left out, may exceed it"
+        verdict += "; vibration, which is neglected, may exceed it"
     if summary["status"] != OK:
         verdict += f"; {summary['status']} {summary.get('reason', '')}"
     return verdict + "."

@@ -129,7 +129,7 @@ def remarks(errors: PathErrors) -> list[str]:
         found.append(
             f"the path takes {errors.periods:.3g} periods of the first natural "
             f"frequency, less than {LEAST_PERIODS:g}: vibration, which these numbers "
-            "leave out, may exceed them"
+            "neglect, may exceed them"
         )
     if not np.isfinite(errors.periods):
         found.append("no natural frequency was found: the vibration is unknown")
@@ -137,11 +137,11 @@ def remarks(errors: PathErrors) -> list[str]:
     if path.jumps or ends > _STARTS * np.abs(path.second).max(initial=0.0):
         found.append(
             "the acceleration jumps along the path or at its ends: undamped vibration, "
-            "which these numbers leave out, makes two to three times the deflection"
+            "which these numbers neglect, doubles or triples the deflection"
         )
     if virtual_joints(errors.robot).cones.shape[1]:
         found.append(
-            "impacts where a clearance changes sides are left out; without a load the "
+            "impacts where a clearance changes sides are neglected; without a load the "
             "pose within the clearances, and the change from it, is not unique"
         )
     fall = (errors.status == OK) & np.isnan(errors.arrays["inertial_screw"][:, 0])

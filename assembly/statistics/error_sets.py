@@ -199,8 +199,8 @@ def zones_of_errors(sources: Sources) -> list[tuple[str, Zone, NDArray]]:
         independent, fixed = sources, sources.fixed
     if fixed is not None and fixed.any():
         raise BadInput(
-            "worst case: found closures that do not close at home, whose mismatch is a "
-            "constant error; expected closures that close"
+            "worst case: found loops that do not close at home, whose mismatch is a "
+            "constant error; expected loops that close"
         )
     found = [] if independent is None else _intervals(independent)
     return found + [(p.name, p.zone, np.ones(sum(p.zone.dimensions))) for p in placed]

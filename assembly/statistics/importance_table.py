@@ -191,8 +191,8 @@ def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
         if most > MOST_FAILED:
             results["reason"] = (
                 f"no indices are computed if more than {MOST_FAILED:.0%} of the "
-                f"draws have no solution: up to {most:.1%} were left out, and the "
-                "errors of the other draws are not independent"
+                f"draws have no solution: up to {most:.1%} were omitted, and the "
+                "errors of the remaining draws are not independent"
             )
         elif np.isnan(of_quantity["total_index"]).all():
             results["reason"] = "it does not vary"
@@ -221,9 +221,9 @@ def importance_text(report: Mapping[str, Any]) -> str:
     """Format the importance as a text table, with the largest shares first."""
     quantities = report["quantities"]
     lines = [
-        f"importance of the errors, {report['base_draws']} base draws, clearances "
-        f"{report['clearance']} in the shares, least in the motion of the platform "
-        "(its slopes are exact):"
+        f"importance of the errors, {report['base_draws']} base draws; clearance model "
+        f"{report['clearance']} for the shares, least for the platform motion "
+        "(exact derivatives):"
     ]
     for name, one in quantities.items():
         if "reason" in one:

@@ -53,7 +53,7 @@ def draws_page(
     goes = summary["assembles"]["forced"]
     verdict = f"Of {summary['draws']} draws {_share_text(goes)} assemble"
     if "within_limits" in summary:
-        verdict += f"; {_share_text(summary['within_limits'])} keep all limits"
+        verdict += f"; {_share_text(summary['within_limits'])} meet all limits"
     return page(
         Page(
             title=f"{summary['robot']}: random errors",
@@ -77,7 +77,7 @@ def draws_sections(
     return [
         section("Probabilities", _yields(summary)),
         _perfect_parts(summary),
-        section("A draw of large error", robot) if robot else "",
+        section("A draw with a large error", robot) if robot else "",
         section("Distributions", _quantities(summary), _histograms(summary, data)),
         _capability(summary),
         _importance(summary),

@@ -222,8 +222,8 @@ def summary_text(summary: Mapping[str, Any]) -> str:
     ]
     if summary["clearance"] == "contact" and not summary.get("load"):
         lines.append(
-            "the contact length determines which clearances close; with the "
-            "service load (--load) they close as this load presses them"
+            "the contact length determines which clearances close; specify a known "
+            "service load with --load to close them as in service"
         )
     if summary.get("clearance_not_mixed"):
         lines.append(

@@ -39,7 +39,7 @@ def tightening_tiles(summary: Mapping[str, Any]) -> list[Tile]:
     if broken:
         tiles.append(_broken_tile(broken))
     elif summary.get("within_limits", {}).get("probability") == 1.0:
-        note = f"all {summary['draws']} draws keep all limits."
+        note = f"all {summary['draws']} draws meet all limits."
         tiles.append(Tile("Tolerance to tighten", ["nothing"], [note]))
     elif names:
         note = "not distinguished by these draws." if len(names) > 1 else ""

@@ -168,7 +168,7 @@ def _callouts(table: Table, robot: Robot, callouts: dict[int, int], number: int)
     """Add the callouts of a table to its class; return the default class name."""
     value = table.content["callouts"]
     if not isinstance(value, list) or not all(isinstance(v, str) for v in value):
-        raise table.bad("callouts", "expected a list of names of [[tolerance]]")
+        raise table.bad("callouts", "expected a list of names of [[tolerance]] entries")
     names = [callout.name for callout in robot.callouts]
     for name in value:
         # a name without a leg's name selects the callout in every leg

@@ -16,7 +16,7 @@ _LISTED = 20  # largest number of errors in a table of shares
 # difference below which two shares count as equal, relative to the largest share
 _ALIKE = 0.01
 _ASSUMED = (
-    "Limits hold at the postures of the grid; nothing is known between them.",
+    "Limits are checked only at the postures of the grid, not between them.",
     "Errors are independent and keep within their tolerances.",
     "Small screws: the closures are linear in the errors.",
 )
@@ -26,7 +26,7 @@ _COST_LAWS = {
 }
 _GOVERNED = {
     "reciprocal": "of the price",
-    "logarithm": "of what looser tolerances would save",
+    "logarithm": "of the saving by looser tolerances",
 }
 
 
@@ -129,8 +129,8 @@ def _present_section(present: Mapping[str, Any]) -> str:
         most[rest] = sum(list(shares.values())[_LISTED:])
     axis = Axis("share of the largest margin")
     return section(
-        "The errors there are",
-        bars(most, axis, "The steepest first.", np.nan, rest),
+        "Present errors",
+        bars(most, axis, "Largest share first.", np.nan, rest),
         table(["error", "size", Column("share of the margin")], rows, "errors"),
     )
 

@@ -57,11 +57,11 @@ _STARTS = 24  # number of random starting corners of the tolerance box
 _CLIMBS = 12  # largest number of steps from one corner of the tolerance box to another
 
 MEANINGS = {
-    "linear": "nothing is over-constrained: every reading is the same",
+    "linear": "no loop is over-constrained: all definitions agree",
     "rigid": "rigid parts: only errors and clearances that close without force",
     "elastic": "elastic parts without clearance: the response is linear",
     "equilibrium": "elastic parts with clearance: between the largest equilibrium "
-    "found by climbing and the bound with clearances counted as errors",
+    "found by searching and the bound with clearances counted as errors",
 }
 
 

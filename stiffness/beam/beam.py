@@ -161,5 +161,5 @@ def unit_vector(name: str, vector: ArrayLike) -> NDArray:
         raise BadInput(f"{name}: found {describe(vector)}, expected 3 finite numbers")
     length = np.linalg.norm(direction)
     if length == 0:
-        raise BadInput(f"{name} is zero; expected a direction")
+        raise BadInput(f"{name} is zero; expected a nonzero direction vector")
     return direction / length

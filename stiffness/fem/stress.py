@@ -93,13 +93,13 @@ class StressInfluence:
         if self.reentrant_edges:
             words += (
                 "; some of them on inner edges without a fillet or between two "
-                "materials, where stress is singular too and grows with the mesh's "
-                "fineness"
+                "materials, where the stress is singular too and grows as the mesh is "
+                "refined"
             )
         if self.source is not None and self.source.left_out.any():
             words += (
-                f"; {self.source.left_out.sum()} nodes are left out, where the mesh "
-                "does not follow the part's surface"
+                f"; {self.source.left_out.sum()} nodes are omitted because the mesh "
+                "does not follow the part's surface there"
             )
         return words
 

@@ -98,8 +98,8 @@ class LinkComparison:
         turns, shifts = (" ".join(f"{v:.2f}" for v in part) for part in (c[:3], c[3:]))
         chord = float(np.linalg.norm(self.fea.tip - self.fea.base))
         bent = (
-            "  A solid's corner is stiffer than two beams that meet in a point: c "
-            "includes more than the end effect."
+            "  The corner of a solid is stiffer than two beams that meet at a point, "
+            "so c includes more than the end effect."
         )
         return (
             f"L / r = {self.slenderness:.3g}.  Held faces cannot warp or shrink: "
