@@ -55,7 +55,7 @@ def check_effects(robot: Robot, under: Covariates) -> None:
     """Reject effects that cannot be computed along a path.
 
     Args:
-        robot: robot with the effects of its file.
+        robot: robot with the effects in its file.
         under: values of covariates by name.
 
     Raises:
@@ -97,7 +97,7 @@ def path_conditions(
     """Apply the effects in the robot file, and return the conditions at k instants.
 
     Args:
-        robot: robot with the effects of its file.
+        robot: robot with the effects in its file.
         postures: k postures of this robot.
         times: (k,) [s] instants.  The covariate ``time`` at an instant is the instant
             plus the value in ``under``.

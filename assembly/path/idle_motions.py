@@ -19,7 +19,7 @@ from forcefit.assembly.path.inertial_loads import InertialLoads, inertial_loads
 from forcefit.assembly.path.motion import Motion, carries_matrix, idle_rates
 
 _MASSLESS = 1e-12  # inertias below this fraction of the largest inertia count as zero
-_ROUNDING = 1e-20  # share of mass x (longest arm)^2: squared arm error 1e-10
+_ROUNDING = 1e-20  # fraction of mass x (longest arm)^2: squared arm error 1e-10
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,7 +31,7 @@ def check_state(robot: Robot, state: str) -> None:
 
     Args:
         robot: any robot.
-        state: state in which the compliance is computed.
+        state: state for which the compliance is computed.
 
     Raises:
         BadInput: the state is not in :data:`STATES`, or the state is ``"exact"`` and a
@@ -53,7 +53,7 @@ def check_linear(conditions: Conditions, state: str) -> None:
 
     Args:
         conditions: conditions at any instants.
-        state: state in which the compliance is computed.
+        state: state for which the compliance is computed.
 
     Raises:
         BadInput: an effect is nonlinear, so that its tangent stiffness is not computed.

@@ -179,8 +179,8 @@ def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
 
     Returns:
         Number of base draws; the indices of each quantity, with the ranks that the
-        intervals allow; part and gain of each group; the share of discarded draws; and
-        a reason if there are no indices.
+        intervals allow; part and gain of each group; the fraction of discarded draws;
+        and a reason if there are no indices.
     """
     groups = [str(g) for g in data["group"].values]
     quantities: dict[str, Any] = {}

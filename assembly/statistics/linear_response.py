@@ -204,5 +204,5 @@ def _bent(reduced: Reduction, closing: NDArray) -> NDArray:
         reduced.linearisation, reduced.joints, reduced.frame_loads,
         reduced.load_multipliers - closing @ bent,
     )  # fmt: skip
-    springs -= reduced.spread @ (reduced.spread.T @ springs)  # removes rounding
+    springs -= reduced.spread @ (reduced.spread.T @ springs)  # removes round-off
     return reduced.joints.elastic @ springs

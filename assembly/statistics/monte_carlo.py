@@ -118,7 +118,7 @@ def _run_draws(
     done = sum(map(len, kept.values()))
     progress(done, count + more)
     missing = [b for b in range(len(spans)) if b not in kept]
-    with threadpool_limits(1):  # linear algebra libraries start no further threads
+    with threadpool_limits(1):  # linear algebra libraries start no threads
         for block, rows in _solved(solve, missing, workers):
             if journal is not None:
                 journal.add(block, rows, {})

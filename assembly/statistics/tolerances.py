@@ -108,7 +108,8 @@ def present_errors(
     Returns:
         The margins; the largest margin and its posture; the factor on all errors at
         which the largest margin becomes 1; and, at this posture, the derivatives of
-        margin and energy with respect to each error, largest first.
+        margin and energy with respect to each error, in order of decreasing effect on
+        the margin.
     """
     prepared, zones = [], []
     for i, posture in enumerate(postures):

@@ -17,7 +17,7 @@ _LISTED = 20  # largest number of errors in a table of shares
 _ALIKE = 0.01
 _ASSUMED = (
     "Limits are checked only at the postures of the grid, not between them.",
-    "Errors are independent and keep within their tolerances.",
+    "Errors are independent and stay within their tolerances.",
     "Small screws: the closures are linear in the errors.",
 )
 _COST_LAWS = {

@@ -82,7 +82,7 @@ def write_sweep(
     Args:
         sweep: sweep to which the results belong.
         read: function from a block number to the records and texts of the block.
-        path: path of the file; an existing file is replaced only by a complete one.
+        path: path of the file, which replaces an existing file only once complete.
 
     Raises:
         BadInput: the file cannot be written.
@@ -218,7 +218,7 @@ def save_dataset(data: "xarray.Dataset", path: Path | str) -> None:
 
     Args:
         data: data set to write.
-        path: path of the file; an existing file is replaced only by a complete one.
+        path: path of the file, which replaces an existing file only once complete.
 
     Raises:
         BadInput: the file cannot be written.

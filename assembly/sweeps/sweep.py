@@ -161,10 +161,10 @@ def sweep_poses(
             ``"budget"``; None if the bounds of the pose error are not computed.
 
     Returns:
-        Data set over the axes: ``margin``, ``margin_free``, ``energy``,
+        Data set over the axes, with ``margin``, ``margin_free``, ``energy``,
         ``platform_screw``; certificates, distances to singularities and ``status``;
         with an assumption also ``rotation_error`` and ``translation_error`` (lower and
-        upper).  At points without a solution, values are NaN and the status is the
+        upper).  At points without a solution, values are NaN and the status states the
         reason.
     """
     targets = grid_targets(axes)
@@ -173,5 +173,5 @@ def sweep_poses(
 
 
 def assemblable(data: "xarray.Dataset", key: str = "margin_free") -> NDArray:
-    """Return a bool array over the grid: True inside the assembly zone."""
+    """Return a bool array over the grid, True inside the assembly zone."""
     return np.asarray(data[key] <= ASSEMBLABLE)

@@ -24,7 +24,7 @@ def read_curve(path: Path | str, nu: float) -> list[Piece]:
             ``tip_section`` makes it tapered, with lengths that change linearly.
             ``center`` and ``turn``, a rotation vector, define an arc.  ``start`` [m] of
             the first piece is optional; its default is the origin.
-        nu: [-] Poisson's ratio, on which shear factors depend.
+        nu: [-] Poisson's ratio, which determines the shear factors.
 
     Returns:
         The pieces from base to tip.
@@ -49,7 +49,7 @@ def read_pieces(tables: Sequence[Table], start: NDArray, nu: float) -> list[Piec
     Args:
         tables: at least one table, with the keys of :func:`read_curve`.
         start: (3,) [m] start of the first piece.
-        nu: [-] Poisson's ratio, on which shear factors depend.
+        nu: [-] Poisson's ratio, which determines the shear factors.
 
     Returns:
         The pieces from base to tip.

@@ -64,7 +64,7 @@ def round_section(radius: float, nu: float, inner_radius: float = 0.0) -> Sectio
 
     Args:
         radius: [m] outer radius, > 0.
-        nu: [-] Poisson's ratio, in (-1, 0.5); the shear factor depends on it.
+        nu: [-] Poisson's ratio, in (-1, 0.5), which determines the shear factor.
         inner_radius: [m] radius of the hole, smaller than ``radius``; 0 if the bar is
             solid.
 
@@ -72,7 +72,7 @@ def round_section(radius: float, nu: float, inner_radius: float = 0.0) -> Sectio
         The section.
 
     Raises:
-        BadInput: a dimension or Poisson's ratio is out of its range.
+        BadInput: a dimension or Poisson's ratio is out of range.
 
     Sources:
         Cowper (1966), "The shear coefficient in Timoshenko's beam theory", for a circle
@@ -99,13 +99,13 @@ def rectangular_section(width: float, height: float, nu: float) -> Section:
     Args:
         width: [m] along the section's y, > 0.
         height: [m] along the section's z, the ``up`` of the beam, > 0.
-        nu: [-] Poisson's ratio, in (-1, 0.5); the shear factor depends on it.
+        nu: [-] Poisson's ratio, in (-1, 0.5), which determines the shear factor.
 
     Returns:
         The section.
 
     Raises:
-        BadInput: a dimension or Poisson's ratio is out of its range.
+        BadInput: a dimension or Poisson's ratio is out of range.
 
     Sources:
         Cowper (1966) for the shear factor; Timoshenko & Goodier, *Theory of
@@ -148,7 +148,7 @@ def box_section(width: float, height: float, wall: float, nu: float) -> Section:
         wall itself; its shear factors are those of thin walls.
 
     Raises:
-        BadInput: a dimension or Poisson's ratio is out of its range.
+        BadInput: a dimension or Poisson's ratio is out of range.
 
     Sources:
         Bredt (1896) for torsion; Cowper (1966) for the shear factor of a thin box.
@@ -201,7 +201,7 @@ def i_section(
         warp. The flanges carry a shear force along y like two rectangles.
 
     Raises:
-        BadInput: a dimension or Poisson's ratio is out of its range.
+        BadInput: a dimension or Poisson's ratio is out of range.
 
     Sources:
         Cowper (1966) for the shear factors of a thin I and of a rectangle.

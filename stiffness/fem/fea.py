@@ -197,7 +197,7 @@ def solve_link(
     Args:
         surface: surface of the link.
         base: held interface.
-        tip: interface that moves.
+        tip: moving interface.
         materials: the first material fills the link, and later ones fill their regions;
             or one material for each solid in a STEP file.
         options: options of the solution.
@@ -352,7 +352,7 @@ def first_mesh(
     Args:
         surface: surface of the link.
         base: the held interface.
-        tip: the interface that moves.
+        tip: the moving interface.
         budget: budget, whose time limits the mesher.
         cache: folder in which meshes are stored; by default the user's cache folder.
 

@@ -25,7 +25,7 @@ class SmoothOutline:
     """Part of an interface's outline across which another patch continues smoothly.
 
     Attributes:
-        patches: numbers of the interface and of the other patch.
+        patches: patch numbers of the interface and of its neighbour.
         wall: surface through the outline, normal to the interface.
         ends: (e, 2, 3) [m] ends of the outline's edges.
         side: 1 if the wall's signed distance is positive outside the interface, else
@@ -63,7 +63,7 @@ def smooth_outline(
         points: (n, 3) [m] points of the surface.
         edges: (e, 2) indices of points, counterclockwise around the interface.
         normals: (e, 3) unit normals of the interface's triangles at the edges.
-        patches: numbers of the interface and of the other patch.
+        patches: patch numbers of the interface and of its neighbour.
 
     Returns:
         The outline, whose wall is a plane or a cone if one fits, and otherwise consists
