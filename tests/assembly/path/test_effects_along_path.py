@@ -235,7 +235,7 @@ def test_nonlinear_effect_is_rejected_in_all_states_except_nominal():
         path_errors(arm(effects=effects), path, state="contact")
 
 
-def test_unknown_covariate_of_a_path_is_refused():
+def test_unknown_covariate_of_a_path_is_rejected():
     path = instants(["q.hub"], [[0.0]], [[0.0]], [[ALPHA]])
     with pytest.raises(BadInput, match='--under: unknown covariate "heat"'):
         path_errors(arm(), path, under={"heat": 1.0})

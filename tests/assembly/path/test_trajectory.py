@@ -166,6 +166,6 @@ def test_path_file_preserves_times_names_and_ids(tmp_path):
     np.testing.assert_array_equal(path.values, [[0, 0.14], [0.01, 0.15]])
 
 
-def test_decreasing_times_are_refused_and_no_file_is_written():
+def test_decreasing_times_are_rejected_and_no_file_is_written():
     with pytest.raises(ValueError, match="path: row 2, time: found -1 s after 0 s"):
         check_path(line(0, 1, times=np.array([0.0, -1.0])))

@@ -73,7 +73,7 @@ def test_draws_of_random_robots_equal_single_solutions(seed, load):
             solve_assembly(posture, load)
 
 
-def test_errors_of_a_wrong_shape_are_refused():
+def test_errors_of_a_wrong_shape_are_rejected():
     robot = load_robot("four_bar")
     posture = place_robot(robot)
     with pytest.raises(ValueError, match=r"expected \(k, 8, 6\)"):

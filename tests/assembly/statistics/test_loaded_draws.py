@@ -61,7 +61,7 @@ def test_motion_of_unloaded_clearances_does_no_work_on_the_load(play, load):
     assert np.abs(moved @ load).max() < 1e-9 * np.abs(moved).max()
 
 
-def test_draws_under_a_load_on_a_free_motion_are_refused():
+def test_draws_under_a_load_on_a_free_motion_are_rejected():
     frames = (
         Frame("pin", joint="revolute"),
         Frame("tip", "pin", translation=[0.3, 0, 0]),

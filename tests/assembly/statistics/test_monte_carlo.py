@@ -170,7 +170,7 @@ def test_invalid_statistics_options_are_rejected_with_one_line(
     assert [p.name for p in tmp_path.iterdir()] == ["errors.toml"]
 
 
-def test_tolerances_of_a_robot_without_errors_are_refused(run):
+def test_tolerances_of_a_robot_without_errors_are_rejected(run):
     status, _, err = run("assembly", "tolerances", "four_bar", "--grid", "tx=0.2")
     assert status == 2
     assert "found no geometric_error of a frame" in err

@@ -45,7 +45,7 @@ def test_random_clearances_do_not_depend_on_the_batch():
         ({"energy": 1.0}, True, False),
     ],
 )
-def test_limit_below_the_pose_error_from_clearances_alone_is_refused(
+def test_limit_below_the_pose_error_from_clearances_alone_is_rejected(
     limits, worst_play, refused
 ):
     """The message names the posture with more clearance; this applies only to the worst
@@ -77,7 +77,7 @@ def test_limit_below_the_pose_error_from_clearances_alone_is_refused(
         ("energy", [("two", 4)], "two.TY"),
     ],
 )
-def test_error_that_no_clearance_or_spring_can_close_is_refused_by_name(
+def test_error_that_no_clearance_or_spring_can_close_is_rejected_by_name(
     limit, places, named
 ):
     """Clearance in x and y takes up no error along z, and no spring does. The same

@@ -96,7 +96,7 @@ def test_number_of_allowed_failures_for_a_yield_equals_wilks_numbers(draws, allo
     assert samples.values == (7, draws)
 
 
-def test_too_few_draws_for_a_yield_are_refused():
+def test_too_few_draws_for_a_yield_are_rejected():
     plan = SimpleNamespace(asked_yield=0.95, draws=29, draws_of=lambda *_: np.zeros(1))
     requirement = SimpleNamespace(plan=plan)
     with pytest.raises(BadInput) as error:

@@ -133,7 +133,7 @@ def test_margins_include_draws_that_do_not_assemble():
 
 
 @pytest.mark.parametrize("key", ["force", "stress"])
-def test_limit_on_a_quantity_that_was_not_computed_is_refused(key):
+def test_limit_on_a_quantity_that_was_not_computed_is_rejected(key):
     """The quantity is missing, or has no link."""
     data = draws(energy=[1.0, 2.0], stress=np.zeros((2, 0)))
     with pytest.raises(

@@ -178,7 +178,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize(("old", "new", "message"), REFUSED.values(), ids=REFUSED)
-def test_invalid_tolerance_file_is_refused_with_one_message(
+def test_invalid_tolerance_file_is_rejected_with_one_message(
     old, new, message, write_file
 ):
     path = write_file(FILE.replace(old, new, 1))
@@ -239,14 +239,14 @@ def test_limit_is_read_with_and_without_spaces(name):
 
 
 @pytest.mark.parametrize("number", ["0", "-1e-9", "inf", "nan", "", "2 J", "1=2"])
-def test_limit_that_is_not_a_positive_number_is_refused_with_its_text(number):
+def test_limit_that_is_not_a_positive_number_is_rejected_with_its_text(number):
     with pytest.raises(BadInput) as error:
         parse_limit(f"force={number}")
     expected = f'--limit force: found "{number}", expected a number > 0'
     assert str(error.value) == expected
 
 
-def test_unknown_quantity_is_refused_with_the_nearest_name():
+def test_unknown_quantity_is_rejected_with_the_nearest_name():
     with pytest.raises(BadInput, match='unknown quantity "enrgy".*energy'):
         parse_limit("enrgy=2")
     for name in ("translation_lower", "duality_gap", "platform_screw", ""):

@@ -136,7 +136,7 @@ def test_shares_of_the_lengths_in_the_rotation_of_a_four_bar_equal_hand_calculat
     assert found.tolerances == pytest.approx(best, rel=2e-3)
 
 
-def test_limit_below_the_clearance_of_a_fit_is_refused(tmp_path):
+def test_limit_below_the_clearance_of_a_fit_is_rejected(tmp_path):
     clearance = {"clearance": Clearance(radial=10.25e-6)}
     robot = replace(arm(**clearance), fits={"elbow": "12 H7/g6"})
     text = PLAN.format(limit="translation = 1e-5", first="arm", second="hand")
@@ -144,7 +144,7 @@ def test_limit_below_the_clearance_of_a_fit_is_refused(tmp_path):
         allotted(tmp_path, [robot], text)
 
 
-def test_over_constrained_parts_with_clearance_are_refused(tmp_path):
+def test_over_constrained_parts_with_clearance_are_rejected(tmp_path):
     """A planar four-bar with rigid pins: their tilts do not close without force."""
     path = tmp_path / "four_bar.toml"
     text = four_bar_file("radial = 1e-5")

@@ -235,7 +235,7 @@ def test_invalid_pose_of_a_bolt_is_reported_in_one_line(tmp_path, key, text):
     assert "\n" not in str(caught.value)
 
 
-def test_bolting_of_a_joint_without_clearance_is_refused(tmp_path):
+def test_bolting_of_a_joint_without_clearance_is_rejected(tmp_path):
     path = tmp_path / "robot.toml"
     text = FOUR_BAR.replace("LOCKED", "").replace(
         'name = "end"', 'name = "end"\nlocked_at = "home"'
@@ -390,7 +390,7 @@ def test_conversion_of_a_joint_bolted_at_a_rotated_platform_is_rejected(tmp_path
     assert not drawn.exists()
 
 
-def test_worst_case_of_a_bolted_robot_is_refused(tmp_path):
+def test_worst_case_of_a_bolted_robot_is_rejected(tmp_path):
     robot = load_robot(four_bar(tmp_path, at_angle(0.4)))
     sources = tolerance_sources(robot, np.full(6, 1e-4), ("pin2",))
     prepared = linear_response(place_robot(robot, joints={"crank": 2.0}))

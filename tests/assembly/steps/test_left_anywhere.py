@@ -158,7 +158,7 @@ def test_rule_for_the_bolting_position_is_equal_after_reading_and_writing(tmp_pa
 
 
 @pytest.mark.parametrize("key", ['{ left = "normal" }', "{ left = 3 }"])
-def test_unknown_rule_for_the_bolting_position_is_refused_in_one_line(tmp_path, key):
+def test_unknown_rule_for_the_bolting_position_is_rejected_in_one_line(tmp_path, key):
     with pytest.raises(BadInput) as caught:
         load_robot(four_bar(tmp_path, key))
     assert "locked_at.left: found" in str(caught.value)

@@ -370,7 +370,7 @@ def test_weight_bends_the_leg_before_the_slot_is_bolted():
         assert results[1].platform_screw[0, 5] == pytest.approx(expected)
 
 
-def test_preload_on_a_part_without_support_is_refused():
+def test_preload_on_a_part_without_support_is_rejected():
     press = Preload("press", "platform", np.array([0, 0, 0, 0, 0, -10.0]))
     with pytest.raises(FreeMotion, match="nothing resists"):
         assemble_in_steps(Plan((press,)), legs_open())
@@ -497,7 +497,7 @@ def test_shims_of_many_machines_under_a_weight_are_computed_together(rng):
     assert found == pytest.approx(lengths[:, 0] - 20e-6 - lengths[:, 1], abs=1e-10)
 
 
-def test_shim_in_a_bolted_joint_among_loose_clearances_is_refused():
+def test_shim_in_a_bolted_joint_among_loose_clearances_is_rejected():
     posture = legs_with_pins((0.0, 30e-6), (20e-6, 20e-6))
     shim = Adjust("shim", "leg2", ("TZ",), Measure("gap", LEG[2]))
     steps = (join_leg(1), Join("bolt", "leg2"), shim, join_leg(2))

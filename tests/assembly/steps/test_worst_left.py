@@ -115,7 +115,7 @@ def test_command_error_bounds_the_worst_bolted_position(tmp_path, run):
     assert found["assumption"] == BRACKET
 
 
-def test_worst_bolted_position_under_a_load_is_refused(tmp_path):
+def test_worst_bolted_position_under_a_load_is_rejected(tmp_path):
     """The worst position under a load is not defined."""
     key = '{ joints = { crank = 1.2 }, left = "worst" }'
     robot = bolt_joints(load_robot(str(four_bar(tmp_path, key))))

@@ -39,7 +39,7 @@ def test_worker_rejects_a_task_for_another_robot():
         solve_task(pickle.dumps(question), "0" * 64, [])
 
 
-def test_workers_with_different_sources_are_refused():
+def test_workers_with_different_sources_are_rejected():
     class Client:
         def __init__(self, **theirs):
             self.theirs = theirs
@@ -57,7 +57,7 @@ def test_workers_with_different_sources_are_refused():
 
 
 @pytest.mark.slow
-def test_unreachable_scheduler_is_refused(tmp_path):
+def test_unreachable_scheduler_is_rejected(tmp_path):
     sweep = drawn_sweep("tx=0,ty=0.13")
     for address in ("tcp://127.0.0.1:9", "nonsense:/"):
         with pytest.raises(BadInput, match="--scheduler .* cannot be reached"):

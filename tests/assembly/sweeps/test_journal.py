@@ -117,7 +117,7 @@ def test_flipped_bit_in_a_journal_invalidates_only_its_record(whole, tmp_path):
     assert go_on(sweep, tmp_path, bytes(spoilt)) == (expected, [3])
 
 
-def test_block_changed_during_the_sweep_is_refused_with_one_message(whole, tmp_path):
+def test_block_changed_during_the_sweep_is_rejected_with_one_message(whole, tmp_path):
     sweep, expected, _ = whole
     path = tmp_path / "map.nc"
 
@@ -134,7 +134,7 @@ def test_block_changed_during_the_sweep_is_refused_with_one_message(whole, tmp_p
     assert path.read_bytes() == expected
 
 
-def test_second_simultaneous_run_into_the_same_file_is_refused(whole, tmp_path):
+def test_second_simultaneous_run_into_the_same_file_is_rejected(whole, tmp_path):
     """The second run starts during the first and does not disturb it."""
     sweep, expected, _ = whole
     path, said = tmp_path / "map.nc", []
@@ -163,7 +163,7 @@ def test_killed_run_releases_its_journal(whole, tmp_path):
     assert path.read_bytes() == expected
 
 
-def test_journal_of_different_sources_is_refused(whole, tmp_path, monkeypatch):
+def test_journal_of_different_sources_is_rejected(whole, tmp_path, monkeypatch):
     """The version is equal, but one line of the sources differs."""
     sweep, _, kept = whole
     copy = tmp_path / "sources" / "assembly"
@@ -211,7 +211,7 @@ def test_designs_with_different_numbers_have_different_hashes(tmp_path):
         (small_sweep(near=0.5), "found near '0.02'; expected near '0.5'"),
     ],
 )  # fmt: skip
-def test_journal_of_another_sweep_is_refused(whole, tmp_path, other, message):
+def test_journal_of_another_sweep_is_rejected(whole, tmp_path, other, message):
     _, _, kept = whole
     path = journal_path(tmp_path / "map.nc")
     path.write_bytes(kept[8])
@@ -222,7 +222,7 @@ def test_journal_of_another_sweep_is_refused(whole, tmp_path, other, message):
     assert path.read_bytes() == kept[8]
 
 
-def test_file_that_is_not_a_journal_is_refused_and_unchanged(tmp_path):
+def test_file_that_is_not_a_journal_is_rejected_and_unchanged(tmp_path):
     path = journal_path(tmp_path / "map.nc")
     path.write_text("notes\n")
     with pytest.raises(BadInput, match="found a file that is not a journal of a sweep"):

@@ -45,7 +45,7 @@ def write_on_a_disk_of(size, path):
 
 
 @pytest.mark.parametrize("share", [0.02, 0.1, 0.6])
-def test_full_disk_is_refused_and_leaves_no_file(tmp_path, share):
+def test_full_disk_is_rejected_and_leaves_no_file(tmp_path, share):
     """HDF5 crashed when it read back data that had not been written."""
     path = tmp_path / "sweep.nc"
     assert write_on_a_disk_of(int(share * SIZE), path) == 2
@@ -58,7 +58,7 @@ def test_file_is_written_if_the_disk_is_large_enough(tmp_path):
     assert path.stat().st_size == pytest.approx(SIZE, rel=0.3)
 
 
-def test_file_with_a_damaged_text_heap_is_refused(tmp_path):
+def test_file_with_a_damaged_text_heap_is_rejected(tmp_path):
     """HDF5 steps from entry to entry, and would never get past a free space of
     size 0.
     """

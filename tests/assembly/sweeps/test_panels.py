@@ -63,7 +63,7 @@ def test_single_natural_frequency_is_plotted(data):
         assert any("frequency" in title for title in titles)
 
 
-def test_unknown_or_too_many_quantities_are_refused_in_one_line(run, data, tmp_path):
+def test_unknown_or_too_many_quantities_are_rejected_in_one_line(run, data, tmp_path):
     save_dataset(data, tmp_path / "s.nc")
     for name, said in (
         ("stifness", 'no "stifness"; did you mean "stiffness"?'),

@@ -102,7 +102,7 @@ frame = [
          "number > 0"),
     ],
 )  # fmt: skip
-def test_invalid_path_or_number_is_refused_with_one_message(design, values, message):
+def test_invalid_path_or_number_is_rejected_with_one_message(design, values, message):
     with pytest.raises(BadInput) as error:
         design.robot(values)
     assert str(error.value).startswith(message)

@@ -87,7 +87,7 @@ def test_missing_number_is_an_empty_csv_cell(data, tmp_path):
         assert (row["energy [J]"] == "") == (float(row["tx [m]"]) > 0.01)
 
 
-def test_rows_of_a_table_follow_the_named_axes_and_unknown_axes_are_refused(data):
+def test_rows_of_a_table_follow_the_named_axes_and_unknown_axes_are_rejected(data):
     table = ff.point_table(data, ["wrench_component"])
     assert list(table.index) == list(WRENCH)
     with pytest.raises(ff.BadInput, match='table: no axis "txx"; did you mean "tx"'):

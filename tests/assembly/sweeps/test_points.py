@@ -186,7 +186,7 @@ def test_point_with_a_linear_algebra_error_has_its_own_status(robot, monkeypatch
          "sweep: found 110001100 points, expected at most 10000000"),
     ],
 )  # fmt: skip
-def test_invalid_sweep_options_are_refused_with_one_message(options, message):
+def test_invalid_sweep_options_are_rejected_with_one_message(options, message):
     with pytest.raises(BadInput) as error:
         ask_sweep("irsbot2", SweepOptions(**options))
     assert message in str(error.value)

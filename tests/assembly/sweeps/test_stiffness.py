@@ -71,7 +71,7 @@ def test_swept_tangent_reports_free_motions():
     assert float(data.stiffness.sel(wrench_component="FY").squeeze()) == 0.0
 
 
-def test_unknown_state_is_refused():
+def test_unknown_state_is_rejected():
     options = SweepOptions(grid="tx=0,tz=-0.5", assumption="none", state="exakt")
     with pytest.raises(BadInput, match='--state: found "exakt"'):
         ask_sweep("irsbot2", options)
@@ -99,6 +99,6 @@ def test_swept_frequencies_equal_those_of_single_postures():
         ("irsbot2", 2, "found no moving mass"),
     ],
 )
-def test_sweep_of_frequencies_without_mass_is_refused(robot, count, message):
+def test_sweep_of_frequencies_without_mass_is_rejected(robot, count, message):
     with pytest.raises(BadInput, match=message):
         sweep(robot, grid="tx=0,tz=-0.5", assumption="none", frequencies=count)

@@ -94,7 +94,7 @@ def test_slopes_include_the_effects_in_the_robot_file(tmp_path):
     np.testing.assert_allclose(soft - rigid, difference, atol=1e-11)
 
 
-def test_length_in_an_overconstrained_loop_is_refused_with_its_alternative(run):
+def test_length_in_an_overconstrained_loop_is_rejected_with_its_alternative(run):
     path = "leg1.link_a.translation.x"
     with pytest.raises(CannotChange, match="leg1.link_a.translation.x cannot change"):
         stiffness_slopes(load_design("irsbot2"), [path], POSE)

@@ -123,7 +123,7 @@ def test_round_section_constants_equal_hand_calculation():
     ),
     (lambda: Section(1, 1, 1, 0, 1, 1), "section: J = 0 must be finite and > 0"),
 ])  # fmt: skip
-def test_invalid_beam_is_refused(call, message):
+def test_invalid_beam_is_rejected(call, message):
     with pytest.raises(BadInput) as caught:
         call()
     assert message in str(caught.value)
@@ -160,7 +160,7 @@ PARALLEL[[0, 1], [1, 0]] = np.nextafter(1.0, 0.0)
     (1e-9 * PARALLEL, "not positive definite"),
     (np.full((6, 6), math.nan), "expected (6, 6) of finite numbers"),
 ])  # fmt: skip
-def test_invalid_compliance_is_refused(C, message):
+def test_invalid_compliance_is_rejected(C, message):
     with pytest.raises(BadInput) as caught:
         LinkStiffness("test", C, tip=[0, 0, 0], base=[0, 0, 0])
     assert message in str(caught.value)

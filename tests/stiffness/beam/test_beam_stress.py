@@ -207,7 +207,7 @@ def test_peak_stress_is_at_the_tip_when_a_force_cancels_the_base_moment():
     (BAR, 0.1, np.zeros(5), r"wrench has shape \(5,\)"),
     (BAR, 0.1, np.full(6, np.nan), "finite numbers"),
 ])  # fmt: skip
-def test_invalid_stress_input_is_refused(section, length, wrench, message):
+def test_invalid_stress_input_is_rejected(section, length, wrench, message):
     with pytest.raises(BadInput, match=message):
         peak_beam_stress(section, length, wrench)
 

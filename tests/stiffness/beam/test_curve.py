@@ -114,7 +114,7 @@ def stepped(t):
     (lambda: i_section(0.1, 0.1, 0.2, 0.01, NU), "expected web < width"),
     (lambda: i_section(0.1, math.nan, 0.01, 0.01, NU), "height = nan"),
 ])  # fmt: skip
-def test_invalid_curve_or_section_is_refused(call, message):
+def test_invalid_curve_or_section_is_rejected(call, message):
     with pytest.raises(BadInput) as caught:
         call()
     assert message in str(caught.value)

@@ -100,7 +100,7 @@ def test_harwell_boeing_rows_follow_the_mapping_file(solid, kind):
     assert link.mass == pytest.approx(0.324)
 
 
-def test_node_table_with_decimal_commas_is_read_and_a_second_unit_is_refused(solid):
+def test_node_table_with_decimal_commas_is_read_and_a_second_unit_is_rejected(solid):
     folder, K, order = solid
     expected = import_link(folder / "k.mtx", nodes=folder / "nodes.csv", **ENDS)
     places = [line.split(",") for line in (folder / "nodes.csv").read_text().split()]
@@ -137,7 +137,7 @@ def test_mapping_of_six_degrees_of_freedom_per_node_is_read(tmp_path):
     ("1 1\n", "expected the number of a row, the number of a node and a label"),
     ("Matrix Eqn\n", "expected rows numbered from 1"),
 ])  # fmt: skip
-def test_wrong_mapping_is_refused_in_one_line(text, message, tmp_path):
+def test_wrong_mapping_is_rejected_in_one_line(text, message, tmp_path):
     (tmp_path / "k.mtx").write_text(matrix_market(csc_array(np.eye(12))))
     (tmp_path / "k.mapping").write_text(text)
     with pytest.raises(BadInput) as caught:
@@ -153,7 +153,7 @@ def test_wrong_mapping_is_refused_in_one_line(text, message, tmp_path):
     (lambda t: t.replace("1.000000000000000D+00", "1.0000x0000000000D+00", 1),
      "expected a number"),
 ])  # fmt: skip
-def test_wrong_harwell_boeing_file_is_refused(change, message, tmp_path):
+def test_wrong_harwell_boeing_file_is_rejected(change, message, tmp_path):
     text = harwell_boeing(csc_array(np.eye(12)), right_side=False)
     (tmp_path / "k.matrix").write_text(change(text))
     with pytest.raises(BadInput, match=message):
@@ -187,7 +187,7 @@ def test_matrix_market_file_of_every_kind_is_read(head, numbers, tmp_path):
     ("array real general\n2 3\n1 1 1 1 1 1\n", "found 2 by 3 numbers"),
     ("array real general\n2 2\n1 1 x 1\n", "expected a number"),
 ])  # fmt: skip
-def test_damaged_matrix_market_file_is_refused(text, message, tmp_path):
+def test_damaged_matrix_market_file_is_rejected(text, message, tmp_path):
     """SciPy's reader accepts some of these, or allocates their stated size."""
     (tmp_path / "k.mtx").write_text(f"%%MatrixMarket matrix {text}")
     with pytest.raises(BadInput, match=message):

@@ -149,7 +149,7 @@ def test_nastran_grids_in_narrow_wide_and_free_fields_are_read(tmp_path):
     assert np.array(list(nodes.values())) == pytest.approx(np.array(expected))
 
 
-def test_nastran_grid_in_another_coordinate_system_is_refused(tmp_path):
+def test_nastran_grid_in_another_coordinate_system_is_rejected(tmp_path):
     """The line refers to a coordinate system that it does not define."""
     path = tmp_path / "bar.bdf"
     path.write_text("GRID,9,4,1.,2.,3.\n")

@@ -194,7 +194,7 @@ def test_chain_of_two_half_beams_is_condensed_to_one_beam(tmp_path):
     (lambda K: K, ["--order", "x"], '--order: found "x"'),
     (lambda K: np.array(["a"]), [], "expected a square matrix of numbers"),
 ])  # fmt: skip
-def test_matrix_that_is_not_the_stiffness_of_a_link_is_refused_in_one_line(
+def test_matrix_that_is_not_the_stiffness_of_a_link_is_rejected_in_one_line(
     run, matrix, options, message, tmp_path
 ):
     path = tmp_path / "k.npy"
@@ -227,7 +227,7 @@ def test_matrix_that_is_not_the_stiffness_of_a_link_is_refused_in_one_line(
     ("k.npz", "not numpy", "not a matrix of NumPy"),
     ("k.odb", "", "found the ending .odb, expected one of"),
 ])  # fmt: skip
-def test_wrong_matrix_file_is_refused_in_one_line(run, name, text, message, tmp_path):
+def test_wrong_matrix_file_is_rejected_in_one_line(run, name, text, message, tmp_path):
     (tmp_path / name).write_text(text)
     status, out, err = run("stiffness", "convert", tmp_path / name)
     assert (status, out) == (2, "")

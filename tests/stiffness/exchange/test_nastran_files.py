@@ -115,7 +115,7 @@ DIAGONAL = "DMIG,KAAX,0,6,2,0\n" + "".join(
     (large_fields(textbook_beam(), "K4AAX"),
      r"K4AAX \(structural damping\), expected one"),
 ])  # fmt: skip
-def test_wrong_dmig_is_refused(text, message, tmp_path):
+def test_wrong_dmig_is_rejected(text, message, tmp_path):
     path = tmp_path / "k.dmig"
     path.write_text(text)
     with pytest.raises(BadInput, match=message):

@@ -90,7 +90,7 @@ def test_bar_of_two_materials_stretches_like_two_springs_in_series(cache):
     ({"accuracy": 0.0}, "accuracy = 0 must lie between"),
     ({"materials": []}, "at least one"),
 ])  # fmt: skip
-def test_wrong_options_are_refused(change, message, cache):
+def test_wrong_options_are_rejected(change, message, cache):
     given = {"materials": [Material(E, NU)], "cache": cache} | change
     materials = given.pop("materials")
     with pytest.raises(BadInput) as caught:
@@ -114,7 +114,7 @@ def test_mesh_is_refined_up_to_the_budget_of_unknowns():
 
 
 @pytest.mark.parametrize("budget", [Budget(unknowns=99), Budget(seconds=1e-9)])
-def test_first_mesh_that_exceeds_the_budget_is_refused(budget):
+def test_first_mesh_that_exceeds_the_budget_is_rejected(budget):
     words = r"the coarsest mesh that follows the part has \d+ unknowns, about .* s and"
     with pytest.raises(MeshFailed, match=f"{words}.*allow more time"):
         solve_bar({"radius": 0.1}, Material(E, NU), FemOptions(budget=budget))

@@ -103,13 +103,13 @@ def test_stress_at_the_face_between_two_solids_is_that_of_each_material(rod):
     (["", "rood"], r'no solid "rood"; did you mean "rod"\?'),
     (["", "rod+tub"], r'no solid "tub"; did you mean "tube"\?'),
 ])  # fmt: skip
-def test_unknown_solid_or_solid_without_material_is_refused_by_name(given, message):
+def test_unknown_solid_or_solid_without_material_is_rejected_by_name(given, message):
     surface = rod_in_tube(INNER, OUTER, LENGTH)
     with pytest.raises(BadInput, match=message):
         placed_materials(surface, [Material(STEEL, 0.3, solid=name) for name in given])
 
 
-def test_solids_that_overlap_are_refused():
+def test_solids_that_overlap_are_rejected():
     surface = rod_in_tube(INNER, OUTER, LENGTH)
     solids = replace(surface.solids, overlaps=("solids a and b have 1 m^3 in common",))
     with pytest.raises(BadInput, match="a and b have 1 m.3 in common; expected solids"):
@@ -119,7 +119,7 @@ def test_solids_that_overlap_are_refused():
         )
 
 
-def test_a_surface_without_solids_is_refused():
+def test_a_surface_without_solids_is_rejected():
     surface = check_surface(*cylinder(), "part.stl")
     with pytest.raises(BadInput, match=r'part.stl: found a material of solid "rod"'):
         placed_materials(surface, [Material(STEEL, 0.3, solid="rod")])

@@ -57,7 +57,7 @@ def test_weight_along_the_bar_causes_a_linear_axial_stress(bar):
     np.testing.assert_allclose(stress, expected, atol=2e-3 * DENSITY * G)
 
 
-def test_gravity_on_a_link_without_a_density_is_refused():
+def test_gravity_on_a_link_without_a_density_is_rejected():
     light = solve_bar({"radius": 0.2}, Material(2e11, 0.3), FemOptions(0.3))
     with pytest.raises(BadInput, match="gravity: the link has no density"):
         with_own_weight(light)

@@ -19,14 +19,14 @@ ENDS = parse_interface("z=0"), parse_interface("z=0.1")
 
 
 @pytest.mark.parametrize("stretch", [0.979, 1.021])
-def test_mesh_of_another_volume_is_refused(stretch):
+def test_mesh_of_another_volume_is_rejected(stretch):
     made = box_solid((2, 2, 2), (0.1, 0.1, 0.1 * stretch))
     with pytest.raises(MeshFailed, match="the mesh has 0.00.* the surface encloses"):
         fit_to_patches(made.points, made.cells, SURFACE, find_patches(SURFACE, *ENDS))
 
 
 @pytest.mark.parametrize(("other", "missing"), [(1, "base"), (0, "tip"), (2, "base")])
-def test_a_mesh_without_a_face_on_an_interface_is_refused(other, missing):
+def test_a_mesh_without_a_face_on_an_interface_is_rejected(other, missing):
     made = box_solid((2, 2, 2), (0.1, 0.1, 0.1))
     far = Plane(50 * Z, Z)  # out of every corner's reach
     patches = Patches(np.full(len(CUBE_TRIANGLES), other), (far, far, far))

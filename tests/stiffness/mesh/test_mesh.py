@@ -121,7 +121,7 @@ def test_same_surface_has_the_same_mesh_in_every_cache(tmp_path):
     assert not np.array_equal(one.cells, other.cells)
 
 
-def test_mesh_with_a_missing_column_is_refused(tmp_path, monkeypatch):
+def test_mesh_with_a_missing_column_is_rejected(tmp_path, monkeypatch):
     """One of 64 columns of the cube is missing: a hole of 1.6 % of the volume."""
     cube = kuhn_cube(8)
     place = np.floor(cube.points[cube.cells].mean(axis=1) / 0.0125)

@@ -104,7 +104,7 @@ def test_estimated_error_between_grid_points_covers_the_true_error(spec, rng):
     ({"radios": 0.02}, 'unknown parameter "radios"; did you mean "radius"?'),
     ({"radius": None}, "radius: missing; expected a value"),
 ])  # fmt: skip
-def test_look_up_outside_the_grid_or_with_other_parameters_is_refused(
+def test_look_up_outside_the_grid_or_with_other_parameters_is_rejected(
     spec, change, message
 ):
     build_library(spec)
@@ -115,7 +115,7 @@ def test_look_up_outside_the_grid_or_with_other_parameters_is_refused(
     assert message in str(caught.value)
 
 
-def test_grid_with_a_missing_entry_is_refused(spec):
+def test_grid_with_a_missing_entry_is_rejected(spec):
     files = build_library(spec)
     files[0].unlink()
     wanted = {"length": 0.3, "radius": 0.02, "young": 6e10, "poisson": 0.3}
@@ -123,7 +123,7 @@ def test_grid_with_a_missing_entry_is_refused(spec):
         look_up(read_library(spec.folder), wanted)
 
 
-def test_entry_with_other_parameters_is_refused_by_name(spec):
+def test_entry_with_other_parameters_is_rejected_by_name(spec):
     """One key was renamed by hand, or the folder contains entries of two libraries."""
     build_library(spec)
     *others, last = read_library(spec.folder)
@@ -159,7 +159,7 @@ FORCES_FIRST = ["FX", "FY", "FZ", "MX", "MY", "MZ"]
     (changed(lambda entry: entry["stiffness"][0].__setitem__(0, -1.0)),
      "not positive definite"),
 ])  # fmt: skip
-def test_wrong_entry_is_refused(spec, text, message):
+def test_wrong_entry_is_rejected(spec, text, message):
     (file, *_) = build_library(spec)
     file.write_text(text(file.read_text()))
     with pytest.raises(BadInput) as caught:
@@ -167,7 +167,7 @@ def test_wrong_entry_is_refused(spec, text, message):
     assert message in str(caught.value)
 
 
-def test_missing_entry_or_library_is_refused_by_name(spec, tmp_path):
+def test_missing_entry_or_library_is_rejected_by_name(spec, tmp_path):
     build_library(spec)
     with pytest.raises(BadInput, match='no entry "round-beam"'):
         read_entry(spec.folder, "round-beam")
@@ -188,7 +188,7 @@ def test_missing_entry_or_library_is_refused_by_name(spec, tmp_path):
     (('shape = "round"', 'shape = "tube"'), "inner_radius: missing"),
     (('method = "beam"', 'method = "beam"\nfoo = 1'), 'unknown key "foo"'),
 ])  # fmt: skip
-def test_wrong_build_file_is_refused(tmp_path, change, message):
+def test_wrong_build_file_is_rejected(tmp_path, change, message):
     path = tmp_path / "spec.toml"
     path.write_text(SPEC.replace(*change))
     with pytest.raises(BadInput) as caught:

@@ -141,7 +141,7 @@ def test_surface_entry_is_rebuilt_only_if_its_input_changed(
     (("density = 2700", LINKS[LINKS.index("[[link]]") :]), 'found "bar" twice'),
     (("accuracy = 0.01", 'shape = "round"'), "grid"),
 ])  # fmt: skip
-def test_wrong_surface_table_of_a_build_file_is_refused(
+def test_wrong_surface_table_of_a_build_file_is_rejected(
     bar_stl, tmp_path, change, message
 ):
     path = tmp_path / "spec.toml"
@@ -151,7 +151,7 @@ def test_wrong_surface_table_of_a_build_file_is_refused(
     assert message in str(caught.value)
 
 
-def test_surface_without_its_interface_is_refused_and_nothing_is_written(
+def test_surface_without_its_interface_is_rejected_and_nothing_is_written(
     bar_stl, tmp_path
 ):
     spec = tmp_path / "spec.toml"

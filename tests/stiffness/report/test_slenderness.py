@@ -130,7 +130,7 @@ def test_slenderness_rejects_wrong_options_before_meshing(run, options, message)
     assert message in err
 
 
-def test_comparison_of_a_beam_with_another_tip_is_refused():
+def test_comparison_of_a_beam_with_another_tip_is_rejected():
     C = beam_compliance(0.4, round_section(0.02, 0.3), 6e10, 0.3)
     one = LinkStiffness("beam", C, tip=[0.4, 0, 0], base=[0, 0, 0])
     other = LinkStiffness("fea", C, tip=[0.41, 0, 0], base=[0, 0, 0])
@@ -210,7 +210,7 @@ section = { width = 0.01, height = 0.02, wall = 0.001 }
     (("up = [0, 1, 0]", "tip_section = { radius = 0.1 }"),
      "found different lengths at both ends of a tapered piece"),
 ])  # fmt: skip
-def test_wrong_curve_file_is_refused_by_its_path(tmp_path, change, message):
+def test_wrong_curve_file_is_rejected_by_its_path(tmp_path, change, message):
     path = curve_file(tmp_path, L_BRACKET.replace(*change, 1))
     with pytest.raises(BadInput) as caught:
         read_curve(path, 0.3)

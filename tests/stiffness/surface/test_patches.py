@@ -92,6 +92,6 @@ def test_mesh_of_a_barrel_has_the_volume_of_the_smooth_shape(tmp_path):
     assert abs(volume / exact - 1) < 3e-4
 
 
-def test_same_interface_at_base_and_tip_is_refused():
+def test_same_interface_at_base_and_tip_is_rejected():
     with pytest.raises(BadInput, match="the same faces"):
         find_patches(bar(), parse_interface("z=0"), parse_interface("z=0"))

@@ -108,7 +108,7 @@ def test_disc_interface_consists_of_the_triangles_within_its_radius(unit):
             assert triangles_on(surface, disc, "tip").tolist() == [0, 1]
 
 
-def test_interface_off_the_part_is_refused_with_the_extent_of_the_part():
+def test_interface_off_the_part_is_rejected_with_the_extent_of_the_part():
     words = (
         "bar: no face of the surface lies on the tip interface {} [m]; the part spans "
     )

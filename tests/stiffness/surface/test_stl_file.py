@@ -85,7 +85,7 @@ def test_binary_stl_file_is_read(tmp_path, case):
     (TEXT[: TEXT.rindex(b"\n", 0, TEXT.rindex(b"endloop")) - 4], "facet 12: the file"),
     (TEXT[: TEXT.rindex(b"vertex") + 6], "facet 12: the file is cut"),
 ])  # fmt: skip
-def test_damaged_stl_file_is_refused_with_the_number_of_the_facet(
+def test_damaged_stl_file_is_rejected_with_the_number_of_the_facet(
     tmp_path, content, message
 ):
     with pytest.raises(BadInput, match=re.escape(message).replace('"', "['\"]")) as no:
@@ -93,7 +93,7 @@ def test_damaged_stl_file_is_refused_with_the_number_of_the_facet(
     assert "cube.stl" in str(no.value)
 
 
-def test_any_damaged_stl_file_is_read_or_refused(tmp_path, rng):
+def test_any_damaged_stl_file_is_read_or_rejected(tmp_path, rng):
     """500 files with bytes changed, cut out or missing at the end."""
     for number in range(500):
         content = bytearray(TEXT if number % 2 else BINARY)

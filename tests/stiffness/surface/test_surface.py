@@ -38,7 +38,7 @@ def test_every_file_format_has_the_same_surface(tmp_path, kind):
     assert len(surface.triangles) == len(triangles)
 
 
-def test_surface_unit_scales_the_part_and_a_wrong_unit_is_refused(tmp_path):
+def test_surface_unit_scales_the_part_and_a_wrong_unit_is_rejected(tmp_path):
     points, triangles = cylinder()
     path = write_stl(tmp_path / "bar.stl", 1000 * points, triangles)
     assert read_surface(path, "mm").volume == pytest.approx(bar().volume, rel=1e-6)
@@ -57,7 +57,7 @@ def test_surface_unit_scales_the_part_and_a_wrong_unit_is_refused(tmp_path):
     ("a.xyz", b"1 2 3", "unknown kind of surface file"),
     ("absent/a.stl", None, "cannot be read"),
 ])  # fmt: skip
-def test_wrong_surface_file_is_refused(tmp_path, name, content, message):
+def test_wrong_surface_file_is_rejected(tmp_path, name, content, message):
     path = tmp_path / name
     if content is not None:
         path.write_bytes(content)

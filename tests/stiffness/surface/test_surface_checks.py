@@ -36,7 +36,7 @@ def test_surface_digest_depends_on_the_geometry_only():
     (19.99, "m", None), (20.01, "m", "mm"), (20.01, "mm", "m"),
     (1.001e-3, "mm", None), (0.999e-3, "mm", "m"), (0.999e-3, "m", "m"),
 ])  # fmt: skip
-def test_part_of_implausible_size_is_refused_with_a_likely_unit(size, unit, hint):
+def test_part_of_implausible_size_is_rejected_with_a_likely_unit(size, unit, hint):
     """Plausible sizes are from a millimetre to twenty metres."""
     points = CUBE * size / (0.1 * np.sqrt(3))
     if hint is None:
@@ -170,7 +170,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("points", "triangles", "message"), REFUSED)
-def test_surface_that_bounds_no_solid_is_refused(points, triangles, message):
+def test_surface_that_bounds_no_solid_is_rejected(points, triangles, message):
     with pytest.raises(BadInput, match=f"part: .*{message}"):
         check_surface(points, triangles, "part")
 

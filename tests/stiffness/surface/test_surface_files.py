@@ -61,7 +61,7 @@ def test_msh_file_of_a_cube_is_read(tmp_path, content, capfd):
     (msh2([(1, 2)], 1), "contains neither triangles nor tetrahedra"),
     (msh2(TRIANGLES[:-1], 2), "the surface is open"),
 ])  # fmt: skip
-def test_wrong_msh_file_is_refused(tmp_path, content, message, capfd):
+def test_wrong_msh_file_is_rejected(tmp_path, content, message, capfd):
     path = tmp_path / "bad.msh"
     path.write_text(content)
     with pytest.raises(BadInput, match=message):
@@ -69,7 +69,7 @@ def test_wrong_msh_file_is_refused(tmp_path, content, message, capfd):
     assert capfd.readouterr().out == ""
 
 
-def test_step_file_without_gmsh_is_refused_with_the_package_to_install(
+def test_step_file_without_gmsh_is_rejected_with_the_package_to_install(
     tmp_path, monkeypatch
 ):
     monkeypatch.setitem(sys.modules, "gmsh", None)
@@ -162,7 +162,7 @@ gmsh.write(sys.argv[1])
 """
 
 
-def test_touching_solids_are_united_and_separate_ones_refused(tmp_path):
+def test_touching_solids_are_united_and_separate_ones_rejected(tmp_path):
     """Boxes of 20 x 30 x 40 mm, of 10 x 10 x 50 mm on top of it, and a separate one of
     1 x 1 x 1 mm.
     """
@@ -199,7 +199,7 @@ def test_files_written_by_gmsh_are_read(tmp_path, gmsh, version, binary, dimensi
     assert surface.volume == pytest.approx(exact, rel=2e-2)
 
 
-def test_a_broken_step_file_is_refused(tmp_path, gmsh):
+def test_a_broken_step_file_is_rejected(tmp_path, gmsh):
     path = tmp_path / "part.step"
     path.write_text("rubbish")
     with pytest.raises(
@@ -209,7 +209,7 @@ def test_a_broken_step_file_is_refused(tmp_path, gmsh):
 
 
 @pytest.mark.parametrize("kept", [0.3, 0.6, 0.9])
-def test_a_file_that_crashes_its_reader_is_refused(tmp_path, kept):
+def test_a_file_that_crashes_its_reader_is_rejected(tmp_path, kept):
     """VTK crashes on a truncated binary PLY file."""
     pyvista = pytest.importorskip("pyvista")
     path = tmp_path / "part.ply"
@@ -257,7 +257,7 @@ def faces_of(model, path, solid):
     return list(sides(model, dict.fromkeys(chosen.values(), 0)))
 
 
-def test_faces_of_a_named_solid_are_selected_and_unknown_names_refused(tmp_path):
+def test_faces_of_a_named_solid_are_selected_and_unknown_names_rejected(tmp_path):
     path = tmp_path / "arm.step"
     assert faces_of(Model(arm=[1, 2]), path, "") == [1, 2]
     both = Model(arm=[1, 2], bolt=[3], bolt__2=[4, 5], _=[6])
