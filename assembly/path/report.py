@@ -74,7 +74,7 @@ def path_page(
         provenance: the command and its input files.
 
     Returns:
-        self-contained HTML.
+        Self-contained HTML.
     """
     peaks = summary.get("largest", {})
     return page(

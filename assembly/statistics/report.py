@@ -48,7 +48,7 @@ def draws_page(
         robot: HTML from :func:`forcefit.assembly.statistics.scenes.drawn_robot`.
 
     Returns:
-        self-contained HTML.
+        Self-contained HTML.
     """
     goes = summary["assembles"]["forced"]
     verdict = f"Of {summary['draws']} draws {_share_text(goes)} assemble"

@@ -43,7 +43,7 @@ def tolerances_page(
             errors.
 
     Returns:
-        self-contained HTML.
+        Self-contained HTML.
     """
     present, allocation = (results.get(key) for key in ("present", "allocation"))
     tiles, body, sentences = [], [], []

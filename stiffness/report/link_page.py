@@ -36,7 +36,7 @@ def link_page(link: LinkStiffness, provenance: Provenance) -> str:
         provenance: command and files.
 
     Returns:
-        self-contained HTML.
+        Self-contained HTML.
     """
     place = ", ".join(f"{v:g}" for v in link.tip)
     return page(
