@@ -1,4 +1,4 @@
-"""A link's stiffness and its estimated error."""
+"""Link stiffness and its estimated error."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import Figures, html_table, numbers, short_repr
 
-# rounding error of the eigenvalues of a scaled 6 by 6 matrix, relative to its size
+# round-off error of the eigenvalues of a scaled 6 by 6 matrix, relative to its size
 _ROUNDING = 6 * np.finfo(float).eps
 
 
@@ -19,16 +19,17 @@ _ROUNDING = 6 * np.finfo(float).eps
 class LinkStiffness:
     """An elastic link between two interfaces, described at its tip.
 
-    The base is held, and a wrench acts on the tip: ``screw = compliance @ wrench``.
-    Screw and wrench are read at ``tip``, in the axes of ``tip`` and ``base``.
+    The base is held while a wrench acts on the tip: ``screw = compliance @ wrench``.
+    Screw and wrench refer to the point ``tip``, in the same axes as ``tip`` and
+    ``base``.
 
     Attributes:
-        method: method of the computation, such as ``"Timoshenko beam"``.
+        method: computation method, such as ``"Timoshenko beam"``.
         compliance: (6, 6) [rad/(N m) .. m/N] symmetric positive definite.
-        tip: (3,) [m] point at which screws and wrenches are read.
+        tip: (3,) [m] reference point of screws and wrenches.
         base: (3,) [m] centre of the held interface.
-        stiffness_error: (6, 6) [N m/rad .. N/m] estimated difference between
-            ``stiffness`` and the exact stiffness, symmetric; zero for a closed form.
+        stiffness_error: (6, 6) [N m/rad .. N/m] symmetric estimate of the difference
+            between ``stiffness`` and the exact stiffness; zero for a closed form.
         mesh: counts, volume and quality of the mesh; empty for a closed form.
         mass: [kg] mass of the link; 0 if no density was given.
         center_of_mass: (3,) [m] position of the centre of mass.
@@ -50,7 +51,7 @@ class LinkStiffness:
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 
     def _figures(self) -> Figures:
-        """Return the values that represent the link in short texts."""
+        """Return the values shown in short texts on the link."""
         K = np.diag(self.stiffness)
         error = self.relative_error_estimate
         figures = {
@@ -93,7 +94,7 @@ class LinkStiffness:
 
     @property
     def relative_errors(self) -> NDArray:
-        """(6, 6) absolute error of each entry of K, divided by sqrt(K_ii K_jj)."""
+        """(6, 6) absolute error of each entry of K, scaled by sqrt(K_ii K_jj)."""
         return np.abs(scaled(self.stiffness_error, self.stiffness))
 
     @property
@@ -103,11 +104,11 @@ class LinkStiffness:
 
 
 def scaled(matrix: ArrayLike, stiffness: ArrayLike) -> NDArray:
-    """Divide entries by sqrt(K_ii K_jj), so that rotations compare with translations.
+    """Scale entries by sqrt(K_ii K_jj), so that rotations and translations compare.
 
     Args:
         matrix: (6, 6) stiffness, or difference of two stiffnesses.
-        stiffness: (6, 6) stiffness whose diagonal gives the scale.
+        stiffness: (6, 6) stiffness whose diagonal sets the scale.
 
     Returns:
         (6, 6) [1] scaled entries.
@@ -117,15 +118,15 @@ def scaled(matrix: ArrayLike, stiffness: ArrayLike) -> NDArray:
 
 
 def check_definite(who: str, matrix: NDArray) -> None:
-    """Raise an error if a matrix is neither a stiffness nor a compliance.
+    """Check that a matrix can be a stiffness or a compliance.
 
     Args:
         who: description of the matrix, for the error message.
         matrix: (6, 6) matrix.
 
     Raises:
-        BadInput: the matrix is not symmetric to 1e-6 of its scale, or not positive
-            definite beyond rounding.
+        BadInput: the matrix is not symmetric within 1e-6 of its scale, or not positive
+            definite beyond round-off.
     """
     if not np.all(np.diag(matrix) > 0):
         raise BadInput(f"{who} is not positive definite: a diagonal entry is <= 0")
@@ -145,7 +146,7 @@ def check_definite(who: str, matrix: NDArray) -> None:
 
 
 def inverted(matrix: NDArray) -> NDArray:
-    """Return the inverse of a symmetric positive definite matrix of mixed units.
+    """Invert a symmetric positive definite matrix of mixed units.
 
     Args:
         matrix: (6, 6) stiffness or compliance.
@@ -159,14 +160,14 @@ def inverted(matrix: NDArray) -> NDArray:
 
 
 def turn_link(link: LinkStiffness, rotation: ArrayLike) -> LinkStiffness:
-    """Express a link in other axes with the same origin.
+    """Express a link in rotated axes with the same origin.
 
     Args:
         link: the link.
         rotation: (3, 3) rotation whose columns are the old axes in the new axes.
 
     Returns:
-        The link with all its vectors and matrices in the new axes.
+        The link, with all vectors and matrices in the new axes.
 
     Raises:
         BadInput: the matrix is not a rotation.

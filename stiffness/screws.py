@@ -1,4 +1,4 @@
-"""Screws and wrenches: small motions and loads, read at a point in given axes.
+"""Screws and wrenches: small motions and loads at a point, in given axes.
 
 All packages use one convention:
 
@@ -11,8 +11,9 @@ C       compliance             ``s = C @ w``                   rad/(N m) .. m/N
 K       stiffness              ``w = K @ s``                   N m/rad .. N/m
 ======  =====================  ==============================  ================
 
-Rotations are computed with NumPy.  SciPy's results agree up to rounding (tests compare
-them), but importing them takes a quarter of the time that solving a posture takes.
+Rotations are computed with NumPy, to machine precision as in SciPy (tests compare the
+two), because importing SciPy's rotations would take a quarter of the time needed to
+solve a posture.
 """
 
 import numpy as np
@@ -26,7 +27,7 @@ UNIT_VECTORS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)
 
 
 def skew(vector: ArrayLike) -> NDArray:
-    """Return the matrix of the cross product: ``skew(a) @ b == cross(a, b)``.
+    """Return the cross product matrix, with ``skew(a) @ b == cross(a, b)``.
 
     Args:
         vector: (..., 3) vectors in any unit.
@@ -36,20 +37,21 @@ def skew(vector: ArrayLike) -> NDArray:
     """
     v = np.asarray(vector, dtype=float)
     S = np.zeros((*v.shape[:-1], 3, 3))
-    S[..., (2, 0, 1), (1, 2, 0)] = v  # requires exactly three components
+    S[..., (2, 0, 1), (1, 2, 0)] = v  # fails unless there are exactly three components
     return S - np.swapaxes(S, -1, -2)
 
 
 def screw_map(offset: ArrayLike, rotation: ArrayLike | None = None) -> NDArray:
-    """Return the matrix that transforms a screw to another point and other axes.
+    """Return the matrix that transforms a screw to another point and axes.
 
-    A body moves by the small screw ``s``, read at point ``q`` in the axes of a frame at
-    ``q``.  The same motion, read at point ``p``, is ``screw_map(q - p, R) @ s``.  This
-    is the block ``[R 0; [q - p]x R, R]`` of the paper's eqs. (13)-(15), as corrected.
+    If a body moves by the small screw ``s`` at point ``q``, in the axes of a frame at
+    ``q``, then ``screw_map(q - p, R) @ s`` is the same motion at point ``p``. The
+    matrix is the block ``[R 0; [q - p]x R, R]`` of eqs. (13)-(15) in the paper, as
+    corrected.
 
-    Wrenches transform in the opposite direction.  A wrench ``w`` read at ``p`` becomes
-    ``screw_map(q - p, R).T @ w`` when it is read at ``q`` in the frame's axes.  The
-    power ``w @ s`` is the same at both points.
+    Wrenches transform in the opposite direction.  A wrench ``w`` at ``p`` becomes
+    ``screw_map(q - p, R).T @ w`` at ``q`` in the frame's axes, so the power ``w @ s``
+    is the same at both points.
 
     Args:
         offset: (..., 3) [m] vector from the new point to the old point, in the new
@@ -68,7 +70,7 @@ def screw_map(offset: ArrayLike, rotation: ArrayLike | None = None) -> NDArray:
 
 
 def rotation_matrix(rotation_vector: ArrayLike) -> NDArray:
-    """Return the rotation matrices of rotation vectors.
+    """Convert rotation vectors to rotation matrices.
 
     Args:
         rotation_vector: (..., 3) [rad] axis times angle.
@@ -86,7 +88,7 @@ def rotation_matrix(rotation_vector: ArrayLike) -> NDArray:
 
 
 def rotation_vector(rotation: ArrayLike) -> NDArray:
-    """Return the rotation vectors of rotation matrices, with angles of at most pi.
+    """Convert rotation matrices to rotation vectors with angles of at most pi.
 
     Args:
         rotation: (..., 3, 3) proper orthogonal matrices.
@@ -100,7 +102,7 @@ def rotation_vector(rotation: ArrayLike) -> NDArray:
     R = np.asarray(rotation, dtype=float)
     trace = np.trace(R, axis1=-2, axis2=-1)[..., None]
     # matrix 4 q q^T of the unit quaternion q = [x y z w]; the row with the largest norm
-    # determines q with the smallest rounding error
+    # determines q with the smallest round-off error
     products = np.empty((*R.shape[:-2], 4, 4))
     products[..., :3, :3] = R + np.swapaxes(R, -1, -2)
     products[..., [0, 1, 2], [0, 1, 2]] += 1.0 - trace
@@ -109,7 +111,7 @@ def rotation_vector(rotation: ArrayLike) -> NDArray:
     products[..., 3, 3] = 1.0 + trace[..., 0]
     largest = np.diagonal(products, axis1=-2, axis2=-1).argmax(axis=-1)
     q = np.take_along_axis(products, largest[..., None, None], axis=-2)[..., 0, :]
-    q = np.where(q[..., 3:] < 0, -q, q)  # use the smaller of the two angles
+    q = np.where(q[..., 3:] < 0, -q, q)  # choose the smaller of the two angles
     sine = np.linalg.norm(q[..., :3], axis=-1, keepdims=True)
     angle = 2.0 * np.arctan2(sine, q[..., 3:])
     return q[..., :3] * np.divide(angle, sine, out=np.zeros_like(sine), where=sine > 0)

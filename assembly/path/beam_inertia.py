@@ -1,16 +1,16 @@
-r"""Inertia and weight of a moving beam, as wrenches at its ends and sections.
+r"""Inertial loads and weight of a moving beam, as wrenches at its ends and sections.
 
-A beam moves almost as a rigid body.  Its load per length is then linear along the beam,
-q(x) = rho A (g - a(x)). Its moment per length is constant, m = -rho (J alpha + omega x
-J omega).  At the tip of a cantilever, this load causes the same deflection as
+A beam moves almost as a rigid body, so its load per length is linear along the beam,
+q(x) = rho A (g - a(x)), and its moment per length is constant, m = -rho (J alpha +
+omega x J omega). At the tip of a cantilever, this load causes the same deflection as
 
     F_x = Q_0 / 2 + Q_1 / 3                M_x = m_x L / 2
     F_y = Q_0 / 2 + Q_1 (7/20 + phi/3) / (1 + phi) + m_z / (1 + phi)
     M_z = Q_0 L / 12 + Q_1 L / 8 - L (F_y - m_z) / 2 + ..
 
-and so on, with Q_0 = q(0) L, Q_1 = (q(L) - q(0)) L and phi = 12 E I / (k G A L^2).  For
+and so on, where Q_0 = q(0) L, Q_1 = (q(L) - q(0)) L and phi = 12 E I / (k G A L^2). For
 phi = 0 this is the consistent mass matrix times the rigid accelerations of both ends.
-The remaining part of the load acts at the base.
+The remainder of the load acts at the base.
 
 ======  =======================================================  ==============
 symbol  meaning                                                  unit
@@ -38,13 +38,13 @@ from forcefit.stiffness.beam.beam import section_axes
 from forcefit.stiffness.beam.beam_stress import peak_beam_stress, section_stress
 from forcefit.stiffness.beam.sections import declared_section
 
-_ALONG = 33  # number of sections; a parabola between two sections differs by 1e-3
-_FEW = 34  # number of fibres used to find the section of largest stress
+_ALONG = 33  # number of sections, between which a parabola is off by at most 1e-3
+_FEW = 34  # number of fibres used to locate the section with the largest stress
 
 
 @dataclass(frozen=True, eq=False)
 class BeamData:
-    """Properties of a beam with a density, from which its loads are computed.
+    """Properties of a beam with a density, as required to compute its loads.
 
     Attributes:
         length: [m] length of the beam.
@@ -63,7 +63,7 @@ class BeamData:
 
 @dataclass(frozen=True, eq=False)
 class BeamLoad:
-    """Distributed load of a beam at k points, in the axes of its section.
+    """Distributed load of a beam at k points, in section axes.
 
     Attributes:
         data: the beam.
@@ -116,7 +116,7 @@ class BeamLoad:
         return np.concatenate([moment, force - tip[:, 3:]], axis=1)
 
     def on_sections(self, tip: NDArray, count: int = _ALONG) -> NDArray:
-        """Return the wrenches that sections transmit, from the base to the tip.
+        """Compute the wrenches that sections transmit, from the base to the tip.
 
         Args:
             tip: (k, 6) [N m, N] wrench transmitted at the tip, section's axes.
@@ -136,7 +136,7 @@ class BeamLoad:
 
 @lru_cache(maxsize=256)
 def beam_data(frame: Frame) -> BeamData | None:
-    """Return the beam data of a frame; None without a beam or without a density."""
+    """Return the beam data of a frame, or None without a beam or a density."""
     link = frame.link
     if not isinstance(link, BeamLink) or not link.density:
         return None
@@ -156,7 +156,7 @@ def beam_data(frame: Frame) -> BeamData | None:
 
 
 def beam_load(motion: Motion, body: int, gravity: NDArray) -> BeamLoad | None:
-    """Return the inertia and weight of a body's beam.
+    """Compute the inertial load and weight of a body's beam.
 
     Args:
         motion: motion at k points.
@@ -164,7 +164,7 @@ def beam_load(motion: Motion, body: int, gravity: NDArray) -> BeamLoad | None:
         gravity: (3,) [m/s^2] gravity in base axes.
 
     Returns:
-        The load; None without a beam or without a density.
+        The load, or None without a beam or a density.
     """
     data = beam_data(motion.postures.robot.frames[body])
     if data is None:
@@ -189,7 +189,7 @@ def beam_load(motion: Motion, body: int, gravity: NDArray) -> BeamLoad | None:
 
 
 def beam_stress(frame: Frame, load: BeamLoad, tip: NDArray) -> NDArray:
-    """Return the largest von Mises stress along a beam under its distributed load.
+    """Compute the largest von Mises stress along a beam under its distributed load.
 
     Args:
         frame: frame of the beam, which has a declared cross-section.
@@ -197,8 +197,8 @@ def beam_stress(frame: Frame, load: BeamLoad, tip: NDArray) -> NDArray:
         tip: (k, 6) [N m, N] wrench transmitted at the tip, in the frame's axes.
 
     Returns:
-        (k,) [Pa] stress. A tenth of the section's fibres is evaluated at 33 sections.
-        All fibres are then evaluated at the section of largest stress.
+        (k,) [Pa] stress. A tenth of the fibres is evaluated at 33 sections, then all
+        fibres at the section with the largest stress.
     """
     assert isinstance(frame.link, BeamLink)
     R = load.data.axes

@@ -1,10 +1,10 @@
-"""Conditions at the instants of a path: loads and effects of the robot's file.
+"""Conditions at the instants of a path: loads and effects in the robot file.
 
-The effects change errors, springs, masses, loads and gravity at each instant as they do
-in ``forcefit assembly solve``.  Errors of the measuring device do not change the pose
-error.  Effects of two kinds are not accepted, because the path does not state their
-inputs: those that depend on the side from which a position is approached, and functions
-that depend on earlier rows of a campaign.
+At each instant, the effects change errors, springs, masses, loads and gravity as in
+``forcefit assembly solve``. Errors of the measuring device do not affect the pose
+error. Two kinds of effects are rejected, because a path does not supply their inputs:
+effects that depend on the direction of approach, and functions that depend on earlier
+readings of a campaign.
 """
 
 from collections.abc import Mapping
@@ -37,13 +37,13 @@ Covariates = Mapping[str, float | str]
 
 @dataclass(frozen=True, eq=False)
 class Equilibria:
-    """Least-energy solutions at k instants of a path, of a robot of n frames.
+    """Minimum-energy solutions of a robot with n frames at k instants of a path.
 
     Attributes:
         assembly: solutions of all instants.
         wrenches: (k, n, 6) [N m, N] wrenches of the links' springs; NaN without a
             solution.
-        joint_wrenches: (k, n, 6) [N m, N] wrenches through the joints.
+        joint_wrenches: (k, n, 6) [N m, N] wrenches transmitted by the joints.
     """
 
     assembly: Assembly
@@ -55,12 +55,12 @@ def check_effects(robot: Robot, under: Covariates) -> None:
     """Reject effects that cannot be computed along a path.
 
     Args:
-        robot: robot with the effects of its file.
+        robot: robot with the effects in its file.
         under: values of covariates by name.
 
     Raises:
-        BadInput: an effect depends on the direction of approach, on earlier rows of a
-            campaign or on finite motions; or a covariate is unknown or missing.
+        BadInput: an effect depends on the direction of approach, on earlier readings of
+            a campaign or on finite motions; or a covariate is unknown or missing.
     """
     session = str(under.get("session"))
     for name in (*robot.effects, *robot.session_effects.get(session, ())):
@@ -94,20 +94,20 @@ def path_conditions(
     robot: Robot, postures: Posture, times: NDArray, load: ArrayLike | None,
     gravity: ArrayLike | None, under: Covariates,
 ) -> Conditions:  # fmt: skip
-    """Return the conditions at k instants, after applying the effects of the file.
+    """Apply the effects in the robot file, and return the conditions at k instants.
 
     Args:
-        robot: robot with the effects of its file.
+        robot: robot with the effects in its file.
         postures: k postures of this robot.
-        times: (k,) [s] instants.  The covariate ``time`` at an instant is its value in
-            ``under`` plus the instant.
+        times: (k,) [s] instants.  The covariate ``time`` at an instant is the instant
+            plus the value in ``under``.
         load: (6,) [N m, N] constant load on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
         under: values of covariates by name.
 
     Returns:
-        Conditions with k rows.  Their robot has the springs, clearances and masses
-        that result from the effects; an elastic foundation is an additional frame.
+        Conditions with k rows. Their robot includes the effects in its springs,
+        clearances and masses, and an elastic foundation as an additional frame.
     """
     covariates: dict[str, ArrayLike] = dict(under)
     if "time" in covariates:
@@ -121,15 +121,14 @@ def path_conditions(
 
 
 def equilibria(conditions: Conditions, loads: InertialLoads) -> Equilibria:
-    """Return the least-energy solutions, problem (22), under loads on the bodies.
+    """Solve problem (22), the minimum energy, under loads on the bodies.
 
     Args:
         conditions: conditions at k instants.
         loads: d'Alembert loads and weight at each instant.
 
     Returns:
-        The solutions.  Instants with compliant places of nonlinear laws are solved one
-        by one.
+        The solutions. Instants with nonlinear compliances are solved one by one.
     """
     if not (conditions.laws or conditions.yields):
         found = solve_assembly(
@@ -149,7 +148,7 @@ def equilibria(conditions: Conditions, loads: InertialLoads) -> Equilibria:
 def _equilibrium(
     conditions: Conditions, loads: InertialLoads, i: int
 ) -> Assembly | Exception:
-    """Return the solution at one instant, or the exception that its solution raised."""
+    """Return the solution at one instant, or the exception raised by the solver."""
     try:
         found = equilibrium_of_row(conditions, loads, i)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
@@ -160,7 +159,7 @@ def _equilibrium(
 def equilibrium_of_row(
     conditions: Conditions, loads: InertialLoads, i: int
 ) -> Assembly:
-    """Return the least-energy solution at one instant under loads on the bodies.
+    """Solve problem (22), the minimum energy, at one instant under loads on the bodies.
 
     Args:
         conditions: conditions at k instants.
@@ -171,7 +170,7 @@ def equilibrium_of_row(
         The solution.
 
     Raises:
-        CannotAssemble: a closure cannot be closed.
+        CannotAssemble: a loop cannot be closed.
         FreeMotion: a load acts along a motion without stiffness.
         SolverFailed: the solver failed, or contacts did not converge.
     """

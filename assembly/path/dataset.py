@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 
 
 def path_dataset(errors: "PathErrors", command: str = "") -> "xarray.Dataset":
-    """Return the errors along a path as a data set.
+    """Convert the errors along a path to a data set.
 
     Args:
         errors: errors along a path.
         command: command line for the provenance; empty if there is none.
 
     Returns:
-        Data set over ``time`` with the unit and meaning of every variable. Its
-        attributes are the robot, the profile and the program.
+        Data set over ``time``, with the unit and meaning of every variable. Robot,
+        profile and program are its attributes.
     """
     import xarray
 

@@ -1,12 +1,12 @@
-"""Rates and accelerations of idle motions, which no constraint prevents.
+"""Rates and accelerations of idle motions, which are not constrained.
 
-Neither drives nor platform nor closures prevent an idle motion, such as the spin of a
-rod between two balls.  No force acts along an idle motion, so its momentum remains zero
-on a path that starts from rest: a round rod has no angular momentum about its axis, and
-its kinetic energy is the least.  The acceleration of an idle motion is such that the
-loads do no work on it.  These two rules are exact if the inertia does not depend on the
-idle motion. An example is a body whose mass is rotationally symmetric about its axis of
-spin.
+An idle motion, such as the spin of a rod between two ball joints, is prevented neither
+by drives nor by platform or closures. No force acts along it, so its momentum stays
+zero on a path that starts from rest: a round rod has no angular momentum about its
+axis, and its kinetic energy is minimal. The acceleration of an idle motion follows from
+the condition that the loads do no work on it. Both rules are exact if the inertia does
+not depend on the idle motion, for example if a body's mass is rotationally symmetric
+about its spin axis.
 """
 
 from dataclasses import dataclass, replace
@@ -18,8 +18,8 @@ from forcefit.assembly.kinematics.nominal import motion_screws, size_of
 from forcefit.assembly.path.inertial_loads import InertialLoads, inertial_loads
 from forcefit.assembly.path.motion import Motion, carries_matrix, idle_rates
 
-_MASSLESS = 1e-12  # inertias below this share of the largest inertia count as zero
-_ROUNDING = 1e-20  # share of mass x (longest arm)^2: squared arm error 1e-10
+_MASSLESS = 1e-12  # inertias below this fraction of the largest inertia count as zero
+_ROUNDING = 1e-20  # fraction of mass x (longest arm)^2: squared arm error 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,10 +40,10 @@ class IdleMotions:
 
 
 def idle_motions(motion: Motion) -> IdleMotions | None:
-    """Return the idle motions of a robot along a path; None if there are none.
+    """Return the idle motions of a robot along a path, or None if there are none.
 
     Args:
-        motion: motion at k points; only its postures and equations are used.
+        motion: motion at k points, of which only postures and equations are used.
     """
     if not motion.free:
         return None
@@ -62,14 +62,14 @@ def idle_motions(motion: Motion) -> IdleMotions | None:
 
 
 def momentum_free_rates(motion: Motion, idle: IdleMotions) -> NDArray:
-    """Return joint rates for which the momentum along idle motions is zero.
+    """Compute joint rates for which the momentum along idle motions is zero.
 
     Args:
         motion: motion at k points with arbitrary rates of the idle motions.
         idle: idle motions of the robot.
 
     Returns:
-        (k, n) [rad/s or m/s] rates to be added to the rates of the motion.
+        (k, n) [rad/s or m/s] rates to add to the rates of the motion.
     """
     momentum = _momentum(motion, idle, motion.twists)
     amounts = -idle.inverse @ momentum[..., None]
@@ -79,7 +79,7 @@ def momentum_free_rates(motion: Motion, idle: IdleMotions) -> NDArray:
 def with_idle_accelerations(
     motion: Motion, idle: IdleMotions, gravity: NDArray
 ) -> Motion:
-    """Return the motion with the accelerations of idle motions under the loads.
+    """Return a motion with the accelerations of idle motions under the loads.
 
     Args:
         motion: motion at k points.
@@ -96,14 +96,14 @@ def with_idle_accelerations(
 
 
 def _momentum(motion: Motion, idle: IdleMotions, twists: NDArray) -> NDArray:
-    """Return the momentum (k, d) [kg m^2/s or kg m/s] of twists along idle motions."""
-    # the inertial loads of bodies at rest are linear in their accelerations
+    """Compute the momentum (k, d) [kg m^2/s or kg m/s] of twists along idle motions."""
+    # inertial loads of bodies at rest are linear in the accelerations
     still = replace(motion, twists=np.zeros_like(twists), accelerations=twists)
     return -_work(motion, idle, inertial_loads(still))
 
 
 def _work(motion: Motion, idle: IdleMotions, loads: InertialLoads) -> NDArray:
-    """Return the power (k, d) of loads per unit rate of each idle motion."""
+    """Compute the power (k, d) of loads per unit rate of each idle motion."""
     p = motion.postures.transforms[..., :3, 3]
     return np.stack([
         _power(loads.bodies, body, p) + _power(loads.carried, part, p)
@@ -116,9 +116,9 @@ def _inverse(inertia: NDArray, least: NDArray) -> NDArray:
 
     Args:
         inertia: (k, d, d) inertia of the idle motions.
-        least: (k,) eigenvalues up to this value count as 0.  Without this limit, a spin
-            without mass, or with masses on its axis, would have a rounding error as
-            inertia. Its acceleration would then be arbitrarily large.
+        least: (k,) eigenvalues up to this value count as 0. Without this limit, the
+            inertia of a massless spin, or of one with all mass on its axis, would be
+            mere round-off, and its acceleration arbitrarily large.
 
     Returns:
         The pseudoinverses.
@@ -142,7 +142,7 @@ def _largest_inertia(motion: Motion, bodies: list[NDArray]) -> NDArray:
 
 
 def _power(wrenches: NDArray, twists: NDArray, points: NDArray) -> NDArray:
-    """Return the power (k,) of wrenches (k, n, 6) at points, on twists at the base."""
+    """Compute the power (k,) of wrenches (k, n, 6) at points on twists at the base."""
     velocity = twists[..., 3:] + np.cross(twists[..., :3], points)
     power = np.sum(wrenches[..., :3] * twists[..., :3], axis=(1, 2))
     return power + np.sum(wrenches[..., 3:] * velocity, axis=(1, 2))

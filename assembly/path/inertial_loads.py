@@ -7,9 +7,9 @@ origin O, are
 
 The inertia of a beam with a density is distributed along the beam
 (:mod:`forcefit.assembly.path.beam_inertia`). The inertia of a mesh link follows from
-its consistent mass matrix (:mod:`forcefit.assembly.path.mesh_inertia`).  The share of
-the load at the link's start acts on the part that carries the link.  If the total load
-acted at the tip instead, the deflection of a beam would be up to 1.5 times too large.
+its consistent mass matrix (:mod:`forcefit.assembly.path.mesh_inertia`).  The part of
+the load at the link's start acts on the body that carries the link. If the whole load
+acted at the tip instead, a beam would deflect up to 1.5 times too much.
 """
 
 from dataclasses import dataclass
@@ -31,9 +31,9 @@ class InertialLoads:
         bodies: (k, n, 6) [N m, N] loads on each body, at its frame's origin.
         carried: (k, n, 6) [N m, N] loads on the part that each frame's joint carries,
             at the same point.
-        at_tips: (k, n, 6) [N m, N] share of ``bodies`` that comes from distributed
-            loads of the links, at the frames in their axes.
-        beams: distributed loads of beams, by the index of the frame.
+        at_tips: (k, n, 6) [N m, N] part of ``bodies`` due to distributed loads of the
+            links, at the frames in their axes.
+        beams: distributed loads of beams, by frame index.
     """
 
     bodies: NDArray
@@ -43,7 +43,7 @@ class InertialLoads:
 
 
 def inertial_loads(motion: Motion, gravity: ArrayLike | None = None) -> InertialLoads:
-    """Return the loads due to the bodies' accelerations and weight.
+    """Compute the loads due to the bodies' accelerations and weight.
 
     Args:
         motion: motion of a robot of n frames at k points.
@@ -53,7 +53,7 @@ def inertial_loads(motion: Motion, gravity: ArrayLike | None = None) -> Inertial
         The loads on all bodies.
 
     Raises:
-        BadInput: a mesh was not solved when the robot was loaded.
+        BadInput: a mesh link was not solved when the robot was loaded.
     """
     robot, T = motion.postures.robot, motion.postures.transforms
     g = np.zeros(3) if gravity is None else np.asarray(gravity, dtype=float)
@@ -87,7 +87,7 @@ def inertial_loads(motion: Motion, gravity: ArrayLike | None = None) -> Inertial
 
 
 def _of_rigid_body(motion: Motion, i: int, gravity: NDArray) -> NDArray:
-    """Return the load (k, 6) [N m, N] of a body's rigid mass at its frame."""
+    """Compute the load (k, 6) [N m, N] of a body's rigid mass at its frame."""
     frame, T = motion.postures.robot.frames[i], motion.postures.transforms[:, i]
     R, p = T[:, :3, :3], T[:, :3, 3]
     c = R @ frame.centre_of_mass
@@ -100,6 +100,6 @@ def _of_rigid_body(motion: Motion, i: int, gravity: NDArray) -> NDArray:
 
 
 def _turned(R: NDArray, wrenches: NDArray) -> NDArray:
-    """Return wrenches (k, 6) in axes that are rotated by one or by k rotations."""
+    """Express wrenches (k, 6) in axes rotated by one or by k rotations."""
     halves = wrenches.reshape(len(wrenches), 2, 3)
     return (halves @ np.swapaxes(R, -1, -2)).reshape(len(wrenches), 6)

@@ -1,9 +1,9 @@
-"""Inertia and weight of a moving mesh link, as wrenches at its two ends.
+"""Inertial loads and weight of a moving mesh link, as wrenches at its two ends.
 
 The consistent mass matrix of the link's finite elements is condensed to the motions of
-its two interfaces. It is multiplied by the accelerations of both ends.  Mass away from
-the line between the ends can cause a difference to the resultant force and moment of
-the rigid link. This difference is divided between both ends.
+its two interfaces and multiplied by the accelerations of both ends. If mass lies away
+from the line between the ends, the resulting force and moment may differ from those of
+the rigid link; this difference is divided between both ends.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ from forcefit.stiffness.screws import skew
 def mesh_end_wrenches(
     motion: Motion, body: int, gravity: NDArray
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Return the inertia and weight of a body's mesh link at its ends.
+    """Compute the inertial load and weight of a body's mesh link at its ends.
 
     Args:
         motion: motion at k points.
@@ -47,7 +47,7 @@ def mesh_end_wrenches(
         for point in (tip, tip - R @ span)
     )
     e = span / np.linalg.norm(span)
-    # angular accelerations of both ends in the link's rigid acceleration field
+    # angular accelerations of both ends in the rigid acceleration field of the link
     slope = alpha + np.cross(e, omega) * (omega @ e)[:, None]
     wrenches = -np.hstack([slope, at_base, slope, at_tip]) @ M.T
     base, tip = wrenches[:, :6], wrenches[:, 6:]
@@ -58,7 +58,7 @@ def mesh_end_wrenches(
 
 
 def _at_tip(wrenches: NDArray, span: NDArray) -> NDArray:
-    """Return base wrenches (k, 6) expressed at the tip."""
+    """Express base wrenches (k, 6) at the tip."""
     read = wrenches.copy()
     read[:, :3] -= np.cross(span, wrenches[:, 3:])
     return read
@@ -67,7 +67,7 @@ def _at_tip(wrenches: NDArray, span: NDArray) -> NDArray:
 def _rigid(
     M: NDArray, span: NDArray, omega: NDArray, alpha: NDArray, at_tip: NDArray
 ) -> NDArray:
-    """Return the (k, 6) wrench of the rigid link's inertia and weight at its tip.
+    """Compute the (k, 6) wrench of the rigid link's inertia and weight at its tip.
 
     Args:
         M: (12, 12) mass matrix.

@@ -1,4 +1,4 @@
-r"""Velocities and accelerations of all bodies of a robot whose platform follows a path.
+r"""Velocities and accelerations of all bodies while the platform follows a path.
 
 ======  ======================  ============  =====================================
 symbol  code                    shape         meaning
@@ -11,13 +11,13 @@ V_j     ``twists``              (k, n, 6)     [omega, v] of body j, v of the poi
 A_j     ``accelerations``       (k, n, 6)     derivative of V_j with time
 ======  ======================  ============  =====================================
 
-With V = sum S_j q'_j over the joints that carry a body, its derivative is
-A = sum S_j q''_j + [V_j, S_j] q'_j.  At a closure, V and A of its two frames are equal.
-These equations, and the equations for the prescribed components of the pose, are linear
-in q' and then in q'', with the same matrix.  Closures and path may leave a rate
-undetermined, such as the spin of a rod between two balls. The least-norm solution is
-then used. :mod:`forcefit.assembly.path.idle_motions` adds the rates that the inertia of
-the bodies determines.  No finite differences of poses are used.
+With V = sum S_j q'_j over the joints that carry a body, its derivative is A = sum S_j
+q''_j + [V_j, S_j] q'_j.  At a closure, the two frames have equal V and A. Together with
+the equations for the prescribed pose components, these equations are linear in q' and
+then in q'', with the same matrix. If closures and path leave a rate undetermined, for
+example the spin of a rod between two ball joints, the minimum-norm solution is used.
+:mod:`forcefit.assembly.path.idle_motions` adds the rates determined by the inertia of
+the bodies. Poses are not differentiated by finite differences.
 
 Sources:
     Featherstone (2008), Rigid Body Dynamics Algorithms, chapters 2 and 8 (spatial
@@ -38,14 +38,14 @@ from forcefit.assembly.model.robot import Robot
 # relative size below which a singular value of closures and path counts as zero, as in
 # forcefit.assembly.kinematics.closure_rates
 _SINGULAR = 1e-6
-# the limit of a zero singular value, as a multiple of the closures' nominal error
+# threshold for a zero singular value, as a multiple of the closures' nominal error
 _NOISE = 30.0
 _PRESCRIBED = 1e-4  # largest relative error of a prescribed velocity
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Motion of a robot of n frames at k points of a path.
+    """Motion of a robot with n frames at k points of a path.
 
     Attributes:
         postures: the k postures as one object.
@@ -53,9 +53,10 @@ class Motion:
         second_rates: (k, n) [rad/s^2 or m/s^2] second derivatives.
         twists: (k, n, 6) [rad/s, m/s] twists of the bodies, at the base's origin.
         accelerations: (k, n, 6) [rad/s^2, m/s^2] time derivatives of the twists.
-        free: largest number of joint motions that neither path nor closures prescribe.
+        free: largest number of joint motions prescribed neither by path nor by
+            closures.
         equations: (k, 6 closures + c, n) closures and prescribed pose components per
-            unit rate of the joints.
+            unit joint rate.
     """
 
     postures: Posture
@@ -67,7 +68,7 @@ class Motion:
     equations: NDArray
 
     def acceleration_of(self, body: int, points: NDArray) -> NDArray:
-        """Return the acceleration of points of a body.
+        """Compute the acceleration of points of a body.
 
         Args:
             body: index of the body's frame.
@@ -82,7 +83,7 @@ class Motion:
 
 
 class NotFollowed(Exception):
-    """Error: the robot cannot follow the path at some of its points.
+    """The robot cannot follow the path at some of its points.
 
     Attributes:
         row: index of the first such point.
@@ -97,22 +98,22 @@ def follow_path(
     postures: Posture, names: tuple[str, ...],
     path: tuple[NDArray, NDArray, NDArray], idle: NDArray | float = 0.0,
 ) -> Motion:  # fmt: skip
-    """Return the motion of a robot along a path.
+    """Compute the motion of a robot along a path.
 
     Args:
         postures: k postures on the path.
         names: c prescribed components of one kind, ``tx`` .. or ``q.<frame>``. If joint
-            coordinates are prescribed, drives that are not named do not move.
+            coordinates are prescribed, unnamed drives do not move.
         path: (k, c) components [m or rad], their first and their second derivatives.
-        idle: (k, n) [rad/s or m/s] joint rates that neither closures nor path prescribe
-            (:func:`forcefit.assembly.path.idle_motions.momentum_free_rates`), added to
-            the least-norm solution.
+        idle: (k, n) [rad/s or m/s] joint rates prescribed neither by closures nor by
+            path (:func:`forcefit.assembly.path.idle_motions.momentum_free_rates`),
+            added to the minimum-norm solution.
 
     Returns:
         The motion.
 
     Raises:
-        NotFollowed: the platform cannot have the prescribed velocity or acceleration
+        NotFollowed: the platform cannot reach the prescribed velocity or acceleration
             at a singular posture.
     """
     robot = postures.robot
@@ -151,7 +152,7 @@ def follow_path(
 def _with_all_drives(
     robot: Robot, names: tuple[str, ...], path: tuple[NDArray, NDArray, NDArray]
 ) -> tuple[tuple[str, ...], tuple[NDArray, NDArray, NDArray]]:
-    """Return a joint path that also contains the unnamed drives, which do not move."""
+    """Add the unnamed drives, which do not move, to a joint path."""
     drives = [f"q.{f.name}" for f in robot.frames if f.actuated]
     still = [name for name in drives if name not in names]
     zero = np.zeros((len(path[0]), len(still)))
@@ -166,7 +167,7 @@ def _units(robot: Robot) -> NDArray:
 
 
 def carries_matrix(robot: Robot) -> NDArray:
-    """Return an (n, n) matrix: 1 where the column's joint carries the row's body."""
+    """Return an (n, n) matrix, 1 where the column's joint carries the row's body."""
     return robot.on_path - np.eye(len(robot.frames))
 
 
@@ -186,12 +187,12 @@ def _of_closures(robot: Robot, bodies: NDArray) -> NDArray:
 def _equations(
     postures: Posture, names: tuple[str, ...], values: NDArray, S: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return closures and prescribed pose components per unit rate of all joints.
+    """Return closures and prescribed pose components per unit joint rate.
 
     Returns:
-        (k, 6 closures + c, n) matrix, in which lengths of the closure rows are divided
-        by the robot's size; and (6 closures,) factors: this size for rows of lengths, 1
-        for rows of rotations.
+        (k, 6 closures + c, n) matrix, with translational closure rows divided by the
+        robot's size; and (6 closures,) factors, which are this size for translational
+        rows and 1 for rotational rows.
     """
     robot = postures.robot
     carries = carries_matrix(robot)
@@ -213,7 +214,7 @@ def _equations(
 
 
 def _rotations(postures: Posture, names: tuple[str, ...], values: NDArray) -> NDArray:
-    """Return the platform's rotation vectors (k, 3) [rad] as the path defines them."""
+    """Return the platform's rotation vectors (k, 3) [rad] as defined by the path."""
     turn = pose_components(postures.platform)[:, 3:]
     for k, name in enumerate(names):
         if name[0] == "r":
@@ -222,7 +223,7 @@ def _rotations(postures: Posture, names: tuple[str, ...], values: NDArray) -> ND
 
 
 def _of_pose(postures: Posture, names: tuple[str, ...], values: NDArray) -> NDArray:
-    """Return the rates (k, c, 6) of pose components per unit twist."""
+    """Return the rates (k, c, 6) of the pose components per unit twist."""
     rates = np.zeros((len(values), 6, 6))
     p = postures.platform[:, :3, 3]
     rates[:, :3, 3:] = np.eye(3)
@@ -278,13 +279,14 @@ def _inverse(values: NDArray, mismatch: Any) -> NDArray:
 
 
 def idle_rates(motion: Motion) -> NDArray:
-    """Return joint motions that neither drives nor closures nor platform prevent.
+    """Find joint motions that neither drives nor closures nor the platform prevent.
 
     Args:
         motion: motion of a robot of n frames at k points.
 
     Returns:
-        (k, n, d) [rad or m] d independent motions; d is the least number at any point.
+        (k, n, d) [rad or m] d independent motions, where d is the smallest number at
+        any point.
     """
     robot = motion.postures.robot
     passive = np.array([f.passive for f in robot.frames])
@@ -298,7 +300,7 @@ def idle_rates(motion: Motion) -> NDArray:
 
 
 def _check_followed(E: NDArray, q: NDArray, right: NDArray) -> None:
-    """Reject velocities and accelerations that the robot cannot have."""
+    """Reject velocities and accelerations that the robot cannot reach."""
     left = np.abs((E @ q[..., None])[..., 0] - right).max(axis=1, initial=0.0)
     size = np.abs(right).max(axis=1, initial=0.0)
     size = np.maximum(size, 1e-6 * size.max(initial=0.0))

@@ -1,9 +1,9 @@
 """Errors of a robot along a path: deflection, forces and stress due to acceleration.
 
-At each instant, the bodies' inertia and weight act as loads on the posture. Problem
-(22) is solved as for a robot at rest (quasi-static).  Vibration, damping and the
-inertia of the deflection itself are neglected. This is valid if the motion takes many
-periods of the first natural frequency and its acceleration does not jump.
+At each instant, inertia and weight of the bodies act as loads on the posture, and
+problem (22) is solved as for a robot at rest (quasi-static). Vibration, damping and the
+inertia of the deflection itself are neglected, which is valid if the motion takes many
+periods of the first natural mode and its acceleration does not jump.
 """
 
 from collections.abc import Callable
@@ -45,7 +45,7 @@ from forcefit.assembly.sweeps.targets import goals_of, of_joints
 from forcefit.inputs.table import BadInput, nearest
 from forcefit.results.display import Figures, html_table, largest, short_repr
 
-ASSUMPTIONS = ("none", "frozen", "free")  # for the bounds of problem (27) under load
+ASSUMPTIONS = ("none", "frozen", "free")  # for the bounds in problem (27) under load
 if TYPE_CHECKING:
     import pandas
     import xarray
@@ -64,19 +64,19 @@ Recall = Callable[..., tuple[NDArray, ...]]
 
 @dataclass(frozen=True, eq=False)
 class PathErrors:
-    """Results at k instants of a path, of a robot of n frames.
+    """Results for a robot with n frames at k instants of a path.
 
     Attributes:
-        robot: the robot with the effects of its file applied; an elastic foundation is
-            an additional frame.
+        robot: the robot with the effects in its file applied, where an elastic
+            foundation is an additional frame.
         declared: the robot as declared in its file.
         trajectory: path as components of the pose over time.
-        assumption: assumption of the bounds of problem (27); ``"none"`` for no bounds.
-        state: state in which the compliance is computed.
-        frequency: [Hz] least first natural frequency along the path; NaN if unknown.
-        free: largest number of joint motions that neither path nor closures prescribe;
-            these are kept at rest.
-        arrays: results by name, k rows each; NaN where the status is not ok.
+        assumption: assumption for the bounds in problem (27); ``"none"`` for no bounds.
+        state: state for which the compliance is computed.
+        frequency: [Hz] lowest natural frequency along the path; NaN if unknown.
+        free: largest number of joint motions prescribed neither by path nor by
+            closures; these stay at rest.
+        arrays: results by name, with k rows each; NaN where the status is not ok.
 
             - ``coordinates``, ``rates``, ``second_rates`` (k, n) of all joints
             - ``platform`` (k, 4, 4), ``platform_velocity``, ``platform_acceleration``
@@ -105,7 +105,7 @@ class PathErrors:
     __repr__, _repr_html_ = short_repr, html_table
 
     def _figures(self) -> Figures:
-        """Return the numbers that ``forcefit assembly path`` prints first."""
+        """Return the values that ``forcefit assembly path`` prints first."""
         solved = self.status == OK
         return {
             "points": f"{len(self.status)}, {np.count_nonzero(solved)} solved",
@@ -121,7 +121,7 @@ class PathErrors:
         return path_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a table with one row per instant, columns (variable, component)."""
+        """Return a table with one row per instant and columns (variable, component)."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "time")
@@ -162,7 +162,7 @@ def path_errors(
     progress: Progress = lambda done, most: None,
     recall: Recall = lambda compute, *given: compute(),
 ) -> PathErrors:
-    """Return the errors of a robot along a path, including its inertia.
+    """Compute the errors of a robot along a path, inertial effects included.
 
     Args:
         robot: robot with masses.
@@ -170,12 +170,12 @@ def path_errors(
             :func:`~forcefit.assembly.path.trajectory.profiled`.
         load: (6,) [N m, N] constant load on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
-        assumption: assumption of the pose error bounds, problem (27): ``"frozen"`` or
+        assumption: assumption for the pose error bounds, problem (27): ``"frozen"`` or
             ``"free"``; ``"none"`` for no bounds.
-        state: state of the compliance: ``"nominal"``, ``"contact"`` or ``"exact"``; the
-            latter two under the loads of each instant.
-        under: values by name of the covariates on which the effects of the robot's file
-            depend, such as ``temperature``; ``time`` is that of the first instant.
+        state: state for which the compliance is computed: ``"nominal"``, ``"contact"``
+            or ``"exact"``; the latter two under the loads at each instant.
+        under: values by name of the covariates on which the effects in the robot file
+            depend, such as ``temperature``; ``time`` is its value at the first instant.
         progress: called with the numbers of solved points and of all points.
         recall: method of :class:`forcefit.assembly.statistics.replay.Replay`, which
             stores blocks of points; by default every block is computed.
@@ -184,10 +184,10 @@ def path_errors(
         The results at all instants.
 
     Raises:
-        BadInput: nothing has a mass, an effect cannot be computed along a path, a point
+        BadInput: no body has a mass, an effect cannot be computed along a path, a point
             is out of reach or cannot be followed, the assumption or the state is
-            unknown, a link has a mass and the state is ``"exact"``, or an effect has a
-            nonlinear law and the state is not ``"nominal"``.
+            unknown, a link has a mass while the state is ``"exact"``, or an effect is
+            nonlinear while the state is not ``"nominal"``.
     """
     if assumption not in ASSUMPTIONS:
         hint = nearest(assumption, ASSUMPTIONS)
@@ -217,7 +217,7 @@ def path_errors(
 
 @dataclass(frozen=True, eq=False)
 class _Asked:
-    """Arguments of :func:`path_errors`, which are equal for all blocks."""
+    """Arguments of :func:`path_errors`, shared by all blocks."""
 
     robot: Robot
     trajectory: Trajectory
@@ -229,7 +229,7 @@ class _Asked:
 
 
 def _recalled(asked: _Asked, rows: slice, recall: Recall) -> dict[str, NDArray]:
-    """Return the results of a block of points, either computed or stored."""
+    """Return the results of a block of points, stored or newly computed."""
 
     def compute() -> tuple[NDArray, ...]:
         solved = _solve(asked, rows)
@@ -242,7 +242,7 @@ def _recalled(asked: _Asked, rows: slice, recall: Recall) -> dict[str, NDArray]:
 
 
 def _solve(asked: _Asked, rows: slice) -> dict[str, NDArray]:
-    """Return the results of a block of points."""
+    """Compute the results of a block of points."""
     there = _placed(asked, rows)
     conditions = _conditions(asked, rows, there)
     gravity = conditions.gravity
@@ -312,7 +312,7 @@ def _conditions(asked: _Asked, rows: slice, there: Posture) -> Conditions:
 
 
 def _verdicts(asked: _Asked, rows: slice, there: Posture) -> list[tuple[str, str]]:
-    """Return whether each posture is usable, as a status and its reason."""
+    """Check whether each posture is usable; return status and reason."""
     names = asked.trajectory.names
     goals = goals_of(names, asked.robot, asked.trajectory.values[rows])
     target = Target(coordinates=goals) if of_joints(names) else Target(goals)
@@ -322,7 +322,7 @@ def _verdicts(asked: _Asked, rows: slice, there: Posture) -> list[tuple[str, str
 def _followed(
     asked: _Asked, rows: slice, postures: Posture, idle: NDArray | float = 0.0
 ) -> Motion:
-    """Return the motion of a block of points, including idle motions."""
+    """Compute the motion of a block of points, idle motions included."""
     path = asked.trajectory
     at = path.values[rows], path.first[rows], path.second[rows]
     try:
@@ -338,7 +338,7 @@ def _followed(
 def _statuses(
     assembly: Assembly, verdict: list[tuple[str, str]]
 ) -> tuple[NDArray, NDArray]:
-    """Return the status of each point, and its reason."""
+    """Return the status of each point and its reason."""
     status, reason = assembly.status.astype(object), assembly.reason.astype(object)
     for i, (geometric, why) in enumerate(verdict):
         if geometric and (status[i] == OK or geometric == SINGULAR):
@@ -347,7 +347,7 @@ def _statuses(
 
 
 def _at_origin(twists: NDArray, T: NDArray) -> NDArray:
-    """Return twists (k, 6) at the platform's origin."""
+    """Express twists (k, 6) at the platform's origin."""
     moved = twists.copy()
     moved[:, 3:] += np.cross(twists[:, :3], T[:, :3, 3])
     return moved
@@ -362,7 +362,7 @@ def _drive_forces(robot: Robot, joint_wrenches: NDArray) -> NDArray:
 
 
 def _stresses(robot: Robot, loads: InertialLoads, tips: NDArray) -> NDArray:
-    """Return the largest stress (k, links) [Pa] in every link with a known stress."""
+    """Compute the largest stress (k, links) [Pa] in every link with a known stress."""
     links = stressed_links(robot)
     stress = np.full((len(tips), len(links)), np.nan)
     solved = np.isfinite(tips).all(axis=(1, 2))

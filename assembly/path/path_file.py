@@ -1,4 +1,4 @@
-"""Table of a path: poses or joint coordinates, with or without times."""
+"""Path tables: poses or joint coordinates, with or without times."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,12 +14,12 @@ from forcefit.inputs.table import BadInput, quoted
 
 @dataclass(frozen=True, eq=False)
 class PathTable:
-    """The rows of a path.
+    """Rows of a path.
 
     Attributes:
-        names: components of one kind, ``tx`` .. or ``q.<frame>``.
+        names: components, either ``tx`` .. or ``q.<frame>``.
         values: (rows, components) [m or rad] values.
-        times: (rows,) [s] increasing times; None if the table contains no times.
+        times: (rows,) [s] increasing times; None if the table has no times.
         labels: names of the rows, for messages.
     """
 

@@ -1,4 +1,4 @@
-"""Postures along a path, and the first natural frequency at these postures."""
+"""Postures along a path, and the first natural frequency at them."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,7 +22,7 @@ _FREQUENCIES = 5  # number of postures at which the first frequency is computed
 def placed(
     robot: Robot, names: tuple[str, ...], values: NDArray
 ) -> tuple[list[Posture | None], list[str]]:
-    """Return the posture for each row of a path, or the reason why there is none.
+    """Compute the posture for each row of a path, or the reason why none exists.
 
     Args:
         robot: any robot.
@@ -30,7 +30,8 @@ def placed(
         values: (k, components) [m or rad] values.
 
     Returns:
-        For each row: a posture or None, and the reason, empty if there is a posture.
+        For each row, a posture or None, and a reason, which is empty if there is a
+        posture.
     """
     place = place_many_joints if of_joints(names) else place_many
     return place(robot, goals_of(names, robot, values))
@@ -57,15 +58,15 @@ def first_frequency(
     robot: Robot, trajectory: Trajectory, load: ArrayLike | None,
     gravity: ArrayLike | None, under: Covariates,
 ) -> float:  # fmt: skip
-    """Return the least natural frequency along a path with locked drives.
+    """Compute the lowest natural frequency along a path with locked drives.
 
     Args:
         robot: any robot.
         trajectory: the path.
-        load: (6,) [N m, N] load on the platform, on which the secant stiffness of a
-            nonlinear effect depends.
+        load: (6,) [N m, N] load on the platform, which affects the secant stiffness of
+            nonlinear effects.
         gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
-        under: values by name of the covariates of the robot's effects.
+        under: covariates of the robot's effects by name.
 
     Returns:
         [Hz] frequency of the robot with its effects; NaN if nothing vibrates.

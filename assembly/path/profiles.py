@@ -1,4 +1,4 @@
-"""Motion profiles from rest to rest: path share s over relative time t, 0 to 1.
+"""Rest-to-rest motion profiles: path fraction s over relative time t, 0 to 1.
 
 ==========  ========================  ==========  ============  ====================
 name        s                         peak speed  acceleration  jumps
@@ -32,11 +32,11 @@ def _polynomial(*coefficients: float) -> Law:
 
 def _trapezoid(t: NDArray) -> tuple[NDArray, NDArray, NDArray]:
     """Return s, s' and s'': acceleration, constant speed, deceleration in thirds."""
-    left = np.minimum(t, 1 - t)  # time from the nearer end
+    left = np.minimum(t, 1 - t)  # time from the nearest end
     ramp = left < 1 / 3
     way = np.where(ramp, 2.25 * left**2, 1.5 * left - 0.25)
     speed = np.where(ramp, 4.5 * left, 1.5)
-    # at a jump, the acceleration of the outer third is returned
+    # at a jump, the acceleration in the outer third is returned
     size = np.where(left <= 1 / 3, 4.5, 0.0)
     return np.where(t <= 0.5, way, 1 - way), speed, np.where(t <= 0.5, size, -size)
 
@@ -46,4 +46,4 @@ PROFILES: dict[str, Law] = {
     "seventh": _polynomial(0, 0, 0, 0, 35, -84, 70, -20),
     "trapezoid": _trapezoid,
 }
-JUMPING = frozenset({"trapezoid"})  # profiles whose acceleration jumps
+JUMPING = frozenset({"trapezoid"})  # profiles with discontinuous acceleration

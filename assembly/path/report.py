@@ -1,4 +1,4 @@
-"""Figure and HTML page of the errors along a path."""
+"""Figure and HTML report of the errors along a path."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 _ASSUMED = (
     "Quasi-static: inertia and weight act as loads at each instant. Vibration, damping "
-    "and the inertia of the deflection itself are left out.",
-    "Drives follow the nominal path; their errors of control are left out.",
+    "and the inertia of the deflection itself are neglected.",
+    "Drives follow the nominal path; their control errors are neglected.",
     "Bodies move as the rigid nominal robot; a beam's mass acts along the beam.",
     "Small screws: the closures are linear in errors and deflections.",
 )
@@ -66,7 +66,7 @@ def plot_path(errors: PathErrors) -> "Figure":
 def path_page(
     summary: Mapping[str, Any], errors: PathErrors, provenance: Provenance
 ) -> str:
-    """Return the page of a path as HTML.
+    """Format the results along a path as an HTML page.
 
     Args:
         summary: result of :func:`forcefit.assembly.path.summary.path_summary`.
@@ -74,7 +74,7 @@ def path_page(
         provenance: the command and its input files.
 
     Returns:
-        HTML that refers to no other file.
+        Self-contained HTML.
     """
     peaks = summary.get("largest", {})
     return page(
@@ -108,7 +108,7 @@ def _good(summary: Mapping[str, Any]) -> bool | None:
 
 
 def _verdict(summary: Mapping[str, Any]) -> str:
-    """Return the conclusion on a path's errors as one sentence."""
+    """Format the conclusion on a path's errors as one sentence."""
     if "largest" not in summary:
         return f"No point has a result: {summary.get('reason', summary['status'])}."
     peak = summary["largest"].get("inertial_translation")
@@ -118,14 +118,14 @@ def _verdict(summary: Mapping[str, Any]) -> str:
         size = Value(peak["value"], "m").text
         verdict = f"Acceleration deflects the platform by at most {size}"
     if _good(summary) is None:
-        verdict += "; vibration, which is left out, may exceed it"
+        verdict += "; vibration, which is neglected, may exceed it"
     if summary["status"] != OK:
         verdict += f"; {summary['status']} {summary.get('reason', '')}"
     return verdict + "."
 
 
 def _tiles(summary: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles of deflection, drive force and periods."""
+    """Return tiles for deflection, drive force and periods."""
     tiles = []
     for key in ("inertial_rotation", "inertial_translation", "stress"):
         peak = summary.get("largest", {}).get(key)
@@ -143,7 +143,7 @@ def _tiles(summary: Mapping[str, Any]) -> list[Tile]:
 
 
 def _largest(summary: Mapping[str, Any]) -> str:
-    """Return the table of the largest values and drive forces."""
+    """Format the largest values and drive forces as a table."""
     rows = [
         [LARGEST[key][0], Value(peak["value"], LARGEST[key][1]),
          Value(peak["time"], "s"), peak.get("frame", "")]
@@ -162,7 +162,7 @@ def _largest(summary: Mapping[str, Any]) -> str:
 
 
 def _charts(errors: PathErrors) -> list[str]:
-    """Return charts of deflection, rotation, drive forces and acceleration."""
+    """Plot deflection, rotation, drive forces and acceleration."""
     screws = errors.inertial.T
     forces = dict(zip(errors.drives, errors.arrays["drive_force"].T, strict=True))
     of_size = sizes(errors)
@@ -184,7 +184,7 @@ def _charts(errors: PathErrors) -> list[str]:
 def _chart(
     errors: PathErrors, lines: Mapping[str, NDArray], unit: str, title: str
 ) -> str:
-    """Return a chart of lines over time, with the title as its caption."""
+    """Plot lines over time, with the title as the caption."""
     traces = [
         {"type": "scatter", "mode": "lines", "x": errors.trajectory.times, "y": values,
          "name": name, "line": {"color": COLOURS[k % len(COLOURS)]}}

@@ -1,4 +1,4 @@
-"""The errors along a path from the options of ``forcefit assembly path``."""
+"""Errors along a path from the options of ``forcefit assembly path``."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -38,7 +38,7 @@ POINTS = 201
 
 @dataclass(frozen=True)
 class PathTimes:
-    """How a path is traversed in time.
+    """Timing of a path.
 
     Attributes:
         profile: name of a profile from rest to rest in
@@ -62,7 +62,7 @@ class PathTimes:
 
 
 def _accepting_times(function: Callable[P, R]) -> Callable[P, R]:
-    """Return the function, which also accepts ``times`` as in the last release."""
+    """Make a function accept ``times`` as in the last release."""
 
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -97,12 +97,13 @@ def errors_along_path(
     command: str = "",
     progress: Progress = lambda done, most: None,
 ) -> PathErrors:
-    """Return the errors of a robot along a path, including its inertia.
+    """Compute the errors of a robot along a path, inertial effects included.
 
     Args:
         robot: a robot with masses, a robot file, or a built-in name.
-        path: rows of poses or joint coordinates, or a CSV file of them, with or without
-            a column ``time``; see :func:`forcefit.assembly.path.path_file.read_path`.
+        path: rows of poses or joint coordinates, or a CSV file with such rows, with or
+            without a column ``time``; see
+            :func:`forcefit.assembly.path.path_file.read_path`.
         profile: name of a profile from rest to rest in
             :data:`forcefit.assembly.path.profiles.PROFILES`; None if times are given.
         duration: [s] duration of the profile.
@@ -114,15 +115,15 @@ def errors_along_path(
         points: number of equally spaced instants.
         load: (6,) [N m, N] constant load on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
-        assumption: assumption of the pose error bounds, problem (27): ``"frozen"`` or
+        assumption: assumption for the pose error bounds, problem (27): ``"frozen"`` or
             ``"free"``; ``"none"`` for no bounds.
-        state: state in which the compliance of the platform is computed:
+        state: state for which the compliance of the platform is computed:
             ``"nominal"``; or ``"contact"`` or ``"exact"`` under the loads of each
             instant.
-        drive_force: [N m or N] force by drive. Such a drive applies this force instead
-            of holding its coordinate.
-        under: values by name of the covariates on which the effects of the robot's file
-            depend, such as ``temperature``; ``time`` is that of the first instant.
+        drive_force: [N m or N] force by drive name. Such a drive applies this force
+            instead of holding its coordinate.
+        under: values by name of the covariates on which the effects in the robot file
+            depend, such as ``temperature``; ``time`` is its value at the first instant.
         output: NetCDF file to write.  Finished points are stored in
             ``<output>.journal``. After an interruption, the same call resumes from it.
         command: command line for the provenance in the file; empty if there is none.
@@ -132,8 +133,8 @@ def errors_along_path(
         The results at all instants.
 
     Raises:
-        BadInput: the path, its times or the robot violate a rule; a row is out of
-            reach; the journal belongs to another path; or a file cannot be written.
+        BadInput: the path, its times or the robot are invalid, a row is out of reach,
+            the journal belongs to another path, or a file cannot be written.
     """
     machine = robot if isinstance(robot, Robot) else load_robot(robot)
     if drive_force:
@@ -158,7 +159,7 @@ def errors_along_path(
 def _identity(
     robot: Robot, trajectory: Trajectory, asked: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return the values that must be equal to resume a path from a journal."""
+    """Return values that must be equal to resume a path from a journal."""
     digest = sha256(trajectory.law.encode())
     for name in ("times", "values", "first", "second"):
         digest.update(np.ascontiguousarray(getattr(trajectory, name)).tobytes())
@@ -179,18 +180,18 @@ def _identity(
 def trajectory_of(
     robot: Robot, path: PathTable | str | Path, times: PathTimes
 ) -> Trajectory:
-    """Return a path in time, after checking that the robot reaches all its rows.
+    """Build the trajectory of a path, and check that the robot reaches all its rows.
 
     Args:
         robot: robot with masses.
         path: path as for :func:`errors_along_path`.
-        times: how the path is traversed in time.
+        times: timing of the path.
 
     Returns:
         The trajectory.
 
     Raises:
-        BadInput: for the reasons of :func:`errors_along_path`.
+        BadInput: for the same reasons as in :func:`errors_along_path`.
     """
     check_masses(robot)
     where = "path" if isinstance(path, PathTable) else str(path)
@@ -207,7 +208,7 @@ def trajectory_of(
 
 
 def _with_times(table: PathTable, times: PathTimes, where: str) -> PathTable:
-    """Return the rows with their times; reject options that contradict each other."""
+    """Add times to the rows; reject contradictory options."""
     limits = {
         "--duration": (times.duration, "s"), "--speed": (times.speed, "m/s"),
         "--acceleration": (times.acceleration, "m/s^2"),

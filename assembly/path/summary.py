@@ -17,7 +17,7 @@ from forcefit.results.text import in_unit, lines_of, table_lines
 from forcefit.results.units import FACTORS
 
 LEAST_PERIODS = 10.0  # for fewer periods, vibration adds >= 15 % (quintic, undamped)
-_STARTS = 1e-6  # share of the largest acceleration; a larger end value is a jump
+_STARTS = 1e-6  # fraction of the largest acceleration; a larger end value is a jump
 LAWS = {"times": "spline through given times"}
 # largest values by key: description, SI unit, displayed unit
 LARGEST = {
@@ -35,7 +35,7 @@ LARGEST = {
 
 
 def sizes(errors: PathErrors) -> dict[str, NDArray]:
-    """Return the magnitudes of the results at each instant.
+    """Compute the magnitudes of the results at each instant.
 
     Args:
         errors: errors along a path, k points.
@@ -63,7 +63,7 @@ def sizes(errors: PathErrors) -> dict[str, NDArray]:
 
 
 def path_summary(errors: PathErrors) -> dict[str, Any]:
-    """Return the results of ``assembly path`` as a dictionary of plain values.
+    """Summarise the results of ``assembly path`` as a dictionary of plain values.
 
     Args:
         errors: errors along a path.
@@ -105,7 +105,7 @@ def path_summary(errors: PathErrors) -> dict[str, Any]:
 def _peak(
     values: NDArray, times: NDArray, owners: list[str] | None = None
 ) -> dict[str, Any]:
-    """Return the largest value, when it occurs, and the body or link that has it."""
+    """Return the largest value, when it occurs, and in which body or link."""
     known = np.where(np.isfinite(values), values, -1.0)  # magnitudes are not negative
     over_time = known if known.ndim == 1 else known.max(axis=1)
     row = largest_row(over_time)
@@ -116,7 +116,7 @@ def _peak(
 
 
 def remarks(errors: PathErrors) -> list[str]:
-    """Return remarks on the effects that the quasi-static results neglect.
+    """Format remarks on effects neglected by the quasi-static results.
 
     Args:
         errors: errors along a path.
@@ -129,7 +129,7 @@ def remarks(errors: PathErrors) -> list[str]:
         found.append(
             f"the path takes {errors.periods:.3g} periods of the first natural "
             f"frequency, less than {LEAST_PERIODS:g}: vibration, which these numbers "
-            "leave out, may exceed them"
+            "neglect, may exceed them"
         )
     if not np.isfinite(errors.periods):
         found.append("no natural frequency was found: the vibration is unknown")
@@ -137,11 +137,11 @@ def remarks(errors: PathErrors) -> list[str]:
     if path.jumps or ends > _STARTS * np.abs(path.second).max(initial=0.0):
         found.append(
             "the acceleration jumps along the path or at its ends: undamped vibration, "
-            "which these numbers leave out, makes two to three times the deflection"
+            "which these numbers neglect, doubles or triples the deflection"
         )
     if virtual_joints(errors.robot).cones.shape[1]:
         found.append(
-            "impacts where a clearance changes sides are left out; without a load the "
+            "impacts where a clearance changes sides are neglected; without a load the "
             "pose within the clearances, and the change from it, is not unique"
         )
     fall = (errors.status == OK) & np.isnan(errors.arrays["inertial_screw"][:, 0])
@@ -156,13 +156,13 @@ def remarks(errors: PathErrors) -> list[str]:
 
 
 def _free_motions(errors: PathErrors) -> str:
-    """Return a remark on motions that the path does not prescribe."""
+    """Format a remark on motions that the path does not prescribe."""
     names, robot = errors.trajectory.names, errors.robot
     freedoms = mobility(home_posture(robot)).platform_freedoms
     if names[0] in POSE and len(names) < freedoms:
         return (
             f"the path states {', '.join(names)} alone, and the platform has "
-            f"{freedoms} freedoms: it moves with the least rates of the joints; "
+            f"{freedoms} degrees of freedom: it moves with minimum joint rates; "
             "expected a column for each component of the pose"
         )
     return (
@@ -172,7 +172,7 @@ def _free_motions(errors: PathErrors) -> str:
 
 
 def path_text(summary: dict[str, Any]) -> str:
-    """Return a summary as text: times, largest values and drive forces."""
+    """Format a summary as text: times, largest values and drive forces."""
     lines = lines_of(summary, "status reason")
     periods = summary["periods"]
     in_periods = f", {periods:.3g} periods of {summary['first_frequency']:.4g} Hz"
@@ -189,7 +189,7 @@ def path_text(summary: dict[str, Any]) -> str:
 
 
 def _table(summary: dict[str, Any]) -> list[str]:
-    """Return text lines with the largest values and drive forces."""
+    """Format the largest values and drive forces as lines of text."""
     rows: dict[str, tuple[Any, ...]] = {}
     for key, peak in summary["largest"].items():
         words, _, unit = LARGEST[key]

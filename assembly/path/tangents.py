@@ -1,7 +1,7 @@
-"""Compliance of the platform along a path, nominal or under the loads of each instant.
+"""Platform compliance along a path, nominal or under the loads at each instant.
 
-The tangent is computed for a robot at rest under the d'Alembert loads of the instant.
-These are dead loads: they remain constant while the platform moves.
+The tangent is computed for a robot at rest under the d'Alembert loads at the instant,
+which are dead loads: they stay constant while the platform moves.
 """
 
 from typing import Any
@@ -31,12 +31,11 @@ def check_state(robot: Robot, state: str) -> None:
 
     Args:
         robot: any robot.
-        state: state in which the compliance is computed.
+        state: state for which the compliance is computed.
 
     Raises:
-        BadInput: the state is not in :data:`STATES`; or the state is ``"exact"`` and a
-            link has distributed inertia, for which there is no model of finite
-            motions.
+        BadInput: the state is not in :data:`STATES`, or the state is ``"exact"`` and a
+            link has distributed inertia, for which no finite-motion model is available.
     """
     if state not in STATES:
         raise BadInput(f"--state: found {quoted(state[:60])}{nearest(state, STATES)}")
@@ -54,11 +53,10 @@ def check_linear(conditions: Conditions, state: str) -> None:
 
     Args:
         conditions: conditions at any instants.
-        state: state in which the compliance is computed.
+        state: state for which the compliance is computed.
 
     Raises:
-        BadInput: the law of an effect is nonlinear, so that its tangent stiffness is
-            not computed.
+        BadInput: an effect is nonlinear, so that its tangent stiffness is not computed.
     """
     places = [law.frame for law in conditions.laws]
     places += [place.frame for place in conditions.yields if not place.linear]
@@ -71,7 +69,7 @@ def check_linear(conditions: Conditions, state: str) -> None:
 
 
 def compliances(conditions: Conditions, state: str, loads: InertialLoads) -> NDArray:
-    """Return the compliance of the platform at k instants.
+    """Compute the compliance of the platform at k instants.
 
     Args:
         conditions: conditions at k instants.
@@ -81,8 +79,8 @@ def compliances(conditions: Conditions, state: str, loads: InertialLoads) -> NDA
 
     Returns:
         (k, 6, 6) [rad/(N m) .. m/N] compliance at the platform's origin, base axes; NaN
-        without an equilibrium.  A clearance that touches its bound without a force is
-        free.
+        without an equilibrium. A clearance that touches its bound without force counts
+        as free.
     """
     if state == "nominal" and not conditions.yields:
         many: Any = platform_stiffness(conditions.postures)  # for k postures
@@ -99,7 +97,7 @@ def compliances(conditions: Conditions, state: str, loads: InertialLoads) -> NDA
 def _compliance(
     conditions: Conditions, state: str, loads: InertialLoads, i: int
 ) -> NDArray:
-    """Return the platform's compliance (6, 6) at one instant."""
+    """Compute the platform compliance (6, 6) at one instant."""
     if state == "contact":
         found = equilibrium_of_row(conditions, loads, i)
         return in_contact(found, "unloading").compliance

@@ -1,12 +1,12 @@
-"""A path in time: components of the pose with their first and second derivatives.
+"""Trajectories: pose components over time, with first and second derivatives.
 
 Rows with times are interpolated by a quintic spline, which is continuous up to the
-fourth derivative.  If the ends are at rest, speed and acceleration are zero there; two
-rows then result in the quintic profile.  Rows without times are interpolated by a
-natural cubic spline. Its parameter is the sum of the distances between successive rows
-(chord length), so two rows result in a straight line.  The path is then traversed with
-a profile of :mod:`forcefit.assembly.path.profiles`.  Both splines interpolate
-positions, rotation vectors or joint coordinates, component by component.
+fourth derivative. If the ends are at rest, speed and acceleration vanish there, and two
+rows give the quintic profile. Rows without times are interpolated by a natural cubic
+spline over the chord length, the sum of the distances between successive rows, so two
+rows give a straight line. The path is then traversed with a profile from
+:mod:`forcefit.assembly.path.profiles`.  Both splines interpolate positions, rotation
+vectors or joint coordinates component by component.
 """
 
 from dataclasses import dataclass
@@ -19,13 +19,13 @@ from forcefit.assembly.path.profiles import JUMPING, PROFILES
 from forcefit.inputs.table import BadInput, nearest
 
 MOST_POINTS = 20_000  # takes ten seconds and 600 MB for a hexapod
-_FINE = 4001  # number of instants searched for the largest speed and acceleration
-_ROWS_MOVING = 6  # least number of rows for a quintic spline without end conditions
+_FINE = 4001  # number of instants at which the peak speed and acceleration are sought
+_ROWS_MOVING = 6  # smallest number of rows for a quintic spline without end conditions
 
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Components of the pose at k instants.
+    """Pose components at k instants.
 
     Attributes:
         names: components, ``tx`` .. or ``q.<frame>``.
@@ -33,7 +33,7 @@ class Trajectory:
         values: (k, c) [m or rad] values of the components.
         first: (k, c) first derivatives.
         second: (k, c) second derivatives.
-        law: ``"times"``, or the name of the profile.
+        law: ``"times"`` or the name of the profile.
         jumps: whether the acceleration is discontinuous.
     """
 
@@ -52,14 +52,14 @@ class Trajectory:
 
 
 def timed(table: PathTable, points: int, ends: str = "rest") -> Trajectory:
-    """Return the trajectory through rows at given times.
+    """Interpolate rows at given times.
 
     Args:
         table: path with times.
         points: number of equally spaced instants.
         ends: ``"rest"``: speed and acceleration are zero at both ends; ``"moving"``:
-            they are computed from the rows (the spline's fifth derivative is
-            continuous at the two knots nearest to each end).
+            they follow from the rows (the fifth derivative of the spline is continuous
+            at the two knots nearest to each end).
 
     Returns:
         The trajectory.
@@ -93,13 +93,13 @@ def profiled(
     duration: float | None = None, speed: float | None = None,
     acceleration: float | None = None,
 ) -> Trajectory:  # fmt: skip
-    """Return the trajectory of a profile from rest to rest along the rows.
+    """Traverse the rows with a rest-to-rest motion profile.
 
     Args:
         table: path; its times are not used.
         points: number of equally spaced instants.
         profile: name in :data:`forcefit.assembly.path.profiles.PROFILES`.
-        size: [m] length that counts as 1 rad in the length of a chord.
+        size: [m] length equivalent to 1 rad in the chord length.
         duration: [s] duration of the motion; None if limits are given.
         speed: [m/s, or rad/s of drives] largest speed of the platform's origin, or of
             any named joint.
@@ -107,12 +107,12 @@ def profiled(
             platform's origin, or of any named joint.
 
     Returns:
-        The trajectory, the shortest one within the limits.
+        The shortest trajectory within the limits.
 
     Raises:
-        BadInput: the profile is unknown; both or neither of duration and limits are
-            given; two consecutive rows are equal; or limits are given for a platform
-            origin that does not move.
+        BadInput: the profile is unknown, both or neither of duration and limits are
+            given, two consecutive rows are equal, or limits are given although the
+            platform origin does not move.
     """
     from scipy.interpolate import CubicSpline
 
@@ -150,7 +150,7 @@ def _check_points(points: int) -> None:
 
 
 def _chords(table: PathTable, size: float) -> NDArray:
-    """Return the share (rows,) of the total chord length before each row."""
+    """Return the fraction (rows,) of the total chord length before each row."""
     turns = np.array([name[0] == "r" for name in table.names])
     steps = np.diff(table.values, axis=0) * np.where(turns, size, 1.0)
     lengths = np.linalg.norm(steps, axis=1)
@@ -168,8 +168,8 @@ def _within(
     names: tuple[str, ...], first: NDArray, second: NDArray, speed: float | None,
     acceleration: float | None,
 ) -> float:  # fmt: skip
-    """Return the least duration [s] within limits for a motion of unit duration."""
-    # speeds are inversely proportional to the duration, accelerations to its square
+    """Scale a motion of unit duration to the shortest duration [s] within limits."""
+    # speeds scale inversely with the duration, accelerations with its square
     moved = [k for k, name in enumerate(names) if name[0] == "t"]
     if names[0].startswith("q."):
         fastest = np.abs(first).max(), np.abs(second).max()

@@ -1,4 +1,4 @@
-"""Monte Carlo statistics of geometric errors, and allocation of tolerances.
+"""Monte Carlo statistics of geometric errors and tolerance allocation.
 
 Start with ``monte_carlo.py`` for random errors, ``allocation.py`` for tolerances.
 """

@@ -1,4 +1,4 @@
-"""The result of a tolerance allocation, as values, as text and as a data set."""
+"""Result of a tolerance allocation, as plain values, text and a data set."""
 
 from dataclasses import dataclass, field
 from importlib.metadata import version
@@ -33,25 +33,25 @@ _SHARE_OF = {
 
 @dataclass(frozen=True, eq=False)
 class Allocation:
-    """Tolerances and their cost, with bounds of the cost and of the limited values.
+    """Tolerances and their cost, with bounds on the cost and on each limited quantity.
 
     Attributes:
         plan: costs and limits.
         tolerances: (G,) [rad or m] tolerance of each class.
         price: cost of the tolerances.
-        uniformly_scaled: (G,) [rad or m] tolerances in the proportions of the convex
-            programme, multiplied by one factor so that they meet all limits.
+        uniformly_scaled: (G,) [rad or m] solution of the convex programme, scaled by
+            one common factor so that all limits are met.
         price_uniformly_scaled: cost of ``uniformly_scaled``, at least ``price``.
-        price_bound: lower bound of the cost of any tolerances with which every robot
-            meets the convex limits; NaN for a yield below 1, or if a limit is not
+        price_bound: lower bound on the cost of all tolerances for which every robot
+            meets the convex limits. NaN if the yield is below 1 or a limit is not
             convex.
         cuts: number of cutting planes in the convex programme.
-        worst: by limit, for a yield of 1: the value of the limited quantity at the
-            worst corner found, and its proven upper bound over all postures. The bound
-            is NaN if it could not be proven.
-        proven_scale: factor on the tolerances, at most 1, for which the proven upper
-            bounds also meet the limits; NaN if there is no proof.
-        verification: yields of new random draws, with confidence intervals.
+        worst: for each limit, if the yield is 1: the limited quantity at the worst
+            corner found, and its proven upper bound over all postures (NaN without a
+            proof).
+        proven_scale: factor, at most 1, by which the tolerances must be scaled so that
+            the proven upper bounds meet the limits too. NaN without a proof.
+        verification: yields estimated from new random draws, with confidence intervals.
         perfect_parts: for each limit on a pose error, the pose error [rad or m] due to
             clearances alone, and its posture.
     """
@@ -71,7 +71,7 @@ class Allocation:
     __repr__, _repr_html_ = short_repr, html_table
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return the data set of tolerances by class that ``--output`` writes."""
+        """Return the data set of class tolerances that ``--output`` writes."""
         return tolerance_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
@@ -82,7 +82,7 @@ class Allocation:
 
 
 def allocation_of(allocation: Allocation) -> dict[str, Any]:
-    """Return an allocation as a dictionary of plain values."""
+    """Convert an allocation to a dictionary of plain values."""
     plan, shares = allocation.plan, price_shares(allocation)
     classes = [
         {
@@ -125,19 +125,19 @@ def allocation_of(allocation: Allocation) -> dict[str, Any]:
 
 
 def price_shares(allocation: Allocation) -> NDArray:
-    """Return the share of each class in the saving by larger tolerances.
+    """Return the fraction of the cost saving that each class could contribute.
 
-    At the least cost, the saving per relative change of a tolerance equals the
-    multiplier of the limit times the change of the limited quantity.  For the
+    At the optimum, the cost saved per relative increase of a tolerance equals the
+    limit's multiplier times the resulting change of the limited quantity.  For the
     reciprocal cost law this saving is cost / tolerance; for the logarithmic law it is
-    the cost coefficient.  The saving has no unit, so that angles and lengths can be
+    the cost coefficient.  The saving is dimensionless, so angles and lengths can be
     compared.
 
     Args:
         allocation: result of the allocation.
 
     Returns:
-        (G,) shares that add up to 1.
+        (G,) fractions that sum to 1.
     """
     plan = allocation.plan
     savings = plan.costs.astype(float)
@@ -150,7 +150,7 @@ def price_shares(allocation: Allocation) -> NDArray:
 def _taken(
     allocation: Allocation, key: str, reached: float, at: str
 ) -> dict[str, float | str]:
-    """Return the pose error due to clearances, and the cost if clearances were zero."""
+    """Return the pose error due to clearances, and the cost without any clearance."""
     plan, limit = allocation.plan, allocation.plan.limits[key]
     # the pose errors due to geometric errors and due to clearances nearly add up; the
     # former are proportional to the tolerances
@@ -174,7 +174,7 @@ def _distribution(plan: Plan) -> dict[str, Any]:
 
 
 def _contact_length(plan: Plan) -> float | None:
-    """Return the contact length [m] of the contact model; None for other models."""
+    """Return the contact length [m] of the contact model, or None for other models."""
     if not plan.limits_pose or plan.clearance != "contact":
         return None
     return plan.contact_length or contact_length_of(plan.sources.robot)
@@ -199,7 +199,7 @@ def _is_width(plan: Plan, group: int) -> bool:
 
 
 def allocation_text(results: dict[str, Any]) -> str:
-    """Return an allocation as text."""
+    """Format an allocation as text."""
     lines = []
     for one in results["tolerances"]:
         sides = "" if one.get("width") else "+-"
@@ -238,7 +238,7 @@ def allocation_text(results: dict[str, Any]) -> str:
 
 
 def _taken_text(key: str, one: dict[str, Any]) -> str:
-    """Return a sentence on the pose error that clearances cause at zero errors."""
+    """Format a sentence on the pose error caused by clearances alone."""
     reached, limit = (
         in_unit(one[k], _SHOWN[one["unit"]]) for k in ("reached", "limit")
     )
@@ -251,7 +251,7 @@ def _taken_text(key: str, one: dict[str, Any]) -> str:
 
 
 def _looks_text(check: dict[str, Any]) -> str:
-    """Return the number of verification tests and their confidence levels as text."""
+    """Format the number of verification tests and their confidence levels as text."""
     left = check["yield"]["undecided"]
     undecided = f", {left} draws undecided" if left else ""
     return (
@@ -262,7 +262,7 @@ def _looks_text(check: dict[str, Any]) -> str:
 
 
 def _price_text(results: dict[str, Any]) -> str:
-    """Return the cost of the tolerances as text, with its lower bound or reduction."""
+    """Format the cost of the tolerances as text, with its lower bound or reduction."""
     price, alike, bound = (results[k] for k in ("price", "price_alike", "price_bound"))
     text = f"price {price:.5g}"
     if np.isfinite(bound):
@@ -275,7 +275,7 @@ def _price_text(results: dict[str, Any]) -> str:
 
 
 def tolerance_dataset(allocation: Allocation) -> "xarray.Dataset":
-    """Return an allocation as a data set over ``class``."""
+    """Convert an allocation to a data set over ``class``."""
     import xarray
 
     plan, results = allocation.plan, allocation_of(allocation)

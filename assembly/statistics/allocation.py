@@ -1,15 +1,17 @@
-"""Tolerance allocation: tolerances of least cost within limits.
+"""Tolerance allocation: minimum-cost tolerances within limits.
 
 Each class g of errors has a tolerance t_g, whose cost is ``c_g / t_g`` (or ``-c_g log
-t_g``).  The margin and the energy are convex in the tolerances. If only they are
-limited and the yield is 1, :mod:`forcefit.assembly.statistics.cutting_planes` finds the
-least cost and proves that no tolerances cost less.  Wrenches, stress, pose errors and a
-yield below 1 are not convex in the tolerances. For limits on them,
-:mod:`forcefit.assembly.statistics.least_cost` continues to a local minimum of the cost.
+t_g``).  The margin and the energy are convex in the tolerances. If these are the only
+limited quantities and the yield is 1,
+:mod:`forcefit.assembly.statistics.cutting_planes` finds the minimum cost and proves
+that no tolerances cost less.  Wrenches, stress, pose errors and a yield below 1 are not
+convex in the tolerances. For limits on them,
+:mod:`forcefit.assembly.statistics.least_cost` continues from there to a local minimum
+of the cost.
 
-Finally, all tolerances are multiplied by one factor. With this factor, independent
-random draws, or the worst corners of the tolerance box, just meet every limit. New
-random draws then verify the tolerances.
+Finally, all tolerances are scaled by one common factor, chosen so that independent
+random draws, or the worst corners of the tolerance box, just meet every limit. The
+result is verified with new random draws.
 """
 
 from collections.abc import Callable, Sequence
@@ -50,21 +52,21 @@ def allocate(
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
     replay: Replay | None = None,
 ) -> Allocation:
-    """Find the tolerances of least cost that meet a plan's limits, and verify them.
+    """Find the minimum-cost tolerances that meet a plan's limits, and verify them.
 
     Args:
         postures: postures of one robot in its workspace.
         plan: costs and limits.
-        fresh: number of independent draws for the verification; 0 for none.
-        progress: called with the name of a step, its progress and its total.
-        replay: stored results, from which a killed computation resumes.
+        fresh: number of independent draws for the verification; 0 to skip it.
+        progress: callback that receives the name of a step, its progress and its total.
+        replay: stored results from which an interrupted computation resumes.
 
     Returns:
         The tolerances.
 
     Raises:
-        BadInput: neither clearances nor springs can take up some error, or a limit is
-            violated without errors or with the tightest tolerances.
+        BadInput: an error can be taken up neither by a clearance nor by a spring, or a
+            limit is violated even without errors or with the tightest tolerances.
     """
     replay = replay or Replay()
     if isinstance(plan.sources, CalloutSources) and plan.asked_yield == 1.0:
@@ -108,7 +110,7 @@ def _scaled_tolerances(
     proportions: NDArray,
     progress: Callable[[str, int, int], None],
 ) -> tuple[NDArray, NDArray]:
-    """Return the tolerances of least cost, and uniformly scaled start tolerances."""
+    """Return the minimum-cost and the uniformly scaled starting tolerances."""
     samples = draw_samples(requirement, TRAINING)
     if requirement.is_convex:
         uniformly_scaled = scale_uniformly(

@@ -2,9 +2,8 @@
 
 A prepared posture omits the motion limits of passive joints, because clearances rarely
 move a joint so far.  Draws in which a joint may reach a limit are solved one by one.
-For these draws, every relevant limit is an additional cone of problem (27), which
-describes the set of platform screws
-(:mod:`forcefit.assembly.linear.reference.pose_error`).
+Every relevant limit then adds a cone to problem (27), which describes the set of
+platform screws (:mod:`forcefit.assembly.linear.reference.pose_error`).
 """
 
 from dataclasses import replace
@@ -20,12 +19,12 @@ from forcefit.assembly.linear.reference.reduction import FreeMotion
 from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.assembly.statistics.linear_response import LinearResponse
 
-# assumption of the pose error bounds: springs keep their least-energy deformation
+# assumption of the pose error bounds: spring deformations stay at minimum energy
 ASSUMPTION = "frozen"
 
 
 def draws_at_bounds(prepared: LinearResponse, draws: Assembly) -> NDArray:
-    """Return the draws in which a passive joint may reach a bound of its motion.
+    """Find the draws in which a passive joint may reach its motion limit.
 
     Args:
         prepared: the prepared posture.
@@ -33,8 +32,8 @@ def draws_at_bounds(prepared: LinearResponse, draws: Assembly) -> NDArray:
 
     Returns:
         (k,) bool, True if a motion limit is active in the solution, if the clearances
-        can move a joint to its limit, or if only the limit stops a motion of the
-        platform.
+        allow a joint to reach its limit, or if nothing but the limit stops a platform
+        motion.
     """
     solved = np.isfinite(draws.energy)
     active = solved & np.isnan(draws.clearances).any(axis=1)
@@ -53,7 +52,7 @@ def draws_at_bounds(prepared: LinearResponse, draws: Assembly) -> NDArray:
 
 
 def _moves_platform(prepared: LinearResponse) -> NDArray:
-    """Return (nq,) bool, True if a free motion moves the platform in closed loops."""
+    """Return (nq,) bool, True if a free motion moves the platform with loops closed."""
     mismatch = prepared.posture.mismatch
     A_q = prepared.closures @ prepared.joints.free
     P_q = prepared.platform @ prepared.joints.free
@@ -65,18 +64,18 @@ def _moves_platform(prepared: LinearResponse) -> NDArray:
 def bounded_position(
     draws: Assembly, i: int, wrench: NDArray | None, rng: np.random.Generator
 ) -> tuple[NDArray, bool]:
-    """Return the platform screw of one draw, at contact or from the uniform model.
+    """Compute the platform screw of one draw, at contact or from the uniform model.
 
     Args:
         draws: draws of one posture.
         i: index of the draw.
-        wrench: (6,) [N m, N] wrench that moves the platform to contact; None to sample
-            the platform screw uniformly from its set.
-        rng: generator of random numbers for the uniform model.
+        wrench: (6,) [N m, N] wrench that moves the platform into contact; None to
+            sample the platform screw uniformly from its feasible set.
+        rng: random number generator for the uniform model.
 
     Returns:
         (6,) [rad, m] screw, NaN if the draw has no solution or the solver fails; and
-        whether the random walk mixed.  Motions without any limit are minimised.
+        whether the random walk mixed. Unlimited motions are made as small as possible.
     """
     from forcefit.assembly.solvers.uniform_clearance import sample_uniform_position
 

@@ -1,8 +1,8 @@
 """Random geometric errors from drawing callouts, joint fits and an errors file.
 
-The shift and the tilt of a bore in its position zone depend on each other.  All errors
-of one callout are therefore drawn together.  A draw depends only on its number and on
-the seed, as in :mod:`forcefit.assembly.model.error_distributions`.
+The shift and the tilt of a bore within its position zone are not independent, so all
+errors of one callout are drawn together. A draw depends only on its number and the
+seed, as in :mod:`forcefit.assembly.model.error_distributions`.
 """
 
 from collections.abc import Callable
@@ -30,12 +30,12 @@ from forcefit.assembly.statistics.ranking import group_of, kind_of
 from forcefit.inputs.table import BadInput
 
 _SAMPLE = 1 << 14  # number of draws from which the variance of a fit is estimated
-_WORDS = 4  # number of random numbers that one step of the Philox generator returns
+_WORDS = 4  # random numbers returned by one step of the Philox generator
 
 
 @dataclass(frozen=True, eq=False)
 class CalloutSources:
-    """Sources of random errors (callouts, errors file, fits): m numbers per draw.
+    """Sources of random errors (callouts, errors file, fits), with m numbers per draw.
 
     The m numbers are, in this order: the independent errors [rad or m]; the coordinates
     of the callouts' zones relative to the radius of each ball [-]; and the radial
@@ -62,7 +62,7 @@ class CalloutSources:
 
     @cached_property
     def columns(self) -> list[NDArray]:
-        """Indices of the numbers that belong to each callout."""
+        """Column indices of the numbers of each callout."""
         widths = [sum(placed.zone.dimensions) for placed in self.placed]
         ends = self._independent_count + np.cumsum(widths)
         return [np.arange(e - w, e) for e, w in zip(ends, widths, strict=True)]
@@ -98,16 +98,16 @@ class CalloutSources:
         )
 
     def groups_by(self, by: str) -> list[str]:
-        """Return the name of the group of each number.
+        """Return the group name of each number.
 
         Args:
             by: ``"source"``, ``"frame"`` or ``"kind"``.
 
         Returns:
             (m,) names.  The numbers of a callout are in one group.  By kind, callouts
-            with the same name in every leg are one group.  Numbers that depend on the
-            size of the same hole are one group too: its position at maximum material,
-            the shift of its datum, and its fit.
+            with the same name in every leg form one group. Numbers that depend on the
+            size of the same hole also form one group: its position at maximum material,
+            its datum shift and its fit.
         """
         labels = () if self.independent is None else self.independent.labels
         names, holes, counts = list[str](), list[str](), list[int]()
@@ -129,7 +129,7 @@ class CalloutSources:
         return own
 
     def draw(self, first: int, count: int, seed: int, stream: int = 0) -> NDArray:
-        """Return the numbers (count, m) of draws; see ErrorSources.uniforms."""
+        """Draw the numbers (count, m); see ErrorSources.uniforms."""
         words = [self._independent_count, *(p.zone.words for p in self.placed)]
         words += [2] * len(self.fits)
         ends = np.cumsum(words)
@@ -173,7 +173,7 @@ class CalloutSources:
         return self._with_radial([f.fit.mean_radial + float(v) for f, v in pairs])
 
     def with_largest_clearances(self) -> Robot:
-        """Return the robot in which every fit has its largest clearance."""
+        """Return the robot with the largest clearance of every fit."""
         return self._with_radial([one.fit.radial[1] for one in self.fits])
 
     def _with_radial(self, radial: list[float]) -> Robot:
@@ -192,7 +192,7 @@ class CalloutSources:
         return full if self.fixed is None else full + self.fixed
 
     def of_numbers(self, slopes: NDArray) -> NDArray:
-        """Convert derivatives by delta l (..., n, 6) to ones by numbers (..., m)."""
+        """Convert derivatives by delta l (..., n, 6) into (..., m) by number."""
         return np.einsum("...ni,nim->...m", slopes, self.maps)
 
     @cached_property
@@ -208,13 +208,13 @@ class CalloutSources:
 
     @property
     def units(self) -> list[str]:
-        """Unit of each number; a callout combines shifts and tilts."""
+        """Unit of each number; the numbers of a callout combine shifts and tilts."""
         own = [] if self.independent is None else self.independent.units
         return own + ["rad, m"] * (len(self) - len(own))
 
     @property
     def identity(self) -> list[NDArray]:
-        """Arrays that are equal for two objects exactly if their errors are equal."""
+        """Arrays that are equal if and only if two objects draw equal errors."""
         own = [] if self.independent is None else self.independent.identity
         for p in self.placed:
             law = [DISTRIBUTIONS.index(p.callout.distribution), p.callout.cp]
@@ -244,7 +244,7 @@ def _nth(uniforms: Callable[[int], list[NDArray]], i: int) -> Callable[[int], ND
 def _uniforms(
     first: int, count: int, seed: int, stream: int, words: int, attempt: int
 ) -> NDArray:
-    """Return (count, words) uniform random numbers; each attempt uses new ones."""
+    """Return (count, words) uniform random numbers, new ones for each attempt."""
     steps = -(-max(1, words) // _WORDS)
     philox = np.random.Philox(
         key=np.array([seed, stream], dtype=np.uint64),
@@ -260,21 +260,21 @@ def sources_of(
     independent: Sources | Path | str | None = None,
     fixed: NDArray | None = None,
 ) -> Sources:
-    """Return the random errors of a robot from its callouts and independent errors.
+    """Collect a robot's random errors from its callouts, fits and independent errors.
 
     Args:
         robot: any robot.
         independent: independent errors, or a file of them (TOML, see
-            docs/statistics.md); or None.  The sources that this function returned are
-            returned unchanged.
+            docs/statistics.md); or None.  Sources returned by this function are passed
+            through unchanged.
         fixed: (n, 6) [rad, m] errors that are added to every draw.
 
     Returns:
-        The sources of errors; only the independent ones if the robot has no callouts.
+        The error sources; only the independent errors if the robot has no callouts.
 
     Raises:
-        BadInput: the file violates a rule; or the robot has no callouts, and there are
-            no independent errors.
+        BadInput: the file violates a rule, or the robot has no callouts and no
+            independent errors are given.
     """
     if isinstance(independent, Path | str):
         independent = read_sources(independent, robot, fixed)

@@ -1,4 +1,4 @@
-"""Capability indices Cp and Cpk and parts per million out of limits, with intervals.
+"""Capability indices Cp and Cpk and out-of-limit parts per million, with intervals.
 
 The indices apply to normal data within two limits, or to draws of any distribution
 below one limit.
@@ -29,8 +29,8 @@ class Capability:
     Attributes:
         cp: value, lower and upper bound; NaN unless there are two limits.
         cpk: value, lower and upper bound.
-        share_outside: probability outside the limits of a normal distribution with the
-            sample's mean and standard deviation.
+        share_outside: probability that a normal variable with the sample's mean and
+            standard deviation lies outside the limits.
     """
 
     cp: tuple[float, float, float]
@@ -41,7 +41,7 @@ class Capability:
 def capability(
     values: ArrayLike, lower: float, upper: float, level: float = 0.95
 ) -> Capability:
-    """Return Cp and Cpk of normal data.
+    """Compute Cp and Cpk of normal data.
 
     Args:
         values: (n,) sample of a normal distribution, n > 1.
@@ -75,7 +75,7 @@ def capability(
 
 
 def share_outside(cpk_upper: float, cpk_lower: float) -> float:
-    """Return the share of a normal distribution outside its limits."""
+    """Return the probability mass of a normal distribution outside its limits."""
     return float(norm.sf(3 * cpk_upper) + norm.sf(3 * cpk_lower))
 
 
@@ -115,7 +115,7 @@ def cpk_interval_one_sided(
 def quantile_cpk(
     values: ArrayLike, limit: float, level: float = 0.95
 ) -> tuple[float, float, float]:
-    """Return Cpk of draws of any distribution below an upper limit.
+    """Compute Cpk of draws from any distribution with an upper limit.
 
     Cpk is (limit - median) / (99.865 % quantile - median).  For a normal distribution
     this equals the usual index.
@@ -123,9 +123,9 @@ def quantile_cpk(
     Args:
         values: (k,) draws; inf for a draw without a solution.
         limit: upper limit.
-        level: confidence level of the interval.  The interval is valid for any
-            distribution; both quantiles are bounded by order statistics, each with half
-            of the error probability.
+        level: confidence level of the interval.  The interval is distribution-free:
+            order statistics bound both quantiles, each with half of the error
+            probability.
 
     Returns:
         Value, lower and upper bound; 0 if the draws are too few to bound a quantile.
@@ -146,7 +146,7 @@ def quantile_cpk(
 def quantile_cp(
     values: ArrayLike, limit: float, level: float = 0.95
 ) -> tuple[float, float, float]:
-    """Return Cp of magnitudes, which lie between zero and an upper limit.
+    """Compute Cp of magnitudes, which lie between zero and an upper limit.
 
     Cp is limit / (99.865 % quantile - 0.135 % quantile).  For a normal distribution
     between the limits zero and ``limit`` this equals the usual index.
@@ -173,7 +173,7 @@ def quantile_cp(
 def draws_capability(
     values: ArrayLike, exceeds: Mapping[str, Any], level: float = 0.95
 ) -> dict[str, Any]:
-    """Return Cp, Cpk and the parts per million of draws above a limit.
+    """Compute Cp, Cpk and the parts per million of draws above a limit.
 
     Args:
         values: (k,) draws; a NaN (draw without a solution) counts as above the limit.
@@ -198,10 +198,10 @@ def draws_capability(
 
 
 def capability_text(results: Mapping[str, Any]) -> str:
-    """Return the capability of draws as text, with one line per quantity."""
+    """Format the capability of draws as text, with one line per quantity."""
 
     def index(one: Mapping[str, float]) -> str:
-        # division by an unknown, infinite width of the distribution may result in -0.0
+        # dividing by an infinite (unknown) width of the distribution may give -0.0
         value, low, high = (one[key] + 0.0 for key in ("value", "lower", "upper"))
         return f"{value:.3g} ({low:.3g} to {high:.3g})"
 

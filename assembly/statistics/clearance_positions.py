@@ -1,21 +1,21 @@
-"""Clearance models: where the clearances of an assembled robot are.
+"""Clearance models: positions within the clearances of an assembled robot.
 
-In the solution of least energy, clearances that carry load are at their bounds.  The
-other clearances may move without deforming any spring, and their possible positions
-form a convex set.  The models are
+In the minimum-energy solution, clearances that carry load are at their bounds. The
+other clearances can move without deforming any spring, and their possible positions
+form a convex set. The available models are
 
 ======== =====================================================================
 worst    any position; the largest pose errors are computed, see
          :mod:`forcefit.assembly.statistics.worst_clearance`
 uniform  uniformly distributed over the set (billiard walk)
 contact  displaced by a wrench of random direction on the platform until in contact
-least    the position in the least-energy solution, one of many possible ones
+least    the position in the minimum-energy solution, one of many possible ones
 ======== =====================================================================
 
 The contact model requires a length that relates moments to forces: random moments
 divided by this length are as large as random forces.  The positions depend on the
 length, so every result reports it.  If the service loads are known, they determine how
-the clearances close, and no length is needed.
+the clearances close, so no contact length is needed.
 """
 
 from collections.abc import Sequence
@@ -40,7 +40,7 @@ CLEARANCE_MODELS = {
     "contact": "clearances displaced to contact by a wrench of random direction",
     "least": "positions of the least-energy solution, one of many possible ones",
 }
-CLEARANCE_STREAM = 1  # stream of random numbers for clearances; stream 0 is for errors
+CLEARANCE_STREAM = 1  # random number stream for clearances; stream 0 is for errors
 
 
 def position_clearances(
@@ -50,18 +50,18 @@ def position_clearances(
     generators: Sequence[np.random.Generator],
     contact_length: float | None = None,
 ) -> tuple[NDArray, NDArray]:
-    """Return the platform screws for the clearance positions of a clearance model.
+    """Place the clearances according to a clearance model; return the platform screws.
 
     Args:
         prepared: the prepared posture.
         draws: solutions for k draws, from the posture's ``solve``.
         clearance: one of :data:`CLEARANCE_MODELS` except the worst model.
-        generators: generator of random numbers for each draw; not used for "least".
+        generators: random number generator for each draw; not used for "least".
         contact_length: [m] length of the contact model, see :func:`contact_length_of`.
 
     Returns:
         (k, 6) [rad, m] screws, NaN where a draw has no solution; and (k,) bool, False
-        where the random walk of the uniform model did not mix even at its greatest
+        where the random walk of the uniform model did not mix even at its maximum
         length, see
         :func:`forcefit.assembly.solvers.uniform_clearance.sample_uniform_position`.
 
@@ -96,7 +96,7 @@ def _moved_clearances(
     prepared: LinearResponse, draws: Assembly, left: NDArray, wrenches: NDArray | None,
     generators: Sequence[np.random.Generator],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return moved clearances of the draws ``left``, and whether random walks mixed."""
+    """Move clearances of the draws ``left``; return also whether random walks mixed."""
     clearances, mixed = draws.clearances.copy(), np.ones(len(left), dtype=bool)
     loaded = loaded_clearances(prepared, draws)
     patterns, pattern_of_draw = np.unique(loaded, axis=0, return_inverse=True)
@@ -120,7 +120,7 @@ def contact_length_of(robot: Robot) -> float:
 
 
 def clearance_means(clearance: str, contact_length: float | None = None) -> str:
-    """Return the meaning of a clearance model; for "contact" also its length."""
+    """Describe a clearance model; for "contact", include the contact length."""
     words = CLEARANCE_MODELS[clearance]
     if clearance != "contact" or contact_length is None:
         return words
@@ -130,7 +130,7 @@ def clearance_means(clearance: str, contact_length: float | None = None) -> str:
 def _random_wrenches(
     generators: Sequence[np.random.Generator], length: float
 ) -> NDArray:
-    """Return random platform wrenches (k, 6), moments scaled by the contact length."""
+    """Draw platform wrenches (k, 6) with moments scaled by the contact length."""
     scale = np.repeat([1.0, 1.0 / length], 3)
     wrenches = np.array([rng.normal(size=6) for rng in generators])
     return wrenches.reshape(-1, 6) * scale
@@ -140,7 +140,7 @@ def _at_random(
     prepared: LinearResponse, loaded: NDArray, clearances: NDArray,
     generators: Sequence[np.random.Generator],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return uniformly drawn clearances, and whether each random walk mixed."""
+    """Sample clearances uniformly; return them and whether each random walk mixed."""
     from forcefit.assembly.solvers.uniform_clearance import sample_uniform_position
 
     free = ~loaded
@@ -184,7 +184,7 @@ def _at_contact_alone(
     clearances: NDArray,
     direction: NDArray,
 ) -> NDArray:
-    """Return the farthest clearance position (nu,), computed by the solver Clarabel."""
+    """Compute the farthest clearance position (nu,) with the Clarabel solver."""
     group = np.unique(prepared.joints.group[free], return_inverse=True)[1]
     none, size = np.zeros((0, int(free.sum()))), np.linalg.norm(direction[free])
     solution = minimise_energy(
@@ -207,8 +207,8 @@ def loaded_clearances(prepared: LinearResponse, draws: Assembly) -> NDArray:
         forces += prepared.loads.joint @ prepared.joints.cones
     force_sizes = _sizes(forces, prepared.starts)
     slack = np.maximum(0.0, 1.0 - _sizes(draws.clearances, prepared.starts))
-    # the product of contact force and slack is about the solver's duality gap, so force
-    # or slack is nearly zero
+    # the product of contact force and slack is about the duality gap, so one of the two
+    # is nearly zero
     scale = np.maximum(draws.energy, 1e-18)[:, None]
     loaded = (force_sizes > scale * slack) & (force_sizes > 1e-9 * scale)
     return np.repeat(loaded, np.diff(prepared.starts), axis=1)
@@ -227,5 +227,5 @@ def _cone_columns(prepared: LinearResponse) -> NDArray:
 
 
 def _sizes(values: NDArray, starts: NDArray) -> NDArray:
-    """Return the norms (k, cones) of the clearance components of each cone."""
+    """Return the norm (k, cones) of each cone's clearance components."""
     return np.sqrt(np.add.reduceat(values**2, starts[:-1], axis=1))

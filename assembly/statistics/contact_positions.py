@@ -1,4 +1,4 @@
-"""Clearance positions that lie farthest in given directions of clearance space."""
+"""Clearance positions that lie farthest along given directions in clearance space."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ def move_to_contact(
     rows: NDArray, starts: NDArray, free: NDArray, positions: NDArray,
     directions: NDArray,
 ) -> NDArray:  # fmt: skip
-    """Return the point of the set of clearances that is farthest in each direction.
+    """Find the point of the clearance set that lies farthest along each direction.
 
     Args:
         rows: (p, nu) orthonormal rows, zero for clearances that are not ``free``.
@@ -23,8 +23,8 @@ def move_to_contact(
         directions: (k, nu) directions in which the component is maximised.
 
     Returns:
-        (k, nu) farthest points; NaN if the interior-point method fails, which may
-        happen if the set has empty interior.
+        (k, nu) farthest points; NaN if the interior-point method fails, for example
+        because the interior of the set is empty.
     """
     ends = positions.copy()
     along = np.where(free, directions, 0.0)

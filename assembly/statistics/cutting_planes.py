@@ -1,16 +1,17 @@
-"""Tolerances of least cost for convex requirements, by cutting planes.
+"""Minimum-cost tolerances for convex requirements, by cutting planes.
 
 Two requirements are convex in the tolerances t:
 
 - *yield 1*: margin or energy at every corner of the tolerance box.  For every choice s
   of signs, ``m(t s)`` is convex in t; the margin is also proportional to t.
-- *yield below 1*: the mean over the worst share (1 - yield) of many fixed draws s. This
-  mean is the conditional value at risk. Limiting it is stricter than the yield itself.
+- *yield below 1*: the mean over the worst fraction (1 - yield) of many fixed draws s.
+  This mean is the conditional value at risk; a limit on it is stricter than the yield
+  requirement itself.
 
-Each iteration minimises the cost within the planes found so far.  It then finds the
-largest violation of the requirement, and adds the plane that linearises the violated
-quantity.  Every plane holds for all tolerances that meet the requirement. The minimum
-within the planes is therefore a lower bound of the cost.
+Each iteration minimises the cost subject to the planes found so far, finds the largest
+violation of the requirement, and adds the plane that linearises the violated quantity.
+Every plane is valid for all tolerances that meet the requirement, so the minimum
+subject to the planes is a lower bound on the cost.
 
 Sources:
     Kelley (1960), The cutting-plane method for solving convex programs; Rockafellar,
@@ -33,14 +34,14 @@ _MOST_CUTS = 200
 def cut_planes(
     requirement: Requirement, progress: Callable[[str, int, int], None]
 ) -> tuple[NDArray, float, int]:
-    """Return the tolerances of least cost that meet the convex requirements.
+    """Find the minimum-cost tolerances that meet the convex requirements.
 
     Args:
         requirement: requirement at all postures.
         progress: called with the name of a step, its progress and its total.
 
     Returns:
-        (G,) [rad or m] tolerances, a lower bound of their cost, and the number of
+        (G,) [rad or m] tolerances, a lower bound on their cost, and the number of
         planes.
 
     Raises:
@@ -65,7 +66,7 @@ def cut_planes(
 def cheapest_within(
     plan: Plan, planes: Sequence[NDArray], least: NDArray, most: NDArray
 ) -> NDArray:
-    """Return the tolerances of least cost with ``a.t <= 1`` for every plane a.
+    """Find the minimum-cost tolerances with ``a.t <= 1`` for every plane a.
 
     Args:
         plan: plan with the cost coefficients.
@@ -82,7 +83,7 @@ def cheapest_within(
     import cvxpy as cp
 
     A = np.array(planes).reshape(-1, len(plan.names))
-    # scaled such that each tolerance alone reaches its most restrictive plane at 1
+    # scaled so that each tolerance alone reaches its most restrictive plane at 1
     steepest = np.maximum(A, 0.0).max(axis=0, initial=0.0)
     scale = np.minimum(most, 1.0 / np.maximum(steepest, 1e-300))
     x = cp.Variable(len(plan.names))

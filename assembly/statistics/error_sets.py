@@ -1,4 +1,4 @@
-"""Zones of all errors and clearances at a posture, and the pose errors they cause."""
+"""Zones of all errors and clearances at a posture, and the resulting pose errors."""
 
 from dataclasses import dataclass
 
@@ -18,22 +18,23 @@ from forcefit.assembly.statistics.callout_sources import CalloutSources, Sources
 from forcefit.assembly.statistics.linear_response import LinearResponse
 from forcefit.inputs.table import BadInput
 
-_ROUNDING = 1e-9  # rows smaller than this share of the largest row are rounding errors
+_ROUNDING = 1e-9  # rows smaller than this fraction of the largest row are round-off
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorSets:
-    """Zones of errors and clearances as one vector z with linear conditions on z.
+    """Zones of errors and clearances, stacked in one vector z with linear constraints.
 
     Attributes:
         names: names of the zones.
         zones: the zones, each in unit coordinates.
         columns: indices of each zone's coordinates in z.
         screws: (6, total) [rad, m] map from z to the platform screw.
-        rigid_rows: (p, total) rows whose product with z is zero if parts are rigid.
-        spring_rows: (r, total) rows whose product with z deforms springs.
+        rigid_rows: (p, total) rows whose product with z must vanish if parts are rigid.
+        spring_rows: (r, total) rows whose product with z is taken up by springs.
         clearances: number of coordinates of z that are clearances.
-        contact_rows: (q, total) rows with zero product for parallel contacts.
+        contact_rows: (q, total) rows whose product with z must vanish for parallel
+            contacts.
     """
 
     names: tuple[str, ...]
@@ -46,14 +47,14 @@ class ErrorSets:
     contact_rows: NDArray
 
     def weights_on_zones(self, along: NDArray) -> NDArray:
-        """Return the weights of the coordinates z after parallel contacts reduce them.
+        """Return the weights of the coordinates z, reduced by parallel contacts.
 
         Args:
             along: (total,) weights of the coordinates.
 
         Returns:
-            (total,) weights with the smallest sum of support functions. This sum equals
-            the largest product with ``along`` over all positions of the contacts.
+            (total,) weights with the smallest sum of support functions, which equals
+            the largest product with ``along`` over all contact positions.
         """
         rows = self.contact_rows
         own = rows.any(axis=0)
@@ -73,7 +74,7 @@ class ErrorSets:
 
 
 def error_sets(prepared: LinearResponse, sources: Sources) -> ErrorSets:
-    """Return the zones of errors and clearances, and their effect on the platform.
+    """Collect the zones of errors and clearances, and their effect on the platform.
 
     Args:
         prepared: a posture without loads.
@@ -109,14 +110,14 @@ def error_sets(prepared: LinearResponse, sources: Sources) -> ErrorSets:
 
 
 def parts_of(sets: ErrorSets, along: NDArray) -> list[float]:
-    """Return each zone's part of the largest product if loops may open.
+    """Return each zone's contribution to the largest product if loops may open.
 
     Args:
         sets: zones of errors and clearances.
         along: (total,) weights of the coordinates.
 
     Returns:
-        One part for each zone; their sum is the largest product of ``along`` with z.
+        One contribution per zone; they sum to the largest product of ``along`` with z.
     """
     weights = sets.weights_on_zones(along)
     pairs = zip(sets.zones, sets.columns, strict=True)
@@ -124,15 +125,15 @@ def parts_of(sets: ErrorSets, along: NDArray) -> list[float]:
 
 
 def rigid_parts(sets: ErrorSets, along: NDArray) -> list[float]:
-    """Return each zone's part of the largest product if rigid loops must close.
+    """Return each zone's contribution to the largest product if rigid loops must close.
 
     Args:
         sets: zones of errors and clearances.
         along: (total,) weights of the coordinates.
 
     Returns:
-        One part for each zone: the derivative of the largest product with respect to
-        the logarithm of the zone's size.  Their sum is the largest product (Euler).
+        One contribution per zone: the derivative of the largest product with respect to
+            the logarithm of the zone's size. They sum to the largest product (Euler).
     """
     N, bounds, cones = bounds_where_closed(sets, sets.rigid_rows)
     _, _, sizes = product_by_bounds(along @ N, bounds, cones)
@@ -147,7 +148,7 @@ def rigid_parts(sets: ErrorSets, along: NDArray) -> list[float]:
 def bounds_where_closed(
     sets: ErrorSets, rows: NDArray
 ) -> tuple[NDArray, list[NDArray], list[NDArray]]:
-    """Return the null space of rows, and the bounds of all zones in it.
+    """Return the null space of the rows, and the bounds of all zones within it.
 
     Args:
         sets: zones of errors and clearances.
@@ -174,7 +175,7 @@ def _contact_rows(prepared: LinearResponse, columns: NDArray) -> NDArray:
 
 
 def _real_rows(rows: NDArray, columns: NDArray) -> NDArray:
-    """Return an orthonormal row basis of rows @ columns; empty if all is rounding."""
+    """Return an orthonormal row basis of rows @ columns; empty if only round-off."""
     product = rows @ columns
     scale = np.abs(rows).max(initial=0.0) * np.linalg.norm(columns)
     _, sizes, vt = np.linalg.svd(product, full_matrices=False)
@@ -182,7 +183,7 @@ def _real_rows(rows: NDArray, columns: NDArray) -> NDArray:
 
 
 def _maps(sources: Sources) -> NDArray:
-    """Return the errors (n, 6, m) of all frames per unit of each random number."""
+    """Return the frame errors (n, 6, m) per unit of each random number."""
     if isinstance(sources, CalloutSources):
         return sources.maps
     return np.moveaxis(sources.errors(np.eye(len(sources))), 0, -1)
@@ -198,8 +199,8 @@ def zones_of_errors(sources: Sources) -> list[tuple[str, Zone, NDArray]]:
         independent, fixed = sources, sources.fixed
     if fixed is not None and fixed.any():
         raise BadInput(
-            "worst case: found closures that do not close at home, whose mismatch is a "
-            "constant error; expected closures that close"
+            "worst case: found loops that do not close at home, whose mismatch is a "
+            "constant error; expected loops that close"
         )
     found = [] if independent is None else _intervals(independent)
     return found + [(p.name, p.zone, np.ones(sum(p.zone.dimensions))) for p in placed]

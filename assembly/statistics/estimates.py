@@ -1,9 +1,9 @@
-"""Estimates from a sample of draws, with confidence intervals.
+"""Estimators for a sample of draws, with confidence intervals.
 
-Intervals of probabilities are Clopper-Pearson intervals, which are exact for any number
-of draws.  Intervals of quantiles are order statistics, which are valid for any
-distribution.  Intervals of means use the central limit theorem. Intervals of the most
-probable value use the bootstrap.
+Probabilities have Clopper-Pearson intervals, which are exact for any number of draws.
+Quantiles have distribution-free intervals from order statistics. Intervals of means
+rely on the central limit theorem, and intervals of the most probable value on the
+bootstrap.
 """
 
 from typing import Literal
@@ -16,7 +16,7 @@ _BINS, _RESAMPLES = 1024, 200
 
 
 def proportion(successes: int, count: int, level: float = 0.95) -> dict[str, float]:
-    """Return the probability of success with its Clopper-Pearson interval.
+    """Estimate a probability of success with its Clopper-Pearson interval.
 
     Args:
         successes: number of successes in ``count`` independent trials.
@@ -36,13 +36,13 @@ def proportion(successes: int, count: int, level: float = 0.95) -> dict[str, flo
 def bracketed(
     holds: int, fails: int, count: int, level: float = 0.95
 ) -> dict[str, float]:
-    """Return the probability of success if the outcome of some trials is unknown.
+    """Estimate a probability of success when the outcome of some trials is unknown.
 
     Args:
         holds: number of certain successes in ``count`` independent trials.
         fails: number of certain failures.
         count: number of trials, > 0.
-        level: confidence level, which holds whatever the undecided trials are.
+        level: confidence level, which holds for any outcome of the undecided trials.
 
     Returns:
         ``probability`` of a certain success, bounds ``lower`` and ``upper``, and the
@@ -54,7 +54,7 @@ def bracketed(
 
 
 def quantile(values: ArrayLike, share: float, level: float = 0.95) -> dict[str, float]:
-    """Return a quantile with its confidence interval from order statistics.
+    """Estimate a quantile, with a confidence interval from order statistics.
 
     Args:
         values: (k,) a sample.
@@ -81,7 +81,7 @@ def quantile(values: ArrayLike, share: float, level: float = 0.95) -> dict[str, 
 
 
 def mean(values: ArrayLike, level: float = 0.95) -> dict[str, float]:
-    """Return a mean with its confidence interval from the central limit theorem.
+    """Estimate a mean, with a confidence interval from the central limit theorem.
 
     Args:
         values: (k,) a sample, k > 1.
@@ -102,7 +102,7 @@ def mean(values: ArrayLike, level: float = 0.95) -> dict[str, float]:
 def most_probable(
     values: ArrayLike, level: float = 0.95, *, positive: bool = False, seed: int = 1
 ) -> dict[str, float]:
-    """Return the mode of a sample's density, with a bootstrap interval.
+    """Estimate the mode of a sample's density, with a bootstrap interval.
 
     The density is estimated on 1024 bins with a Gaussian kernel of Silverman's width.
 
@@ -122,9 +122,9 @@ def most_probable(
     x = np.asarray(values, dtype=float)
     spread = float(np.quantile(x, 0.75) - np.quantile(x, 0.25)) / 1.349
     scale = min(float(x.std()), spread) or float(x.std())
-    if scale <= 1e-12 * np.abs(x).max():  # all values are equal except for rounding
+    if scale <= 1e-12 * np.abs(x).max():  # all values are equal up to round-off
         return dict.fromkeys(("value", "lower", "upper"), float(x[0]))
-    # histogram bins exclude a long tail, in which the mode cannot be
+    # the bins exclude a long tail, which cannot contain the mode
     ends = np.quantile(x, [0.25, 0.75]) + np.array([-8.0, 8.0]) * scale
     low = 0.0 if positive else max(float(x.min()) - 4 * scale, float(ends[0]))
     high = min(float(x.max()) + 4 * scale, float(ends[1]))
@@ -149,7 +149,7 @@ def _modes(counts: NDArray, width: float) -> NDArray:
     inner = (i > 0) & (i < bins - 1)
     rows, middle = np.arange(len(i)), np.clip(i, 1, bins - 2)
     a, b, c = (density[rows, middle + k] for k in (-1, 0, 1))
-    # without curvature the density is flat or its maximum is at an end
+    # without curvature, the density is flat or has its maximum at an end
     with np.errstate(invalid="ignore", divide="ignore"):
         offset = (a - c) / (2 * (a - 2 * b + c))
     return np.where(inner, i + offset, i)

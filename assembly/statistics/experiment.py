@@ -1,4 +1,4 @@
-"""Monte Carlo experiments: error distributions and the quantities of each draw."""
+"""Monte Carlo experiments: error distributions and quantities computed per draw."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -41,7 +41,7 @@ class Experiment:
     """Error distributions at a posture, and the quantities to compute for each draw.
 
     Attributes:
-        posture: posture of the robot; drawn errors replace the robot file's errors.
+        posture: posture of the robot; drawn errors replace those in the robot file.
         sources: distributions of the errors.
         seed: seed of all draws.
         clearance: one of
@@ -51,11 +51,12 @@ class Experiment:
         load: load on the platform at its origin in base axes, (6,) [N m, N] or by
             component, ``{"fz": -50}``; None for no load.
         gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
-        stiffness: state in which the platform's stiffness is computed, one of
+        stiffness: state for which the platform stiffness is computed, one of
             :data:`forcefit.assembly.sweeps.point_stiffness.STATES` except the nominal
-            one; empty if it is not computed.
-        precision: [rad, m] required difference between upper and lower bound of the
-            largest pose errors in the worst clearance model; inf if not needed.
+            one; empty to omit the stiffness.
+        precision: [rad, m] required difference between upper and lower bound on the
+            largest pose errors in the worst clearance model; inf if they are not
+            needed.
         contact_length: [m] length of the contact model; random moments divided by it
             are as large as random forces. None for the length of the longest body.
     """
@@ -85,7 +86,7 @@ class Experiment:
 
     @property
     def clearance_model(self) -> str:
-        """The former name of ``clearance``, kept for one release."""
+        """Former name of ``clearance``, available for one more release."""
         warn_renamed("Experiment.clearance_model", "Experiment.clearance")
         return self.clearance
 
@@ -103,7 +104,7 @@ class Experiment:
 
     @cached_property
     def energies(self) -> LinearResponse:
-        """The posture prepared for problem (22), the least energy.
+        """Posture prepared for problem (22), the minimum energy.
 
         Raises:
             BadInput: the load acts along a motion without stiffness.
@@ -115,7 +116,7 @@ class Experiment:
 
     @cached_property
     def zones(self) -> dict[str, PostureMargins]:
-        """The posture prepared for margins, problem (21), by name of the margin."""
+        """Posture prepared for the margins, problem (21), by name of the margin."""
         if not self.margins:
             return {}
         return {k: prepare_margins(self.posture, r) for k, r in MARGINS.items()}
@@ -136,7 +137,7 @@ class Experiment:
 
     @cached_property
     def record_type(self) -> np.dtype:
-        """Type of a record; a record contains the quantities of one draw."""
+        """Type of a record, which contains the quantities of one draw."""
         shapes: dict[str, tuple[int, ...]] = {
             "energy": (), "duality_gap": (), "platform_screw": (6,), "rotation": (),
             "translation": (), "force": (), "moment": (), "stress": (len(self.links),),
@@ -154,7 +155,8 @@ class Experiment:
         """Reject limits on quantities that are not computed.
 
         Raises:
-            BadInput: a limited margin is not computed, or the stress of no link is.
+            BadInput: a limited margin is not computed, or no link has a computed
+                stress.
         """
         for name in limits:
             if name.startswith("margin") and not self.margins:
@@ -171,17 +173,17 @@ class Experiment:
         return self.evaluate(values, range(first, first + count))
 
     def evaluate(self, values: NDArray, draws: Sequence[int] | NDArray) -> NDArray:
-        """Return the records for given values of the error sources.
+        """Evaluate the records for given values of the error sources.
 
         Args:
             values: (k, m) [rad or m] errors.
             draws: (k,) numbers of the random streams for the clearance positions.
 
         Returns:
-            (k,) records of :attr:`record_type`; NaN and status 1 if there is no
-            solution.  In the worst clearance model, rotation and translation are upper
-            bounds of the largest errors. The platform screw is then the screw of the
-            least-energy solution (22).
+            (k,) records of :attr:`record_type`; NaN and status 1 without a solution. In
+            the worst clearance model, rotation and translation are upper bounds on the
+            largest errors, while the platform screw is that of the minimum-energy
+            solution (22).
         """
         if not isinstance(self.sources, CalloutSources) or not self.sources.fits:
             parts = self._bolted(values, np.asarray(draws))
@@ -265,7 +267,7 @@ class Experiment:
 def precision_for(
     limits: Mapping[str, float], share: float = _PRECISION
 ) -> tuple[float, float]:
-    """Return the precision of pose errors that suffices to check their limits.
+    """Return the pose error precision that suffices to check the given limits.
 
     Args:
         limits: limits by quantity.

@@ -1,13 +1,13 @@
-"""Variance-based importance of the errors: Sobol indices.
+"""Variance-based importance of errors: Sobol indices.
 
-The first-order index of a source is the share of a result's variance that the source
-explains by itself. The total index is the share in which the source is involved.
+The first-order index of a source is the fraction of a result's variance that the source
+explains by itself. The total index also includes its interactions with other sources.
 Saltelli's design computes both indices from (groups + 2) x draws evaluations.  If a
 result is linear in the errors, both indices equal ``a_i^2 var_i / sum_j a_j^2 var_j``.
 
 A draw without a solution is counted and discarded, together with the draws that are
-compared with it.  The errors of the remaining draws are then no longer independent.
-If too many draws are discarded, no indices are reported, but the reason why.
+compared with it, so the errors of the remaining draws are no longer independent. If too
+many draws are discarded, a reason is reported instead of indices.
 
 Sources:
     Saltelli et al. (2010), Variance based sensitivity analysis of model output, table 2
@@ -24,9 +24,9 @@ from forcefit.assembly.model.error_distributions import ErrorSources
 from forcefit.assembly.statistics.callout_sources import CalloutSources, Sources
 from forcefit.assembly.statistics.ranking import group_of
 
-# stream numbers of random numbers, see forcefit.assembly.model.error_distributions
+# random number streams, see forcefit.assembly.model.error_distributions
 STREAMS = (2, 3)
-# largest accepted share of discarded draws: discarding makes the errors dependent
+# largest accepted fraction of discarded draws: discarding makes the errors dependent
 MOST_FAILED = 0.05
 _RESAMPLES = 200
 
@@ -40,9 +40,8 @@ class Importance:
         first: (s, d, 3) first-order indices: value, lower bound, upper bound.
         total: (s, d, 3) total indices: value, lower bound, upper bound.
         variance: (s,) variances of the results.
-        failed: (s, d) share of base draws that are discarded because one of three
-            compared draws has no solution. Above :data:`MOST_FAILED` the indices are
-            NaN.
+        failed: (s, d) fraction of base draws discarded because one of three compared
+            draws has no solution. Above :data:`MOST_FAILED` the indices are NaN.
     """
 
     groups: tuple[str, ...]
@@ -54,7 +53,7 @@ class Importance:
 
 @dataclass(frozen=True, eq=False)
 class SaltelliDesign:
-    """Saltelli's design: A, B, and for each group A with that group's columns of B.
+    """Saltelli's design: A, B, and for each group A with the group's columns from B.
 
     Attributes:
         A: (k, m) independent draws of the errors.
@@ -70,7 +69,7 @@ class SaltelliDesign:
         return len(self.A) * (len(self.groups) + 2)
 
     def rows(self, first: int, count: int) -> NDArray:
-        """Return ``count`` rows (count, m) of the design from row ``first`` on."""
+        """Return ``count`` rows (count, m) of the design, starting at ``first``."""
         matrix, base = np.divmod(np.arange(first, first + count), len(self.A))
         rows = np.where((matrix == 1)[:, None], self.B[base], self.A[base])
         for g, (_, columns) in enumerate(self.groups):
@@ -86,7 +85,7 @@ def sobol_importance(
     count: int,
     level: float = 0.95,
 ) -> Importance:
-    """Return the Sobol indices of any function of independent variables.
+    """Estimate the Sobol indices of any function of independent variables.
 
     Args:
         evaluate: function from variables (k, m) to results (k, s), NaN for a draw
@@ -107,7 +106,7 @@ def sobol_importance(
 def sobol_indices(
     design: SaltelliDesign, results: NDArray, level: float = 0.95
 ) -> Importance:
-    """Return the Sobol indices from the results of a design.
+    """Estimate the Sobol indices from the results of a design.
 
     Args:
         design: design of k base draws and d groups.
@@ -144,7 +143,7 @@ def sobol_indices(
 
 
 def _shares(f: NDArray, weights: NDArray, level: float) -> tuple[NDArray, NDArray]:
-    """Return the first-order and the total index (3,) from results (3, k)."""
+    """Estimate the first-order and the total index (3,) from results (3, k)."""
     alone, left = f[1] * (f[2] - f[0]), 0.5 * (f[2] - f[0]) ** 2
     mean = weights @ (f[0] + f[1]) / 2
     variance = weights @ (f[0] ** 2 + f[1] ** 2) / 2 - mean**2
@@ -159,15 +158,15 @@ def _shares(f: NDArray, weights: NDArray, level: float) -> tuple[NDArray, NDArra
 def linear_importance(
     slopes: NDArray, sources: ErrorSources, groups: Sequence[tuple[str, NDArray]]
 ) -> NDArray:
-    """Return the closed-form indices of results that are linear in the errors.
+    """Compute the Sobol indices of results that are linear in the errors.
 
     Args:
-        slopes: (s, m) derivatives of the results by each source.
+        slopes: (s, m) derivatives of the results with respect to each source.
         sources: the m sources.
         groups: name and column indices of each group.
 
     Returns:
-        (s, d) shares of the variance, which equal both the first-order and total index.
+        (s, d) fractions of the variance; first-order and total index are equal.
     """
     parts = slopes**2 * sources.variance
     shares = np.stack([parts[:, columns].sum(axis=1) for _, columns in groups], axis=1)
@@ -175,7 +174,7 @@ def linear_importance(
 
 
 def source_groups(sources: Sources, by: str) -> list[tuple[str, NDArray]]:
-    """Return groups of error sources, formed by source, by frame or by kind of error.
+    """Group the error sources by source, by frame or by kind of error.
 
     Args:
         sources: sources of a robot.

@@ -1,11 +1,10 @@
 """Exact derivatives of the platform's screw with respect to groups of errors.
 
-The ratio of two sampled standard deviations is not a derivative, because it contains
-sampling noise.  As long as the active clearances do not change, the solution (22) is
-linear in the errors, and its derivatives are exact
-(:mod:`forcefit.assembly.statistics.sensitivity`). The gain of a group is the root mean
-square of these derivatives over the group's errors, weighted by variance, and over
-several draws.
+A ratio of two sampled standard deviations would contain sampling noise. As long as the
+active clearances do not change, the solution (22) is linear in the errors, and its
+derivatives are exact (:mod:`forcefit.assembly.statistics.sensitivity`). The gain of a
+group is the root mean square of these derivatives over several draws and over the
+group's errors, weighted by variance.
 """
 
 import numpy as np
@@ -22,7 +21,7 @@ DRAWS = 32  # number of draws over which the derivatives are averaged
 
 
 def platform_gains(experiment: Experiment, design: SaltelliDesign) -> NDArray:
-    """Return the gain of each group of errors: platform motion per unit of error.
+    """Compute the gain of each group of errors: platform motion per unit of error.
 
     Args:
         experiment: error distributions and posture.
@@ -30,8 +29,8 @@ def platform_gains(experiment: Experiment, design: SaltelliDesign) -> NDArray:
 
     Returns:
         (2, d) rotation [rad] and translation [m] per rad or m of error. NaN for a group
-        that contains angles and lengths, and if no draw has a solution. NaN also for
-        robots with bolted joints, whose locked-in clearances depend on the errors.
+        that mixes angles and lengths, if no draw has a solution, and for robots with
+        bolted joints, whose locked-in clearances depend on the errors.
     """
     sources = experiment.sources
     values = design.A[:DRAWS]
@@ -54,7 +53,7 @@ def platform_gains(experiment: Experiment, design: SaltelliDesign) -> NDArray:
 
 
 def platform_slopes(prepared: LinearResponse, draws: Assembly) -> NDArray:
-    """Return the derivatives of the platform's screw by every geometric error.
+    """Differentiate the platform screw with respect to every geometric error.
 
     Args:
         prepared: the prepared posture.

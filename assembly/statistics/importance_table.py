@@ -1,14 +1,14 @@
-"""The importance of errors as a data set, as plain values and as a text table.
+"""Importance of errors as a data set, as plain values and as a text table.
 
-Besides the shares of the variance, two values are reported for each group of errors.
-The *part* of a group is the standard deviation of the platform's screw due to the
-group, from the same sample. The *gain* is an exact derivative: micrometres of platform
-motion per micrometre of error, see
+In addition to the shares of the variance, two values are reported for each group of
+errors. The *part* of a group is the standard deviation of the platform's screw due to
+the group, from the same sample. The *gain* is an exact derivative: micrometres of
+platform motion per micrometre of error, see
 :mod:`forcefit.assembly.statistics.importance_slopes`.  Both are norms, so the gain is 1
 if the platform moves by as much as the error.
 
-Shares are estimates.  Groups whose intervals overlap are not distinguished and share
-the same possible ranks, see :mod:`forcefit.assembly.statistics.ranking`.
+Shares are estimates.  Groups whose intervals overlap cannot be distinguished and have
+possible ranks in common, see :mod:`forcefit.assembly.statistics.ranking`.
 """
 
 from collections.abc import Mapping
@@ -62,7 +62,7 @@ class ImportanceOptions:
 def importance_design(
     experiment: Experiment, asked: ImportanceOptions
 ) -> SaltelliDesign:
-    """Return the design for the importance of an experiment's errors.
+    """Return the Saltelli design for the importance of an experiment's errors.
 
     Args:
         experiment: error distributions and quantities.
@@ -82,7 +82,7 @@ def importance_rows(
     """Return the records of a range of rows of a design.
 
     Random clearance positions would add variance that is not due to the errors, so the
-    positions in the least-energy solution (22) are used.
+    positions in the minimum-energy solution (22) are used.
 
     Args:
         experiment: distributions and quantities.
@@ -104,14 +104,14 @@ def importance_rows(
 
 
 def importance_clearance_model(experiment: Experiment) -> str:
-    """Return the clearance model with which the importance of errors is computed."""
+    """Return the clearance model used to compute the importance of errors."""
     return "worst" if experiment.clearance == "worst" else "least"
 
 
 def importance_dataset(
     experiment: Experiment, design: SaltelliDesign, rows: NDArray, level: float = 0.95
 ) -> "xarray.Dataset":
-    """Return the importance of the error sources for the results of an experiment.
+    """Compute the importance of each error source for an experiment's results.
 
     Args:
         experiment: distributions and quantities.
@@ -162,7 +162,7 @@ def importance_dataset(
 
 
 def _parts(variances: NDArray) -> NDArray:
-    """Return the part (2, d) of each group from the screw's variances (6, d)."""
+    """Compute the part (2, d) of each group from the screw's variances (6, d)."""
     lost = np.isnan(variances).all(axis=0)
     # a component that does not vary has no index and contributes nothing
     variances = np.maximum(np.nan_to_num(variances), 0.0)
@@ -172,15 +172,15 @@ def _parts(variances: NDArray) -> NDArray:
 
 
 def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
-    """Return the data of :func:`importance_dataset` as plain values.
+    """Convert the data of :func:`importance_dataset` to plain values.
 
     Args:
         data: result of :func:`importance_dataset`, possibly merged with the draws.
 
     Returns:
         Number of base draws; the indices of each quantity, with the ranks that the
-        intervals allow; part and gain of each group; the share of discarded draws; and
-        a reason if there are no indices.
+        intervals allow; part and gain of each group; the fraction of discarded draws;
+        and a reason if there are no indices.
     """
     groups = [str(g) for g in data["group"].values]
     quantities: dict[str, Any] = {}
@@ -191,8 +191,8 @@ def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
         if most > MOST_FAILED:
             results["reason"] = (
                 f"no indices are computed if more than {MOST_FAILED:.0%} of the "
-                f"draws have no solution: up to {most:.1%} were left out, and the "
-                "errors of the other draws are not independent"
+                f"draws have no solution: up to {most:.1%} were omitted, and the "
+                "errors of the remaining draws are not independent"
             )
         elif np.isnan(of_quantity["total_index"]).all():
             results["reason"] = "it does not vary"
@@ -218,12 +218,12 @@ def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
 
 
 def importance_text(report: Mapping[str, Any]) -> str:
-    """Return the importance as a text table, with the largest shares first."""
+    """Format the importance as a text table, with the largest shares first."""
     quantities = report["quantities"]
     lines = [
-        f"importance of the errors, {report['base_draws']} base draws, clearances "
-        f"{report['clearance']} in the shares, least in the motion of the platform "
-        "(its slopes are exact):"
+        f"importance of the errors, {report['base_draws']} base draws; clearance model "
+        f"{report['clearance']} for the shares, least for the platform motion "
+        "(exact derivatives):"
     ]
     for name, one in quantities.items():
         if "reason" in one:
@@ -259,7 +259,7 @@ def importance_text(report: Mapping[str, Any]) -> str:
 
 
 def _moves_text(one: Mapping[str, Any]) -> str:
-    """Return the part and the gain of a group of errors as table columns."""
+    """Format the part and the gain of a group of errors as table columns."""
     gain = {
         "m": (f"{one['translation_gain']:11.4g}", " " * 13),
         "rad": (" " * 11, f"{1e3 * one['translation_gain']:13.4g}"),
@@ -271,6 +271,6 @@ def _moves_text(one: Mapping[str, Any]) -> str:
 
 
 def _interval_text(share: NDArray) -> str:
-    """Return a share and its confidence interval as text."""
+    """Format a share and its confidence interval as text."""
     value, low, high = share
     return f"{value:.3f} ({low:.3f} to {high:.3f})"

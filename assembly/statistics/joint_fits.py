@@ -1,4 +1,4 @@
-"""Fits of joints: which frame's clearance each fit determines."""
+"""Joint fits, and the frame whose clearance each fit determines."""
 
 from dataclasses import dataclass, replace
 
@@ -17,8 +17,8 @@ class JointFit:
     Attributes:
         frame: name of the joint's frame, or of the two parts.
         fit: the fit.
-        bounds: frame rows whose clearance the fit bounds, and the fitted end of each;
-            None if the fit bounds the value ``radial``.
+        bounds: indices of the frames whose clearance the fit bounds, and the fitted end
+            of each; None if the fit bounds the value ``radial``.
     """
 
     frame: str
@@ -44,7 +44,7 @@ def fits_of(robot: Robot) -> tuple[JointFit, ...]:
 
 
 def kind_of_fit(robot: Robot, fit: JointFit) -> str:
-    """Return the name of a fit without the leg's name at its beginning, if any."""
+    """Return the name of a fit without a leading leg name."""
     joint, _, rest = fit.frame.partition(".")
     frames = {frame.name for frame in robot.frames}
     of_joint = joint in frames or rest.split(".")[0] in _PARTS_OF_JOINTS
@@ -52,7 +52,7 @@ def kind_of_fit(robot: Robot, fit: JointFit) -> str:
 
 
 def with_clearance(frame: Frame, new: dict[str, float]) -> Frame:
-    """Return the frame with a new clearance; of a bolted joint, before it is bolted."""
+    """Return the frame with a new clearance (for a bolted joint, before bolting)."""
     bolt = frame.locked_at
     if bolt is not None:
         clearance = replace(bolt.clearance, **new)

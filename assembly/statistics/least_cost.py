@@ -1,13 +1,13 @@
-"""Tolerances of locally least cost for limits on nonconvex quantities.
+"""Tolerances of locally minimum cost for limits on nonconvex quantities.
 
 Wrenches, stress and pose errors are not convex in the errors, and a yield is not convex
 in the tolerances.  However, the derivatives of the limited quantities with respect to
-every error and every tolerance are known for the worst samples.  They linearise the
-limits.  A convex programme with the linearised limits computes a trial point within a
-trust region around the present tolerances.  The trial point is scaled uniformly until
+every error and every tolerance are known for the worst samples, so the limits can be
+linearised. A convex programme with the linearised limits computes a trial point within
+a trust region around the current tolerances.  The trial point is scaled uniformly until
 the samples just meet the limits again.  The trial point is accepted if its cost is
-smaller; otherwise the trust region is reduced.  The cost therefore never increases.
-The result is a local minimum; a global minimum is not proved.
+smaller; otherwise the trust region is reduced.  The cost therefore never increases. The
+result is a local minimum, which need not be global.
 
 For a yield below 1, the linearised limit is the mean over the samples closest to the
 limit, which is the derivative of the quantile.  For a yield of 1, each of the worst
@@ -39,14 +39,14 @@ _GAIN = 1e-4
 _LARGEST_RADIUS, _SMALLEST_RADIUS = 2.0, 1.01
 _MOST_STEPS = 60
 _PLANES = 200  # number of worst samples that are linearised for a yield of 1
-_NEARLY_ACTIVE = 0.8  # samples above this share of the limit count as active
+_NEARLY_ACTIVE = 0.8  # samples above this fraction of the limit count as active
 
 
 def least_cost(
     requirement: Requirement, samples: Samples, t: NDArray,
     progress: Callable[[str, int, int], None],
 ) -> tuple[NDArray, Samples]:  # fmt: skip
-    """Return tolerances that cost no more than the uniformly scaled start.
+    """Reduce the cost of tolerances, starting from uniformly scaled ones.
 
     Args:
         requirement: requirement at all postures.
@@ -82,7 +82,7 @@ def least_cost(
         if _saving(plan, t, trial) > _GAIN:
             t = trial
             continue
-        # half of the rejected step, in terms of logarithms
+        # half of the rejected step, in logarithms
         radius = np.exp(np.abs(np.log(trial / t)).max() / 2)
         if radius < _SMALLEST_RADIUS:
             break

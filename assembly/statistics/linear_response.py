@@ -1,6 +1,6 @@
 """Linear response of springs, closures and platform to clearances and errors.
 
-The response belongs to one posture and is common to all draws of the errors;
+The response depends only on the posture, so all draws of errors share it;
 :func:`forcefit.assembly.linear.energy.solve_assembly` solves the draws.
 """
 
@@ -46,10 +46,10 @@ class LinearResponse:
         posture: the robot's configuration; the errors of its robot file are not used.
         joints: virtual joints of the posture.
         starts: (cones + 1,) index of the first clearance of each cone, and nu.
-        G: (r, nu) derivative of the scaled strains by the clearances.
-        H: (p, nu) rows of equations on the clearances that do not depend on springs.
+        G: (r, nu) derivative of the scaled strains with respect to the clearances.
+        H: (p, nu) equations for the clearances that do not involve springs.
         closures: (m, 6n) scaled closure rows.
-        misfit: (r, 6n) derivative of the scaled strains by the errors.
+        misfit: (r, 6n) derivative of the scaled strains with respect to the errors.
         closing: (m, r) map from springs to closure multipliers.
         redundant: (m, m - ..) orthonormal columns: combinations of closure rows to
             which neither free motions nor springs contribute.
@@ -58,7 +58,7 @@ class LinearResponse:
         screws: (6, nu + 6n) derivative of the platform screw.
         platform: (6, 6n) map from the screws of all frames to the platform's screw.
         motions: (nq, nu + 6n) derivative of the free motions.
-        ranges: (nq,) [rad or m] limits of the free motions; they are not applied.
+        ranges: (nq,) [rad or m] limits of the free motions, which are not applied here.
         wrench: (n, 6, m) [N m, N] wrenches for unit closure multipliers.
         load: (6,) [N m, N] load on the platform at its origin, base axes; None if none.
         gravity: (3,) [m/s^2] gravity in base axes; None if none.
@@ -87,7 +87,7 @@ class LinearResponse:
     load_motions: NDArray
 
     def solve(self, errors: ArrayLike) -> Assembly:
-        """Return the least energies of k draws.
+        """Solve the minimum-energy problem for k draws.
 
         Args:
             errors: (k, n, 6) [rad, m] geometric errors delta l.
@@ -109,7 +109,7 @@ class LinearResponse:
 
 
 def checked_errors(errors: ArrayLike, n: int) -> NDArray:
-    """Return the errors of k draws as an array after checking shape and values.
+    """Convert the errors of k draws to an array, and check shape and values.
 
     Args:
         errors: (k, n, 6) [rad, m] geometric errors delta l.
@@ -132,7 +132,7 @@ def checked_errors(errors: ArrayLike, n: int) -> NDArray:
 def linear_response(
     posture: Posture, load: ArrayLike | None = None, gravity: ArrayLike | None = None
 ) -> LinearResponse:
-    """Return the response of a posture, with free motions and springs eliminated.
+    """Compute the response of a posture, with free motions and springs eliminated.
 
     Args:
         posture: the robot's configuration.
@@ -163,7 +163,7 @@ def linear_response(
     # orthonormal rows to which neither free motions nor springs contribute
     held = np.linalg.qr(closing)[0] if closing.shape[1] else closing
     redundant = reduced.basis @ complement(reduced.basis.T @ held, RANK)
-    # the smallest free motions that close the remaining closure error
+    # smallest free motions that close the remaining closure error
     inverse = np.linalg.pinv(A @ free, rcond=RANK)
     springs = joints.elastic @ reduced.spread
     misfit = -closing.T @ A
@@ -197,12 +197,12 @@ def linear_response(
 
 
 def _bent(reduced: Reduction, closing: NDArray) -> NDArray:
-    """Return the elastic deformations (6n,) [rad, m] under load at zero clearance."""
-    # wrenches that balance the free motions, with the least spring energy
+    """Compute the elastic deformations (6n,) [rad, m] under load at zero clearance."""
+    # wrenches that balance the free motions, with the minimum spring energy
     bent = reduced.spread.T @ reduced.load_springs
     springs = spring_deformations(
         reduced.linearisation, reduced.joints, reduced.frame_loads,
         reduced.load_multipliers - closing @ bent,
     )  # fmt: skip
-    springs -= reduced.spread @ (reduced.spread.T @ springs)  # removes rounding
+    springs -= reduced.spread @ (reduced.spread.T @ springs)  # removes round-off
     return reduced.joints.elastic @ springs

@@ -53,18 +53,17 @@ def run_draws(
     importance: ImportanceOptions | int | None = None,
     held: ExitStack | None = None,
 ) -> "xarray.Dataset":
-    """Solve draws 0 to count - 1 of an experiment and return them as a data set.
+    """Solve draws 0 to count - 1 of an experiment; return them as a data set.
 
     Args:
         experiment: error distributions and quantities.
         count: number of draws.
-        path: NetCDF file to write; its journal is used during the computation, then
-            removed.
+        path: NetCDF file to write; a journal next to it exists during the computation.
         workers: number of threads.
         progress: called with the number of finished draws and the number of all draws.
-        importance: options for the importance of errors, or its number of base draws;
-            None if it is not computed.
-        held: exit stack that keeps the journal until it is closed, as in
+        importance: options for the importance of errors, or just its number of base
+            draws; None to omit it.
+        held: exit stack that keeps the journal until the stack is closed, as in
             :func:`forcefit.assembly.sweeps.sweep.run_sweep`.
 
     Returns:
@@ -90,7 +89,7 @@ def _run_draws(
     progress: Callable[[int, int], None], importance: ImportanceOptions | None,
     held: ExitStack,
 ) -> "xarray.Dataset":  # fmt: skip
-    """Return the data set of draws; ``held`` keeps the journal until it is closed."""
+    """Return the data set of draws; the journal lives until ``held`` is closed."""
     design = None if importance is None else importance_design(experiment, importance)
     more = 0 if design is None else len(design)
     # blocks of draws, then of the design: first row and number of rows
@@ -119,7 +118,7 @@ def _run_draws(
     done = sum(map(len, kept.values()))
     progress(done, count + more)
     missing = [b for b in range(len(spans)) if b not in kept]
-    with threadpool_limits(1):  # linear algebra libraries start no further threads
+    with threadpool_limits(1):  # linear algebra libraries start no threads
         for block, rows in _solved(solve, missing, workers):
             if journal is not None:
                 journal.add(block, rows, {})
@@ -141,10 +140,10 @@ def _run_draws(
 def _solved(
     solve: Callable[[int], NDArray], blocks: list[int], workers: int
 ) -> Iterator[tuple[int, NDArray]]:
-    """Yield solved blocks; the number of queued blocks is limited to save memory."""
+    """Yield solved blocks, with few blocks queued at a time to save memory."""
     if not blocks:
         return
-    # the first block fills the caches that the threads share
+    # the first block fills caches that the threads share
     yield blocks[0], solve(blocks[0])
     waiting = iter(blocks[1:])
     with ThreadPoolExecutor(workers) as pool:
@@ -166,7 +165,7 @@ def _solved(
 
 
 def provenance(experiment: Experiment) -> dict[str, str | int | float]:
-    """Return values that are equal for two runs exactly if their draws are equal."""
+    """Return values that are equal if and only if two runs have equal draws."""
     posture, sources = experiment.posture, experiment.sources
     contact = experiment.used_contact_length
     numbers = [*sources.identity, posture.transforms]
@@ -190,14 +189,14 @@ def provenance(experiment: Experiment) -> dict[str, str | int | float]:
 
 
 def draws_dataset(experiment: Experiment, rows: NDArray) -> "xarray.Dataset":
-    """Return the draws as a data set with units and provenance.
+    """Convert draws to a data set with units and provenance.
 
     Args:
         experiment: experiment of the draws.
         rows: (k,) records of the experiment's record type.
 
     Returns:
-        Data set over ``draw``; the descriptions of pose errors name the clearance
+        Data set over ``draw``, in which pose error descriptions name the clearance
         model.
     """
     import xarray

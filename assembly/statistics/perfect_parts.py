@@ -1,10 +1,10 @@
-"""Margins, energy and pose errors at zero errors: effect of clearances and loads.
+"""Margins, energy and pose errors of perfect parts: effect of clearances and loads.
 
-If a robot without errors exceeds a limit, no tolerance can meet this limit.  In the
-worst clearance model, the clearance of each joint contributes a part to the largest
-pose error.  Without errors, the largest pose error is a homogeneous function of the
-clearances. By Euler's theorem it equals the sum over the clearances of each clearance
-times its derivative, which is the multiplier of the clearance's bound.
+If a robot without geometric errors exceeds a limit, no tolerance can meet that limit.
+In the worst clearance model, the largest pose error splits into contributions of the
+joint clearances. Without geometric errors, it is a homogeneous function of the
+clearances, so by Euler's theorem it equals the sum of each clearance times its
+derivative, which is the multiplier of the clearance's bound.
 """
 
 import json
@@ -28,24 +28,24 @@ from forcefit.assembly.statistics.worst_clearance import (
 # number of random clearance positions from which the median is computed
 _DRAWS = 200
 _PRECISION = (1e-9, 1e-9)  # [rad, m] required precision of the largest pose errors
-_SHARE = 1e-3  # parts below this share of the largest pose error are not listed
-_OWN = 0.02  # required precision of the parts, relative to the largest pose error
+_SHARE = 1e-3  # contributions below this fraction of the pose error are not listed
+_OWN = 0.02  # required precision of contributions, relative to the pose error
 OWN_MOTION = "own motion of passive joints"
 _EXCEEDED = 1e-9  # relative excess from which a limit counts as exceeded
 
 
 def perfect_parts(experiment: Experiment) -> dict[str, Any]:
-    """Return the results of a robot without geometric errors.
+    """Compute the results of a robot without geometric errors.
 
     Args:
         experiment: posture, loads and clearance model.
 
     Returns:
-        By quantity: ``reached``, the value without errors; for random clearance models
-        this is the median of 200 positions.  For pose errors of the worst model without
-        loads also ``clearances``: the part [rad or m] of each kind of clearance,
-        largest first. The dictionary is empty if the robot without errors has no
-        solution.
+        By quantity: ``reached``, the value without errors (for random clearance models,
+            the median of 200 positions). For pose errors of the unloaded worst model
+            also ``clearances``: the contribution [rad or m] of each kind of clearance,
+            largest first. The dictionary is empty if the robot has no solution even
+            without errors.
     """
     random = experiment.clearance in {"uniform", "contact"}
     count = _DRAWS if random else 1
@@ -73,7 +73,7 @@ def perfect_parts(experiment: Experiment) -> dict[str, Any]:
 
 
 def _clearance_parts(prepared: LinearResponse) -> dict[str, dict[str, float]]:
-    """Return the part of each clearance kind in the largest pose errors [rad or m]."""
+    """Return the contribution of each clearance kind to the largest pose errors."""
     draws = prepared.solve(np.zeros((1, len(prepared.posture.robot.frames), 6)))
     if not (np.isfinite(draws.energy).all() and np.isfinite(draws.clearances).all()):
         return {}
@@ -107,7 +107,7 @@ def _clearance_kinds(prepared: LinearResponse) -> list[str]:
 
 
 def stored_perfect_parts(experiment: Experiment) -> str:
-    """Return the results at zero errors as JSON text, for a data set attribute."""
+    """Format the results at zero errors as JSON text, for a data set attribute."""
     return json.dumps(perfect_parts(experiment))
 
 
@@ -131,7 +131,7 @@ def limits_broken(
 
 
 def perfect_text(summary: Mapping[str, Any]) -> list[str]:
-    """Return lines of text on the results without errors and on exceeded limits."""
+    """Format the results without errors and the exceeded limits as lines of text."""
     parts, lines = summary.get("perfect_parts", {}), []
     alone = {k: parts[k] for k in POSE_ERRORS if parts.get(k, {}).get("reached")}
     why = "clearances and loads alone" if summary.get("load") else "clearances alone"
@@ -149,14 +149,14 @@ def perfect_text(summary: Mapping[str, Any]) -> list[str]:
 
 
 def _size_text(one: Mapping[str, Any]) -> str:
-    """Return a result without errors as text, with its unit."""
+    """Format a result without errors as text, with its unit."""
     if np.isinf(one["reached"]):
         return "without bound"
     return f"of {one['reached']:.4g} {one['unit']}"
 
 
 def _of_text(one: Mapping[str, Any]) -> str:
-    """Return the two clearances that contribute most as text in brackets."""
+    """Format the two clearances that contribute most as text in brackets."""
     parts = list(one.get("clearances", {}).items())[:2]
     if not parts:
         return ""

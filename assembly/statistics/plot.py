@@ -1,4 +1,4 @@
-"""Figures of draws, importance and tolerances from their data sets."""
+"""Figures of draws, importance and tolerances, made from their data sets."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -32,12 +32,12 @@ NAMES = {name: one.words for name, one in _SHOWN.items()}
 def figure_of_draws(
     data: "xarray.Dataset", kind: str | None, quantities: Sequence[str] = ()
 ) -> "Figure | None":
-    """Return the figure of a data set of draws or tolerances.
+    """Plot a data set of draws or tolerances.
 
     Args:
         data: data set saved by ``statistics`` or ``tolerances``, or another data set.
         kind: ``"histogram"``, ``"tornado"`` or ``"allocation"``; None to choose the
-            kind that fits the data.
+            kind that suits the data.
         quantities: quantities of a histogram, by the names in
             :mod:`forcefit.assembly.sweeps.panels`.
 
@@ -64,7 +64,7 @@ def figure_of_draws(
 def histogram_figure(
     data: "xarray.Dataset", quantities: Sequence[str] = ()
 ) -> "Figure":
-    """Return histograms with medians, 95 % quantiles and most probable values.
+    """Plot histograms with medians, 95 % quantiles and most probable values.
 
     Args:
         data: result of :func:`forcefit.assembly.statistics.monte_carlo.run_draws`.
@@ -112,7 +112,7 @@ def histogram_figure(
 
 
 def _histogram(panel: Any, text: str, values: Any) -> None:
-    """Draw one histogram; for several components, of the largest component."""
+    """Draw one histogram; several components are represented by the largest one."""
     x = values.max(axis=1) if values.ndim == 2 else values
     x = x[np.isfinite(x)]
     panel.set(xlabel=text, ylabel="draws")
@@ -137,15 +137,15 @@ def _histogram(panel: Any, text: str, values: Any) -> None:
 
 
 def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
-    """Return the tornado plot of the importance of errors, largest share on top.
+    """Plot the importance of errors as a tornado chart, largest index on top.
 
     Args:
         data: data set with ``first_index`` and ``total_index``.
         most: largest number of bars per panel.
 
     Returns:
-        A figure with one panel per quantity: total shares are light, first-order shares
-        dark.
+        A figure with one panel per quantity: total indices are light, first-order
+            indices dark.
 
     Raises:
         ValueError: the data set has no importance.
@@ -185,16 +185,17 @@ def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
 
 
 def allocation_figure(data: "xarray.Dataset") -> "Figure":
-    """Return a bar chart of the tolerances and their upper bounds.
+    """Plot the tolerances and their upper bounds as a bar chart.
 
     Args:
         data: data of
             :func:`forcefit.assembly.statistics.allocated_tolerances.tolerance_dataset`.
 
     Returns:
-        A figure with separate panels for angles and lengths.  Wide bars are tolerances
-        of least cost. Narrow bars, drawn where different, are the uniformly scaled
-        tolerances of the convex programme.  The title reports cost and verification.
+        A figure with separate panels for angles and lengths.  Wide bars are
+        minimum-cost tolerances. Narrow bars, drawn where different, are the uniformly
+        scaled tolerances of the convex programme.  The title reports cost and
+        verification.
 
     Raises:
         ValueError: the data set has no tolerances.

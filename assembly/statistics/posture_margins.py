@@ -1,8 +1,8 @@
-"""Problem (21), the assembly margin, at one posture for many draws, with derivatives.
+"""Assembly margin, problem (21), at one posture for many draws, with derivatives.
 
 The margin is ``max q.K e`` over multipliers q with ``sum_k |B_k^T q| <= 1``.  It is
-convex in the errors e and positively homogeneous.  Its derivative by e is ``K^T q``
-with the optimal q.
+convex and positively homogeneous in the errors e. Its derivative with respect to e is
+``K^T q`` at the optimal q.
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from forcefit.assembly.linear.zone import Compliant, Zone, zone_margin
 from forcefit.assembly.solvers.cones import cone_starts
 from forcefit.assembly.statistics.linear_response import checked_errors
 
-# [rad, reference lengths] a larger infeasible error component is no rounding error, so
+# [rad, reference lengths] an infeasible error component above this is not round-off, so
 # no motion or clearance can close the loops
 _CLEARLY_INFEASIBLE = 1e-10
 
@@ -32,7 +32,7 @@ class PostureMargins:
         posture: the robot's configuration; the errors of its robot file are not used.
         starts: (cones + 1,) index of the first clearance of each cone, and finally nu.
         B: (p, nu) orthonormal rows of the equations for the clearances u, B u = K e.
-        K: (p, 6n) map from the errors e to the right sides of these equations.
+        K: (p, 6n) map from the errors e to the right-hand sides of these equations.
         infeasible: (.., 6n) map from the errors to their infeasible component.
         compliant: whether compliant joints are ``"rigid"`` or ``"free"``, see
             :mod:`forcefit.assembly.linear.zone`.
@@ -46,15 +46,14 @@ class PostureMargins:
     compliant: Compliant
 
     def solve(self, errors: ArrayLike) -> Zone:
-        """Return the margins of k draws.
+        """Compute the margins of k draws.
 
         Args:
             errors: (k, n, 6) [rad, m] geometric errors delta l.
 
         Returns:
-            Margins with their certificates.  If the errors cannot be closed even with
-            enlarged clearances, the forces belong to the part of the errors that
-            clearances can close.
+            Margins with their certificates. If even enlarged clearances cannot close
+            the errors, the forces are those of the part that clearances can close.
 
         Raises:
             ValueError: the shape does not match the robot, or a value is not finite.
@@ -72,21 +71,21 @@ class PostureMargins:
         return found
 
     def slopes(self, zone: Zone) -> NDArray:
-        """Return the derivatives of the margins by each error.
+        """Return the derivatives of the margins with respect to each error.
 
         Args:
             zone: result of :meth:`solve` for k draws.
 
         Returns:
-            (k, n, 6) [1/rad, 1/m] derivatives; NaN for draws that needed the reference
-            method.
+            (k, n, 6) [1/rad, 1/m] derivatives; NaN for draws that required the
+            reference method.
         """
         slopes = zone.forces @ self.B.T @ self.K
         return slopes.reshape(len(slopes), -1, 6)
 
 
 def prepare_margins(posture: Posture, compliant: Compliant = "free") -> PostureMargins:
-    """Return a posture prepared for margins, with free motions eliminated.
+    """Prepare a posture for margins, with free motions eliminated.
 
     Args:
         posture: the robot's configuration.
@@ -104,7 +103,7 @@ def prepare_margins(posture: Posture, compliant: Compliant = "free") -> PostureM
     robot = posture.robot
     lin, joints = linearise(posture), virtual_joints(robot, False, compliant == "free")
     reduced = reduce_problem(lin, joints)
-    # with orthonormal rows the result does not depend on the units of the closures
+    # orthonormal rows make the result independent of the units of the closures
     U, S, B = svd(reduced.H, full_matrices=False)
     rigid = reduced.rigid
     held = np.linalg.qr(rigid)[0] if rigid.shape[1] else rigid

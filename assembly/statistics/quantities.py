@@ -1,4 +1,4 @@
-"""The quantities of each draw, their units, and limits on them."""
+"""Quantities computed for each draw, their units, and limits on them."""
 
 import numpy as np
 
@@ -19,12 +19,12 @@ _UNLIMITED = {"platform_screw", "duality_gap", "rotation_lower", "translation_lo
 
 
 def limit_names() -> tuple[str, ...]:
-    """Return the quantities on which limits are possible."""
+    """Return the names of the quantities that can be limited."""
     return tuple(k for k in UNITS if k not in _UNLIMITED)
 
 
 def parse_limit(text: str) -> tuple[str, float]:
-    """Return quantity and limit from text such as ``"energy=5"``.
+    """Parse a limit such as ``"energy=5"`` into quantity and number.
 
     Args:
         text: name of the quantity, "=", and a number > 0; names are energy [J], margin,

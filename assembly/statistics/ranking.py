@@ -1,4 +1,4 @@
-"""Possible ranks of variance shares, and joint names for equal errors of all legs."""
+"""Possible ranks of variance shares, and merged names for equal errors in all legs."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -20,7 +20,7 @@ def possible_ranks(shares: Mapping[str, NDArray]) -> dict[str, tuple[int, int]]:
     """Return the best and the worst possible rank of each contributor.
 
     Args:
-        shares: value, lower and upper bound of each share, by name.
+        shares: value, lower and upper bound on each share, by name.
 
     Returns:
         Best and worst rank by name.  A share ranks before another one only if its lower
@@ -38,7 +38,7 @@ def possible_ranks(shares: Mapping[str, NDArray]) -> dict[str, tuple[int, int]]:
 
 
 def rank_text(rank: Sequence[int] | None) -> str:
-    """Return possible ranks as text, such as 1 or 2-4; empty if there are none."""
+    """Format possible ranks as text, such as 1 or 2-4; empty if there are none."""
     if rank is None:
         return ""
     first, last = rank
@@ -46,7 +46,7 @@ def rank_text(rank: Sequence[int] | None) -> str:
 
 
 def ranked(summary: Mapping[str, Any], key: str) -> list[tuple[str, list[float]]]:
-    """Return each error's total share of a quantity's variance, largest first.
+    """Return the total variance share of each error for a quantity, largest first.
 
     Args:
         summary: result of :func:`forcefit.assembly.statistics.summary.summarise`.
@@ -66,7 +66,7 @@ def ranked(summary: Mapping[str, Any], key: str) -> list[tuple[str, list[float]]
 def shares_sentence(
     shares: Sequence[tuple[str, Sequence[float]]], quantity: str
 ) -> str:
-    """Return the largest shares of a quantity's variance as a sentence.
+    """Format the largest shares of a quantity's variance as a sentence.
 
     Args:
         shares: names with value, lower and upper bound, the largest first.
@@ -86,12 +86,12 @@ def shares_sentence(
 
 
 def leaders(ranks: Mapping[str, Sequence[int]]) -> list[str]:
-    """Return the names of the contributors that may rank first."""
+    """Return the names of all contributors that could rank first."""
     return [name for name, (first, _) in ranks.items() if first == 1]
 
 
 def named_together(names: Iterable[str], among: Iterable[str]) -> list[str]:
-    """Return names of contributors, with equal ones of all legs merged into one name.
+    """Merge the names of contributors that occur in every leg.
 
     Args:
         names: names of the contributors, such as ``leg1.hinge.RX``.
@@ -99,7 +99,7 @@ def named_together(names: Iterable[str], among: Iterable[str]) -> list[str]:
 
     Returns:
         ``hinge.RX of all legs`` if this component of every leg is among the names;
-        other names are unchanged. The order of the names is kept.
+        other names, and the order of the names, stay unchanged.
     """
     names = list(names)
     of_kind: dict[str, list[str]] = {}

@@ -1,9 +1,8 @@
-"""Journal of the results of a long deterministic computation, in order.
+"""Journal of a long deterministic computation, which stores results in order.
 
-An interrupted computation resumes when it is started again: results in the journal are
-read instead of computed.  Each result is stored with a digest of its arguments. A
-result whose digest differs, for example after a change of the program, is computed
-again.
+When an interrupted computation is started again, results in the journal are read
+instead of computed. Each result is stored with a digest of its arguments, and is
+recomputed if the digest differs, for example because the program has changed.
 """
 
 import io
@@ -26,7 +25,7 @@ _DIGEST = 32
 
 @dataclass(eq=False)
 class Replay:
-    """The stored results of a computation, which are returned in order.
+    """Stored results of a computation, returned in order.
 
     Attributes:
         journal: journal with records of type :data:`RECORD`; None to store nothing.
@@ -39,11 +38,11 @@ class Replay:
     def recall(
         self, compute: Callable[[], tuple[ArrayLike, ...]], *given: ArrayLike
     ) -> tuple[NDArray, ...]:
-        """Return the next result, either read from the journal or computed.
+        """Return the next result, from the journal if possible, otherwise computed.
 
         Args:
             compute: function that computes the result.
-            given: numbers and texts that determine the result.
+            given: numbers and texts on which the result depends.
 
         Returns:
             The results of ``compute``, as arrays.
@@ -78,7 +77,7 @@ def journalled(
         whose: values that must be equal for two computations to share results.
 
     Yields:
-        The stored results; the journal is removed when the block ends without an error.
+        The stored results. The journal is removed when the block ends without an error.
 
     Raises:
         BadInput: the journal belongs to another computation, or cannot be written.

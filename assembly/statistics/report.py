@@ -1,4 +1,4 @@
-"""HTML page of random draws: yields, values for perfect parts, main contributors."""
+"""HTML report on random draws: yields, perfect parts and main contributors."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import xarray
 
 _BINS = 60
-_GOOD = 0.95  # yield above which a result is shown as favourable
+_GOOD = 0.95  # yield above which a result is marked as good
 _LISTED = 20  # largest number of errors in a table of shares
 _ASSUMED = (
     "Small screws: the closures are linear in the errors of each draw.",
@@ -38,7 +38,7 @@ def draws_page(
     summary: Mapping[str, Any], data: "xarray.Dataset", provenance: Provenance,
     robot: str = "",
 ) -> str:  # fmt: skip
-    """Return the page of an experiment as HTML.
+    """Format the results of an experiment as an HTML page.
 
     Args:
         summary: result of :func:`forcefit.assembly.statistics.summary.summarise`, with
@@ -48,12 +48,12 @@ def draws_page(
         robot: HTML from :func:`forcefit.assembly.statistics.scenes.drawn_robot`.
 
     Returns:
-        HTML that refers to no other file.
+        Self-contained HTML.
     """
     goes = summary["assembles"]["forced"]
     verdict = f"Of {summary['draws']} draws {_share_text(goes)} assemble"
     if "within_limits" in summary:
-        verdict += f"; {_share_text(summary['within_limits'])} keep all limits"
+        verdict += f"; {_share_text(summary['within_limits'])} meet all limits"
     return page(
         Page(
             title=f"{summary['robot']}: random errors",
@@ -73,11 +73,11 @@ def draws_page(
 def draws_sections(
     summary: Mapping[str, Any], data: "xarray.Dataset", robot: str = ""
 ) -> list[str]:
-    """Return the sections of :func:`draws_page`, which other pages also contain."""
+    """Return the sections of :func:`draws_page`, which other pages share."""
     return [
         section("Probabilities", _yields(summary)),
         _perfect_parts(summary),
-        section("A draw of large error", robot) if robot else "",
+        section("A draw with a large error", robot) if robot else "",
         section("Distributions", _quantities(summary), _histograms(summary, data)),
         _capability(summary),
         _importance(summary),
@@ -86,7 +86,7 @@ def draws_sections(
 
 
 def _share(summary: Mapping[str, Any]) -> Mapping[str, float]:
-    """Return the yield: limits met or, if none are given, the robot assembles."""
+    """Return the yield: all limits met or, without limits, the robot assembles."""
     limits: Mapping[str, float] | None = summary.get("within_limits")
     forced: Mapping[str, float] = summary["assembles"]["forced"]
     return limits or forced
@@ -100,13 +100,13 @@ def _good(share: Mapping[str, float]) -> bool | None:
 
 
 def _share_text(interval: Mapping[str, float]) -> str:
-    """Return a probability in per cent as text, with its confidence interval."""
+    """Format a probability in per cent as text, with its confidence interval."""
     low, high = 100 * interval["lower"], 100 * interval["upper"]
     return f"{100 * interval['probability']:.2f} % ({low:.2f} to {high:.2f})"
 
 
 def _draws_tiles(summary: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles of the yield, the pose error, and the main errors."""
+    """Return tiles for the yield, the pose error and the main errors."""
     share = _share(summary)
     low, high = (100 * share[end] for end in ("lower", "upper"))
     words = "all limits kept" if "within_limits" in summary else WORDS["forced"]
@@ -125,7 +125,7 @@ def _draws_tiles(summary: Mapping[str, Any]) -> list[Tile]:
 
 
 def _yields(summary: Mapping[str, Any]) -> str:
-    """Return the table of all probabilities as HTML."""
+    """Format all probabilities as an HTML table."""
     named = {WORDS[key]: one for key, one in summary["assembles"].items()}
     for key, one in summary["exceeds"].items():
         limit = f"{one['limit']:g} {one['unit']}".removesuffix(" 1")
@@ -144,7 +144,7 @@ def _yields(summary: Mapping[str, Any]) -> str:
 
 
 def _perfect_parts(summary: Mapping[str, Any]) -> str:
-    """Return the results without errors, by kind of clearance, as HTML."""
+    """Format the results without errors, by kind of clearance, as HTML."""
     parts = {k: v for k, v in summary["perfect_parts"].items() if v["reached"]}
     if not parts:
         return ""
@@ -167,7 +167,7 @@ def _perfect_parts(summary: Mapping[str, Any]) -> str:
 
 
 def _quantities(summary: Mapping[str, Any]) -> str:
-    """Return the table of means and quantiles as HTML."""
+    """Format means and quantiles as an HTML table."""
     rows: list[list[Cell]] = []
     for key, one in summary["quantities"].items():
         if "mean" not in one:
@@ -182,7 +182,7 @@ def _quantities(summary: Mapping[str, Any]) -> str:
 
 
 def _histograms(summary: Mapping[str, Any], data: "xarray.Dataset") -> str:
-    """Return histograms of the varying quantities, with median and 95 % quantile."""
+    """Plot histograms of the varying quantities, with median and 95 % quantile."""
     charts, still = [], []
     solved = data["status"].values == 0
     for key, one in summary["quantities"].items():
@@ -198,7 +198,7 @@ def _histograms(summary: Mapping[str, Any], data: "xarray.Dataset") -> str:
 
 
 def _histogram(name: str, one: Mapping[str, Any], values: NDArray) -> str:
-    """Return a histogram with bins of equal width as HTML."""
+    """Plot a histogram with bins of equal width as HTML."""
     counts, edges = np.histogram(values, _BINS)
     traces: list[dict[str, Any]] = [{
         "type": "bar", "x": (edges[1:] + edges[:-1]) / 2, "y": counts,
@@ -215,7 +215,7 @@ def _histogram(name: str, one: Mapping[str, Any], values: NDArray) -> str:
 
 
 def _capability(summary: Mapping[str, Any]) -> str:
-    """Return the table of Cpk and parts per million as HTML."""
+    """Format Cpk and parts per million as an HTML table."""
     rows: list[list[Cell]] = [
         [NAMES[key], Value(one["limit"], one["unit"]),
          *(one[index][k] for index in ("cp", "cpk", "ppm")
@@ -229,7 +229,7 @@ def _capability(summary: Mapping[str, Any]) -> str:
 
 
 def _importance(summary: Mapping[str, Any]) -> str:
-    """Return the section on the errors that contribute to the variance as HTML."""
+    """Format the section on the errors that contribute to the variance as HTML."""
     pieces = []
     for key, one in summary.get("importance", {}).get("quantities", {}).items():
         shares = ranked(summary, key)[:_LISTED]

@@ -1,4 +1,4 @@
-"""Requirements on tolerances: limits at every posture, and the required yield."""
+"""Requirements on tolerances: limits at every posture and a required yield."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -25,7 +25,7 @@ COSTS = ("reciprocal", "logarithm")
 # required difference of upper and lower bound, relative to the limit on a pose error
 _PRECISION = 1e-4
 _BATCH = 512  # number of draws that are solved and stored together
-# stream numbers of random numbers; further verifications use higher numbers
+# random number streams; additional verifications use higher numbers
 TRAINING, SCALING, FRESH = 10, 11, 12
 
 
@@ -34,8 +34,8 @@ class Plan:
     """Costs and limits of tolerances.
 
     Attributes:
-        sources: m errors that are scaled to tolerances of 1 [rad or m]; zones of
-            callouts are scaled to a width of 1 m.
+        sources: m errors, scaled to tolerances of 1 [rad or m]; callout zones are
+            scaled to a width of 1 m.
         group: (m,) class of each error.
         names: names of the G classes.
         costs: (G,) cost coefficient of each class, > 0.
@@ -44,8 +44,8 @@ class Plan:
         cost: cost law, ``"reciprocal"`` or ``"logarithm"``.
         limits: limits by quantity: margin, margin_free, energy [J], force [N], moment
             [N m], stress [Pa], rotation [rad], translation [m].
-        asked_yield: 1 if all robots must meet the limits; otherwise the share of robots
-            that must meet every limit at every posture.
+        asked_yield: 1 if all robots must meet the limits; otherwise the fraction of
+            robots that must meet every limit at every posture.
         draws: number of training draws at every posture.
         seed: seed of all draws.
         clearance: clearance model for limits on pose errors, one of
@@ -70,17 +70,17 @@ class Plan:
 
     @property
     def limits_pose(self) -> bool:
-        """Whether a pose error is limited; otherwise no clearance model is used."""
+        """Whether a pose error is limited; without one, no clearance model is used."""
         return bool(set(POSE_ERRORS) & set(self.limits))
 
     __repr__, _repr_html_ = short_repr, html_table
 
     def spread(self, tolerances: NDArray) -> NDArray:
-        """Return the (m,) tolerance of every source."""
+        """Return the tolerance (m,) of every source."""
         return tolerances[self.group]
 
     def gather(self, slopes: NDArray) -> NDArray:
-        """Return the sums (G,) of slopes over the sources of each class."""
+        """Sum slopes over the sources of each class; return (G,)."""
         return np.bincount(self.group, weights=slopes, minlength=len(self.names))
 
     def price(self, tolerances: NDArray) -> float:
@@ -90,7 +90,7 @@ class Plan:
         return float(-(self.costs * np.log(tolerances)).sum())
 
     def draws_of(self, stream: int, count: int) -> NDArray:
-        """Return drawn errors (count, m), relative to the tolerances."""
+        """Draw errors (count, m), relative to the tolerances."""
         return self.sources.draw(0, count, self.seed, stream)
 
 
@@ -143,8 +143,8 @@ class Requirement:
     def convex(self) -> dict[str, list]:
         """Prepared postures by limited quantity, for quantities convex in the errors.
 
-        If a joint is bolted, no quantity is convex in the errors, because the locked-in
-        clearance is not linear in the errors.
+        If a joint is bolted, no quantity is convex, because the locked-in clearance is
+        not linear in the errors.
         """
         if any(frame.locked_at for frame in self.postures[0].robot.frames):
             return {}
@@ -157,7 +157,7 @@ class Requirement:
 
     @property
     def cases(self) -> list[tuple[str, int]]:
-        """Limit and posture that belong to each row of :meth:`utilisations`."""
+        """Limit and posture of each row of :meth:`utilisations`."""
         return [(key, i) for key in self.plan.limits for i in range(len(self.postures))]
 
     def utilisations(self, values: NDArray) -> tuple[NDArray, NDArray]:
@@ -167,9 +167,9 @@ class Requirement:
             values: (k, m) [rad or m] errors.
 
         Returns:
-            (limits x postures, k) lower and upper bounds; rows as in :attr:`cases`.
-            The bounds differ only for pose errors of the worst clearance model.  The
-            utilisation is inf for a draw without a solution.
+            (limits x postures, k) lower and upper bounds, with rows as in
+            :attr:`cases`. The two differ only for pose errors of the worst clearance
+            model. The utilisation of a draw without a solution is inf.
         """
         chunks = [
             self._batch_utilisations(values, i) for i in range(0, len(values), _BATCH)
@@ -224,7 +224,7 @@ class Requirement:
         return bounds[0], bounds[1]
 
     def utilisation_slopes(self, case: int, values: NDArray) -> NDArray:
-        """Return derivatives (k, m) by each error of a row of :meth:`utilisations`."""
+        """Return derivatives (k, m) of a row of :meth:`utilisations` by each error."""
         key, i = self.cases[case]
         return self.respond(key, i, values)[1] / self.plan.limits[key]
 
@@ -246,7 +246,7 @@ class Requirement:
         return size, slopes
 
     def worst_corner(self, key: str, i: int, t: NDArray, corners: NDArray) -> Corner:
-        """Return the worst corner of the tolerance box (G,) found at posture i."""
+        """Search for the worst corner of the tolerance box (G,) at posture i."""
         spread, sources = self.plan.spread(t), self.plan.sources
         assert isinstance(sources, ErrorSources)  # callouts have no corners
 
@@ -261,10 +261,10 @@ class Requirement:
         return Corner(float(value), signs, slopes)
 
     def perfect_parts(self) -> dict[str, tuple[float, str]]:
-        """Return the pose errors that clearances alone cause, for limited pose errors.
+        """Return the limited pose errors that clearances alone cause.
 
         Returns:
-            By quantity: a lower bound of the largest pose error [rad or m] without
+            By quantity: a lower bound on the largest pose error [rad or m] without
             errors over all postures, and its posture. The result is empty for clearance
             models other than the worst.
 
@@ -288,7 +288,7 @@ class Requirement:
         return reached
 
     def _refuse_broken(self, reached: Mapping[str, tuple[float, str]]) -> None:
-        """Reject the limit that a robot without errors exceeds most, if any."""
+        """Reject the limit that a robot without errors exceeds by the most, if any."""
         limits = self.plan.limits
         for key in sorted(reached, key=lambda k: -reached[k][0] / limits[k]):
             value, where = reached[key]
@@ -302,7 +302,7 @@ class Requirement:
                 )
 
     def check_taken_up(self) -> None:
-        """Reject errors that neither a clearance nor a spring can compensate.
+        """Reject errors that neither a clearance nor a spring can take up.
 
         Raises:
             BadInput: such an error exists; the message names the error.

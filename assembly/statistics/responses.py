@@ -1,4 +1,4 @@
-"""A limited quantity as a function of the errors, with derivatives by each error."""
+"""Limited quantities as functions of the errors, with derivatives."""
 
 from functools import partial
 
@@ -27,7 +27,7 @@ from forcefit.assembly.steps.bolted import bolted_errors
 _STEP = 1e-6  # step for differences of the stress formula, relative to the wrench
 _PRECISION = 1e-9  # [rad or m] required precision of the largest pose errors
 # finite-difference step for errors of bolted joints, relative to the largest absolute
-# value of the error; and the least value to which the step is relative
+# value of the error; and a lower limit on that reference value
 _BOLT_STEP, _LEAST_VALUE = 1e-4, 1e-6
 _PARTS = {"moment": slice(0, 3), "force": slice(3, 6)}
 
@@ -37,7 +37,7 @@ def respond(
     key: str = "energy", clearance: str = "worst",
     contact_length: float | None = None,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return a quantity for given errors, with its derivatives by each error.
+    """Evaluate a quantity and its derivatives for given errors.
 
     Args:
         prepared: a posture prepared for margins, or one prepared for energies, which
@@ -48,16 +48,16 @@ def respond(
             force [N], moment [N m], stress [Pa], rotation [rad] or translation [m].
         clearance: for a pose error, one of
             :data:`forcefit.assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
-            In the worst model, the value and its derivatives belong to the largest
-            error found. For uniform and contact positions the derivatives belong to the
-            least-energy solution (22).  They leave out the motion of clearances that
-            the least energy does not determine.
+            In the worst model, the value and its derivatives are those of the largest
+            error found. For uniform and contact positions, the derivatives are those of
+            the minimum-energy solution (22), which omit the motion of clearances that
+            the minimum energy leaves undetermined.
         contact_length: [m] length of the contact model, see
             :class:`forcefit.assembly.statistics.experiment.Experiment`.
 
     Returns:
-        (k,) values and (k, m) derivatives; NaN without a solution.  Clearances of
-        bolted joints are locked in at their least sum of squares for these errors.
+        (k,) values and (k, m) derivatives; NaN without a solution. Bolted joints lock
+        in the clearances with the smallest sum of squares for these errors.
 
     Raises:
         CannotBolt: a robot cannot be assembled at the pose where its joint is bolted.
@@ -74,7 +74,7 @@ def respond(
         return draws.energy, -by_number(draws.wrenches)
     size = np.full(len(values), np.nan)
     slopes = np.full(errors.shape, np.nan)
-    # a draw without known clearances has no known active clearance bounds
+    # without known clearances, the active clearance bounds are unknown too
     known = np.isfinite(draws.energy) & np.isfinite(draws.clearances).all(axis=1)
     solved = np.flatnonzero(known)
     if len(solved):
@@ -96,7 +96,7 @@ def respond(
 def _by_number(
     robot: Robot, sources: Sources, values: NDArray, slopes: NDArray
 ) -> NDArray:
-    """Return derivatives by m sources (k, m), from derivatives by all frame errors.
+    """Return derivatives (k, m) by m sources, from derivatives by all frame errors.
 
     The clearance that a bolted joint locks in depends on the errors; its derivatives
     are central differences.
@@ -156,7 +156,7 @@ def _wrench_quantity(some: Assembly, key: str) -> tuple[NDArray, NDArray]:
 
 
 def _size(parts: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the norms of vectors, and their derivatives by the components."""
+    """Return the norms of vectors, and their derivatives by component."""
     size = np.linalg.norm(parts, axis=-1)
     return size, parts / np.maximum(size, 1e-300)[..., None]
 
@@ -164,9 +164,9 @@ def _size(parts: NDArray) -> tuple[NDArray, NDArray]:
 def _stress_slopes(
     link: LinkStress, wrenches: NDArray, at_tip: NDArray = WEIGHTLESS
 ) -> NDArray:
-    """Return the derivatives (k, 6) of the peak stress by the wrench of a link."""
-    # central differences of the formula, not of the solution: the stress of a fibre is
-    # the root of a quadratic form, so the relative error is 1e-10
+    """Differentiate the peak stress with respect to the wrench of a link (k, 6)."""
+    # The formula, not the solution, is differenced. A fibre's stress is the root of a
+    # quadratic form, so the relative error is 1e-10.
     slopes = np.zeros_like(wrenches)
     for part in (slice(0, 3), slice(3, 6)):
         step = _STEP * np.linalg.norm(wrenches[:, part], axis=1).max(initial=1e-9)

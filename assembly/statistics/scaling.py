@@ -1,4 +1,4 @@
-"""Uniform scaling of tolerances until samples of the errors just meet all limits."""
+"""Uniform scaling of tolerances until error samples just meet all limits."""
 
 from dataclasses import dataclass
 
@@ -28,19 +28,19 @@ class Samples:
 
 
 def draw_samples(requirement: Requirement, stream: int, times: int = 1) -> Samples:
-    """Return random error samples or, for a yield of 1, corners of the tolerance box.
+    """Draw random error samples or, for a yield of 1, corners of the tolerance box.
 
     Args:
         requirement: requirement at all postures.
-        stream: stream of random numbers.
+        stream: random number stream.
         times: factor on the number of the plan's draws.
 
     Returns:
-        The samples.  If at most the allowed number fail, the required yield is
+        The samples. If no more than the allowed number fail, the required yield is
         demonstrated with 95 % confidence.
 
     Raises:
-        BadInput: the draws are too few to demonstrate that yield.
+        BadInput: there are too few draws to demonstrate that yield.
     """
     plan = requirement.plan
     if plan.asked_yield == 1.0:
@@ -54,11 +54,11 @@ def draw_samples(requirement: Requirement, stream: int, times: int = 1) -> Sampl
 def with_worst_corners(
     requirement: Requirement, samples: Samples, t: NDArray
 ) -> Samples:
-    """Return samples extended by the worst corner for each limit and posture.
+    """Extend samples by the worst corner for each limit and posture.
 
     Args:
         requirement: requirement at all postures; no failure is allowed.
-        samples: present corners.
+        samples: current corners.
         t: (G,) [rad or m] tolerances.
 
     Returns:
@@ -91,8 +91,8 @@ def scale_uniformly(
         precision: relative precision of the largest utilisation, or of the factor.
 
     Returns:
-        (G,) [rad or m] tolerances; their upper bounds if the samples still meet all
-        limits there.
+        (G,) [rad or m] tolerances, or their upper bounds if the samples meet all limits
+        even there.
 
     Raises:
         BadInput: no scale factor makes the samples meet the limits.
@@ -128,7 +128,7 @@ def scale_uniformly(
             steep = np.log(utilisation / previous[1]) / np.log(factor / previous[0])
             power = float(np.clip(steep, 0.3, 10.0))
         previous = factor, utilisation
-        # predict the factor by a power law of the utilisation, or else bisect
+        # predict the factor with a power law of the utilisation, otherwise bisect
         factor = _next_factor(low, high, factor, utilisation, power, precision)
     return np.clip(low * t, plan.least, plan.most)
 
@@ -148,8 +148,8 @@ def _next_factor(
 
 
 def _allowed_failures(draws: int, asked: float) -> int:
-    """Return the most failures with which a yield is demonstrated at 95 %."""
-    # proportion() decreases with the number of failures, so bisection applies
+    """Return the largest number of failures that still demonstrates a yield at 95 %."""
+    # proportion() is monotonic in the number of failures, so bisection applies
     low, high = -1, draws
     while high - low > 1:
         middle = (low + high) // 2

@@ -1,4 +1,4 @@
-"""Three-dimensional scenes of robots with drawn errors, and maps of margins."""
+"""3D scenes of robots with drawn errors, and maps of assembly margins."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -28,7 +28,7 @@ _CAPTION = (
 
 
 def drawn_robot(experiment: Experiment, data: "xarray.Dataset") -> str:
-    """Return the scene of the draw with the pose error nearest to the 95 % quantile.
+    """Draw the robot whose pose error is closest to the 95 % quantile.
 
     Args:
         experiment: the experiment of the draws.
@@ -59,7 +59,7 @@ def drawn_robot(experiment: Experiment, data: "xarray.Dataset") -> str:
 
 
 def tightest_robot(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
-    """Return the scene of the robot's present errors at the posture of largest margin.
+    """Draw the robot with its present errors at the posture of largest margin.
 
     Args:
         postures: the assessed postures.
@@ -81,7 +81,7 @@ def _forced_robot(
     *,
     why: str,
 ) -> str:
-    """Return the scene of an assembled robot; empty if the assembly has no solution."""
+    """Draw an assembled robot; the result is empty if the assembly has no solution."""
     try:
         forced = solve_assembly(posture, load, gravity=gravity)
     except (CannotAssemble, SolverFailed):
@@ -90,7 +90,7 @@ def _forced_robot(
 
 
 def margin_map(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
-    """Return the map of the margins over the postures of a grid as HTML.
+    """Plot the margins over a grid of postures as an HTML map.
 
     Args:
         postures: the assessed postures.
@@ -98,7 +98,7 @@ def margin_map(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
             :func:`forcefit.assembly.statistics.tolerances.present_errors`.
 
     Returns:
-        HTML of a map; empty if the grid does not have one or two axes.
+        HTML of the map; empty unless the grid has one or two axes.
     """
     poses = [posture.pose() for posture in postures]
     values = {name: np.array([pose[name] for pose in poses]) for name in poses[0]}

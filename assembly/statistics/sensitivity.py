@@ -1,12 +1,12 @@
 """Derivatives of a solution with respect to every geometric error.
 
-The least energy (22) equals the maximum of its dual ``-w.dl - ..`` over all balanced
-wrenches w.  The derivative of the energy by delta l is therefore minus the wrench that
-the body transmits.
+The minimum energy (22) equals the maximum of its dual ``-w.dl - ..`` over all balanced
+wrenches w.  The derivative of the energy with respect to delta l is therefore minus the
+wrench that the body transmits.
 
-Wrenches and the platform's screw are part of the solution.  As long as the set of
-active clearances does not change, the derivatives of the solution follow from the
-optimality conditions, differentiated:
+Wrenches and the platform screw are part of the solution. As long as the set of active
+clearances does not change, their derivatives follow from the differentiated optimality
+conditions:
 
     G^T (G u + h) + H^T eta + nu u = 0,   H u = k,   |u_c| = 1 where nu_c > 0,
 
@@ -14,8 +14,8 @@ so du is orthogonal to u_c in every active cone, and
 
     P (G^T G + nu) P du + P H^T deta = -P G^T dh,   H P du = dk
 
-where P is the projector on these directions.  One solution of the transposed equations
-computes the derivatives by any number of errors (adjoint method).
+where P is the projector on these directions.  A single solve with the transposed
+equations gives the derivatives with respect to any number of errors (adjoint method).
 """
 
 import numpy as np
@@ -25,24 +25,24 @@ from forcefit.assembly.linear.energy import Assembly
 from forcefit.assembly.solvers.conic import GAP_WITHOUT_CLEARANCE
 from forcefit.assembly.statistics.linear_response import LinearResponse
 
-# forces below this share of the largest force on any clearance count as zero
+# forces below this fraction of the largest force on any clearance count as zero
 _ACTIVE = 1e-7
-# relative size below which a singular value counts as zero; clearances are assumed not
-# to move along such directions
+# relative size below which a singular value counts as zero; clearances are assumed to
+# stay fixed along the corresponding directions
 _RANK = 1e-10
 
 
 def energy_slopes(assembly: Assembly) -> NDArray:
-    """Return the derivatives of the least energy by every geometric error.
+    """Differentiate the minimum energy with respect to every geometric error.
 
     Args:
-        assembly: the assembly at least energy. Under a load, the result is the
+        assembly: the assembly at minimum energy. Under a load, the result is the
             derivative of the energy minus the work of the load.
 
     Returns:
-        (n, 6) [J/rad, J/m] derivatives by delta l of every frame in its axes.  If rigid
-        parts are overconstrained, the wrenches are not unique; the smallest wrenches
-        and the corresponding derivatives are returned.
+        (n, 6) [J/rad, J/m] derivatives with respect to delta l of every frame, in frame
+        axes. If rigid parts are overconstrained, the wrenches are not unique, and the
+        derivatives for the smallest wrenches are returned.
     """
     return -assembly.wrenches
 
@@ -51,20 +51,21 @@ def solution_slopes(
     prepared: LinearResponse, draws: Assembly, by_wrench: NDArray, by_screw: NDArray,
     by_clearance: NDArray | None = None,
 ) -> NDArray:  # fmt: skip
-    """Return the derivatives of a function of wrenches and platform screw by errors.
+    """Differentiate a function of wrenches and platform screw with respect to errors.
 
     Args:
         prepared: the prepared posture.
         draws: solutions of k draws, from :meth:`LinearResponse.solve`.
         by_wrench: (k, n, 6) derivatives of the function by the wrench of every body.
-        by_screw: (k, 6) derivatives by the platform's screw.
-        by_clearance: (k, nu) derivatives by the clearances, relative to their bounds.
+        by_screw: (k, 6) derivatives with respect to the platform's screw.
+        by_clearance: (k, nu) derivatives with respect to the clearances, relative to
+            their bounds.
 
     Returns:
-        (k, n, 6) derivatives by delta l of every frame in its axes. If a clearance is
-        weakly active, one of several one-sided derivatives is returned.  Undetermined
-        clearances are assumed not to move.  Motion limits of passive joints are
-        ignored.
+        (k, n, 6) derivatives with respect to delta l of every frame, in frame axes. If
+        a clearance is weakly active, one of the one-sided derivatives is returned.
+        Undetermined clearances are assumed to stay fixed, and motion limits of passive
+        joints are ignored.
     """
     A, nu, k = prepared.closures, prepared.starts[-1], len(draws.energy)
     closure_columns = A @ prepared.joints.cones
@@ -99,8 +100,8 @@ def _active_clearances(
     """Return projectors (k, nu, nu) normal to active clearances, and multipliers."""
     k, nu = forces.shape
     P, N = np.tile(np.eye(nu), (k, 1, 1)), np.zeros((k, nu, nu))
-    # inside an assembly zone the multipliers y are rounding errors: the energies
-    # y^2 / 2 are far below the forces G y
+    # inside an assembly zone the multipliers y are round-off: the energies y^2 / 2 are
+    # far below the forces G y
     pressed = draws.energy > GAP_WITHOUT_CLEARANCE * np.abs(forces).sum(
         axis=1, initial=0.0
     )

@@ -1,4 +1,4 @@
-"""Pictures of all results: of robots, of results at one point, and of data sets."""
+"""Pictures of robots, of results at one point, and of data sets."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -28,16 +28,16 @@ def show(
     at: Mapping[str, float | str] | None = None,
     kind: str | None = None,
 ) -> "Picture | Figure":
-    """Return a picture of a robot, of a result at one point, or of a data set.
+    """Draw a robot, a result at one point, or a data set.
 
     Args:
         thing: object to draw. A robot is drawn in its home pose. A posture is drawn
-            without errors. An assembly is drawn nominal and forced, with exaggerated
-            displacements. An assembly with finite motions is also drawn nominal and
-            forced, but large displacements are to scale. For a platform stiffness, the
-            shares of its parts are drawn.  For a data set, maps over two axes or lines
-            along one axis of a sweep are drawn, or histograms of draws, or tolerances.
-            The path of its NetCDF file is accepted too.
+            without errors. An assembly is drawn in its nominal and its forced state,
+            with exaggerated displacements; with finite motions, large displacements are
+            to scale. A platform stiffness is drawn as the compliance shares of its
+            parts. A data set, which may also be given as the path of a NetCDF file, is
+            drawn as maps over two axes or lines along one axis of a sweep, as
+            histograms of draws, or as bars of tolerances.
         errors: for an assembly: ``"translation"`` or ``"rotation"`` to add the possible
             platform errors within the clearances.
         assumption: assumption of problem (27) for these errors: ``"frozen"``,
@@ -47,15 +47,15 @@ def show(
             a scene in a notebook and a figure elsewhere.  A data set has figures only.
         quantities: for a data set: variables to draw, or their components, such as
             ``["energy", "stiffness.FX"]``; by default those of figure 5 of the paper.
-        at: for a sweep: values on further axes by name; the nearest points are drawn.
-            If no draw is selected, the median over the draws is drawn.
+        at: for a sweep: values on the remaining axes by name; the nearest points are
+            drawn. If no draw is selected, the median over all draws is drawn.
         kind: for draws or tolerances: ``"histogram"``, ``"tornado"`` or
-            ``"allocation"``; None for the kind that fits the data set.
+            ``"allocation"``; None to choose the kind that suits the data set.
 
     Returns:
-        The scene; or the figure, which is not displayed: ``savefig`` writes it, and
-        ``pyplot.show()`` opens a window.  A notebook displays it as the result of a
-        cell.
+        The scene or the figure. A notebook displays it as the result of a cell.
+        Otherwise a figure is not shown: use ``savefig`` to write it, or
+        ``pyplot.show()`` to open a window.
 
     Raises:
         BadInput: the object has another type or many points; a file cannot be read; an

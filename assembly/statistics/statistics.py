@@ -1,4 +1,4 @@
-"""Random errors in one call: from a posture and its errors to draws and yields.
+"""Random errors in one call, from a posture and its errors to draws and yields.
 
 Start with :func:`statistics`; the command ``forcefit assembly statistics`` has the same
 options.
@@ -37,12 +37,12 @@ _WORDS: dict[str, tuple[str | None, ...]] = {
 
 @dataclass(frozen=True, eq=False)
 class Statistics:
-    """The draws of the random errors at a posture, and what they say about yields.
+    """Draws of the random errors at a posture, with their yields.
 
     Attributes:
         data: data set over ``draw``, with units.
-        summary: yields, quantiles and most probable values, as ``forcefit assembly
-            statistics --json`` writes them; see
+        summary: yields, quantiles and most probable values in the format of ``forcefit
+            assembly statistics --json``; see
             :func:`forcefit.assembly.statistics.summary.summarise`.
     """
 
@@ -87,15 +87,15 @@ def statistics(
     output: Path | str | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Statistics:
-    """Draw random errors of a robot: estimate the yield and the pose errors.
+    """Estimate the yield and the pose errors of a robot from random errors.
 
     Args:
         posture: posture of the robot; drawn errors replace the robot file's errors.
-        errors: file with the distributions of errors (TOML, see docs/statistics.md), in
-            addition to the tolerances and fits in the robot file; None for these alone.
-            Sources of errors are accepted too; those of
+        errors: file with error distributions (TOML, see docs/statistics.md), in
+            addition to the tolerances and fits in the robot file; None to use only the
+            latter. Error sources are accepted too; those returned by
             :func:`forcefit.assembly.statistics.callout_sources.sources_of` may include
-            errors that are the same in every draw.
+            constant errors, equal in every draw.
         draws: number of draws, at least 2.
         seed: seed of the draws.
         clearance: positions within the clearances: ``"worst"``, ``"uniform"``,
@@ -106,16 +106,16 @@ def statistics(
         load: load on the platform at its origin in base axes, (6,) [N m, N] or by
             component, ``{"fz": -50}``.
         gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
-        limits: limits of results in SI units, such as ``{"translation": 2e-4}``; a draw
-            meets the limits if it exceeds none.
-        yield_strength: [Pa] yield strength of the links, the limit of their stress.
+        limits: limits on results in SI units, such as ``{"translation": 2e-4}``. A draw
+            meets the limits if it exceeds none of them.
+        yield_strength: [Pa] yield strength of the links, used as limit on their stress.
         capability: whether Cp, Cpk and parts per million of each limit are computed.
         importance: number of base draws for the Sobol indices of the errors; None to
             omit the indices.
         by: groups of errors in the Sobol indices: ``"source"``, ``"frame"`` or
             ``"kind"``.
         margins: whether the assembly margins, problem (21), are computed.
-        state: state in which the platform's stiffness is computed for each draw,
+        state: state for which the platform stiffness of each draw is computed,
             ``"contact"`` or ``"exact"``; None to omit it.
         confidence: confidence level of all intervals.
         workers: number of threads.
@@ -169,7 +169,7 @@ def statistics(
 
 
 def _check_words(**words: str | None) -> None:
-    """Raise an error for a word that is not among those of its argument."""
+    """Reject an argument whose value is not one of its valid words."""
     for name, word in words.items():
         if word not in _WORDS[name]:
             valid = [one for one in _WORDS[name] if one is not None]
@@ -179,7 +179,7 @@ def _check_words(**words: str | None) -> None:
 def _check_numbers(
     draws: int, workers: int, confidence: float, yield_strength: float | None
 ) -> None:
-    """Raise an error for a number that is out of its range."""
+    """Reject a number that is out of range."""
     for name, count, least in (("draws", draws, 2), ("workers", workers, 1)):
         if count < least:
             raise BadInput(f"{name}: found {count}, expected at least {least}")

@@ -1,9 +1,9 @@
-"""Distribution of the platform's stiffness over draws of errors and clearances.
+"""Distribution of the platform stiffness over draws of errors and clearances.
 
-Errors do not change the nominal platform stiffness K_C.  They change which clearances
-are in contact, so the tangent stiffness of problem (22) differs between draws.  The
-tangent of the exact equilibrium also includes the effects of internal forces and of
-rotated parts.
+Errors do not change the nominal platform stiffness K_C, but they determine which
+clearances are in contact, so the tangent stiffness of problem (22) differs between
+draws. The tangent of the exact equilibrium also includes internal forces and the
+rotation of parts.
 """
 
 from collections.abc import Mapping
@@ -26,14 +26,14 @@ from forcefit.results.display import numbers
 from forcefit.stiffness.screws import WRENCH
 
 _NAMED = 5  # largest number of free motions that are reported, most frequent first
-_ALIKE = 2  # number of decimals to which the motions of two draws are compared
+_ALIKE = 2  # number of decimals used to compare the motions of two draws
 
 
 def draw_stiffnesses(
     posture: Posture, errors: NDArray, state: str,
     load: ArrayLike | None = None, gravity: ArrayLike | None = None,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the stiffness of each draw along every axis, with the other axes free.
+    """Compute the stiffness of each draw along every axis, with the other axes free.
 
     Args:
         posture: the robot's configuration.
@@ -43,9 +43,9 @@ def draw_stiffnesses(
         gravity: (3,) [m/s^2] gravity in base axes.
 
     Returns:
-        (k, 6) [N m/rad, N/m] for ``[mx my mz fx fy fz]``: 0 for a free motion, such as
-        one within a clearance; NaN without equilibrium.  And (k, 6, 6) [rad, m] unit
-        screws of the free motions in rows; unused rows are NaN.
+        (k, 6) [N m/rad, N/m] for ``[mx my mz fx fy fz]``: 0 for a free motion, for
+            example within a clearance, and NaN without equilibrium. Second, (k, 6, 6)
+            [rad, m] unit screws of the free motions in rows; unused rows are NaN.
     """
     stiffnesses = np.full((len(errors), 6), np.nan)
     motions = np.full((len(errors), 6, 6), np.nan)
@@ -68,7 +68,7 @@ def draw_stiffnesses(
 def stiffness_report(
     stiffnesses: NDArray, motions: NDArray, state: str, level: float
 ) -> dict[str, Any]:
-    """Return the distribution of the stiffness along each axis.
+    """Summarise the distribution of the stiffness along each axis.
 
     Args:
         stiffnesses: (k, 6) result of :func:`draw_stiffnesses`.
@@ -77,9 +77,9 @@ def stiffness_report(
         level: confidence level.
 
     Returns:
-        By axis: the number of draws with a result; the shares of draws with a free
-        motion and, if any, with a rigid platform; mean and quantiles of the other
-        draws, with intervals.  Also the most frequent free motions.
+        By axis: the number of draws with a result; the fractions of draws with a free
+            motion and, if any, with a rigid platform; and mean and quantiles of the
+            remaining draws, with intervals. Also the most frequent free motions.
     """
     axes: dict[str, Any] = {}
     for name, values in zip(WRENCH, stiffnesses.T, strict=True):
@@ -112,7 +112,7 @@ def stiffness_report(
 
 
 def stiffness_spread_text(report: Mapping[str, Any]) -> str:
-    """Return the distribution as text, with one line for each axis."""
+    """Format the distribution as text, with one line for each axis."""
     lines = [f"stiffness of the platform, {report['means']}:"]
     for name, one in report["axes"].items():
         shares = {

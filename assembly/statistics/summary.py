@@ -1,8 +1,8 @@
-"""Summary of the draws of an experiment: yields, quantiles, most probable values.
+"""Summary of an experiment's draws: yields, quantiles and most probable values.
 
 Yields count all draws.  Energies, wrenches and pose errors exist only for draws that
-assemble, whose number is reported.  Margins exist for all draws and are also summarised
-over all draws.  Every pose error is reported with its clearance model.
+can be assembled, whose number is reported.  Margins exist for all draws and are also
+summarised over all draws.  Every pose error is reported with its clearance model.
 """
 
 import json
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     import xarray
 
 QUANTILES = (0.05, 0.5, 0.95, 0.99)
-_ROUNDING = 1e-18  # values below this share of the largest value count as zero
+_ROUNDING = 1e-18  # values below this fraction of the largest value count as zero
 _MARGINS = {"margin": "rigid", "margin_free": "rigid_compliant_free"}
 WORDS = {
     "forced": "assembles, by force if necessary",
@@ -55,7 +55,7 @@ def summarise(
     level: float = 0.95,
     capable: bool = False,
 ) -> dict[str, Any]:
-    """Return a summary of draws from :func:`.monte_carlo.run_draws`.
+    """Summarise draws from :func:`.monte_carlo.run_draws`.
 
     Args:
         data: the draws.
@@ -70,7 +70,7 @@ def summarise(
         (with any energy, or by clearances with compliant joints rigid or free),
         ``exceeds`` and ``within_limits``.  ``perfect_parts``, and the limits that
         perfect parts exceed.  Mean, quantiles and most probable value of every quantity
-        among the assembled draws, for margins also among all draws.  Mean, covariance
+        over the assembled draws, and for margins also over all draws.  Mean, covariance
         and most probable value of the platform screw.
 
     Raises:
@@ -141,7 +141,7 @@ def summarise(
 def _yields(
     data: "xarray.Dataset", solved: NDArray, limits: Mapping[str, float], level: float
 ) -> dict[str, Any]:
-    """Return the probability that each limit, and any limit, is exceeded."""
+    """Estimate the probability that each limit, and any limit, is exceeded."""
     count = len(solved)
     met, failed, exceeds = solved.copy(), ~solved, {}
     for key, limit in limits.items():
@@ -152,8 +152,8 @@ def _yields(
             )
         values, lower = _worst(data, key), f"{key}_lower"
         over = ~(values <= limit)
-        # a draw has two bounds of a largest pose error, but one value of any other
-        # quantity
+        # a largest pose error has two bounds in each draw, all other quantities one
+        # value
         least = data[lower].values if lower in data else values
         surely = ~solved | (least > limit)
         met &= ~over
@@ -174,7 +174,7 @@ def _yields(
 
 
 def _worst(data: "xarray.Dataset", key: str) -> NDArray:
-    """Return a quantity's (k,) values; for links, the largest over all links."""
+    """Return a quantity's (k,) values; for links, the maximum over all links."""
     values = np.asarray(data[key].values, dtype=float)
     return values.max(axis=1) if values.ndim == 2 else values
 
@@ -182,7 +182,7 @@ def _worst(data: "xarray.Dataset", key: str) -> NDArray:
 def _described(
     data: "xarray.Dataset", key: str, solved: NDArray, level: float
 ) -> dict[str, Any]:
-    """Return mean, quantiles and mode; the mode is 0 if most values are zero."""
+    """Compute mean, quantiles and mode; the mode is 0 if most values are zero."""
     every = _worst(data, key)
     values = every[solved]
     finite = values[np.isfinite(values)]
@@ -200,7 +200,7 @@ def _described(
         }
     if len(finite) < 2:
         return description
-    # draws inside an assembly zone store no energy: their values are rounding errors
+    # draws inside an assembly zone store no energy, so their values are round-off
     zero = finite <= _ROUNDING * finite.max()
     often = dict.fromkeys(("value", "lower", "upper"), 0.0)
     if zero.sum() <= len(finite) / 2:
@@ -214,7 +214,7 @@ def _described(
 
 
 def summary_text(summary: Mapping[str, Any]) -> str:
-    """Return the results of :func:`summarise` as text."""
+    """Format the results of :func:`summarise` as text."""
     draws, assembled = summary["draws"], summary["assembled"]
     lines = [
         f"{draws} draws; in brackets {summary['confidence']:.0%} intervals",
@@ -222,8 +222,8 @@ def summary_text(summary: Mapping[str, Any]) -> str:
     ]
     if summary["clearance"] == "contact" and not summary.get("load"):
         lines.append(
-            "the contact length determines which clearances close; with the "
-            "service load (--load) they close as this load presses them"
+            "the contact length determines which clearances close; specify a known "
+            "service load with --load to close them as in service"
         )
     if summary.get("clearance_not_mixed"):
         lines.append(
@@ -277,7 +277,7 @@ def _titled(name: str, results: Mapping[str, Any]) -> str:
 
 
 def _share(interval: Mapping[str, float]) -> str:
-    """Return as text a probability, its interval and the count of undecided draws."""
+    """Format a probability, its interval and the number of undecided draws as text."""
     low, high = interval["lower"], interval["upper"]
     text = f"{interval['probability']:.5g} ({low:.5g} to {high:.5g})"
     undecided = interval.get("undecided", 0)
@@ -285,12 +285,12 @@ def _share(interval: Mapping[str, float]) -> str:
 
 
 def _named(value: float, unit: str) -> str:
-    """Return a number as text with its unit."""
+    """Format a number as text with its unit."""
     return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
 
 
 def _quantiles_text(quantiles: Mapping[str, Mapping[str, float]]) -> str:
-    """Return the median and the 95 % quantile as text."""
+    """Format the median and the 95 % quantile as text."""
     half, high = quantiles["0.5"], quantiles["0.95"]
     return (
         f"median {half['value']:.4g} ({half['lower']:.4g} to {half['upper']:.4g}), "

@@ -1,4 +1,4 @@
-"""Report tiles that name the error or clearance with the largest effect."""
+"""Report tiles that name the most influential error or clearance."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,13 +12,13 @@ _NAMED = 3  # largest number of contributors named in a tile
 
 
 def tightening_tiles(summary: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles: results without errors, main contributor, advice to tighten.
+    """Return tiles with results without errors, main contributor and advice to tighten.
 
     Args:
         summary: result of :func:`forcefit.assembly.statistics.summary.summarise`.
 
     Returns:
-        The tiles; tiles on errors are included only if their importance is known.
+        The tiles, including tiles on errors if their importance is known.
     """
     tiles = _clearance_tiles(summary)
     broken, key = summary["perfect_parts_break"], _deciding(summary)
@@ -39,7 +39,7 @@ def tightening_tiles(summary: Mapping[str, Any]) -> list[Tile]:
     if broken:
         tiles.append(_broken_tile(broken))
     elif summary.get("within_limits", {}).get("probability") == 1.0:
-        note = f"all {summary['draws']} draws keep all limits."
+        note = f"all {summary['draws']} draws meet all limits."
         tiles.append(Tile("Tolerance to tighten", ["nothing"], [note]))
     elif names:
         note = "not distinguished by these draws." if len(names) > 1 else ""
@@ -89,6 +89,6 @@ def _broken_tile(broken: Mapping[str, Any]) -> Tile:
 
 
 def _listed(names: list[str]) -> str:
-    """Return a text with the first names and the number of the remaining names."""
+    """List the first names, followed by the number of remaining names."""
     more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
     return ", ".join(names[:_NAMED]) + more

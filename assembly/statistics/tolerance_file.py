@@ -1,4 +1,4 @@
-"""Reading tolerance files: classes of errors, their costs, and limits on results.
+"""Reader of tolerance files: classes of errors, their costs, and limits on results.
 
 The format is described in ``docs/tolerances.md``.
 """
@@ -24,12 +24,12 @@ from forcefit.assembly.steps.bolted import refuse_bolted
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 from forcefit.stiffness.screws import SCREW
 
-# [rad, m] largest accepted tolerances, for which screws are still small
+# [rad, m] largest accepted tolerances, for which small screws are still valid
 _LOOSEST = (0.1, 0.01)
 
 
 def read_plan(path: Path | str, robot: Robot) -> Plan:
-    """Return the plan of a tolerance file.
+    """Read the plan in a tolerance file.
 
     Args:
         path: path of the TOML file.
@@ -39,7 +39,7 @@ def read_plan(path: Path | str, robot: Robot) -> Plan:
         The plan.
 
     Raises:
-        BadInput: the file violates a rule; or the worst case of callouts is requested
+        BadInput: the file violates a rule, or the worst case of callouts is requested
             for a robot with a joint that is bolted at a pose.
     """
     root = read_toml(path)
@@ -168,7 +168,7 @@ def _callouts(table: Table, robot: Robot, callouts: dict[int, int], number: int)
     """Add the callouts of a table to its class; return the default class name."""
     value = table.content["callouts"]
     if not isinstance(value, list) or not all(isinstance(v, str) for v in value):
-        raise table.bad("callouts", "expected a list of names of [[tolerance]]")
+        raise table.bad("callouts", "expected a list of names of [[tolerance]] entries")
     names = [callout.name for callout in robot.callouts]
     for name in value:
         # a name without a leg's name selects the callout in every leg

@@ -1,4 +1,4 @@
-"""Postures of a workspace, and the assessment of a robot's present errors there."""
+"""Workspace postures, and the assessment of a robot's present errors over them."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -26,15 +26,15 @@ from forcefit.inputs.table import BadInput
 
 
 def grid_postures(robot: Robot, grid: str) -> tuple[list[Posture], dict[str, int]]:
-    """Return the postures of a grid that the robot can reach and that are usable.
+    """Return the grid postures that the robot can reach and use.
 
     Args:
         robot: the robot.
         grid: grid such as ``"tx=-0.2:0.2:0.1,tz=-0.5"``.
 
     Returns:
-        The postures, and the number of omitted postures by status: out of reach, or a
-        status of :func:`forcefit.assembly.kinematics.verdict.verdicts`.
+        The postures, and the number of omitted postures by status, which is out of
+        reach or a status of :func:`forcefit.assembly.kinematics.verdict.verdicts`.
 
     Raises:
         BadInput: the grid is invalid, or none of its postures can be reached.
@@ -61,7 +61,7 @@ def grid_postures(robot: Robot, grid: str) -> tuple[list[Posture], dict[str, int
 
 
 def left_out_text(left_out: dict[str, int]) -> str:
-    """Return a line of text that counts the omitted postures by reason."""
+    """Format the number of omitted postures by reason as a line of text."""
     counts = ", ".join(f"{status}: {n}" for status, n in left_out.items())
     text = f"postures left out: {counts}"
     if SINGULAR in left_out:
@@ -70,7 +70,7 @@ def left_out_text(left_out: dict[str, int]) -> str:
 
 
 def identity_of(postures: Sequence[Posture], plan: Plan, fresh: int) -> dict[str, Any]:
-    """Return the values that must be equal for two allocations to share results."""
+    """Return values that must be equal for two allocations to share results."""
     arrays = [p.transforms for p in postures]
     arrays += [v for v in vars(plan).values() if isinstance(v, np.ndarray)]
     arrays += plan.sources.identity
@@ -96,7 +96,7 @@ def present_errors(
     compliant: Compliant = "free",
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[str, Any]:
-    """Assess the errors of the robot file: largest margin over postures, and causes.
+    """Assess the errors in the robot file: largest margin over postures, and causes.
 
     Args:
         postures: postures of a robot with errors.
@@ -106,9 +106,10 @@ def present_errors(
             postures.
 
     Returns:
-        The margins; the largest margin and its posture; the factor on all errors for
-        which the largest margin is 1; derivatives of margin and energy by each error
-        at this posture, largest first.
+        The margins; the largest margin and its posture; the factor on all errors at
+        which the largest margin becomes 1; and, at this posture, the derivatives of
+        margin and energy with respect to each error, in order of decreasing effect on
+        the margin.
     """
     prepared, zones = [], []
     for i, posture in enumerate(postures):
@@ -151,7 +152,7 @@ def present_errors(
 
 
 def present_text(results: dict[str, Any]) -> str:
-    """Return :func:`present_errors` as text, with the five largest derivatives."""
+    """Format :func:`present_errors` as text, with the five largest derivatives."""
     where = ", ".join(
         f"{k} = {v:.4g}" for k, v in results["at"].items() if abs(v) > 1e-9
     )

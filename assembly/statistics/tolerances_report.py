@@ -1,4 +1,4 @@
-"""HTML page of tolerances, their requirement, and the effect of clearances alone."""
+"""HTML report on tolerances, their requirement, and the effect of clearances alone."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -16,8 +16,8 @@ _LISTED = 20  # largest number of errors in a table of shares
 # difference below which two shares count as equal, relative to the largest share
 _ALIKE = 0.01
 _ASSUMED = (
-    "Limits hold at the postures of the grid; nothing is known between them.",
-    "Errors are independent and keep within their tolerances.",
+    "Limits are checked only at the postures of the grid, not between them.",
+    "Errors are independent and stay within their tolerances.",
     "Small screws: the closures are linear in the errors.",
 )
 _COST_LAWS = {
@@ -26,14 +26,14 @@ _COST_LAWS = {
 }
 _GOVERNED = {
     "reciprocal": "of the price",
-    "logarithm": "of what looser tolerances would save",
+    "logarithm": "of the saving by looser tolerances",
 }
 
 
 def tolerances_page(
     results: Mapping[str, Any], provenance: Provenance, pictures: Sequence[str] = ()
 ) -> str:
-    """Return the page of ``assembly tolerances`` as HTML.
+    """Format the results of ``assembly tolerances`` as an HTML page.
 
     Args:
         results: results that contain ``present``, ``allocation`` or both, the number of
@@ -43,7 +43,7 @@ def tolerances_page(
             errors.
 
     Returns:
-        HTML that refers to no other file.
+        Self-contained HTML.
     """
     present, allocation = (results.get(key) for key in ("present", "allocation"))
     tiles, body, sentences = [], [], []
@@ -78,7 +78,7 @@ def tolerances_page(
 
 
 def _sentence(parts: Sequence[str]) -> str:
-    """Join the parts to one sentence and return it."""
+    """Join parts into one sentence."""
     text = "; ".join(parts)
     return f"{text[:1].upper()}{text[1:]}."
 
@@ -88,7 +88,7 @@ def _good(
 ) -> bool | None:
     """Return whether all postures assemble and new draws demonstrate the yield.
 
-    Return None if some postures assemble only by force, or if new draws are undecided.
+    Return None if some postures assemble only by force, or if new draws do not decide.
     """
     verdict = "shown"
     if allocation is not None:
@@ -100,7 +100,7 @@ def _good(
 
 
 def _present_tiles(present: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles of the largest margin, and of the error that contributes most."""
+    """Return tiles for the largest margin and for the error that contributes most."""
     at = ", ".join(f"{k} = {v:.4g}" for k, v in present["at"].items() if abs(v) > 1e-9)
     note = f"at {at or 'the origin'} [m, rad]; it assembles up to 1."
     tiles = [Tile("Largest margin", [Value(present["largest_margin"])], [note])]
@@ -129,8 +129,8 @@ def _present_section(present: Mapping[str, Any]) -> str:
         most[rest] = sum(list(shares.values())[_LISTED:])
     axis = Axis("share of the largest margin")
     return section(
-        "The errors there are",
-        bars(most, axis, "The steepest first.", np.nan, rest),
+        "Present errors",
+        bars(most, axis, "Largest share first.", np.nan, rest),
         table(["error", "size", Column("share of the margin")], rows, "errors"),
     )
 
@@ -141,7 +141,7 @@ def _error_unit(name: str) -> str:
 
 
 def _allocation_sentence(allocation: Mapping[str, Any]) -> str:
-    """Return a sentence that says whether the tolerances meet the limits."""
+    """Format a sentence on whether the tolerances meet the limits."""
     text = f"tolerances for a yield of {allocation['yield']:g}"
     proven = allocation["proven_scale"]
     if np.isfinite(proven):
@@ -190,7 +190,7 @@ def _tighten_tile(allocation: Mapping[str, Any]) -> Tile:
 
 
 def _asked_section(results: Mapping[str, Any], allocation: Mapping[str, Any]) -> str:
-    """Return the table of the requirement: limits, yield, distribution, postures."""
+    """Format the requirement as a table: limits, yield, distribution, postures."""
     rows: list[list[Cell]] = [
         [f"{NAMES[key]}, at most", Value(limit, UNITS[key].removesuffix("1"), 6)]
         for key, limit in allocation["limits"].items()
@@ -256,7 +256,7 @@ def _allocation_section(allocation: Mapping[str, Any]) -> str:
 
 
 def _price_paragraph(allocation: Mapping[str, Any]) -> str:
-    """Return a paragraph on the cost, and on its lower bound if one is proved."""
+    """Format a paragraph on the cost and, if one is proved, its lower bound."""
     price, bound = (allocation[key] for key in ("price", "price_bound"))
     if np.isfinite(bound):
         return paragraph(
@@ -271,7 +271,7 @@ def _price_paragraph(allocation: Mapping[str, Any]) -> str:
 
 
 def _clearance_sections(allocation: Mapping[str, Any]) -> list[str]:
-    """Return sections on the pose errors that clearances alone cause."""
+    """Return the sections on pose errors caused by clearances alone."""
     taken = {k: v for k, v in allocation["perfect_parts"].items() if v["reached"] > 0.0}
     if not taken:
         return []

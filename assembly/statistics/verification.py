@@ -1,4 +1,4 @@
-"""Verification of tolerances by proven upper bounds and by new random draws."""
+"""Verification of tolerances by proven upper bounds and new random draws."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -18,15 +18,15 @@ from forcefit.assembly.statistics.worst_case import (
 )
 
 _BATCH = 256  # number of draws between two progress reports
-_ROUNDING = 1e-9  # relative excess over a limit that counts as rounding error
-# largest number of verification tests, and the confidence level of all tests together
+_ROUNDING = 1e-9  # relative excess over a limit that counts as round-off error
+# largest number of verification tests, and their joint confidence level
 LOOKS, CONFIDENCE = 4, 0.95
 
 
 def prove_worst(
     requirement: Requirement, t: NDArray, progress: Callable[[str, int, int], None]
 ) -> tuple[dict[str, tuple[float, float]], float]:
-    """Return bounds of the worst case over all errors in tolerance and all postures.
+    """Bound the worst case over all errors within tolerance and all postures.
 
     Args:
         requirement: requirement at all postures.
@@ -35,8 +35,9 @@ def prove_worst(
 
     Returns:
         For each limit: the value at the worst corner found, and the proven upper bound,
-        NaN if the limit is not convex.  Also the factor on the tolerances, at most 1,
-        for which the upper bounds meet all limits; NaN if a limit is not convex.
+        NaN if the limit is not convex.  Also the factor, at most 1, by which the
+        tolerances must be scaled so that the upper bounds meet all limits; NaN if a
+        limit is not convex.
     """
     plan = requirement.plan
     spread, worst, scale = plan.spread(t), {}, np.inf
@@ -65,7 +66,7 @@ def prove_worst(
 
 
 def _proof(bound: Callable, *given: Any) -> tuple[float]:
-    """Return a proven upper bound of a limited quantity at one posture."""
+    """Return a proven upper bound on a limited quantity at one posture."""
     return (bound(*given),)
 
 
@@ -75,15 +76,15 @@ def verify(
     fresh: int,
     progress: Callable[[str, int, int], None],
 ) -> tuple[NDArray, dict[str, Any]]:
-    """Verify tolerances by new draws, and tighten tolerances that fail.
+    """Verify tolerances with new draws, and tighten tolerances that fail.
 
-    Each verification uses independent draws.  The error probability is divided equally
-    among all verifications (Bonferroni).
+    Each verification uses independent draws, and the error probability is divided
+    equally among all verifications (Bonferroni).
 
     Args:
         requirement: requirement at all postures.
         t: (G,) [rad or m] tolerances.
-        fresh: number of draws of each verification; they are used only once.
+        fresh: number of draws per verification, each used only once.
         progress: called with the name of a step, its progress and its total.
 
     Returns:
@@ -111,20 +112,20 @@ def verify_yield(
     progress: Callable[[str, int, int], None], stream: int = FRESH,
     level: float = CONFIDENCE,
 ) -> dict[str, Any]:  # fmt: skip
-    """Compute the yield of new draws at each posture, and at all postures together.
+    """Estimate the yield from new draws, at each posture and at all postures together.
 
     Args:
         requirement: requirement at all postures.
         t: (G,) [rad or m] tolerances.
-        fresh: number of draws, which are used only in this verification.
+        fresh: number of draws, used only in this verification.
         progress: called with the name of a step, its progress and its total.
-        stream: stream of random numbers.
+        stream: random number stream.
         level: confidence level of the interval.
 
     Returns:
         A dictionary with the yield and its interval, the yield at every posture, and
         the verdict.  A draw whose pose error is undecided counts as failed; the
-        interval is valid for both outcomes.
+        interval covers both outcomes.
     """
     plan = requirement.plan
     values = plan.draws_of(stream, fresh) * plan.spread(t)

@@ -1,12 +1,12 @@
-"""Lower and upper bounds of the worst case of errors within tolerances.
+"""Lower and upper bounds on the worst case of errors within tolerances.
 
 Margin and energy are convex in the errors. Their worst case is therefore a corner of
 the tolerance box, where every error is at one end of its tolerance.  The derivatives at
-a corner point to another corner whose value is at least as large.  Repeating this step
-from many corners finds a lower bound.  The worst case of a wrench, a stress or a pose
-error need not be a corner; the same search still finds a lower bound.  The upper bound
-restricts the clearances to affine functions of the errors: ``u = sum_i V_i s_i`` for
-errors ``t_i s_i``, abs(s_i) <= 1.  A single cone programme computes V, which certifies
+a corner point to another corner whose value is at least as large, and repeating this
+step from many corners gives a lower bound. The worst case of a wrench, a stress or a
+pose error need not be a corner, but the search still gives a lower bound. The upper
+bound restricts the clearances to affine functions of the errors: ``u = sum_i V_i s_i``
+for errors ``t_i s_i``, abs(s_i) <= 1.  A single cone programme finds V, which certifies
 the bound.
 
 Sources:
@@ -24,19 +24,20 @@ from forcefit.assembly.statistics.linear_response import LinearResponse
 from forcefit.assembly.statistics.posture_margins import PostureMargins
 from forcefit.assembly.statistics.responses import respond
 
-CORNERS = 24  # number of random corners from which the search starts
-# largest number of steps from corner to corner; three usually suffice
+CORNERS = 24  # number of random starting corners of the search
+# largest number of steps from corner to corner; three are usually enough
 _ITERATIONS = 12
 
 
 @dataclass(frozen=True, eq=False)
 class Corner:
-    """The worst corner of the tolerance box that a search found.
+    """Worst corner of the tolerance box that a search found.
 
     Attributes:
-        value: the quantity at the corner, a lower bound of the worst case.
+        value: the quantity at the corner, a lower bound on the worst case.
         signs: (m,) signs of the errors, -1 or 1.
-        slopes: (m,) [unit of the value per rad or m] derivatives by each error.
+        slopes: (m,) [unit of the value per rad or m] derivatives with respect to each
+            error.
     """
 
     value: float
@@ -50,7 +51,7 @@ def worst_corner(
     clearance: str = "worst",
     contact_length: float | None = None,
 ) -> Corner:  # fmt: skip
-    """Return the worst corner found by searches from several starting corners.
+    """Search for the worst corner from several starting corners.
 
     Args:
         prepared: a posture prepared for margins, or one prepared for energies, which
@@ -67,7 +68,7 @@ def worst_corner(
     """
     signs = corners.copy()
     if isinstance(prepared, LinearResponse):
-        # if clearances compensate an error completely, the energy has zero derivative
+        # the energy has zero derivative if clearances compensate an error completely
         signs = np.vstack([
             signs,
             _worst_without_clearance(prepared, sources, tolerances, signs),
@@ -109,7 +110,7 @@ def random_corners(count: int, sources: int, seed: int = 1) -> NDArray:
 def bound_margin(
     zone: PostureMargins, sources: ErrorSources, tolerances: NDArray
 ) -> float:
-    """Return an upper bound of the largest margin over all errors within tolerances.
+    """Bound the margin from above over all errors within tolerances.
 
     Args:
         zone: a posture prepared for margins; the margin is a factor on all clearances.
@@ -117,7 +118,7 @@ def bound_margin(
         tolerances: (m,) [rad or m] half widths of the tolerances.
 
     Returns:
-        The bound; inf if no clearance can close some error.
+        The bound; inf if no clearance can close one of the errors.
     """
     columns = 6 * sources.frame + sources.component
     if np.abs(zone.infeasible[:, columns] * tolerances).max(initial=0.0) > 1e-12:
@@ -133,7 +134,7 @@ def bound_margin(
 def bound_energy(
     prepared: LinearResponse, sources: ErrorSources, tolerances: NDArray
 ) -> float:
-    """Return an upper bound of the largest energy over all errors within tolerances.
+    """Bound the energy from above over all errors within tolerances.
 
     Args:
         prepared: a posture prepared for energies.
@@ -141,9 +142,9 @@ def bound_energy(
         tolerances: (m,) [rad or m] half widths of the tolerances.
 
     Returns:
-        [J] bound for clearances and springs that are affine in the errors.  The bound
-        adds up the norms of their deflections, so it may be several times the worst
-        case. It is inf if no spring can close some error.
+        [J] bound for clearances and springs that are affine in the errors.  It adds up
+        the norms of their deflections, so it may be several times the worst case. The
+        bound is inf if no spring can close one of the errors.
     """
     columns = 6 * sources.frame + sources.component
     if np.abs(prepared.infeasible[:, columns] * tolerances).max(initial=0.0) > 1e-12:
@@ -165,7 +166,7 @@ def _reach(V: NDArray, starts: NDArray) -> NDArray:
 def _affine_clearances(
     B: NDArray, asked: NDArray, starts: NDArray, G: NDArray | None, h: NDArray | None
 ) -> NDArray:
-    """Return the map V (nu, m) with B V = asked: smallest norms or least energy."""
+    """Return the map V (nu, m) with B V = asked: smallest norms or minimum energy."""
     import cvxpy as cp
 
     nu, m = starts[-1], asked.shape[1]

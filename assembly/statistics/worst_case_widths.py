@@ -1,11 +1,11 @@
-"""Zone widths of callouts with least cost for which every machine meets the limits.
+"""Minimum-cost zone widths of callouts with which every machine meets the limits.
 
 The worst pose error is the maximum over directions n of a sum of support functions,
-``sum_g t_g s_g(n) + c(n)``. This formula holds only without closure constraints: either
-no loop is over-constrained, or parts are elastic and joints have no clearance.  The
-worst pose error is then convex in the tolerances t.  For each direction, ``sum_g t_g
-s_g(n) <= limit - c(n)`` holds for all tolerances that meet the limit. A programme of
-such planes therefore proves the least cost, see
+``sum_g t_g s_g(n) + c(n)``. This formula requires that no loop is over-constrained, or
+that parts are elastic and joints have no clearance. The worst pose error is then convex
+in the tolerances t, and all tolerances that meet the limit satisfy ``sum_g t_g s_g(n)
+<= limit - c(n)`` for each direction. Minimising the cost subject to such planes
+therefore proves the minimum cost, see
 :mod:`forcefit.assembly.statistics.cutting_planes`.
 """
 
@@ -33,7 +33,7 @@ from forcefit.assembly.statistics.verification import verify
 from forcefit.assembly.statistics.worst_pose import farthest_screw
 from forcefit.inputs.table import BadInput
 
-_TOLERANCE = 1e-3  # largest violation before the last scaling, relative to a limit
+_TOLERANCE = 1e-3  # largest violation before the final scaling, relative to a limit
 _MOST_STEPS = 200
 
 Progress = Callable[[str, int, int], None]
@@ -41,7 +41,7 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, eq=False)
 class _Case:
-    """A limit at a posture, with zones of largest width and their classes."""
+    """A limit at a posture, with zones at their largest widths and their classes."""
 
     key: str
     sets: ErrorSets
@@ -49,7 +49,7 @@ class _Case:
     where: str
 
     def scaled(self, shares: NDArray) -> ErrorSets:
-        """Return the error sets for shares (G,) of the largest widths."""
+        """Return the error sets for given fractions (G,) of the largest widths."""
         factors = np.ones(self.sets.screws.shape[1])
         for columns, g in zip(self.sets.columns, self.classes, strict=True):
             factors[columns] = shares[g] if g >= 0 else 1.0
@@ -79,22 +79,23 @@ def allot_worst_case(
     postures: Sequence[Posture], plan: Plan, fresh: int, progress: Progress,
     replay: Replay | None = None,
 ) -> Allocation:  # fmt: skip
-    """Return the tolerances of least cost within which every machine meets the limits.
+    """Find the minimum-cost tolerances with which every machine meets the limits.
 
     Args:
         postures: postures of one robot.
         plan: plan with callouts, limits on rotation and translation, and a yield of 1;
             fits have their largest clearance.
-        fresh: number of new draws that verify the tolerances; 0 for none.
+        fresh: number of new draws that verify the tolerances; 0 to skip the
+            verification.
         progress: called with the name of a step, its progress and its total.
         replay: stored results of the draws.
 
     Returns:
-        The tolerances, their worst case and a lower bound of the cost.
+        The tolerances, their worst case and a lower bound on the cost.
 
     Raises:
         BadInput: the worst case is not a convex maximisation, or a limit is exceeded by
-            clearances without errors or with the tightest tolerances.
+            clearances alone or with the tightest tolerances.
     """
     if plan.clearance != "worst":
         fault = f"found {plan.clearance} with callouts and a yield of 1"
@@ -131,7 +132,7 @@ def allot_worst_case(
 
 
 def _case(posture: Posture, plan: Plan, key: str) -> _Case:
-    """Return a limit at a posture; raise an error if its worst case is not convex."""
+    """Return a limit at a posture; reject it if its worst case is not convex."""
     sources = plan.sources
     assert isinstance(sources, CalloutSources)
     sets = error_sets(linear_response(posture), sources)
@@ -170,7 +171,7 @@ def _plane(case: _Case, plan: Plan, shares: NDArray) -> list[NDArray]:
 
 def _factor(case: _Case, plan: Plan, shares: NDArray) -> float:
     """Return the factor on tolerances for which the certified bound meets the limit."""
-    # the worst pose error is convex in the factor, so a chord from zero lies above it
+    # the worst pose error is convex in the factor, so it lies below a chord from zero
     limit, high = plan.limits[case.key], case.worst(shares)[1]
     if high <= limit:
         return 1.0

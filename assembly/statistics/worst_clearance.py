@@ -1,16 +1,17 @@
-"""Largest pose errors over all clearance positions: problem (27) for many draws.
+"""Largest pose errors over all clearance positions, problem (27), for many draws.
 
-The assumption ``frozen`` is used: springs keep their deformations from the least-energy
-solution (22), and unloaded clearances may be anywhere within their bounds.  By strict
-convexity, all least-energy solutions have the same spring deformations. By
-complementary slackness, they have the same loaded clearances.  The set of positions is
-therefore the set of *all* least-energy solutions, inside and outside an assembly zone.
-The set contains the positions of the uniform and the contact model, and the solution
-that the solver returns. The other assumptions change the robot: ``free`` lets compliant
-joints rotate without energy; ``budget`` allows more energy than the least.
+The assumption ``frozen`` is used: springs keep their deformations from the
+minimum-energy solution (22), and unloaded clearances may be anywhere within their
+bounds.  By strict convexity, all minimum-energy solutions have the same spring
+deformations. By complementary slackness, they have the same loaded clearances.  The set
+of positions is therefore the set of *all* minimum-energy solutions, inside and outside
+an assembly zone. The set contains the positions of the uniform and the contact model as
+well as the solution that the solver returns. The alternative assumptions change the
+robot: ``free`` lets compliant joints rotate without energy, and ``budget`` allows more
+than the minimum energy.
 
-Under a load, the energy minus the work of the load replaces the energy. Only clearances
-that transmit no force are then free.
+Under a load, the energy minus the work of the load takes the place of the energy, and
+only clearances that transmit no force are free.
 """
 
 import numpy as np
@@ -31,14 +32,14 @@ from forcefit.assembly.statistics.quantities import POSE_ERRORS
 
 ASSUMPTION = "frozen"
 PRECISION = (1e-6, 1e-6)  # [rad, m] required difference of upper and lower bounds
-# [rad or m] precision of the support function, whose multipliers are the derivatives
+# [rad or m] precision of the support function, whose multipliers give the derivatives
 _SUPPORT_PRECISION = 1e-12
 
 
 def bound_worst_errors(
     draws: Assembly, precision: tuple[float, float] = PRECISION
 ) -> tuple[NDArray, NDArray]:
-    """Return certified bounds of the largest pose errors over all clearance positions.
+    """Compute certified bounds on the largest pose errors over all clearance positions.
 
     Args:
         draws: solutions of k draws at one posture.
@@ -46,10 +47,10 @@ def bound_worst_errors(
             bound that is not needed.
 
     Returns:
-        (k, 2, 2) lower and upper bounds of the rotation [rad] and the translation [m],
+        (k, 2, 2) lower and upper bounds on the rotation [rad] and the translation [m],
         at least as large as the errors of the screw in ``draws``.  NaN for a draw
-        without a solution; an upper bound is inf if not proved.  And (k, 2, 6) [rad, m]
-        screws that attain the lower bounds, at least nearly.
+        without a solution; an upper bound is inf if not proved. Second, (k, 2, 6) [rad,
+        m] screws that attain the lower bounds, at least nearly.
     """
     bounds = np.full((len(draws), 2, 2), np.nan)
     screws = np.tile(draws.platform_screw[:, None], (1, 2, 1))
@@ -105,10 +106,10 @@ def _under_load(
 def worst_error_slopes(
     prepared: LinearResponse, draws: Assembly, key: str, screws: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return the derivatives of the largest pose error by screw and clearances.
+    """Differentiate the largest pose error with respect to screw and clearances.
 
     The farthest point attains the support function in its own direction. By the
-    envelope theorem, the derivatives equal those of this support function.
+    envelope theorem, its derivatives equal those of this support function.
 
     Args:
         prepared: the prepared posture.
@@ -126,7 +127,7 @@ def worst_error_slopes(
     by_screw, by_clearance = np.zeros_like(screws), np.zeros_like(draws.clearances)
     by_screw[:, part : part + 3] = screws[:, part : part + 3] / np.maximum(size, 1e-300)
     loaded = loaded_clearances(prepared, draws)
-    # derivative of the pose error by clearances; a clearance at its bound does not move
+    # derivative of the pose error by clearances; a clearance at its bound is fixed
     along = by_screw @ prepared.screws[:, : draws.clearances.shape[1]]
     patterns, pattern_of = np.unique(loaded, axis=0, return_inverse=True)
     for k, pattern in enumerate(patterns):

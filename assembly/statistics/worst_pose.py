@@ -1,19 +1,19 @@
-"""Worst pose error over all errors within tolerance and all clearances.
+"""Worst pose error over all errors within tolerance and all clearance positions.
 
-Four definitions of the worst pose error differ if a machine is over-constrained:
+If a machine is over-constrained, the worst pose error depends on its definition:
 
 =========== ====================================================================
 rigid       errors and clearances that close without any force: a convex set
 elastic     no clearance: the platform's screw is linear in the errors
-equilibrium least energy (22) at given errors, worst position in the clearances
-bound       clearances are added like errors: an upper bound of ``equilibrium``
+equilibrium minimum energy (22) at given errors, worst position in the clearances
+bound       clearances are added like errors: an upper bound on ``equilibrium``
 =========== ====================================================================
 
 The rigid and the elastic worst case are convex maximisations: the maximum over all
-directions of a sum of support functions. If no loop is over-constrained, all four
-definitions are such maximisations.  Otherwise the equilibrium with clearances is not.
-A search from corner to corner then finds its lower bound, and ``bound`` is its upper
-bound.
+directions of a sum of support functions. The same is true of all four definitions if no
+loop is over-constrained. Otherwise the equilibrium with clearances is no convex
+maximisation: a search from corner to corner gives its lower bound, and ``bound`` is its
+upper bound.
 
 Sources:
     Hoffman (1981), see :mod:`forcefit.assembly.solvers.outer_cuts`.
@@ -53,21 +53,21 @@ from forcefit.results.text import in_unit
 
 # accepted difference of the bounds, relative to the support along x, y and z
 _TOLERANCE = 3e-4
-_STARTS = 24  # number of random corners of the tolerances at which searches start
-_CLIMBS = 12  # largest number of steps from one corner of the tolerances to another
+_STARTS = 24  # number of random starting corners of the tolerance box
+_CLIMBS = 12  # largest number of steps from one corner of the tolerance box to another
 
 MEANINGS = {
-    "linear": "nothing is over-constrained: every reading is the same",
+    "linear": "no loop is over-constrained: all definitions agree",
     "rigid": "rigid parts: only errors and clearances that close without force",
     "elastic": "elastic parts without clearance: the response is linear",
     "equilibrium": "elastic parts with clearance: between the largest equilibrium "
-    "found by climbing and the bound with clearances counted as errors",
+    "found by searching and the bound with clearances counted as errors",
 }
 
 
 @dataclass(frozen=True, eq=False)
 class WorstPose:
-    """The worst pose error over errors and clearances.
+    """Worst pose error over errors and clearances.
 
     Attributes:
         quantity: ``"rotation"`` or ``"translation"``.
@@ -75,10 +75,11 @@ class WorstPose:
         attained: [rad or m] the largest value found.
         bound: [rad or m] a certified upper bound.
         direction: (3,) unit vector of the value attained, base axes.
-        shares: [rad or m] by callout, independent error or clearance, along that
-            direction, largest first; their sum is the support function of the bound.
-        rigid: [rad or m] value attained by the rigid definition, which is part of the
-            equilibrium; NaN for the other definitions.
+        shares: [rad or m] contribution of each callout, independent error or clearance
+            along that direction, largest first; they sum to the support function of the
+            bound.
+        rigid: [rad or m] value attained by the rigid definition, which the equilibrium
+            includes; NaN for the other definitions.
     """
 
     quantity: str
@@ -92,7 +93,7 @@ class WorstPose:
     __repr__, _repr_html_ = short_repr, html_table
 
     def _figures(self) -> Figures:
-        """Return text lines with both bounds and the three largest shares."""
+        """Format both bounds and the three largest shares as lines of text."""
         unit = "mrad" if self.quantity == "rotation" else "um"
         return {
             "quantity": self.quantity,
@@ -110,15 +111,16 @@ def worst_pose(
     quantity: str = "translation",
     seed: int = 1,
 ) -> WorstPose:
-    """Return the worst pose error over all errors within tolerance and clearances.
+    """Compute the worst pose error over all errors within tolerance and clearances.
 
     Args:
         posture: a posture without loads, or its linear response.
         errors: file of independent errors that are bounded and symmetric (TOML), in
             addition to the callouts and fits of the robot, each fit at its largest
-            clearance; None for the callouts and fits alone; or sources of errors.
+            clearance; None to use only the callouts and fits. Error sources are
+            accepted too.
         quantity: ``"rotation"`` or ``"translation"``.
-        seed: seed of the random corners from which the search starts.
+        seed: seed of the random starting corners of the search.
 
     Returns:
         The worst case, with the definition that applies.
@@ -152,7 +154,7 @@ def worst_pose(
     direction = direction / size if size else np.eye(3)[0]
     along = direction @ sets.screws[half : half + 3]
     parts = rigid_parts(sets, along) if reading == "rigid" else parts_of(sets, along)
-    shares: dict[str, float] = {}  # all contacts of one joint are listed under one name
+    shares: dict[str, float] = {}  # all contacts of a joint are listed under one name
     for name, part in zip(sets.names, parts, strict=True):
         shares[name] = shares.get(name, 0.0) + part
     ordered = tuple(sorted(shares.items(), key=lambda share: -share[1]))
@@ -162,7 +164,7 @@ def worst_pose(
 def bound_worst_pose(
     prepared: LinearResponse, sources: Sources, tolerance: float = _TOLERANCE
 ) -> tuple[str, dict[str, float]]:
-    """Return certified upper bounds of the worst pose error, without attained values.
+    """Compute certified upper bounds on the worst pose error, without attained values.
 
     Args:
         prepared: as for :func:`worst_pose`.
@@ -235,7 +237,7 @@ def _farthest(
         return (0.0, 0.0), np.zeros(6)
     bounds, screw, _ = farthest(np.zeros(6), half, tolerance * max(sizes), support)
     low = bounds[0]
-    # the farthest screw in the direction of a screw is at least as long as that screw
+    # the farthest screw along a screw's direction is at least as long as that screw
     for _ in range(50):
         further = support(screw[half : half + 3] / low)[1]
         size = float(np.linalg.norm(further[half : half + 3]))
@@ -283,7 +285,7 @@ def _support(
 def _climb(
     prepared: LinearResponse, sources: Sources, quantity: str, seed: int, start: NDArray
 ) -> tuple[float, NDArray]:
-    """Return the largest equilibrium pose error found, and its direction (3,)."""
+    """Search for the largest equilibrium pose error and its direction (3,)."""
     half = 3 * POSE_ERRORS.index(quantity)
     own = zones_of_errors(sources)
     sizes = [sum(zone.dimensions) for _, zone, _ in own]

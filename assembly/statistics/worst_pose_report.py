@@ -1,4 +1,4 @@
-"""The worst pose error as plain values, as text and as a section of a report."""
+"""Worst pose error as plain values, as text and as a section of a report."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,22 +11,23 @@ from forcefit.page.page import paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
 
 _LISTED = 8  # largest number of shares in the text
-_LEAST = 1e-6  # smallest listed share of the sum; smaller shares are rounding errors
+_LEAST = 1e-6  # smallest listed share of the sum; smaller shares are round-off
 
 
 def worst_results(
     prepared: LinearResponse, sources: Sources, seed: int = 1
 ) -> dict[str, Any]:
-    """Return the worst rotation and translation over errors and clearances.
+    """Compute the worst rotation and translation over errors and clearances.
 
     Args:
         prepared: a posture without loads.
         sources: see :func:`forcefit.assembly.statistics.worst_pose.worst_pose`.
-        seed: seed of the random corners from which the search starts.
+        seed: seed of the random starting corners of the search.
 
     Returns:
         By quantity: definition and its meaning, value attained and certified bound,
-        unit, direction, shares by name; for an equilibrium also the rigid value.
+            unit, direction, and shares by name. For an equilibrium also the rigid
+            value.
     """
     results = {}
     for key in POSE_ERRORS:
@@ -41,7 +42,7 @@ def worst_results(
 
 
 def worst_text(results: Mapping[str, Any]) -> str:
-    """Return results of :func:`worst_results` as text."""
+    """Format results of :func:`worst_results` as text."""
     lines = []
     for key, worst in results.items():
         unit = worst["unit"]
@@ -62,7 +63,7 @@ def worst_text(results: Mapping[str, Any]) -> str:
 
 
 def worst_section(results: Mapping[str, Any]) -> str:
-    """Return results of :func:`worst_results` as a section of a page."""
+    """Format results of :func:`worst_results` as a section of a page."""
     rows: list[list[Cell]] = [
         [key, Value(one["attained"], one["unit"]), Value(one["bound"], one["unit"]),
          one["means"]]

@@ -1,6 +1,6 @@
-"""Adjustments: the change of a geometric error that minimises a reading.
+"""Adjustments: changes of a geometric error that minimise a reading.
 
-Three cases are solved differently:
+The solution method depends on the case:
 
 ====================== =============================================================
 no loose clearance     the reading is linear in the change: least squares
@@ -30,11 +30,11 @@ from forcefit.assembly.steps.state import (
 )
 from forcefit.inputs.table import BadInput, quoted
 
-_MOST_STEPS, _HALVINGS = 30, 12  # most Gauss-Newton steps, and most halvings of a step
+_MOST_STEPS, _HALVINGS = 30, 12  # largest numbers of steps, and halvings per step
 _STEP = 1e-7  # [rad, reference lengths] step of the finite differences
-# derivatives below this share of the largest one are finite-difference errors
+# derivatives below this fraction of the largest one are finite-difference errors
 _FLAT = 1e-6
-_SETTLED = 1e-7  # relative reduction of the reading below which the search ends
+_SETTLED = 1e-7  # relative reduction of the reading below which the search stops
 
 
 def with_adjustment(
@@ -48,7 +48,7 @@ def with_adjustment(
 
 
 def adjustment_of(machine: Machine, state: State, step: Adjust) -> NDArray:
-    """Return the (k, a) [rad or m] change that minimises the reading of a step.
+    """Compute the (k, a) [rad or m] change that minimises the reading of a step.
 
     Args:
         machine: columns and rows of the robot.
@@ -56,10 +56,10 @@ def adjustment_of(machine: Machine, state: State, step: Adjust) -> NDArray:
         step: the adjustment.
 
     Returns:
-        Changes of the a adjusted components of the frame's geometric error.
+        Changes of the frame's geometric error in its a adjusted components.
 
     Raises:
-        BadInput: some clearances are loose, and the joint of the frame is bolted.
+        BadInput: some clearances are loose while the joint of the frame is bolted.
     """
     if step.amount is not None:
         return np.broadcast_to(step.amount, (len(state.errors), len(step.components)))
@@ -76,7 +76,7 @@ def adjustment_of(machine: Machine, state: State, step: Adjust) -> NDArray:
 
 
 def _linear_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
-    """Return the adjustment that minimises a reading if no clearance is loose."""
+    """Find the adjustment that minimises a reading if no clearance is loose."""
     count = len(step.components)
     value = _to_vanish(machine, state, step)
     slopes = np.empty((value.shape[1], count))
@@ -85,7 +85,7 @@ def _linear_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
         unit[:, i] = 1.0
         moved = settle(machine, with_adjustment(machine, state, step, unit))
         slopes[:, i] = (_to_vanish(machine, moved, step) - value)[0]
-    # among equally good changes take the smallest, lengths in reference lengths
+    # of all equally good changes, take the smallest, with lengths in reference lengths
     unit = 1 / machine.scale[rows_of(step.components)]
     return -value @ np.linalg.pinv(slopes * unit).T * unit
 
@@ -101,7 +101,7 @@ def _best_local_adjustment(machine: Machine, state: State, step: Adjust) -> NDAr
 
 
 def _with_pressed_clearances(machine: Machine, state: State) -> tuple[Machine, State]:
-    """Return the machine with its present clearances as fixed geometric errors."""
+    """Return the machine with its current clearances as fixed geometric errors."""
     moved, joints = state.found.clearances @ machine.cones.T, machine.joints
     fixed = replace(joints, cones=joints.cones[:, :0], group=joints.group[:0])
     found = replace(state.found, clearances=state.found.clearances[:, :0])
@@ -120,7 +120,7 @@ def _local_adjustment(
         inverse = np.linalg.pinv(slopes * unit, rcond=_FLAT)
         change = -np.einsum("kcp,kp->kc", inverse, value) * unit
         size, going = np.linalg.norm(value, axis=1), np.ones(len(value), dtype=bool)
-        for _ in range(_HALVINGS):  # a full step may end at another set of contacts
+        for _ in range(_HALVINGS):  # a full step may lead to another set of contacts
             trial = amount + change * going[:, None]
             found = _value_at(machine, state, step, trial)
             less = np.linalg.norm(found, axis=1) < size * (1 - _SETTLED)
@@ -138,7 +138,7 @@ def _local_adjustment(
 def _value_and_slopes(
     machine: Machine, state: State, step: Adjust, amount: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return minimised quantities (k, p) after an adjustment, and their derivatives."""
+    """Evaluate minimised quantities (k, p), and their derivatives by adjustment."""
     value = _value_at(machine, state, step, amount)
     slopes = np.empty((*value.shape, len(step.components)))
     for i, scale in enumerate(machine.scale[rows_of(step.components)]):
@@ -150,7 +150,7 @@ def _value_and_slopes(
 
 
 def _value_at(machine: Machine, state: State, step: Adjust, amount: NDArray) -> NDArray:
-    """Return the quantities that an adjustment minimises, after a trial change."""
+    """Evaluate the quantities that an adjustment minimises, after a trial change."""
     moved = settle(machine, with_adjustment(machine, state, step, amount))
     return _to_vanish(machine, moved, step)
 
@@ -166,12 +166,12 @@ def _check_not_bolted(machine: Machine, state: State, step: Adjust) -> None:
 
 
 def _closing_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
-    """Return the adjustment with which closing a loop needs the least energy.
+    """Return the adjustment that minimises the energy required to close a loop.
 
     The changes are treated as free motions of the closed machine, whose energy is
     convex in the changes and the clearances together.  If several changes are equally
-    good, the clearances remain as close as possible to their positions; among these
-    changes the smallest is taken.
+    good, the smallest of those that keep the clearances closest to their positions is
+    taken.
     """
     rows = rows_of(step.components)
     units = np.zeros((len(machine.free), len(rows)))
@@ -201,7 +201,7 @@ def _least_change(machine: Machine, state: State, count: int) -> NDArray:
 
 
 def _to_vanish(machine: Machine, state: State, step: Adjust) -> NDArray:
-    """Return the minimised quantities: a reading, or the strains of a closure."""
+    """Return the quantities to minimise: a reading, or the strains of a closure."""
     part = step.reading.part
     if isinstance(part, str):
         return reading_of(machine, state, step.reading)

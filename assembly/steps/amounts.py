@@ -1,10 +1,10 @@
 """Simultaneous optimisation of all adjustments of a plan for one objective.
 
 The search starts from the changes with which each adjustment minimises its own reading.
-The Gauss-Newton method then uses finite differences of the whole plan. All trial
-changes are carried out together, as machines that differ in their adjustments.  A
-change is accepted only if the objective decreases, so the result is at least as good as
-the changes that minimise the readings. The result is a local minimum.
+A Gauss-Newton method then differentiates the whole plan by finite differences, for
+which all trial changes are carried out together, as machines that differ in their
+adjustments. A change is accepted only if the objective decreases, so the result, a
+local minimum, is never worse than the starting point.
 """
 
 from collections.abc import Callable
@@ -20,11 +20,11 @@ from forcefit.assembly.steps.run import StepResult, carry_out
 from forcefit.assembly.steps.state import State
 
 _STEP = 1e-7  # [rad, reference lengths] step of the finite differences
-# derivatives below this share of the largest one are finite-difference errors
+# derivatives below this fraction of the largest one are finite-difference errors
 _FLAT = 1e-6
-# largest number of Gauss-Newton steps, and tried shares of each step
+# largest number of Gauss-Newton steps, and fractions of each step that are tried
 _MOST_STEPS, _SHARES = 20, 0.5 ** np.arange(8)
-_SETTLED = 1e-7  # relative reduction of the objective below which the iteration ends
+_SETTLED = 1e-7  # relative reduction of the objective below which the iteration stops
 
 # function from a number of machines to their state before the first step
 Start = Callable[[int], State]
@@ -33,18 +33,18 @@ Start = Callable[[int], State]
 def with_best_amounts(
     plan: Plan, machine: Machine, start: Start, objective: str, given: float
 ) -> tuple[Plan, float]:
-    """Return a plan whose adjustments together reduce an objective, and its value.
+    """Optimise all adjustments of a plan together; return the plan and its objective.
 
     Args:
-        plan: a plan that can be carried out.
+        plan: a feasible plan.
         machine: columns and rows of the robot.
         start: function from a number of equal machines to their state before the plan.
         objective: ``"force"``, ``"energy"`` or ``"error"``.
-        given: value of the objective if each adjustment minimises its reading.
+        given: objective if each adjustment minimises its own reading.
 
     Returns:
-        The plan with the changes as ``amount`` of its adjustments, and the objective.
-        If nothing better is found, the plan and the value that were passed.
+        The plan, with the changes as ``amount`` of its adjustments, and the objective.
+        Without an improvement, both are returned as passed.
     """
     steps = [step for step in plan.steps if isinstance(step, Adjust)]
     if not steps:
@@ -81,7 +81,7 @@ def with_best_amounts(
 
 
 def _rounded(steps: list[Adjust], amounts: NDArray) -> NDArray:
-    """Return adjustments rounded to multiples of the increments of their steps."""
+    """Round adjustments to multiples of the increments of their steps."""
     sizes = np.concatenate([np.full(len(s.components), s.increment) for s in steps])
     whole = np.where(sizes > 0, sizes, 1.0)
     return np.where(sizes > 0, whole * np.round(amounts / whole), amounts)
@@ -100,7 +100,7 @@ def _with_amounts(plan: Plan, amounts: NDArray) -> Plan:
 
 
 def _carried_out(plan: Plan, machine: Machine, state: State) -> list[StepResult]:
-    """Return the results of all steps of a plan."""
+    """Carry out all steps of a plan; return their results."""
     results = []
     for step in plan.steps:
         state, result = carry_out(machine, state, step)
@@ -111,7 +111,7 @@ def _carried_out(plan: Plan, machine: Machine, state: State) -> list[StepResult]
 def _outcome(
     plan: Plan, machine: Machine, state: State, objective: str
 ) -> tuple[NDArray, NDArray]:
-    """Return least-squares residuals (k, p) of a plan, and its objective (k,)."""
+    """Evaluate the least-squares residuals (k, p) of a plan, and its objective (k,)."""
     forces = [np.zeros((len(state.errors), 3))]
     screw = machine.platform_screw(state.errors, state.found)
     for step in plan.steps:

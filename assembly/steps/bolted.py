@@ -1,10 +1,11 @@
-"""Joints that are bolted at one pose and rigid afterwards (``locked_at``).
+"""Joints that are bolted at one pose and are rigid afterwards (``locked_at``).
 
-Without loads, the clearance of a joint that is about to be bolted moves such that the
-closures need the least energy. Among the clearances of least energy, the least sum of
-squares, in units of their bounds, is taken.  Bolting locks this clearance in: at all
-other poses it acts like a geometric error.  Joints are bolted in the order of the
-frames; joints with the same pose are bolted together.
+Just before a joint is bolted, its clearance moves, without loads, to a position at
+which closing the loops requires minimum energy. If there are several such positions,
+the one with the smallest sum of squares, in units of the clearance bounds, is taken.
+Bolting locks this clearance in, so that it acts like a geometric error at all other
+poses. Joints are bolted in the order of the frames; joints with the same pose are
+bolted together.
 """
 
 from collections.abc import Sequence
@@ -29,8 +30,8 @@ from forcefit.assembly.steps.state import State, first_state
 from forcefit.inputs.table import BadInput, quoted
 from forcefit.results.display import numbers
 
-BOLT_STREAM = 4  # stream number of the bolted positions, see draw_generator
-_ROUNDED = 1e-12  # clearances below this share of their bound are rounding errors
+BOLT_STREAM = 4  # random number stream of the bolted positions, see draw_generator
+_ROUNDED = 1e-12  # clearances below this fraction of their bound are round-off
 _BOLTED = "is bolted at"  # words in the remark on a bolted joint
 _RULES = {
     "least": "",
@@ -40,19 +41,20 @@ _RULES = {
 
 
 class CannotBolt(BadInput):
-    """A machine that cannot be assembled at the pose where its joint is bolted."""
+    """A machine cannot be assembled at the pose where its joint is bolted."""
 
 
 def bolt_joints(robot: Robot, rng: np.random.Generator | None = None) -> Robot:
-    """Return a robot in which the clearances of bolted joints are locked in.
+    """Lock in the clearances of a robot's bolted joints.
 
     Args:
         robot: robot with solved link stiffnesses.
-        rng: generator for the position of a drawn machine, see :func:`bolted_errors`.
+        rng: random number generator for the position in a drawn machine, see
+            :func:`bolted_errors`.
 
     Returns:
-        The robot; the locked-in screws are part of its geometric errors.  If no joint
-        is bolted, the robot object that was passed.
+        The robot, with the locked-in screws included in its geometric errors. If no
+        joint is bolted, the robot is returned as passed.
 
     Raises:
         BadInput: the pose at which a joint is bolted is out of reach, or the robot
@@ -75,7 +77,7 @@ def bolt_joints(robot: Robot, rng: np.random.Generator | None = None) -> Robot:
 
 
 def _remark(frame: Frame) -> str:
-    """Return a sentence on the position in which a joint is bolted."""
+    """Format a sentence on the position in which a joint is bolted."""
     assert frame.locked_at is not None
     screw = numbers(frame.locked_at.screw)
     rule = _RULES[frame.locked_at.left]
@@ -85,7 +87,7 @@ def _remark(frame: Frame) -> str:
 def bolt_generators(
     robot: Robot, seed: int, draws: Sequence[int] | NDArray
 ) -> list[np.random.Generator] | None:
-    """Return generators for the positions in which drawn machines are bolted.
+    """Return random number generators for the bolted positions of drawn machines.
 
     Args:
         robot: any robot.
@@ -105,18 +107,18 @@ def bolt_generators(
 def bolted_errors(
     robot: Robot, errors: NDArray, rngs: Sequence[np.random.Generator] | None = None
 ) -> NDArray:
-    """Return errors of k machines with the clearances of bolted joints locked in.
+    """Lock in the clearances of bolted joints in the errors of k machines.
 
     Args:
-        robot: robot of n frames with solved link stiffnesses; the errors of its file
+        robot: robot of n frames with solved link stiffnesses; the errors in its file
             are not used.
         errors: (k, n, 6) [rad, m] errors of the machines, without locked-in screws.
-        rngs: k generators for joints with ``left = "uniform"``; if None, these joints
-            are bolted at the least sum of squares.
+        rngs: k random number generators for joints with ``left = "uniform"``; if None,
+            these joints are bolted at the smallest sum of squares.
 
     Returns:
-        (k, n, 6) [rad, m] errors with the locked-in screws. If no joint is bolted, the
-        array that was passed.
+        (k, n, 6) [rad, m] errors including the locked-in screws. If no joint is bolted,
+        the array is returned as passed.
 
     Raises:
         CannotBolt: a machine cannot be assembled at the pose where it is bolted.
@@ -136,7 +138,7 @@ def bolted_errors(
 def _loose_state(
     robot: Robot, frames: list[int], machine: Machine, errors: NDArray
 ) -> State:
-    """Return machines at the pose where a joint is bolted, before it is bolted."""
+    """Return machines at the pose where a joint is bolted, just before bolting."""
     try:
         return first_state(machine, Plan(()), errors, None)
     except (CannotAssemble, SolverFailed) as error:
@@ -147,7 +149,7 @@ def _loose_state(
 def _with_locked(
     machine: Machine, frames: list[int], errors: NDArray, u: NDArray
 ) -> NDArray:
-    """Return errors that include the locked-in clearances of bolted frames."""
+    """Add the locked-in clearances of bolted frames to errors."""
     moved = np.where(np.abs(u) > _ROUNDED, u, 0.0) @ machine.cones.T
     total = errors.copy()
     total[:, frames] += moved.reshape(total.shape)[:, frames]
@@ -155,14 +157,14 @@ def _with_locked(
 
 
 def last_bolt(robot: Robot) -> tuple[list[int], Machine, State]:
-    """Return the joints that are bolted last, and the machine before they are bolted.
+    """Return the joints that are bolted last, and the machine just before.
 
     Args:
         robot: robot with a joint that has ``left = "worst"``.
 
     Returns:
-        Indices of the frames; the machine and its state at the pose of the bolt, in
-        which these joints are loose.
+        Indices of the frames, and the machine and its state at the pose of bolting,
+        with these joints still loose.
 
     Raises:
         BadInput: a joint with ``left = "worst"`` is not bolted last, or the robot
@@ -196,14 +198,14 @@ def _bolts(robot: Robot) -> list[tuple[list[int], Machine]]:
 
 
 def _pose(frame: Frame) -> tuple:
-    """Return the pose at which frames are bolted; it is equal for all of them."""
+    """Return the common pose at which frames are bolted."""
     bolt = frame.locked_at
     assert bolt is not None
     return sorted(bolt.pose.items()), sorted(bolt.joints.items()), bolt.left
 
 
 def _posture(robot: Robot, row: int, open_: set[int]) -> Posture:
-    """Return the posture at which joints are bolted; unbolted joints are loose."""
+    """Return the posture at which joints are bolted, with unbolted joints loose."""
     frames = tuple(
         _loose(frame) if i in open_ else frame for i, frame in enumerate(robot.frames)
     )
@@ -218,18 +220,18 @@ def _posture(robot: Robot, row: int, open_: set[int]) -> Posture:
 
 
 def _loose(frame: Frame) -> Frame:
-    """Return a frame as it is before its joint is bolted."""
+    """Return a frame in its state before its joint is bolted."""
     bolt = frame.locked_at
     assert bolt is not None
     return replace(frame, clearance=bolt.clearance, locked_at=None)
 
 
 def refuse_bolted(robot: Robot, what: str) -> None:
-    """Reject a robot with bolted joints in computations that are linear in the errors.
+    """Reject robots with bolted joints in computations that are linear in the errors.
 
     Args:
         robot: any robot.
-        what: name of the computation, for the message.
+        what: name of the computation, for messages.
 
     Raises:
         BadInput: a joint is bolted at a pose.
@@ -244,7 +246,7 @@ def refuse_bolted(robot: Robot, what: str) -> None:
 
 
 def loose_over_poses(robot: Robot) -> list[str]:
-    """Return a remark on fixed joints whose clearance is not bolted at any pose.
+    """Format a remark on fixed joints whose clearance is not bolted at any pose.
 
     Args:
         robot: robot that is solved at several poses.

@@ -1,7 +1,7 @@
-"""Which steps of a plan may be exchanged.
+"""Rules for exchanging the steps of a plan.
 
-Consecutive joins and adjustments may be exchanged. However, an adjustment of a closure
-must stay before, or after, the step that joins this closure, as in the plan.
+Consecutive joins and adjustments may be exchanged, except that an adjustment of a
+closure and the step that joins this closure stay in the order of the plan.
 """
 
 from collections.abc import Iterator
@@ -12,10 +12,10 @@ from forcefit.assembly.steps.plan import Adjust, Join, Step
 
 
 def choices(left: tuple[Step, ...]) -> Iterator[tuple[Step, tuple[Step, ...]]]:
-    """Yield each step that may come next, with the steps that remain after it.
+    """Yield each step that may come next, together with the steps that then remain.
 
     Args:
-        left: steps that are not yet carried out, in the order of the plan.
+        left: steps not yet carried out, in the order of the plan.
 
     Yields:
         A step, and the remaining steps.
@@ -31,7 +31,7 @@ def choices(left: tuple[Step, ...]) -> Iterator[tuple[Step, tuple[Step, ...]]]:
 
 
 def _keep_order(one: Step, other: Step) -> bool:
-    """Return whether one step adjusts a closure that the other one joins."""
+    """Return whether one step adjusts a closure that the other step joins."""
     steps = {type(one): one, type(other): other}
     join, adjust = steps.get(Join), steps.get(Adjust)
     if not isinstance(join, Join) or not isinstance(adjust, Adjust):
@@ -40,7 +40,7 @@ def _keep_order(one: Step, other: Step) -> bool:
 
 
 def movable_runs(steps: tuple[Step, ...]) -> list[list[Step]]:
-    """Return the sequences of steps that may be exchanged among themselves.
+    """Return the sequences of steps within which steps may be exchanged.
 
     Args:
         steps: steps of a plan.

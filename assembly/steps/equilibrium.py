@@ -1,18 +1,18 @@
-"""Least energy of a partly assembled robot, for many sets of errors at once.
+"""Minimum energy of a partly assembled robot, for many sets of errors at once.
 
 The small screws of all frames are s = e + E y + U u + F q. Here e are the errors, y the
 springs, u the clearances and q the free motions
-(:mod:`forcefit.assembly.linear.closure`).  At each step of assembly the rows
+(:mod:`forcefit.assembly.linear.closure`).  At each assembly step, the rows
 
     R s + L y_f = b
 
-of the closures joined so far and of the fixtures hold, where y_f are the springs of the
-fixtures.  The equilibrium minimises y.y / 2 minus the work of the loads.  Its
-multipliers are the wrenches of the rows.  The unknowns are eliminated as in
+of all fixtures and of all closures joined so far hold, where y_f are the springs of the
+fixtures.  The equilibrium minimises y.y / 2 minus the work of the loads, and its
+multipliers are the wrenches of the rows. The unknowns are eliminated as in
 :mod:`forcefit.assembly.linear.reference.reduction`.
 
-Clearances and free motions that the energy does not determine remain as close as
-possible to their values after the preceding step. The distance is the sum of squares,
+Clearances and free motions that the energy leaves undetermined stay as close as
+possible to their values after the preceding step. Distance means the sum of squares,
 with clearances in units of their bounds and lengths in reference lengths.
 """
 
@@ -32,18 +32,18 @@ from forcefit.assembly.solvers.many_programmes import (
     minimise_energies,
 )
 
-_OPEN = 1e-12  # [rad, reference lengths] closure error that counts as rounding
-_ROUNDING = 1e-14  # rounding error of the equations, relative to the largest right side
-_SOLVED = 1e-11  # strains below this share of their summands are errors of the solver
-_DRIVEN = 1e-8  # a smaller share of a load along a free motion counts as rounding
+_OPEN = 1e-12  # [rad, reference lengths] closure error that counts as round-off
+_ROUNDING = 1e-14  # round-off error of the equations relative to the right-hand side
+_SOLVED = 1e-11  # strains below this fraction of their summands are solver round-off
+_DRIVEN = 1e-8  # a smaller fraction of a load along a free motion is round-off
 
 
 class Held(NamedTuple):
-    """Constraint equations of k partly assembled machines, one row each (m rows).
+    """Constraint equations of k partly assembled machines, m rows each.
 
     Attributes:
         rows: (m, 6n) rows on the screws of all frames, lengths in reference lengths.
-        right: (k, m) right sides.
+        right: (k, m) right-hand sides.
         roots: (m, nf) columns of the fixtures' springs, whose energy is y.y / 2.
     """
 
@@ -60,8 +60,8 @@ class Movable(NamedTuple):
         cones: (6n, nu) columns of clearances, in units of their bounds.
         group: (nu,) cone number of each clearance, from 0.
         free: (6n, nq) columns of free motions, lengths in reference lengths.
-        on_springs: (k, ny) [sqrt(2 J)] loads on the springs. All loads are equal for
-            all machines.
+        on_springs: (k, ny) [sqrt(2 J)] loads on the springs. All machines have equal
+            loads.
         on_cones: (k, nu) [J] loads on the clearances.
         on_free: (k, nq) [J] loads on the free motions.
     """
@@ -77,15 +77,15 @@ class Movable(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """The unknowns of k machines at least energy.
+    """Unknowns of k machines at minimum energy.
 
     Attributes:
         springs: (k, ny) [sqrt(2 J)] scaled deformations of links and joints.
         fixtures: (k, nf) [sqrt(2 J)] scaled deformations of the fixtures.
         clearances: (k, nu) clearances in units of their bounds.
         motions: (k, nq) free motions.
-        multipliers: (k, m) [J] multipliers of the rows: derivatives of the energy by
-            their right sides.
+        multipliers: (k, m) [J] multipliers of the rows: derivatives of the energy with
+            respect to their right-hand sides.
     """
 
     springs: NDArray
@@ -96,7 +96,7 @@ class Equilibrium:
 
     @property
     def energy(self) -> NDArray:
-        """(k,) [J] energy of all springs, including the springs of fixtures."""
+        """(k,) [J] energy of all springs, including those of fixtures."""
         links = np.vecdot(self.springs, self.springs)
         return (links + np.vecdot(self.fixtures, self.fixtures)) / 2
 
@@ -114,10 +114,10 @@ class _Split(NamedTuple):
 def equilibrium(
     held: Held, movable: Movable, last: tuple[NDArray, NDArray], tolerance: float = RANK
 ) -> Equilibrium:
-    """Return the equilibrium of least energy closest to the last state.
+    """Find the minimum-energy equilibrium closest to the last state.
 
     Args:
-        held: rows that hold, with right sides from which fixed screws are subtracted.
+        held: rows that hold, with fixed screws subtracted from their right-hand sides.
         movable: columns that may move, and the loads on them.
         last: preceding clearances (k, nu) and free motions (k, nq).
         tolerance: relative size below which a singular value counts as zero.
@@ -152,7 +152,7 @@ def equilibrium(
 
 
 def without_idle_weight(movable: Movable, weight: NDArray, rows: NDArray) -> Movable:
-    """Return the loads less the weight along motions that nothing resists.
+    """Remove the weight along motions that nothing resists from the loads.
 
     Args:
         movable: columns that may move, and the loads on them.
@@ -160,7 +160,8 @@ def without_idle_weight(movable: Movable, weight: NDArray, rows: NDArray) -> Mov
         rows: (m, 6n) rows that hold.
 
     Returns:
-        The columns with reduced loads: the fitter carries parts that are still free.
+        The columns with reduced loads, because the fitter carries parts that are still
+        free.
     """
     if not len(weight):
         return movable
@@ -199,7 +200,7 @@ def _least(
     split: _Split, A_u: NDArray, right: NDArray, movable: Movable, by_motions: NDArray,
     last: NDArray, noise: float,
 ) -> tuple[NDArray, NDArray, NDArray]:  # fmt: skip
-    """Return clearances, strains and multipliers of constraint rows with springs."""
+    """Compute clearances, strains and multipliers of constraint rows with springs."""
     S = split.values
     h, rigid = right @ split.elastic / S, right @ split.rigid
     if not A_u.shape[1]:
@@ -238,7 +239,7 @@ def _closest(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, least: Minima, last: NDArray,
     group: NDArray,
 ) -> NDArray:  # fmt: skip
-    """Return the clearances of least energy that are closest to the preceding ones."""
+    """Find the minimum-energy clearances closest to the preceding ones."""
     rows = np.vstack([G, H, d[:1]])  # one row of d: machines have equal loads
     size = np.linalg.norm(rows, axis=1)
     rows = rows[size > 0] / size[size > 0, None]
@@ -251,7 +252,7 @@ def _closest(
 
 
 def _moved(B_q: NDArray, right: NDArray, last: NDArray) -> NDArray:
-    """Return free motions that satisfy all constraints, closest to the last ones."""
+    """Find the free motions closest to the last ones that satisfy all constraints."""
     if not B_q.shape[1]:
         return last
     return last + (right - last @ B_q.T) @ np.linalg.pinv(B_q, rcond=RANK).T

@@ -1,4 +1,4 @@
-"""Whether the order of the joins changes the assembled machine.
+"""Influence of the order of joins on the assembled machine.
 
 A join that is bolted "as it lies" locks in the present opening G_k x.  The set S
 of earlier joins has changed this opening by A_kS lambda_S + B_k q, where
@@ -13,10 +13,10 @@ lambda                          wrenches of the earlier joins
 
 K is the stiffness of the machine before the first of these joins.  Assume that A_kj = 0
 for all other joins j, and that no free motion changes the openings at k and j together.
-Then k finds the same opening after every set of other joins. The place of k in the
-order then does not matter.  Free motions that change only the opening at j, such as the
-rotation of its own pin, are omitted. The wrenches that they do not transmit are omitted
-too.
+Then k finds the same opening after every set of other joins, so its place in the order
+does not matter. Free motions that change only the opening at j, for example the
+rotation of its own pin, are omitted together with the wrenches that they do not
+transmit.
 """
 
 from collections.abc import Sequence
@@ -30,13 +30,13 @@ from forcefit.assembly.steps.machine import Machine
 from forcefit.assembly.steps.plan import Adjust, Fix, Join, Plan, Step, rows_of
 from forcefit.assembly.steps.state import State
 
-_ZERO = 1e-9  # relative size below which an influence counts as rounding error
-_FREE = 1e-11  # stiffnesses below this share of the largest one count as zero
+_ZERO = 1e-9  # relative size below which an influence counts as round-off error
+_FREE = 1e-11  # stiffnesses below this fraction of the largest one count as zero
 
 
 @dataclass(frozen=True, eq=False)
 class Influence:
-    """The effect of closing one part on the opening at another part.
+    """Effect of closing one part on the opening at another part.
 
     Attributes:
         locked: step that locks in the opening that it finds.
@@ -44,7 +44,7 @@ class Influence:
         coefficients: (p, r) [rad, m per N m, N] motion of the p components that are
             locked, per unit of the r components of the closing wrench.
         free: whether a free motion changes both openings.
-        zero: whether closing the part leaves the opening unchanged, for any errors.
+        zero: whether closing the part leaves the opening unchanged for all errors.
     """
 
     locked: str
@@ -55,13 +55,13 @@ class Influence:
 
 
 def why_order_matters(plan: Plan) -> str:
-    """Return why the final state depends on the order; empty if it does not.
+    """Explain why the final state depends on the order; empty if it does not.
 
     Args:
         plan: any plan.
 
     Returns:
-        Text that lists the steps that depend on the state that they find.
+        Text that lists the steps whose outcome depends on the preceding state.
     """
     steps = [step.name for step in plan.steps if depends_on_state(step)]
     return ", ".join(steps)
@@ -75,7 +75,7 @@ def depends_on_state(step: Step) -> bool:
 
     Returns:
         True for parts locked as they lie, force limits that leave an opening, clamps
-        where the part lies, and adjustments.
+        that hold a part where it lies, and adjustments.
     """
     if isinstance(step, Join):
         return isinstance(step.part, str) or bool(step.locked) or step.leave_open
@@ -83,15 +83,15 @@ def depends_on_state(step: Step) -> bool:
 
 
 def influences(machine: Machine, state: State, run: Sequence[Join]) -> list[Influence]:
-    """Return the influence of all joins on the joins that lock in an opening.
+    """Compute the influence of all joins on the joins that lock in an opening.
 
     Args:
         machine: columns and rows of the robot.
         state: state before the first of the joins; all its clearances are bolted.
-        run: joins that may be exchanged.
+        run: exchangeable joins.
 
     Returns:
-        One result for each pair of a join that depends on the state and another join.
+        One result for each pair of a state-dependent join and another join.
     """
     rows = [_rows(machine, join) for join in run]
     bodies, free = _motions(machine, state)
@@ -160,7 +160,7 @@ def _rows(machine: Machine, join: Join) -> NDArray:
 
 
 def _motions(machine: Machine, state: State) -> tuple[NDArray, NDArray]:
-    """Return elastic motions, scaled such that A = W W^T, and free motions.
+    """Return elastic motions W, scaled so that A = W W^T, and free motions.
 
     Returns:
         Columns on springs and free motions that satisfy all rows that hold.

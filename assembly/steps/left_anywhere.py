@@ -1,8 +1,8 @@
-"""Random positions of clearances that no force determines.
+"""Random positions of clearances that are not determined by any force.
 
-At least energy, clearances that transmit force are at their bounds.  The others may
+At minimum energy, clearances that transmit force are at their bounds.  The others can
 move without deforming springs. Their possible positions form a convex set, over which
-the distribution is uniform (:mod:`forcefit.assembly.solvers.uniform_clearance`).
+they are distributed uniformly (:mod:`forcefit.assembly.solvers.uniform_clearance`).
 """
 
 from collections.abc import Sequence
@@ -16,30 +16,30 @@ from forcefit.assembly.steps.machine import Machine
 from forcefit.assembly.steps.state import State
 
 _SAME = 1e-10  # relative size below which a singular value counts as zero
-_LOADED = 1e-9  # a clearance is loaded if its force exceeds this share of the energy
+_LOADED = 1e-9  # a clearance is loaded if its force exceeds this fraction of the energy
 
 
 def positions_left_anywhere(
     machine: Machine, state: State, rngs: Sequence[np.random.Generator]
 ) -> NDArray:
-    """Return clearances distributed uniformly over all positions of least energy.
+    """Sample clearances uniformly from all minimum-energy positions.
 
     Args:
         machine: columns and rows of the robot.
-        state: state of k machines at least energy, without loads.
-        rngs: k generators of random numbers.
+        state: state of k machines at minimum energy, without loads.
+        rngs: k random number generators.
 
     Returns:
         (k, nu) clearances in units of their bounds.
     """
     u = state.found.clearances.copy()
-    # random combinations of all clearances show whether the random walk mixed
+    # random combinations of the clearances reveal whether the random walk mixed
     judged = np.random.default_rng(0).normal(size=(6, u.shape[1]))
     of_cones, of_motions = _of_rows(machine, state)
     loaded = _loaded(machine, state, of_cones[1:])
     for i, rng in enumerate(rngs):
-        # forces as small as the solver's error do not show which clearances are loaded;
-        # if the set of all clearances has an interior, no clearance is loaded
+        # forces at the level of solver error do not reveal which clearances are loaded;
+        # if the set of all clearances has an interior, none is loaded
         for free in (np.ones_like(loaded[i]), ~loaded[i]):
             Z = _directions(of_cones[:, free], of_motions)
             own, starts = u[i, free].copy(), _starts(machine.joints.group[free])
@@ -56,11 +56,11 @@ def positions_left_anywhere(
 def free_positions(
     machine: Machine, state: State, row: int
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Return how the clearances of one machine may move at least energy.
+    """Find the possible motion of one machine's clearances at minimum energy.
 
     Args:
         machine: columns and rows of the robot.
-        state: state of k machines at least energy, without loads.
+        state: state of k machines at minimum energy, without loads.
         row: index of the machine.
 
     Returns:
@@ -75,7 +75,7 @@ def free_positions(
 
 
 def _of_rows(machine: Machine, state: State) -> tuple[NDArray, NDArray]:
-    """Return all constraint rows on clearances and free motions; row 0 is zero."""
+    """Return the constraint rows on clearances and free motions; row 0 is zero."""
     rows = np.vstack([
         np.zeros((1, len(machine.cones))),
         *(h.rows for h in state.holds.values()),
@@ -96,7 +96,7 @@ def _loaded(machine: Machine, state: State, of_cones: NDArray) -> NDArray:
     cones = (group[:, None] == np.unique(group)).astype(float)
     forces = np.sqrt((state.found.multipliers @ of_cones) ** 2 @ cones)
     slack = np.maximum(0.0, 1.0 - np.sqrt(state.found.clearances**2 @ cones))
-    # force times slack is about the solver's gap, so one of the two is nearly zero
+    # force times slack is about the duality gap, so one of the two is nearly zero
     scale = np.maximum(energy, 1e-18)[:, None]
     loaded = (forces > scale * slack) & (forces > _LOADED * scale)
     return loaded @ cones.T > 0

@@ -1,4 +1,4 @@
-"""A robot at a posture as arrays: columns of motions, rows of closures and frames."""
+"""Array form of a robot at a posture: motion columns, closure and frame rows."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -71,7 +71,7 @@ class Machine:
         return rank_tolerance(float(self.posture.mismatch))
 
     def rows(self, part: Part) -> NDArray:
-        """Return the rows of a frame's screw or of a closure's opening.
+        """Return the rows for a frame's screw or a closure's opening.
 
         Args:
             part: a frame, or the two frames of a closure.
@@ -103,7 +103,8 @@ class Machine:
             count: number of machines.
 
         Returns:
-            The columns; and the clearances (nu,) and motions (nq,) among them, bool.
+            The columns; and bool masks of the clearances (nu,) and motions (nq,) among
+            them.
         """
         frames = np.repeat(~np.isin(np.arange(len(self.springs) // 6), bolted), 6)
         cones = np.abs(self.cones)[frames].any(axis=0)
@@ -122,7 +123,7 @@ class Machine:
         return movable, cones, motions
 
     def values(self, rows: NDArray, errors: NDArray, found: Equilibrium) -> NDArray:
-        """Return the values of rows for the screws of all frames.
+        """Evaluate rows for the screws of all frames.
 
         Args:
             rows: (m, 6n) rows from :meth:`rows`.
@@ -151,12 +152,11 @@ class Machine:
         Args:
             errors: (k, 6n) geometric errors.
             found: springs, clearances and free motions.
-            holds: rows that already hold.
-            hold: the rows to be closed.
+            holds: rows that hold already.
+            hold: rows to be closed.
 
         Returns:
-            (k, m) right sides minus the values of the rows, lengths in reference
-            lengths.
+            (k, m) right-hand sides minus row values, lengths in reference lengths.
         """
         open_ = hold.right - self.values(hold.rows, errors, found)
         rows = [other.rows @ self.free for other in holds.values()]
@@ -181,7 +181,7 @@ class Machine:
 
 
 def machine_at(posture: Posture) -> Machine:
-    """Return the arrays of a robot at a posture.
+    """Convert a robot at a posture to arrays.
 
     Args:
         posture: pose at which the robot is assembled.

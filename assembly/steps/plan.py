@@ -1,4 +1,4 @@
-"""A plan of assembly: its steps as data.
+"""Assembly plan: the steps as data.
 
 A frame's screw is expressed at the frame's origin in its axes, after its joint.  The
 opening of a closure is expressed at the origin of the closure's first frame, in the
@@ -23,16 +23,16 @@ GRAVITY = "gravity"  # name of the weight in the dictionary of acting loads
 
 @dataclass(frozen=True)
 class Fix:
-    """A step in which a fixture holds a frame at a position.
+    """A step in which a fixture holds a frame in position.
 
     Attributes:
         name: name of the step.
         frame: frame that is held.
-        position: [rad, m] by component, the error of the fixture; components that are
-            not listed are free.  None to hold all six components where the frame lies.
-        stiffness: [N m/rad, N/m] stiffness of the fixture by component; components that
-            are not listed are rigid.
-        kind: ``"fix"`` or ``"clamp"``, the name of the step's kind in results.
+        position: [rad, m] fixture error by component; unlisted components are free.
+            None to hold all six components where the frame lies.
+        stiffness: [N m/rad, N/m] fixture stiffness by component; unlisted components
+            are rigid.
+        kind: ``"fix"`` or ``"clamp"``, the kind of step named in results.
     """
 
     name: str
@@ -50,11 +50,11 @@ class Join:
         name: name of the step.
         part: the two frames of a closure, or the frame whose joint is bolted as it
             lies.
-        locked: components of the closure's opening that are bolted as they lie; the
-            other components are closed.
+        locked: components of the closure's opening that are bolted as they lie; all
+            others are closed.
         force_limit: [N] largest closing force.
-        leave_open: whether the opening that remains at the force limit is locked in;
-            otherwise the closure is closed and the excess force is reported.
+        leave_open: whether the opening that remains at the force limit is locked in.
+            Otherwise the closure is closed, and the excess force is reported.
     """
 
     name: str
@@ -85,7 +85,7 @@ class Release:
 
     Attributes:
         name: name of the step.
-        steps: names of the earlier steps, which are released together.
+        steps: names of the earlier steps to release together.
     """
 
     name: str
@@ -94,12 +94,12 @@ class Release:
 
 @dataclass(frozen=True)
 class Measure:
-    """A step that reads a screw or an opening.
+    """A step that measures a screw or an opening.
 
     Attributes:
         name: name of the step.
-        part: frame whose screw is read, or closure whose opening is read.
-        components: components that are read.
+        part: frame whose screw is measured, or closure whose opening is measured.
+        components: measured components.
     """
 
     name: str
@@ -115,12 +115,12 @@ class Adjust:
         name: name of the step.
         frame: frame whose geometric error is changed.
         components: components of the error that are changed.
-        reading: quantity to minimise: components of a frame's screw, or the energy that
-            closing a closure would need.
+        reading: quantity to minimise: components of a frame's screw, or the energy
+            required to close a closure.
         increment: [rad or m] changes are rounded to multiples of this value; 0 for
             continuous changes.
-        amount: (a,) or (k, a) [rad or m] change that is made regardless of the reading,
-            from :func:`forcefit.assembly.steps.amounts.with_best_amounts`.
+        amount: (a,) or (k, a) [rad or m] change made regardless of the reading, from
+            :func:`forcefit.assembly.steps.amounts.with_best_amounts`.
     """
 
     name: str
@@ -138,8 +138,8 @@ Step = Fix | Join | Preload | Release | Measure | Adjust
 class Plan:
     """The steps of assembly, in order.
 
-    Closures that no step joins are closed before the first step. Joints that no step
-    bolts retain their clearance.
+    Closures that are not joined by any step are closed before the first step. Joints
+    that are not bolted by any step retain their clearance.
 
     Attributes:
         steps: the steps.
@@ -154,16 +154,16 @@ class Plan:
 
 
 def check_plan(plan: Plan, robot: Robot) -> None:
-    """Reject steps that do not fit the robot or each other.
+    """Reject steps that are inconsistent with the robot or with each other.
 
     Args:
         plan: any plan.
         robot: the robot to be assembled.
 
     Raises:
-        BadInput: a name is used twice or unknown, a part is joined twice, a step
+        BadInput: a name is unknown or used twice, a part is joined twice, a step
             releases something that is not held, or a drive of the robot applies a
-            force.  The message begins with the step.
+            force. The message starts with the step.
     """
     driven = [frame.name for frame in robot.frames if frame.drive_force]
     if driven:
@@ -232,7 +232,7 @@ def _check_join(where: str, step: Join, robot: Robot, held: Mapping) -> None:
 
 
 def _held(held: Mapping) -> str:
-    """Return the names of the steps that may be released, as text."""
+    """List the names of the steps that may be released."""
     names = ", ".join(map(quoted, held))
     return f"one of {names}" if names else "an earlier step that holds something"
 

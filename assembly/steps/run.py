@@ -1,7 +1,7 @@
-"""A plan carried out on one machine, or on many that differ in their errors.
+"""Execution of an assembly plan, on one machine or many that differ in their errors.
 
-The machine is linear in small screws at one posture.  Each step changes which rows
-hold; then the equilibrium is computed from the preceding state (``equilibrium.py``).
+The machine is linear in small screws at one posture. Each step changes the set of rows
+that hold; the equilibrium then follows from the preceding state (``equilibrium.py``).
 
 ======  ==================  ==========  ==============================================
 symbol  code                shape       meaning
@@ -46,35 +46,35 @@ from forcefit.assembly.steps.state import (
     without,
 )
 
-_ROUNDED = 1e-13  # smaller relative energy differences are rounding errors
-_HALVINGS = 50  # bisections of the share of an opening that a limited force closes
+_ROUNDED = 1e-13  # smaller relative energy differences are round-off
+_HALVINGS = 50  # bisections for the fraction of an opening that a limited force closes
 
 
 @dataclass(frozen=True, eq=False)
 class StepResult:
-    """The result of one step for k machines.
+    """Result of one step for k machines.
 
     Attributes:
         step: the step.
         energy: (k,) [J] energy after the step.
-        work: (k,) [J] work of the step: by the closing wrench, by a clamp, or by a
-            preload that increases slowly.
+        work: (k,) [J] work done by the step: by the closing wrench, a clamp, or a
+            slowly increasing preload.
         load_work: (k,) [J] work of the loads that act both before and after the step.
-        lost: (k,) [J] energy that a release dissipates.
+        lost: (k,) [J] energy dissipated by a release.
         closing_wrench: (k, 6) [N m, N] largest closing wrench, in the axes of the
             closure or fixture; 0 for other steps.
-        opening: (k, 6) [rad, m] opening of the closure before the step, without the
-            part that free motions can close.
-        left_open: (k, 6) [rad, m] opening after the step, if a force limit leaves one.
-        exceeded: (k,) bool, whether closing needs more than the allowed force.
-        spring_back: (k, 6) [rad, m] motion of the part that is released, the last one
-            if several are, in its axes.
+        opening: (k, 6) [rad, m] opening of the closure before the step, less the part
+            that free motions can close.
+        left_open: (k, 6) [rad, m] opening that a force limit leaves after the step.
+        exceeded: (k,) bool, whether closing requires more than the allowed force.
+        spring_back: (k, 6) [rad, m] motion of the released part (the last one if
+            several are released), in its axes.
         reading: (k, p) [rad or m] reading of a measurement.
-        adjustment: (k, a) [rad or m] change that an adjustment makes.
+        adjustment: (k, a) [rad or m] change made by an adjustment.
         platform_screw: (k, 6) [rad, m] screw after the step, at the platform's origin,
             base axes.
-        wrenches: (k, 6) [N m, N] locked-in wrenches after the step, by the name of the
-            step that holds, in its axes.
+        wrenches: (k, 6) [N m, N] locked-in wrenches after the step, by name of the
+            holding step, in its axes.
         balance: (k,) [J] work, or dissipated energy, minus half the multipliers times
             the opening; NaN with clearances or gravity.
     """
@@ -107,22 +107,22 @@ def assemble_in_steps(
     errors: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
 ) -> list[StepResult]:
-    """Carry out a plan and return the result of each step.
+    """Carry out an assembly plan, and return the result of each step.
 
     Args:
         plan: the steps.
         posture: pose at which the robot of n frames is assembled.
         errors: (k, n, 6) [rad, m] geometric errors of k machines; None for the errors
-            of the robot file.
-        gravity: (3,) [m/s^2] gravity in base axes, which acts from the beginning.  It
+            in the robot file.
+        gravity: (3,) [m/s^2] gravity in base axes, which acts from the beginning but
             does not move parts that nothing holds yet.
 
     Returns:
         The results, one per step.
 
     Raises:
-        BadInput: the plan does not fit the robot.
-        CannotAssemble: the conditions of rigid parts contradict each other.
+        BadInput: the plan is inconsistent with the robot.
+        CannotAssemble: the constraints of rigid parts contradict each other.
         FreeMotion: a load acts along a motion that nothing resists.
         SolverFailed: the solver for the clearances did not converge.
     """
@@ -142,7 +142,7 @@ def carry_out(machine: Machine, state: State, step: Step) -> tuple[State, StepRe
     Args:
         machine: columns and rows of the robot.
         state: state before the step.
-        step: step of a plan that has been checked.
+        step: step of a checked plan.
 
     Returns:
         The state after the step, and the result.
@@ -214,10 +214,10 @@ def _join(
 
 
 def _share(linear: bool, limit: float, needed: NDArray, force: Callable) -> NDArray:
-    """Return the share (k,) of each opening that the limited force can close."""
+    """Return the fraction (k,) of each opening that the limited force can close."""
     share = np.minimum(1.0, limit / np.maximum(needed, 1e-300))
     if linear:
-        return share  # the closing force is proportional to the closed share
+        return share  # the closing force is proportional to the closed fraction
     low, high = np.zeros_like(needed), np.ones_like(needed)
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
@@ -254,7 +254,7 @@ def _wrenches(machine: Machine, state: State) -> dict[str, NDArray]:
 def _told(
     machine: Machine, before: State, after: State, result: StepResult
 ) -> tuple[State, StepResult]:
-    """Return the state after a step, and the step's result with its energies."""
+    """Return the state after a step, and the result of the step with its energies."""
     step = result.step
     kept = [after.loads[name] for name in after.loads if name in before.loads]
     load_work = machine.work(kept, after) - machine.work(kept, before)
@@ -279,8 +279,8 @@ def _told(
 def _half_work(machine: Machine, before: State, after: State, step: Step) -> NDArray:
     """Return the work (k,) [J] of a linear step from its wrenches and openings.
 
-    The work is half the wrench that a step adds, or that a release removes, times the
-    motion against this wrench. It is NaN for steps of other kinds.
+    The work is half the wrench that a step adds, or a release removes, times the motion
+    against this wrench. It is NaN for all other kinds of steps.
     """
     if step.name in after.holds:
         hold, multipliers = after.holds[step.name], after.multipliers()[step.name]

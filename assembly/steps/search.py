@@ -1,15 +1,15 @@
-"""Search for the best order of joining: least force, least energy or least error.
+"""Search for the joining order with minimum force, energy or error.
 
-Only steps that join or adjust are permuted, within each sequence between other steps.
-An adjustment of a closure stays before, or after, the step that joins this closure.  If
-no step locks in a position that it finds, the state depends only on the set of parts
-joined so far. The least peak force is then a shortest path over the 2^n sets, in which
-the maximum replaces the sum.  The path is searched from its end, because the state of
-a set contains the closing forces of all its parts.  If joints are bolted as they lie,
-the orders are searched by branch and bound. Two bounds are used: The peak force never
-decreases.  The final energy is at least the energy of the state in which all pinned
-parts are joined and all locked parts are left open.  For the least error, no bound
-exists.
+Only joining and adjusting steps are permuted, within each uninterrupted sequence of
+such steps. An adjustment of a closure and the step that joins this closure keep their
+order. If no step locks in a position, the state depends only on the set of parts joined
+so far. Minimising the peak force is then a shortest-path problem over the 2^n sets,
+with the maximum in place of the sum. The path is searched from its end, because the
+state of a set contains the closing forces of all its parts. If joints are bolted as
+they lie, the joining orders are searched by branch and bound. As a lower bound on the
+peak force, the search uses the peak so far; as a lower bound on the final energy, the
+energy of the state in which all pinned parts are joined and all locked parts are left
+open. No bound is known for the error.
 """
 
 from collections.abc import Callable
@@ -36,25 +36,25 @@ from forcefit.inputs.table import BadInput, quoted
 Objective = Literal["force", "energy", "error"]
 OBJECTIVES: tuple[Objective, ...] = ("force", "energy", "error")
 _EQUAL = 1e-9  # smallest relative improvement that replaces the given order
-MOST_STATES = 200_000  # largest number of states computed, which takes some minutes
+MOST_STATES = 200_000  # largest number of computed states, which takes a few minutes
 
 
-# a partial order of steps: state, peak force, completed steps and remaining steps
+# a partial order of steps: state, peak force, completed steps, remaining steps
 _Partial = tuple[State, float, tuple[Step, ...], tuple[Step, ...]]
 
 
 @dataclass(frozen=True)
 class BestOrder:
-    """The best order of the steps of a plan.
+    """Best order of the steps of a plan.
 
     Attributes:
-        plan: the plan in the best order, with the changes of its adjustments.
+        plan: the plan in the best order, including the changes made by its adjustments.
         value: value of the objective [N, J or m].
-        bound: lower bound over all orders. It equals ``value`` if all orders were
-            searched. It is 0 if adjustments were found that are better than
-            the adjustments that minimise the readings.
-        given: value for the order of the given plan; inf if it cannot be assembled.
-        searched: number of sets, or of partial orders, that were computed.
+        bound: lower bound over all orders, equal to ``value`` if all orders were
+            searched. It is 0 if some adjustments improve on those that minimise the
+            readings.
+        given: value for the order in the given plan; inf if it cannot be assembled.
+        searched: number of computed sets or partial orders.
         method: ``"sets"`` or ``"orders"``.
     """
 
@@ -74,7 +74,7 @@ def best_order(
     progress: Callable[[int], None] = lambda done: None,
     most: int = MOST_STATES,
 ) -> BestOrder:
-    """Return the order of the joining steps that minimises an objective.
+    """Find the order of the joining steps that minimises an objective.
 
     Args:
         plan: the steps; consecutive joins and adjustments are permuted.
@@ -84,7 +84,7 @@ def best_order(
             platform at the end.
         gravity: (3,) [m/s^2] gravity in base axes.
         progress: called with the number of computed states.
-        most: number of states after which the search ends with a bound.
+        most: number of states after which the search stops with a bound.
 
     Returns:
         The best order found, with a bound.
@@ -118,7 +118,7 @@ def best_order(
 
 @dataclass(eq=False)
 class _Search:
-    """A search: machine, objective and number of computed states."""
+    """Search with its machine, objective and number of computed states."""
 
     machine: Machine
     objective: Objective
@@ -127,7 +127,7 @@ class _Search:
     done: int = 0
 
     def carry_out(self, state: State, step: Step) -> tuple[State, StepResult] | None:
-        """Carry out a step and return the result; None if it cannot be assembled."""
+        """Carry out a step; return None if the machine cannot be assembled."""
         self.done += 1
         self.progress(self.done)
         try:
@@ -138,7 +138,7 @@ class _Search:
     def closing_forces(
         self, start: State, run: list[Step], chosen: int
     ) -> list[tuple[int, float]]:
-        """Return the closing force [N] of each part of a set if it is joined last."""
+        """Return the closing force [N] of each part in a set if joined last."""
         self.done += 1
         self.progress(self.done)
         joined = [k for k in range(len(run)) if chosen >> k & 1]
@@ -159,7 +159,7 @@ class _Search:
         return list(zip(joined, forces, strict=True))
 
     def value(self, peak: float, state: State) -> float:
-        """Return the objective of a state, given the peak force of its steps."""
+        """Evaluate the objective of a state, given the peak force of its steps."""
         if self.objective == "force":
             return peak
         if self.objective == "energy":
@@ -168,7 +168,7 @@ class _Search:
         return float(np.linalg.norm(screw[3:]))
 
     def bound(self, peak: float, state: State, left: tuple[Step, ...]) -> float:
-        """Return a lower bound of the objective after the remaining steps."""
+        """Return a lower bound on the objective after the remaining steps."""
         if self.objective == "force":
             return peak
         joins = [step for step in left if isinstance(step, Join)]
@@ -185,7 +185,7 @@ class _Search:
         return float(closed.found.energy[0])
 
     def value_of(self, state: State, steps: tuple[Step, ...]) -> float:
-        """Return the objective of steps in the given order; inf if not possible."""
+        """Evaluate the objective of steps in the given order; inf if infeasible."""
         peak = 0.0
         for step in steps:
             found = self.carry_out(state, step)
@@ -203,7 +203,7 @@ def _force(result: StepResult) -> float:
 def _over_sets(
     search: _Search, state: State, runs: list[list[Step]], given: float
 ) -> BestOrder:
-    """Return the best order if the state depends only on the set of joined parts."""
+    """Find the best order if the state depends only on the set of joined parts."""
     steps: list[Step] = []
     peak = bound = 0.0
     for run in runs:
@@ -224,12 +224,12 @@ def _over_sets(
 def _bottleneck(
     search: _Search, start: State, run: list[Step]
 ) -> tuple[list[Step], float, float]:
-    """Return the order of one sequence with the least peak force, force and bound.
+    """Return the order of a sequence with minimum peak force, the force and a bound.
 
-    The search goes backwards from the set of all parts, by increasing peak force: one
-    equilibrium contains the closing forces of all parts that may have been joined last.
-    After the largest number of states, or after Ctrl-C, the part that needs the least
-    force is always placed last.
+    The search proceeds backwards from the set of all parts, by increasing peak force:
+    one equilibrium contains the closing forces of all parts that may have been joined
+    last. Once the number of states is exhausted, or after Ctrl-C, the part that
+    requires the smallest force is always placed last.
     """
     chosen = (1 << len(run)) - 1
     best, later = {chosen: 0.0}, {chosen: -1}
@@ -266,10 +266,10 @@ def _joined_after(chosen: int, later: dict[int, int]) -> list[int]:
 
 
 def _over_orders(search: _Search, start: State, plan: Plan, given: float) -> BestOrder:
-    """Return the best order by depth-first branch and bound.
+    """Return the best order, found by depth-first branch and bound.
 
-    After the largest number of states, or after Ctrl-C, the bounds of the orders that
-    were not searched enter the bound of the result.
+    Once the number of states is exhausted, or after Ctrl-C, the bounds of all orders
+    not yet searched enter the bound of the result.
 
     Raises:
         BadInput: no order can be assembled.
@@ -303,7 +303,7 @@ def _children(
     search: _Search, state: State, peak: float, done: tuple[Step, ...],
     left: tuple[Step, ...],
 ) -> list[_Partial]:  # fmt: skip
-    """Return the partial orders made by appending each step that may come next."""
+    """Extend a partial order by each step that may come next."""
     children = []
     for step, others in choices(left):
         found = search.carry_out(state, step)

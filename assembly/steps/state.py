@@ -1,4 +1,4 @@
-"""The state of a partly assembled machine: its constraints and its equilibrium."""
+"""State of a partly assembled machine: its constraints and its equilibrium."""
 
 from dataclasses import dataclass, field, replace
 
@@ -25,13 +25,13 @@ from forcefit.assembly.steps.plan import (
 
 @dataclass(frozen=True, eq=False)
 class Hold:
-    """The constraint equations of one joined closure or of one fixture.
+    """Constraint equations of one joined closure or one fixture.
 
     Attributes:
-        rows: (m, 6n) equations on the frames' screws, lengths in reference lengths.
-        right: (k, m) right sides.
+        rows: (m, 6n) equations for the frame screws, lengths in reference lengths.
+        right: (k, m) right-hand sides.
         roots: (m, nf) columns of the fixture's springs.
-        part: frame or closure whose axes the rows refer to.
+        part: frame or closure in whose axes the rows are written.
         components: (m,) components of the screw.
     """
 
@@ -44,14 +44,14 @@ class Hold:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """The state of k partly assembled machines.
+    """State of k partly assembled machines.
 
     Attributes:
         errors: (k, 6n) [rad, m] geometric errors, including adjustments.
         found: springs, clearances, free motions and multipliers.
-        holds: rows of closures and fixtures, by the name of the step.
-        loads: loads that act, by the name of the step.
-        bolted: frame whose joint is bolted as it lies, by the name of the step.
+        holds: rows of closures and fixtures, by step name.
+        loads: acting loads, by step name.
+        bolted: frame whose joint is bolted as it lies, by step name.
     """
 
     errors: NDArray
@@ -110,12 +110,11 @@ def first_state(
 
 
 def settle(machine: Machine, state: State) -> State:
-    """Return the equilibrium of a state, closest to the preceding equilibrium.
+    """Compute the equilibrium of a state that is closest to the preceding one.
 
     Args:
         machine: Jacobian columns and constraint rows of the robot.
-        state: new supports, loads and errors; the unknowns are those of the preceding
-            state.
+        state: new supports, loads and errors, with the unknowns of the preceding state.
 
     Returns:
         The state with its unknowns at equilibrium.
@@ -142,7 +141,7 @@ def settle(machine: Machine, state: State) -> State:
 
 
 def _blocks(blocks: list[NDArray], count: int) -> NDArray:
-    """Return all fixture springs as a block matrix on all constraint rows."""
+    """Stack all fixture springs in a block matrix over all constraint rows."""
     columns = np.zeros((count, sum(block.shape[1] for block in blocks)))
     row = column = 0
     for block in blocks:
@@ -153,7 +152,7 @@ def _blocks(blocks: list[NDArray], count: int) -> NDArray:
 
 
 def closed_rows(machine: Machine, state: State, closure: tuple[str, str]) -> Hold:
-    """Return the constraint equations of a closure that is closed."""
+    """Return the constraint equations of a closed closure."""
     rows = machine.rows(closure)
     none = np.zeros((len(state.errors), 6)), np.zeros((6, 0))
     return Hold(rows, *none, closure, np.arange(6))
@@ -178,12 +177,12 @@ def fixture_rows(machine: Machine, state: State, step: Fix) -> Hold:
 
 
 def with_hold(state: State, name: str, hold: Hold) -> State:
-    """Return the state with one more closure or fixture, before its equilibrium."""
+    """Add a closure or fixture to a state, without computing the equilibrium."""
     return replace(state, holds=state.holds | {name: hold})
 
 
 def without(state: State, names: tuple[str, ...]) -> State:
-    """Return the state without the constraints of some steps, not yet settled."""
+    """Remove the constraints of some steps, without computing the equilibrium."""
 
     def kept(given: dict) -> dict:
         return {name: value for name, value in given.items() if name not in names}
@@ -195,7 +194,7 @@ def without(state: State, names: tuple[str, ...]) -> State:
 
 
 def reading_of(machine: Machine, state: State, step: Measure) -> NDArray:
-    """Return the readings (k, p) [rad or m] of a measurement."""
+    """Evaluate the readings (k, p) [rad or m] of a measurement."""
     chosen = rows_of(step.components)
     if isinstance(step.part, str):
         rows = machine.rows(step.part)

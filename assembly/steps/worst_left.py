@@ -1,20 +1,20 @@
-"""Largest pose error over all positions in which a joint may have been bolted.
+"""Largest pose error over all positions in which a joint may be bolted.
 
-At the pose where the joint is bolted, all positions of least energy form a convex set
-of clearances u.  At another pose, the locked-in clearance acts like an error, and the
-platform's screw is
+At the pose where the joint is bolted, all minimum-energy positions form a convex set of
+clearances u. At any other pose, the locked-in clearance acts like an error, and the
+platform screw is
 
     x = x0 + X (u - u0) + V (v - v0),
 
-which is linear in u and in the clearances v that are loose at that pose.  The largest
-rotation and translation over the set are found by convex maximisation, as intervals
-between a value attained and a certified bound:
+which is linear in u and in the clearances v that are loose at that pose.  Convex
+maximisation brackets the largest rotation and translation over the set between a value
+attained and a certified bound:
 
 ======================  ================================================================
 loose clearances        largest error
 ======================  ================================================================
 none, or no springs     attained within the interval: all u and v that close the loops
-with springs            v follows from the least energy, so the maximum over all v is an
+with springs            v follows from the minimum energy, so the maximum over v is an
                         upper bound; equilibria at its corners are attained
 ======================  ================================================================
 """
@@ -43,7 +43,7 @@ from forcefit.assembly.steps.machine import Machine
 from forcefit.stiffness.screws import skew
 
 _TOLERANCE = 5e-4  # width of an interval relative to the largest support along an axis
-_ROUNDING = 1e-10  # rows below this share of the largest row are rounding errors
+_ROUNDING = 1e-10  # rows below this fraction of the largest row are round-off
 
 CONVEX = "the largest of all positions of least energy; a convex set, certified"
 BRACKET = (
@@ -54,7 +54,7 @@ BRACKET = (
 
 @dataclass(frozen=True, eq=False)
 class WorstLeft:
-    """The largest pose error over the positions in which joints may be bolted.
+    """Largest pose error over the positions in which joints may be bolted.
 
     Attributes:
         rotation: (2,) [rad] value attained and certified upper bound.
@@ -111,16 +111,15 @@ def is_left_worst(robot: Robot) -> bool:
 
 
 def worst_left(posture: Posture, offset: ArrayLike = (0.0, 0.0, 0.0)) -> WorstLeft:
-    """Return the largest pose error over all positions of joints with worst bolting.
+    """Bracket the largest pose error over all positions of joints left ``"worst"``.
 
     Args:
-        posture: posture of a robot with a joint that has ``left = "worst"``, without
-            loads.
+        posture: unloaded posture of a robot with a joint that has ``left = "worst"``.
         offset: (3,) [m] vector from the platform's origin to the point whose
             translation is bounded, base axes.
 
     Returns:
-        Value attained and certified bound of the rotation and of the translation.
+        Value attained and certified bound for both rotation and translation.
 
     Raises:
         BadInput: another joint is bolted after those with ``left = "worst"``.
@@ -139,7 +138,7 @@ def worst_left(posture: Posture, offset: ArrayLike = (0.0, 0.0, 0.0)) -> WorstLe
 
 
 def _response(posture: Posture) -> _Response:
-    """Return the linear response of an unloaded posture to errors."""
+    """Compute the linear response of an unloaded posture to errors."""
     robot = posture.robot
     lin, joints = linearise(posture), virtual_joints(robot)
     reduced = reduce_problem(lin, joints, no_loads(robot.errors.size))
@@ -156,7 +155,7 @@ def _response(posture: Posture) -> _Response:
 
 
 def _positions(posture: Posture, response: _Response, offset: NDArray) -> _Positions:
-    """Return the set of positions of bolted and loose clearances, with their screws."""
+    """Return the positions of bolted and loose clearances, with their screws."""
     robot, cones = posture.robot, response.joints.cones
     frames, machine, state = last_bolt(robot)
     u, free, Z = free_positions(machine, state, 0)
@@ -190,7 +189,7 @@ def _locked_in(machine: Machine, frames: list[int]) -> NDArray:
 
 
 def _largest(at: _Positions, half: int) -> tuple[tuple[float, float], list[NDArray]]:
-    """Bracket the largest rotation or translation; also return the visited corners."""
+    """Bracket the largest rotation or translation, and return the visited corners."""
     corners: list[NDArray] = [at.start]
     starts, right = cone_starts(at.group), (at.rows @ at.start)[None]
 
@@ -221,7 +220,7 @@ def _attained(
     posture: Posture, at: _Positions, corners: list[NDArray], half: int,
     offset: ArrayLike,
 ) -> float:  # fmt: skip
-    """Return the largest pose error at equilibrium if bolted at given corners."""
+    """Compute the largest pose error at equilibrium if bolted at given corners."""
     moved = (np.array(corners) - at.start) @ at.errors.T
     errors = posture.robot.errors + moved.reshape(len(moved), -1, 6)
     bounds = bound_pose_error(solve_assembly(posture, errors=errors), offset=offset)

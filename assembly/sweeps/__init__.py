@@ -1,4 +1,4 @@
-"""Sweeps: quantities of a robot at many postures, designs and draws, in one file.
+"""Sweeps: quantities of a robot at many postures, designs and draws of errors.
 
-Start with ``request.py`` for the options, ``sweep.py`` for the solution.
+Start with ``request.py`` for the options and ``sweep.py`` for the computation.
 """

@@ -1,10 +1,10 @@
-"""Parallel solution of a sweep with Dask, on this machine or on a cluster.
+"""Parallel computation of a sweep with Dask, on this machine or on a cluster.
 
-The client submits a few tasks per worker at a time and writes their results to the
-journal. The client and every worker therefore hold only a few blocks in memory.  A task
-contains as many blocks as can be solved in about half a second. The last tasks are
+The client submits only a few tasks per worker at a time and writes their results to the
+journal, so neither the client nor a worker holds more than a few blocks in memory.  A
+task contains as many blocks as can be solved in about half a second. The last tasks are
 smaller, so that workers finish at nearly the same time.  Dask reassigns the tasks of a
-lost worker.  The distribution of blocks does not change any result, because each
+lost worker.  How blocks are distributed does not affect any result, because each
 process computes on one thread and points do not depend on neighbouring points.
 """
 
@@ -54,11 +54,11 @@ def cluster_solver(
         workers: number of processes of a local cluster to start; None if
             ``scheduler`` is given.
         scheduler: address of a running cluster, such as ``tcp://10.0.0.1:8786``.
-        report: function called at the end with a line of text: the number of tasks
-            and their median duration.
+        report: callback that receives a final line of text with the number of tasks and
+            their median duration.
 
     Returns:
-        The solver, which connects to the cluster or starts it when it is first used.
+        The solver, which connects to the cluster, or starts it, when first used.
     """
 
     def solve(
@@ -67,7 +67,7 @@ def cluster_solver(
         import dask
         from distributed import Client, LocalCluster
 
-        # the sweep reports failures in one message
+        # the sweep itself reports failures, in one message
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
         if scheduler is not None:
             with _connected(scheduler) as client:
@@ -86,7 +86,7 @@ def cluster_solver(
 
 @contextmanager
 def _without_interrupts() -> Generator[None, None, None]:
-    """Let processes started in the block ignore Ctrl-C; the sweep terminates them."""
+    """Make processes started in the block ignore Ctrl-C; the sweep terminates them."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -116,7 +116,7 @@ def _distribute_connected(
     blocks: list[int],
     report: Callable[[str], None],
 ) -> Iterator[tuple[int, SolvedPoints]]:
-    """Distribute blocks; if the scheduler is lost, raise one error that says so."""
+    """Distribute blocks; if the scheduler is lost, report this in a single error."""
     from distributed.comm import CommClosedError
 
     try:
@@ -176,12 +176,12 @@ def _distribute(
 
 
 def _threads(client: "distributed.Client") -> int:
-    """Return the present number of threads of all workers, which may change."""
+    """Return the total number of threads of the current workers, which may change."""
     from distributed.comm import CommClosedError
 
     try:
         return max(1, sum(client.nthreads().values()))
-    except OSError as error:  # a lost scheduler also fails to answer this query
+    except OSError as error:  # a lost scheduler does not answer this query either
         raise CommClosedError(str(error)) from error
 
 
@@ -204,7 +204,7 @@ def _check_workers(client: "distributed.Client") -> None:
 
 
 def _program() -> dict[str, str]:
-    """Return the program's version, and the digest of its sources and libraries."""
+    """Return the program version and the digest of its sources and libraries."""
     return {
         "program": f"forcefit {version('forcefit')}",
         "program_sha256": program_hash(),
@@ -225,8 +225,8 @@ def solve_task(
         Computation time [s], and the number of each block with its results.
 
     Raises:
-        BadInput: the digest on this worker differs, because a mesh or a library
-            differs.
+        BadInput: the digest on this worker differs, because a mesh or a stiffness
+            library differs.
     """
     from threadpoolctl import threadpool_limits
 
@@ -239,7 +239,7 @@ def solve_task(
 
 @lru_cache(maxsize=4)
 def _question(content: bytes, digest: str) -> Question:
-    """Return the unpickled quantities; a cache keeps one robot object per worker."""
+    """Return the unpickled quantities, cached so that each worker has one robot."""
     asked: Question = pickle.loads(content)
     question = replace(asked, robot=solve_links(asked.robot))
     if question_hash(question) != digest:

@@ -1,7 +1,7 @@
 """Results of a sweep as an xarray data set, in memory or in a NetCDF file.
 
-A file is written from the journal block by block, which limits the memory used.  The
-bytes of the file depend only on the sweep.
+A file is written from the journal block by block to limit memory use. Equal sweeps give
+identical files, byte for byte.
 """
 
 import os
@@ -29,26 +29,26 @@ if TYPE_CHECKING:
     from forcefit.assembly.sweeps.plan import Sweep
 
 Texts = dict[str, dict[int, str]]
-# kinds of files that commands write, and the attribute that marks each kind
+# kinds of files written by commands, and the attribute that identifies each kind
 KINDS = {
     "a sweep": "near", "draws": "sources_and_posture_sha256", "tolerances": "cost_law",
     "a path": "path_law",
 }  # fmt: skip
 _TEXT = {name: QUANTITIES[name].meaning for name in ("status", *TEXTS)}
 _TEXT["status"] += ": " + ", ".join(OF_POINTS[1:])
-# variable names in files of older releases, and the present names
+# variable names in files of older releases, and their current names
 _OLD_NAMES = {
     "rotation_error_play": "rotation_error_clearance",
     "translation_error_play": "translation_error_clearance",
     "play_mixed": "clearance_mixed",
 }
 _OLD_ATTRIBUTES = {"play": "clearance", "reading": "assumption"}
-# number of blocks per write; one write lasts as long as solving a hundred points
+# number of blocks per write; one write takes as long as solving a hundred points
 _TOGETHER = 256
 
 
 def sweep_dataset(sweep: "Sweep", records: NDArray, texts: Texts) -> "xarray.Dataset":
-    """Return the data set of a whole sweep in memory.
+    """Build the data set of a whole sweep in memory.
 
     Args:
         sweep: sweep to which the results belong.
@@ -81,8 +81,8 @@ def write_sweep(
 
     Args:
         sweep: sweep to which the results belong.
-        read: function that returns the records and texts of a block.
-        path: path of the file; an existing file is replaced only by a complete one.
+        read: function from a block number to the records and texts of the block.
+        path: path of the file, which replaces an existing file only once complete.
 
     Raises:
         BadInput: the file cannot be written.
@@ -94,7 +94,7 @@ def write_sweep(
 def _write(
     sweep: "Sweep", read: Callable[[int], tuple[NDArray, Texts]], file: Any
 ) -> None:
-    """Write the NetCDF file, first the coordinates, then block after block."""
+    """Write the NetCDF file: coordinates first, then block by block."""
     import h5py
 
     text = h5py.string_dtype()
@@ -218,7 +218,7 @@ def save_dataset(data: "xarray.Dataset", path: Path | str) -> None:
 
     Args:
         data: data set to write.
-        path: path of the file; an existing file is replaced only by a complete one.
+        path: path of the file, which replaces an existing file only once complete.
 
     Raises:
         BadInput: the file cannot be written.
@@ -230,14 +230,14 @@ def save_dataset(data: "xarray.Dataset", path: Path | str) -> None:
 
 
 def check_dataset(path: Path | str, what: str) -> None:
-    """Raise an error before the computation if a NetCDF file cannot be written.
+    """Check before a computation that its NetCDF file can be written.
 
     Args:
         path: path of the file that will be written.
         what: one of :data:`KINDS`; an existing file must be of this kind.
 
     Raises:
-        BadInput: the file is of another kind, or for the reasons in
+        BadInput: an existing file is of another kind, or for the reasons in
             :func:`forcefit.inputs.writing.check_writable`.
     """
     check_writable(path, NETCDF)
@@ -264,7 +264,7 @@ def _is(path: Path, what: str) -> bool:
 
 
 def open_dataset(path: Path | str) -> "xarray.Dataset":
-    """Return the data set that a NetCDF file contains.
+    """Load the data set in a NetCDF file.
 
     Args:
         path: path of a NetCDF file.
@@ -273,7 +273,7 @@ def open_dataset(path: Path | str) -> "xarray.Dataset":
         The data set, loaded into memory.
 
     Raises:
-        BadInput: the file is absent, or is not a NetCDF file.
+        BadInput: the file does not exist or is not a NetCDF file.
     """
     import xarray
 
@@ -291,7 +291,7 @@ def open_dataset(path: Path | str) -> "xarray.Dataset":
 
 
 def _with_new_names(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Return a data set of an older release with present variable names."""
+    """Rename the variables of a data set written by an older release."""
     old = {name: new for name, new in _OLD_NAMES.items() if name in data.data_vars}
     data.attrs = {_OLD_ATTRIBUTES.get(str(k), k): v for k, v in data.attrs.items()}
     return data.rename_vars(old)

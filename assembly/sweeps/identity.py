@@ -1,6 +1,6 @@
-"""Digests that identify results, of the program, the robot and the computed quantities.
+"""Digests of the program, the robot and the computed quantities, to identify results.
 
-Each digest is a SHA-256. Journals and the workers of a cluster compare the digests.
+Each digest is a SHA-256, which journals and the workers of a cluster compare.
 """
 
 import hashlib
@@ -25,23 +25,23 @@ from forcefit.assembly.model.robot import LibraryLink, MeshLink, Robot
 from forcefit.assembly.sweeps.parameters import Design
 from forcefit.inputs.program import sources_hash
 
-# libraries that affect the results; another version may round differently
+# libraries that affect the results, because another version may round differently
 _LIBRARIES = ("numpy", "scipy", "clarabel")
 
 
 @cache
 def program_hash() -> str:
-    """Return the SHA-256 of the program's sources and its libraries' versions."""
+    """Return the SHA-256 of the program's sources and the versions of its libraries."""
     packages = forcefit.inputs, forcefit.stiffness, forcefit.assembly
     own = sources_hash(packages, _LIBRARIES)
     return hashlib.sha256((own + kernels.sources).encode()).hexdigest()
 
 
 def robot_hash(robot: Robot) -> str:
-    """Return the SHA-256 of a robot file and of all that the file refers to.
+    """Return the SHA-256 of a robot file and of everything it refers to.
 
-    A robot file may refer to meshes, stiffness libraries, and effects of other
-    packages, of which the version is hashed.
+    A robot file may refer to meshes, stiffness libraries, and effects from other
+    packages, whose version enters the hash.
 
     Args:
         robot: the robot.
@@ -50,7 +50,7 @@ def robot_hash(robot: Robot) -> str:
         The digest.
 
     Raises:
-        BadInput: a mesh or a library was not read when the robot was loaded.
+        BadInput: a mesh or a stiffness library was not read when the robot was loaded.
     """
     table = robot_table(robot)
     table.pop("description", None)
@@ -66,10 +66,11 @@ def robot_hash(robot: Robot) -> str:
 
 
 def question_hash(question: Any) -> str:
-    """Return the SHA-256 of an object from the names and values of its attributes.
+    """Return the SHA-256 of an object's attribute names and values.
 
     Args:
-        question: plain values, arrays, robots, designs and dataclasses of these.
+        question: plain values, arrays, robots, designs, or dataclasses composed of
+            these.
 
     Returns:
         The digest.
@@ -81,7 +82,7 @@ def _as_json(value: Any) -> Any:
     """Return a value as JSON-serializable data, different for different values."""
     if isinstance(value, Robot):
         return ["robot", robot_hash(value)]
-    if isinstance(value, Design):  # the path of the design's file does not matter
+    if isinstance(value, Design):  # the path of the design's file is irrelevant
         return ["design", _as_json(value.content)]
     if isinstance(value, np.ndarray):
         content = np.ascontiguousarray(value)

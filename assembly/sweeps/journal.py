@@ -1,12 +1,11 @@
-"""Journal of a sweep: a file of finished blocks that survives an interruption.
+"""Journal of a sweep: finished blocks in a file that survives an interruption.
 
-The file begins with one line of JSON that identifies the sweep, and its check sum.
-Records follow. Each record is appended by one write. It contains the number of a block,
-the length of the content and a check sum, then the block's rows and texts.  Each check
-sum continues the check sum of the first line, so every record identifies its sweep.  A
-record with a wrong check sum is ignored: it is damaged, or an interruption cut it
-short.  Records may be in any order and may occur twice.  Only one program at a time can
-lock the file.
+The file begins with one line of JSON, which identifies the sweep, and the checksum of
+this line. Records follow, each appended by a single write: block number, length of the
+content, checksum, and the block's rows and texts. Each checksum continues that of the
+first line, so every record is tied to its sweep. A record with a wrong checksum is
+damaged, or was cut short by an interruption, and is ignored. Records may be in any
+order and may occur twice.  Only one program at a time can lock the file.
 """
 
 import json
@@ -28,7 +27,7 @@ from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import check_writable, unwritable
 
 _MAGIC = b"FFB2"
-_HEAD = struct.Struct("<4sQQI")  # magic, block, length of the content, check sum
+_HEAD = struct.Struct("<4sQQI")  # magic, block, length of the content, checksum
 _KIND = "forcefit sweep journal 2"
 
 
@@ -39,7 +38,7 @@ class Journal:
     Attributes:
         path: path of the file.
         record_type: type of the rows.
-        owner: check sum of the first line, from which the records' check sums continue.
+        owner: checksum of the first line, which the records' checksums continue.
         places: file offset and length [bytes] of each finished block's content.
     """
 
@@ -51,12 +50,12 @@ class Journal:
     def add(
         self, block: int, records: NDArray, texts: dict[str, dict[int, str]]
     ) -> None:
-        """Append a finished block; when this function returns, the file contains it.
+        """Append a finished block, which is in the file when this function returns.
 
         Args:
             block: number of the block.
             records: records of its points.
-            texts: for each text variable, the texts of the rows that have one.
+            texts: for each text variable, the texts by row, for rows that have one.
 
         Raises:
             BadInput: the file cannot be written, for example because the disk is full.
@@ -127,15 +126,16 @@ def open_journal(
 
     Args:
         path: path of the file.
-        whose: plain values that identify the sweep. All must be equal to resume it,
-            except ``program``: its version differs between commits of equal sources.
+        whose: plain values that identify the sweep. All of them must be equal to resume
+            it, except ``program``, whose version differs between commits of equal
+            sources.
         record_type: type of the records.
 
     Yields:
         The journal with the finished blocks.
 
     Raises:
-        BadInput: another program has locked the file; or the file belongs to another
+        BadInput: another program has locked the file, or the file belongs to another
             sweep, is not a journal, or cannot be written.
     """
     check_writable(path)
@@ -157,7 +157,7 @@ def open_journal(
 
 
 def _recover(path: Path, header: bytes, owner: int) -> dict[int, tuple[int, int]]:
-    """Return file positions of finished blocks; repair the first line and the end."""
+    """Locate the finished blocks in the file; repair its first line and its end."""
     try:
         with path.open("r+b") as file:
             size = os.fstat(file.fileno()).st_size
@@ -183,7 +183,7 @@ def _recover(path: Path, header: bytes, owner: int) -> dict[int, tuple[int, int]
 def _scan(
     content: mmap.mmap, start: int, owner: int
 ) -> tuple[dict[int, tuple[int, int]], int]:
-    """Return the file positions of all valid records, and the end of the last one."""
+    """Locate all valid records in the file, and the end of the last one."""
     places: dict[int, tuple[int, int]] = {}
     end = start
     place = content.find(_MAGIC, start)
@@ -203,13 +203,13 @@ def _scan(
 
 
 def _check(owner: int, block: int, content: bytes) -> int:
-    """Return the check sum of a record from sweep, block number, length and content."""
+    """Return the checksum of a record over sweep, block number, length and content."""
     head = struct.pack("<QQ", block, len(content))
     return zlib.crc32(content, zlib.crc32(head, owner))
 
 
 def _difference(first_line: bytes, header: bytes) -> str:
-    """Return the difference between a journal and the expected journal as text."""
+    """Describe how a journal differs from the expected journal."""
     expected = json.loads(header.rpartition(b" ")[0])
     line, _, check = first_line.rstrip(b"\n").rpartition(b" ")
     if not first_line.startswith(b'{"kind": "forcefit sweep journal'):
@@ -225,7 +225,7 @@ def _difference(first_line: bytes, header: bytes) -> str:
         )
     other = json.loads(line)
     keys = [k for k in expected if other.get(k) != expected[k]]
-    # omit the hash of the whole input if another line names the differing part
+    # omit the hash of the whole input if a more specific key differs
     keys = [k for k in keys if k != "question_sha256"] or keys
     theirs = ", ".join(f"{k} {str(other.get(k))[:60]!r}" for k in keys)
     wanted = ", ".join(f"{k} {str(expected[k])[:60]!r}" for k in keys)

@@ -1,6 +1,6 @@
 """Figures of a sweep from its data set: maps over two axes, or lines along one axis.
 
-Each function takes a data set and returns a figure.
+Each of these functions takes a data set and returns a figure.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,19 +26,19 @@ def figure_of(
     at: Mapping[str, float | str] | None = None,
     quantities: Sequence[str] = (),
 ) -> "Figure":
-    """Return the figure of a sweep: maps over two axes, or lines along one axis.
+    """Plot a sweep as maps over two axes, or as lines along one axis.
 
     Args:
         data: data set of a sweep.
-        at: values on further axes by name; the nearest points are shown.  If no draw is
-            selected, the median over the draws is shown.
+        at: values on the remaining axes by name; the nearest points are shown. If no
+            draw is selected, the median over all draws is shown.
         quantities: quantities to show, by the names in
-            :mod:`forcefit.assembly.sweeps.panels`; by default the quantities in
-            figure 5 of the paper.
+            :mod:`forcefit.assembly.sweeps.panels`; by default those in figure 5 of the
+            paper.
 
     Returns:
-        A figure with one panel per quantity, by default six.  It is not shown, except
-        by a notebook where it is the result of a cell.
+        A figure with one panel per quantity, by default six. A notebook shows it as the
+        result of a cell; otherwise it is not shown.
 
     Raises:
         BadInput: an axis or a quantity is unknown, or more than two axes remain.
@@ -65,7 +65,8 @@ def check_axes(sizes: Mapping[str, int]) -> None:
         sizes: number of values on each axis.
 
     Raises:
-        BadInput: the number of axes with several values, without draws, is not 1 or 2.
+        BadInput: the number of axes with several values, not counting draws, is not 1
+            or 2.
     """
     long = {name: n for name, n in sizes.items() if n > 1 and name != "draw"}
     if len(long) > 2:
@@ -83,14 +84,14 @@ def check_axes(sizes: Mapping[str, int]) -> None:
 def part_of_sweep(
     data: "xarray.Dataset", at: Mapping[str, float | str]
 ) -> tuple["xarray.Dataset", str]:
-    """Select a part of a sweep: some axes at fixed values, and the median over draws.
+    """Select part of a sweep by fixing values on axes, and take the median over draws.
 
     Args:
         data: data set of a sweep.
         at: value for each axis to be fixed.
 
     Returns:
-        The part without axes of length one, and a note that describes the selection.
+        The selected part without axes of length one, and a note on the selection.
 
     Raises:
         BadInput: an axis or a value is unknown.
@@ -119,7 +120,7 @@ def part_of_sweep(
 
 
 def _number(name: str, value: float | str) -> float:
-    """Return the number at which an axis is fixed."""
+    """Return the value at which an axis is fixed."""
     try:
         return float(value)
     except ValueError:
@@ -129,7 +130,7 @@ def _number(name: str, value: float | str) -> float:
 
 
 def _median(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Return each point's median over the draws, and its first status except ok."""
+    """Return each point's median over the draws, and its first status other than ok."""
     numbers = [k for k, v in data.data_vars.items() if v.dtype.kind == "f"]
     middle = data[numbers].median("draw", skipna=True)
     first = data.isel(draw=0, drop=True)
@@ -146,7 +147,7 @@ def _median(data: "xarray.Dataset") -> "xarray.Dataset":
 
 
 def _squeezed(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Return the data set without axes that have only one value."""
+    """Remove the axes that have only one value from a data set."""
     single = [d for d in data["status"].dims if data.sizes[d] == 1]
     return data.squeeze(single, drop=True)
 
@@ -154,7 +155,7 @@ def _squeezed(data: "xarray.Dataset") -> "xarray.Dataset":
 def map_figure(
     data: "xarray.Dataset", panels: Sequence[Panel] | None = None
 ) -> "Figure":
-    """Return maps over a two-dimensional grid: margins, energy and platform error.
+    """Plot margins, energy and platform error as maps over a two-dimensional grid.
 
     Args:
         data: data set of a sweep over two axes with more than one value each.
@@ -181,7 +182,7 @@ def map_figure(
         low, high = float(finite.min()), float(finite.max())
         if low < high:
             figure.colorbar(image, ax=panel)
-        elif low == high:  # any colour scale would show rounding errors as differences
+        elif low == high:  # any colour scale would make round-off visible
             title = f"{title}: {low:.4g} everywhere"
         inside = bool((finite < 1).any()) and bool((finite > 1).any())
         if key.startswith("margin") and inside and min(finite.shape) > 1:
@@ -195,7 +196,7 @@ def map_figure(
 
 
 def _figure_for(count: int, height: float) -> tuple["Figure", "list[Axes]"]:
-    """Return a figure with a grid of at least the given number of panels."""
+    """Create a figure with a grid of at least the given number of panels."""
     from matplotlib.figure import Figure
 
     rows, columns = -(-count // 2), min(count, 2)
@@ -207,7 +208,7 @@ def _figure_for(count: int, height: float) -> tuple["Figure", "list[Axes]"]:
 def path_figure(
     data: "xarray.Dataset", panels: Sequence[Panel] | None = None
 ) -> "Figure":
-    """Return a figure of the quantities along one axis, or over a list of postures.
+    """Plot the quantities along one axis, or over a list of postures.
 
     Args:
         data: data set of a sweep over one axis.
@@ -244,7 +245,7 @@ def path_figure(
 
 
 def _along_numbers(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Return the data set with increasing axis values; text labels become 1, 2, .."""
+    """Sort a data set by axis values; text labels become 1, 2, .."""
     for name in map(str, data["status"].dims):
         if data[name].dtype.kind not in "fiu":
             data = data.assign_coords({name: np.arange(data.sizes[name]) + 1})
@@ -253,7 +254,7 @@ def _along_numbers(data: "xarray.Dataset") -> "xarray.Dataset":
 
 
 def _near(data: "xarray.Dataset") -> NDArray:
-    """Return a bool array that is True at points near a singularity."""
+    """Return a bool array, True at points near a singularity."""
     if "near_singularity" not in data:
         return np.zeros(data["status"].shape, dtype=bool)
     texts = data["near_singularity"].transpose(*data["status"].dims)
@@ -280,7 +281,7 @@ def _states(panel: "Axes", data: "xarray.Dataset", x: str, y: str) -> None:
 
 
 def _label(panel: "Axes", data: "xarray.Dataset", x: str, y: str, title: str) -> None:
-    """Set the title and axis labels; two axes of lengths get equal scales."""
+    """Set the title and axis labels, with equal scales if both axes are lengths."""
     same = data[x].attrs.get("units") == data[y].attrs.get("units")
     spans = [float(np.ptp(data[k].values)) for k in (x, y)]
     fits = same and 0.2 < spans[0] / spans[1] < 5
@@ -295,13 +296,13 @@ def _axis_name(data: "xarray.Dataset", name: str) -> str:
 
 
 def _counts(data: "xarray.Dataset") -> str:
-    """Return the number of points of each status as text."""
+    """Format the number of points of each status as text."""
     names, counts = np.unique(data["status"].values.astype(str), return_counts=True)
     return ", ".join(f"{n}: {c}" for n, c in zip(names, counts, strict=True))
 
 
 def _caption(data: "xarray.Dataset") -> str:
-    """Return a caption with the robot, the statuses and the nearby singularities."""
+    """Format a caption with the robot, the statuses and the nearby singularities."""
     caption = f"{data.attrs.get('robot', '')}; {_counts(data)}"
     if _near(data).any():
         texts = np.unique(data["near_singularity"].values.astype(str))

@@ -22,7 +22,7 @@ def netcdf_file(path: Path | str) -> Generator[Any, None, None]:
     """Open a new NetCDF file for writing, as a context.
 
     Args:
-        path: path of the file, which is created only if the block ends without error.
+        path: path of the file, which appears only if the block ends without an error.
 
     Yields:
         The open ``h5netcdf.File``.
@@ -43,7 +43,7 @@ def netcdf_file(path: Path | str) -> Generator[Any, None, None]:
 
 
 class Stored(NamedTuple):
-    """A variable of a file; the attributes have the names that xarray uses.
+    """A variable in a file, with the same attribute names as in xarray.
 
     Attributes:
         dims: names of the axes.
@@ -57,7 +57,7 @@ class Stored(NamedTuple):
 
 
 class StoredDataset(NamedTuple):
-    """A data set that is read without xarray, because importing xarray takes a second.
+    """A data set read without xarray, because importing xarray takes a second.
 
     Attributes:
         data_vars: variables by name, without coordinates.
@@ -69,7 +69,7 @@ class StoredDataset(NamedTuple):
 
 
 def stored_dataset(path: Path | str) -> StoredDataset:
-    """Return a newly written data set, from which its summary is computed.
+    """Read a newly written data set, in order to compute its summary.
 
     Args:
         path: path of a NetCDF file written by forcefit.
@@ -93,7 +93,7 @@ def stored_dataset(path: Path | str) -> StoredDataset:
 
 
 def _decoded(values: NDArray) -> NDArray:
-    """Return values with bytes decoded, because HDF5 returns texts as bytes."""
+    """Decode bytes in the values, because HDF5 returns text as bytes."""
     if values.dtype != object:
         return values
     texts = [text.decode() for text in values.ravel()]
@@ -104,17 +104,17 @@ def forgive_damaged_files() -> None:
     """Prevent h5netcdf from writing to stderr when it closes a damaged file."""
     import h5netcdf
 
-    h5netcdf.File._writable = False  # default until an opened file sets it
+    h5netcdf.File._writable = False  # default, which an opened file overrides
 
 
 def check_heaps(path: Path) -> None:
-    """Reject a file with damaged heaps of texts, on which HDF5 would loop endlessly.
+    """Reject a file with damaged text heaps, on which HDF5 would loop forever.
 
     Args:
         path: path of an HDF5 file; other files are accepted.
 
     Raises:
-        BadInput: an entry of a heap points outside the heap.
+        BadInput: a heap entry points outside the heap.
     """
     size = path.stat().st_size
     if not size:
@@ -126,7 +126,7 @@ def check_heaps(path: Path) -> None:
             end, place = start + min(length, size - start), start + 16
             while place + 16 <= end:
                 number, _, own = struct.unpack_from("<HH4xQ", data, place)
-                # a text, or the free space, whose size includes its own header
+                # a text, or free space, whose size includes its own header
                 step = 16 + -(-own // 8) * 8 if number else own
                 if step < 16:
                     raise BadInput(f"{path}: cannot be read as NetCDF: damaged heap")
@@ -135,10 +135,10 @@ def check_heaps(path: Path) -> None:
 
 
 class _Target:
-    """The file to which HDF5 writes; after a failure it becomes a copy in memory.
+    """File to which HDF5 writes; after a failure it continues as a copy in memory.
 
-    HDF5 crashes the whole process if a file cannot be closed, or if data that it reads
-    back differ from the data it wrote.
+    HDF5 crashes the whole process if a file cannot be closed, or if data read back
+    differ from the data written.
     """
 
     def __init__(self, file: FileIO) -> None:
@@ -171,7 +171,7 @@ class _Target:
         return self.file.seek(offset, whence)
 
     def tell(self) -> int:
-        """Return the present position in the file [bytes]."""
+        """Return the current position in the file [bytes]."""
         return self.file.tell()
 
     def truncate(self, size: int | None = None) -> int:
@@ -183,7 +183,7 @@ class _Target:
             return self.truncate(size)
 
     def flush(self) -> None:
-        """Do nothing: no data are buffered."""
+        """Do nothing, because no data are buffered."""
 
     def _go_on_in_memory(self, failure: OSError) -> None:
         """Record the failure, and copy the data written so far into memory."""

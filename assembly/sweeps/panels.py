@@ -1,7 +1,7 @@
-"""Panels of the figures of a sweep or of draws: quantities, units and titles.
+"""Figure panels for a sweep or for draws: quantities, units and titles.
 
 A quantity is a variable of the data set, followed by a component if the variable has
-several: ``energy``, ``stiffness.FX``, ``wrench.leg1.link_a.FZ``.  The names equal the
+several: ``energy``, ``stiffness.FX``, ``wrench.leg1.link_a.FZ``.  The names are the
 column names of :func:`forcefit.assembly.sweeps.point_table.point_table`.  The
 quantities ``rotation`` and ``translation`` are the magnitudes of the platform's pose
 error.
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _MOST = 12  # largest number of panels in a readable figure
 _HALVES = {"rotation": slice(0, 3), "translation": slice(3, 6)}
-# for each unit in the file: the unit in the figure, and the conversion factor to it
+# for each unit in the file: the unit in the figure and the conversion factor
 _SHOWN = {
     "rad": (1e3, "mrad"), "m": (1e3, "mm"), "N/m": (1e-6, "N/um"), "Pa": (1e-6, "MPa"),
     "1": (1.0, "-"),
@@ -34,7 +34,7 @@ class Panel(NamedTuple):
 
     Attributes:
         key: name of the quantity.
-        scale: factor on the values.
+        scale: factor by which the values are multiplied.
         title: title with the unit of the scaled values.
         colours: colour map.
     """
@@ -45,8 +45,8 @@ class Panel(NamedTuple):
     colours: str
 
 
-# the six panels of the paper's figure 5; the panels below replace the last two if these
-# were not computed
+# the six panels of figure 5 in the paper; the panels below replace the last two if
+# those were not computed
 _PAPER = (
     Panel("margin_free", 1.0, "zone margin, compliant joints free [-]", "magma_r"),
     Panel("energy", 1.0, "minimum assembly energy [J]", "inferno"),
@@ -67,16 +67,16 @@ _FREQUENCY = Panel("frequency.1", 1.0, "lowest natural frequency [Hz]", "viridis
 
 
 def usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
-    """Return the panels of a sweep's figure if the user names no quantity.
+    """Return the default panels of a sweep's figure.
 
     Args:
         data: data set of a sweep.
 
     Returns:
-        The usual panels whose quantities are stored.
+        The default panels whose quantities are stored.
 
     Raises:
-        BadInput: the sweep stored none of these quantities.
+        BadInput: the sweep has stored none of these quantities.
     """
     usual = _usual_panels(data)
     panels = tuple(panel for panel in usual if _is_stored(data, panel.key))
@@ -108,7 +108,7 @@ def _usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
 
 
 def named_panels(data: "xarray.Dataset", names: Sequence[str]) -> tuple[Panel, ...]:
-    """Return panels of named quantities; a variable's name selects all its components.
+    """Return panels by quantity name; a variable's name selects all its components.
 
     Args:
         data: data set of a sweep or of draws.
@@ -192,5 +192,5 @@ def _quantities(data: "xarray.Dataset") -> dict[str, str]:
 
 
 def _further(data: "xarray.Dataset", name: str) -> list[str]:
-    """Return the axes of a variable that are not axes of the points."""
+    """Return the axes of a variable other than the axes of the points."""
     return [str(d) for d in data[name].dims if d not in data["status"].dims]

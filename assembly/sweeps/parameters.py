@@ -1,12 +1,12 @@
-"""Design parameters: any number in a robot file, addressed by its path.
+"""Design parameters: numbers in a robot file, addressed by their paths.
 
 A path consists of a frame's name and the keys of the number, such as
-``leg1.link_a.link.beam.radius`` or ``leg1.elbow.clearance.radial``.  A frame's name
-without the leg's name addresses that frame in every leg.  A path may also begin with a
-joint of several frames, such as ``ball.clearance.ball``.  In arrays, three numbers are
-called x, y, z; six numbers are called rx .. tz. Rows and columns of a 6 x 6 matrix are
-also called rx .. tz (``stiffness.rx.ty`` sets both entries of a symmetric matrix). Six
-moments of inertia are called xx, yy, zz, xy, xz, yz.
+``leg1.link_a.link.beam.radius`` or ``leg1.elbow.clearance.radial``.  A frame name
+without the leg name addresses that frame in every leg. A path may also begin with a
+joint that consists of several frames, such as ``ball.clearance.ball``. The entries of
+an array are called x, y, z if it has three numbers, and rx .. tz if it has six, as are
+the rows and columns of a 6 x 6 matrix (``stiffness.rx.ty`` sets both entries of a
+symmetric matrix). Six moments of inertia are called xx, yy, zz, xy, xz, yz.
 """
 
 import copy
@@ -26,7 +26,7 @@ from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 
 _AXES = {3: ("x", "y", "z"), 6: ("rx", "ry", "rz", "tx", "ty", "tz")}
 _MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
-_ABSENT: dict[str, Any] = {  # values of keys that a frame may omit
+_ABSENT: dict[str, Any] = {  # defaults of keys that a frame may omit
     "geometric_error": [0.0] * 6, "mass": 0.0, "centre_of_mass": [0.0] * 3
 }  # fmt: skip
 _PLACED: dict[str, Any] = {"translation": [0.0] * 3, "rotation": [0.0] * 3}
@@ -46,7 +46,7 @@ Setter = Callable[[float], None]
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """The content of a robot file, in which numbers can be changed.
+    """Content of a robot file whose numbers can be changed.
 
     Attributes:
         content: root table of the file as plain values.
@@ -98,7 +98,7 @@ class Design:
         return matches
 
     def changed(self, values: Mapping[str, float]) -> dict[str, Any]:
-        """Return a root table in which some numbers are replaced.
+        """Replace some numbers in the root table.
 
         Args:
             values: mapping from path to new value.
@@ -117,18 +117,18 @@ class Design:
         return content
 
     def robot(self, values: Mapping[str, float]) -> Robot:
-        """Return the robot with some numbers replaced.
+        """Build the robot with some numbers replaced.
 
         Args:
             values: mapping from path to new value.
 
         Returns:
-            The robot, checked like a robot that is read from a file.
+            The robot, checked as if it had been read from a file.
 
         Raises:
-            BadInput: a path does not lead to a number, a value violates a rule of the
-                format, the closures no longer close, or a link's mesh or stiffness
-                library is not usable.
+            BadInput: a path does not lead to a number, a value violates the format, the
+                loops no longer close, or a link's mesh or stiffness library is not
+                usable.
         """
         robot = robot_of(Table(self.changed(values), self.file, ""), self.name)
         try:
@@ -137,24 +137,24 @@ class Design:
             raise BadInput(f"{self.file}: {error}") from None
 
     def check(self, values: Mapping[str, float]) -> None:
-        """Reject numbers that violate a rule of the format.
+        """Reject numbers that violate the format.
 
         Args:
             values: mapping from path to new value.
 
         Raises:
-            BadInput: a number violates a rule. The closures are not checked.
+            BadInput: a number violates the format. Loop closure is not checked.
         """
         declared_robot(Table(self.changed(values), self.file, ""), self.name)
 
 
 def design_of(robot: Robot) -> Design:
-    """Return a robot in memory as the content of a robot file."""
+    """Convert a robot in memory to the content of a robot file."""
     return Design(robot_table(robot), robot.name, robot.name, robot.joints)
 
 
 def load_design(name: str | Path) -> Design:
-    """Return a built-in robot, or a robot file, as a design.
+    """Load a built-in robot, or a robot file, as a design.
 
     Args:
         name: name such as ``"irsbot2"``, or the path of a robot file.
@@ -168,14 +168,14 @@ def load_design(name: str | Path) -> Design:
     from forcefit.assembly.exchange.robot_files import is_robot_file, load_robot
     from forcefit.assembly.robots import BUILT_IN
 
-    # raise an error for an invalid file before any number is changed
+    # reject an invalid file before any number is changed
     robot = load_robot(name, links=False)
     if str(name) in BUILT_IN or not is_robot_file(Path(name)):
         return design_of(robot)
     table = read_toml(Path(name))
     if is_drawing(
         table
-    ):  # bodies may be copied from other bodies, so frames contain the numbers
+    ):  # a body may be a copy of another body, so its numbers are read from the frames
         return Design(robot_table(robot), str(name), robot.name, robot.joints)
     return Design(table.content, str(name), robot.name, robot.joints)
 
@@ -191,7 +191,7 @@ def unit_of(path: str) -> str:
 
 
 def _numbers(content: dict[str, Any]) -> Iterator[tuple[str, float, Setter]]:
-    """Yield path, value and setter function of every number, also of omitted zeros."""
+    """Yield path, value and setter function of every number, omitted zeros included."""
     for frame in content.get("frame", ()):
         given = dict(_ABSENT) if "dh" in frame else _ABSENT | _PLACED
         if frame.get("joint", "fixed") != "fixed":
@@ -221,7 +221,7 @@ def _inside(path: str, table: dict[str, Any]) -> Iterator[tuple[str, float, Sett
 
 
 def _is_number(value: object) -> bool:
-    """Return whether a plain value is a number and not a boolean."""
+    """Return whether a plain value is a number other than a boolean."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 

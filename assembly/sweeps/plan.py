@@ -1,4 +1,4 @@
-"""A sweep: the requested quantities, and the points at which to compute them."""
+"""Sweep definition: requested quantities and the points at which to compute them."""
 
 import hashlib
 import json
@@ -23,11 +23,11 @@ class Sweep:
     """The requested quantities, and the points at which to compute them.
 
     Attributes:
-        question: the quantities.
+        question: the requested quantities.
         targets: the postures.
         values: values of each varied parameter, in the order of ``question.varied``.
-        draws: number of draws of errors; 0 to use the errors of the robot file.
-        command: command line for the provenance; empty if there is none.
+        draws: number of draws of errors; 0 to use the errors in the robot file.
+        command: command line, for the provenance; empty if there is none.
         block_size: number of points that are solved and stored together.
     """
 
@@ -69,7 +69,7 @@ class Sweep:
         return -(-self.size // self.block_size)
 
     def points(self, block: int) -> Points:
-        """Return the points of a block, by the block's number."""
+        """Return the points of a block, given its number."""
         first = block * self.block_size
         numbers = np.arange(first, min(first + self.block_size, self.size))
         numbers, draws = np.divmod(numbers, max(1, self.draws))
@@ -84,7 +84,7 @@ class Sweep:
 
     @property
     def units(self) -> dict[str, str]:
-        """Unit of each varied parameter, and of each component of the postures."""
+        """Unit of each varied parameter and of each posture component."""
         robot = self.question.robot
         of_postures = {n: unit_of_target(n, robot) for n in self.targets.names}
         return {path: unit_of(path) for path in self.question.varied} | of_postures
@@ -127,6 +127,6 @@ class Sweep:
             "strength": str(question.strength),
             "conditions": str((question.load, question.gravity, dict(question.under))),
             "block": str(self.block_size),
-            # all attributes of the question except the ones named above
+            # all attributes of the question except those named above
             "question_sha256": question_hash(question),
         }

@@ -1,8 +1,8 @@
-"""Conditions at the points of a sweep: load, gravity and effects of the robot file.
+"""Conditions at the points of a sweep: load, gravity and the robot file's effects.
 
-Compiled functions solve many points together, also under loads and with effects that
-change errors, springs or clearances.  Points with nonlinear compliances are solved one
-by one, which takes a few milliseconds each.
+Compiled functions solve many points at once, even under loads and with effects that
+change errors, springs or clearances. Points with nonlinear compliances are solved one
+by one and take a few milliseconds each.
 """
 
 from dataclasses import replace
@@ -30,7 +30,7 @@ from forcefit.assembly.sweeps.quantities import Question
 def point_conditions(
     question: Question, robot: Robot, postures: list[Posture], errors: NDArray | None
 ) -> Conditions:
-    """Return the conditions at the points of one design, after applying the effects.
+    """Apply the effects, and return the conditions at the points of one design.
 
     Args:
         question: quantities of the sweep, with load, gravity and covariates.
@@ -61,14 +61,14 @@ def point_conditions(
 
 
 def is_loaded(conditions: Conditions) -> bool:
-    """Return whether there are loads, weights, or elastic effects or contacts."""
+    """Return whether any loads, weights, elastic effects or contacts are present."""
     loaded = conditions.load.any() or conditions.gravity.any()
     compliant = conditions.laws or conditions.yields
     return bool(loaded or driven(conditions.robot) or compliant)
 
 
 def assemble_rows(conditions: Conditions) -> tuple[Assembly, NDArray, NDArray]:
-    """Return the least-energy solutions, problem (22), of all rows under load.
+    """Solve problem (22), the minimum energy, for all rows under load.
 
     Args:
         conditions: conditions with k rows, for a robot of n frames.
@@ -93,7 +93,7 @@ def assemble_rows(conditions: Conditions) -> tuple[Assembly, NDArray, NDArray]:
 
 
 def _assembled(conditions: Conditions, i: int) -> Assembly | Exception:
-    """Return the solution of one point, or the exception that its solution raised."""
+    """Return the solution of one point, or the exception raised by the solver."""
     try:
         assembly = assemble_row(conditions, i)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:

@@ -1,8 +1,8 @@
-"""Properties of a sweep's points that depend only on the nominal geometry.
+"""Properties of sweep points that depend only on the nominal geometry.
 
-The properties are the joint coordinates, the distances to singularities, and whether
-the posture is usable.  A usable posture is within the joint limits and regular, and no
-singularity separates it from the home posture.
+These are the joint coordinates, the distances to singularities, and whether the posture
+is usable. A usable posture is regular and within the joint limits, and no singularity
+separates it from the home posture.
 """
 
 from collections.abc import Sequence
@@ -26,13 +26,13 @@ def note_geometry(
     question: Question, robot: Robot, goals: NDArray, postures: Sequence[Posture],
     rows: Sequence[range], records: NDArray, near_singularity: dict[int, str],
 ) -> list[tuple[str, str]]:  # fmt: skip
-    """Record the geometry of postures; return the postures that are not usable.
+    """Record the geometry of postures, and return their status.
 
     Args:
         question: quantities of the sweep.
         robot: robot of the design.
-        goals: (k, 6) or (k, n) poses or coordinates of the k postures.
-        postures: the postures that were reached.
+        goals: poses (k, 6) or joint coordinates (k, n) of the k postures.
+        postures: the reachable postures.
         rows: indices of the records of each posture.
         records: records of the points, which are filled in.
         near_singularity: names of nearby singularities by row, which are filled in.

@@ -1,9 +1,9 @@
 """Platform stiffness K_C at the points of a sweep.
 
-Errors, loads and clearances do not change the nominal K_C, so all draws at a posture
-share one matrix.  A tangent stiffness is computed for each point.  It belongs either to
-problem (22), with clearances free or in contact, or to the exact equilibrium, with its
-internal forces.
+Errors, loads and clearances do not affect the nominal K_C, so all draws at a posture
+share one matrix. A tangent stiffness, in contrast, is computed for each point. It is
+the tangent of either problem (22), with clearances free or in contact, or the exact
+equilibrium with its internal forces.
 """
 
 from dataclasses import replace
@@ -47,7 +47,8 @@ def stiffness_parts(robot: Robot, state: str) -> tuple[str, ...]:
         state: one of :data:`STATES`.
 
     Returns:
-        Links and joints; for a tangent also clearances in contact and internal forces.
+        Links and joints; for a tangent stiffness also clearances in contact and
+        internal forces.
     """
     return tuple(part.words for part in _parts(robot, state))
 
@@ -65,7 +66,7 @@ def _parts(robot: Robot, state: str) -> list[Part]:
 def nominal_stiffnesses(
     posture: Posture,
 ) -> tuple[dict[str, NDArray], dict[int, str]]:
-    """Return the nominal K_C of k postures, without errors and loads.
+    """Compute the nominal K_C of k postures, without errors and loads.
 
     Args:
         posture: k postures.
@@ -80,7 +81,7 @@ def nominal_stiffnesses(
 def tangent_stiffnesses(
     conditions: Conditions, state: str
 ) -> tuple[dict[str, NDArray], dict[int, str]]:
-    """Return the tangent stiffnesses of k points under errors, loads and effects.
+    """Compute the tangent stiffnesses of k points under errors, loads and effects.
 
     Args:
         conditions: conditions with k rows.
@@ -88,7 +89,7 @@ def tangent_stiffnesses(
 
     Returns:
         The quantities of :func:`nominal_stiffnesses`, NaN without an equilibrium and 0
-        along free motions; and the reason for each row without a tangent.
+        along free motions; and a reason for each row without a tangent.
     """
     parts = _parts(conditions.robot, state)
     rows, reasons = [], {}
@@ -109,7 +110,7 @@ def tangent_stiffnesses(
 
 
 def _tangent(conditions: Conditions, i: int, state: str) -> PlatformStiffness:
-    """Return the tangent stiffness at a point; at a contact change, the smaller one."""
+    """Compute the tangent stiffness at a point, the smaller one at a contact change."""
     if conditions.laws or any(not place.linear for place in conditions.yields):
         raise SolverFailed(
             "tangent",
@@ -123,7 +124,7 @@ def _tangent(conditions: Conditions, i: int, state: str) -> PlatformStiffness:
 
 
 def _unknown(parts: int) -> dict[str, NDArray]:
-    """Return NaN for all stored quantities of a point without tangent stiffness."""
+    """Return NaN for all stored quantities of a point without a tangent stiffness."""
     sizes = {
         "compliance": (6, 6), "stiffness": (6,), "eigen_stiffness": (6,),
         "stiffness_condition": (), "share": (parts, 6),

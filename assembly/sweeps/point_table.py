@@ -1,7 +1,7 @@
 """Data sets as tables with one row per point or draw and one column per component.
 
 ``xarray.Dataset.to_dataframe`` forms the product of all axes of all variables, which
-turns a sweep of some megabytes into tens of millions of rows.
+would turn a sweep of a few megabytes into tens of millions of rows.
 """
 
 from collections.abc import Sequence
@@ -17,25 +17,25 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# variables whose axes become table rows, in files of sweeps and draws, or of tolerances
+# variables whose axes become table rows, for sweeps and draws, or for tolerances
 _OF_POINTS = ("status", "tolerance")
 
 
 def point_table(
     data: "xarray.Dataset | Path | str", rows: Sequence[str] = ()
 ) -> "pandas.DataFrame":
-    """Return a data set as a table with one row for each point, draw or tolerance.
+    """Convert a data set to a table with one row for each point, draw or tolerance.
 
     Args:
         data: data set of a sweep, of draws or of tolerances; or the path of a file.
-        rows: axes whose points become rows, such as ``["quantity", "group"]`` for the
-            importance of errors; by default the axes of the sweep's points, the draws
-            or the classes of tolerances.
+        rows: axes whose points become rows, for example ``["quantity", "group"]`` for
+            the importance of errors; by default the axes of the sweep's points, the
+            draws or the tolerance classes.
 
     Returns:
         Table whose columns are pairs (variable, component); the component is empty for
-        plain numbers.  For example, ``table["platform_screw", "TX"]`` is a column.  The
-        index contains the axes.  ``attrs["units"]`` maps variables and axes to units.
+        scalars. For example, ``table["platform_screw", "TX"]`` is a column. The index
+        holds the axes.  ``attrs["units"]`` maps variables and axes to units.
 
     Raises:
         BadInput: the file cannot be read, an axis is unknown, or ``rows`` is empty for
@@ -73,8 +73,8 @@ def write_point_table(
         rows: see :func:`point_table`.
 
     Raises:
-        BadInput: for the reasons of :func:`point_table`, or if the file cannot be
-            written.
+        BadInput: for the same reasons as in :func:`point_table`, or if the file cannot
+            be written.
     """
     check_writable(path, TABLE)
     table = point_table(data, rows)

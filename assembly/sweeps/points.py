@@ -1,8 +1,8 @@
 """Computation of all quantities at the points of a sweep.
 
-Points are solved in blocks.  If a point has no solution, ``status`` and ``reason``
-state why, and the other points are still solved.  The results of a point do not depend
-on the other points of its block.
+Points are solved in blocks. If a point has no solution, ``status`` and ``reason`` state
+why, and the remaining points are still solved. The result at a point does not depend on
+the other points of its block.
 """
 
 from collections.abc import Iterator, Mapping
@@ -55,17 +55,17 @@ from forcefit.assembly.sweeps.quantities import (
 from forcefit.assembly.sweeps.targets import goals_of, of_joints
 from forcefit.inputs.table import BadInput
 
-_PAGE = 256  # number of draws generated together
+_PAGE = 256  # number of draws generated at a time
 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Some of the points of a sweep.
+    """A subset of the points of a sweep.
 
     Attributes:
         values: (k, p) values of the varied parameters.
         rows: (k, components) components of the postures.
-        draws: (k,) number of the draw of errors; not used without error sources.
+        draws: (k,) number of the error draw; not used without error sources.
     """
 
     values: NDArray
@@ -91,12 +91,11 @@ class SolvedPoints:
 
 
 def solve_points(question: Question, points: Points) -> SolvedPoints:
-    """Solve some of the points of a sweep.
+    """Solve a subset of the points of a sweep.
 
     Args:
         question: quantities of the sweep.
-        points: points in the order of the sweep, in which points of one posture are
-            adjacent.
+        points: points in sweep order, in which the points of one posture are adjacent.
 
     Returns:
         Records in the order of the points.
@@ -128,7 +127,7 @@ def _runs(rows: NDArray) -> Iterator[slice]:
 
 @lru_cache(maxsize=4)
 def _robots(question: Question, values: tuple[float, ...]) -> tuple[Robot, Robot]:
-    """Return the robot of a design, and the robot of the design without errors."""
+    """Return the robot of a design, with and without its errors."""
     robot = question.robot
     if question.design is not None:
         robot = question.design.robot(dict(zip(question.varied, values, strict=True)))
@@ -165,7 +164,7 @@ def _solve_variant(
             _fail(solved, rows[i], status, reason)
             continue
         reachable += [(row, posture) for row in rows[i]]
-        # the results are valid, but the robot may not be able to reach the pose
+        # the results are valid, although the robot may be unable to reach the pose
         if status:
             far += [(row, reason) for row in rows[i]]
     if not reachable:
@@ -210,7 +209,7 @@ def _fail(solved: SolvedPoints, rows: range, status: str, reason: str) -> None:
 
 
 def _errors(question: Question, robot: Robot, draws: NDArray) -> NDArray:
-    """Return the errors (k, n, 6) [rad, m] of draws, with locked-in bolted joints."""
+    """Draw errors (k, n, 6) [rad, m], with locked-in clearances of bolted joints."""
     pages = {page: _page(question, page) for page in np.unique(draws // _PAGE).tolist()}
     own, which = np.unique(draws, return_inverse=True)
     errors = np.array([pages[d // _PAGE][d % _PAGE] for d in own.tolist()])
@@ -221,7 +220,7 @@ def _errors(question: Question, robot: Robot, draws: NDArray) -> NDArray:
 
 @lru_cache(maxsize=8)
 def _page(question: Question, page: int) -> NDArray:
-    """Return the errors (256, n, 6) [rad, m] of draws 256 page to 256 page + 255."""
+    """Draw the errors (256, n, 6) [rad, m] of draws 256 page to 256 page + 255."""
     sources = question.sources
     assert sources is not None
     return sources.errors(sources.draw(page * _PAGE, _PAGE, question.seed))
@@ -282,7 +281,7 @@ def _solve_reached(
 def _solved_rows(
     energies: Assembly, failed: Mapping[int, str], solved: SolvedPoints, rows: NDArray
 ) -> list[int]:
-    """Return the points with a solution; record status and reason of the others."""
+    """Return the points with a solution; record status and reason of all others."""
     ok = []
     for i, row in enumerate(rows.tolist()):
         status, reason = energies.status[i], energies.reason[i]
@@ -299,7 +298,7 @@ def _record_wrenches(
     question: Question, robot: Robot, wrenches: NDArray, at_tips: NDArray,
     solved: SolvedPoints, rows: NDArray,
 ) -> None:  # fmt: skip
-    """Record the wrenches at the chosen frames, and the stress of the links."""
+    """Record the wrenches at the requested frames and the stress of the links."""
     out = solved.records
     if question.wrenches:
         chosen = [row_of(robot, name) for name in question.wrenches]
@@ -316,7 +315,7 @@ def _record_wrenches(
 def _record_stiffness(
     state: str, conditions: Conditions, solved: SolvedPoints, rows: NDArray
 ) -> None:
-    """Record K_C: nominal stiffness once per posture, tangent stiffness per point."""
+    """Record K_C, once per posture for the nominal state, per point for a tangent."""
     T = conditions.transforms
     runs = list(_runs(T.reshape(len(T), -1)))
     if state == "nominal":
@@ -347,12 +346,12 @@ def _record_frequencies(
         try:
             frequencies = natural_modes(there, count).frequencies
         except BadInput:
-            continue  # no part with a mass moves at this posture
+            continue  # no part with mass moves at this posture
         solved.records["frequency"][rows[run], : len(frequencies)] = frequencies
 
 
 def _record_bounds(bounds: PoseError, solved: SolvedPoints, rows: NDArray) -> None:
-    """Record pose error bounds where a solution exists, and record failures."""
+    """Record pose error bounds where a solution exists, and failures elsewhere."""
     out = solved.records
     for i in np.flatnonzero(out["status"][rows] == 0).tolist():
         row = int(rows[i])
@@ -366,7 +365,7 @@ def _record_bounds(bounds: PoseError, solved: SolvedPoints, rows: NDArray) -> No
 def _bound_clearance_only(
     perfect: Posture, solved: SolvedPoints, rows: NDArray
 ) -> None:
-    """Record pose error bounds, problem (27), at zero errors for each posture."""
+    """Record pose error bounds, problem (27), of each posture at zero errors."""
     T = perfect.transforms
     runs = list(_runs(T.reshape(len(T), -1)))
     starts = [run.start for run in runs]
@@ -385,7 +384,7 @@ def _bound_clearance_only(
 def _compare_finite(
     conditions: Conditions, i: int, solved: SolvedPoints, row: int
 ) -> None:
-    """Record the difference between linear and finite solution at a point."""
+    """Record the difference between the linear and the finite solution at a point."""
     out = solved.records
     try:
         exact = assemble_row(replace(conditions, exact=True), i)

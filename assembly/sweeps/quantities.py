@@ -1,4 +1,4 @@
-"""The quantities that a sweep can compute, with units and meanings."""
+"""Quantities that a sweep can compute, with units and meanings."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -23,34 +23,34 @@ BY_CLEARANCE = ("rotation_error_clearance", "translation_error_clearance")
 FINITE = ("linearisation_rotation", "linearisation_translation", "linearisation_energy")
 STRESS = ("stress", "stress_error", "safety")
 
-# effects that change measured readings, but not the platform screw
+# effects that change the readings but not the platform screw
 _READING = ("registration", "drift")
 
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """The quantities requested at every point; every worker receives them once.
+    """The quantities requested at every point, sent once to each worker.
 
     Attributes:
-        robot: robot with the errors of its file, which are used if none are drawn.
-        design: content of the robot file if parameters vary; otherwise None.
+        robot: robot with the errors in its file, which are used if none are drawn.
+        design: content of the robot file if parameters are varied; otherwise None.
         varied: paths of the varied parameters.
         components: components of the postures, see
             :mod:`forcefit.assembly.sweeps.targets`.
-        sources: sources of drawn errors; None to use the errors of the robot file.
+        sources: sources of drawn errors; None to use the errors in the robot file.
         seed: seed of the draws.
         assumption: assumption of problem (27); None if its bounds are not computed.
-        clearance_only: whether the pose error is also bounded without errors.
+        clearance_only: whether the pose error is also bounded at zero errors.
         wrenches: frames whose wrenches are recorded.
         linearisation: whether each point is also solved with finite motions.
         near: distance below which a singularity is reported.
-        strength: [Pa] yield strength of the links; stress and safety are then computed.
+        strength: [Pa] yield strength of the links, from which stress and safety are
+            computed.
         load: (6,) [N m, N] load on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] gravity in base axes.
         under: covariates on which the robot's effects depend.
-        stiffness: state in which K_C and the shares of its parts are computed, one of
-            :data:`forcefit.assembly.sweeps.point_stiffness.STATES`; empty if they are
-            not computed.
+        stiffness: state for which K_C and the shares of its parts are computed, one of
+            :data:`forcefit.assembly.sweeps.point_stiffness.STATES`; empty to omit them.
         frequencies: number of natural frequencies, computed from the same K_C and the
             masses in the robot file.
         kept: names of the variables that are stored; by default all computed ones.
@@ -93,8 +93,8 @@ class Variable:
 
     Attributes:
         dims: axes in addition to the axes of the points, with their labels.
-        quantity: entry in the table of quantities.
-        condition: condition of the computation, appended to the meaning.
+        quantity: entry in the quantity table.
+        condition: computation condition, appended to the meaning.
     """
 
     dims: Mapping[str, tuple[str, ...]]
@@ -109,7 +109,7 @@ class Variable:
 
 
 def _variable(name: str, condition: str = "", **labels: tuple[str, ...]) -> Variable:
-    """Return a variable from the table of quantities, with labels for its axes."""
+    """Return a variable from the quantity table, with labels for its axes."""
     known = QUANTITIES[name]
     every = {**LABELS, **labels}
     dims = {dim: every[dim] for dim in (*labels, *known.dims)}
@@ -188,7 +188,7 @@ def _stiffness_variables(robot: Robot, state: str) -> dict[str, Variable]:
 
 
 def record_type(question: Question) -> np.dtype:
-    """Return the type of a point's record: stored variables, ``status`` as a code."""
+    """Return the record type of a point: stored variables, and ``status`` as a code."""
     return record_of(variables(question))
 
 

@@ -1,4 +1,4 @@
-"""Creation of a sweep from checked options, and the summary of its results."""
+"""Creation of a sweep from checked options, and summary of its results."""
 
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
@@ -77,7 +77,7 @@ def ask_sweep(robot: Robot | str | Path, options: SweepOptions) -> Sweep:
         options: options of the command.
 
     Returns:
-        The sweep, after all options were checked.
+        The sweep, with all options checked.
 
     Raises:
         BadInput: an option, a file named by an option, or the robot violates a rule.
@@ -193,7 +193,7 @@ def _sources(
 
 
 def _short(value: float | str) -> str:
-    """Return a covariate's value as text for the command line."""
+    """Format a covariate's value as text for the command line."""
     return value if isinstance(value, str) else f"{value:g}"
 
 
@@ -211,14 +211,14 @@ def _check_assumption(question: Question) -> None:
 
 
 def _targets(robot: Robot, grid: str | None, poses: Path | str | None) -> Targets:
-    """Return the postures of a grid or of a table."""
+    """Read the postures from a grid or from a table."""
     if poses is not None:
         return read_targets(poses, robot)
     return grid_targets(parse_grid(grid or "", robot))
 
 
 def _vary(design: Design, texts: Sequence[str]) -> dict[str, NDArray]:
-    """Return the varied values by path; check the extreme values like a robot file."""
+    """Return the varied values by path; check the extreme ones as in a robot file."""
     values_by_path: dict[str, NDArray] = {}
     owner: dict[str, str] = {}
     for text in texts:
@@ -245,7 +245,7 @@ def _vary(design: Design, texts: Sequence[str]) -> dict[str, NDArray]:
 
 
 def _command(robot: str | Path, options: SweepOptions) -> str:
-    """Return the command of this sweep, without options at their defaults."""
+    """Return the command line of this sweep, without options at their defaults."""
     default = {option.name: option.default for option in fields(options)}
     given = {name: getattr(options, name) for name in default} | {
         "load": _assigned((name.lower() for name in WRENCH), options.load),
@@ -266,13 +266,13 @@ def _command(robot: str | Path, options: SweepOptions) -> str:
 
 
 def _assigned(names: Iterable[str], values: Iterable[float]) -> str | None:
-    """Return nonzero values as they are written on the command line."""
+    """Format nonzero values as on the command line."""
     given = zip(names, values, strict=True)
     return ",".join(f"{name}={value:g}" for name, value in given if value) or None
 
 
 def summary_of(data: "xarray.Dataset | StoredDataset") -> dict[str, Any]:
-    """Return the summary of a sweep as a dictionary of plain values.
+    """Summarise a sweep as a dictionary of plain values.
 
     Args:
         data: data set of a sweep.
@@ -310,7 +310,7 @@ def _spread(variable: "xarray.DataArray | Stored") -> dict[str, Any] | None:
 
 
 def summary_text(summary: Mapping[str, Any], data: "StoredDataset") -> str:
-    """Return a text with all statuses, and the first reason for each except ok."""
+    """List all statuses, with the first reason for each of them except ok."""
     lines = [", ".join(f"{name}: {n}" for name, n in summary["status"].items())]
     status = data.data_vars["status"].values.astype(str).ravel()
     for name in summary["status"]:

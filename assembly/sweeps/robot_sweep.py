@@ -1,4 +1,4 @@
-"""A sweep in one call: from a robot and varied quantities to a data set.
+"""Sweeps in one call, from a robot and varied quantities to a data set.
 
 Start with :func:`sweep`; the command ``forcefit assembly sweep`` has the same options.
 """
@@ -63,8 +63,8 @@ def sweep(
         assumption: assumption of problem (27): ``"frozen"``, ``"free"``, ``"budget"``,
             or ``"none"`` if its bounds are not computed.
         quantities: names of the data variables to compute and store; ``"default"``
-            stands for those that are stored if none are named.  Some variables are
-            computed only if they are named: the bounds by clearances without errors
+            stands for those stored if none are named. Some variables are computed only
+            if named explicitly: the bounds by clearances without errors
             (``"rotation_error_clearance"``, ``"translation_error_clearance"``) and the
             differences to finite motions (``"linearisation_rotation"``, ..).
         wrench_of: frames whose wrenches are recorded.
@@ -73,21 +73,23 @@ def sweep(
         load: load on the platform at its origin in base axes, (6,) [N m, N] or by
             component, ``{"fz": -50}``.
         gravity: (3,) [m/s^2] gravity in base axes.
-        under: covariates on which effects of the robot's file depend.
-        state: ``"nominal"``, ``"contact"`` or ``"exact"``: state in which K_C and the
-            shares of links and joints in it are computed; None to omit them.
+        under: covariates on which the effects in the robot file depend.
+        state: ``"nominal"``, ``"contact"`` or ``"exact"``: state for which K_C and the
+            compliance shares of links and joints are computed; None to omit them.
         frequencies: number of natural frequencies.
         rest: frame to which the closures' mismatch at home is added as geometric error.
         mismatch: ``"spring"`` to preload redundant drives that do not fit at home.
         output: NetCDF file to write.  Finished points are stored in
             ``<output>.journal``. After an interruption, the same call resumes from the
             journal and writes the same file, byte for byte.
-        progress: function called with the number of finished points and of all points.
+        progress: callback that receives the numbers of finished points and of all
+            points.
         solve: function that solves blocks of points, here or in other processes, see
             :mod:`forcefit.assembly.sweeps.cluster`.
 
     Returns:
-        The data set over the axes, with units, in memory even if a file is written.
+        The data set over the axes, with units. It is in memory even if a file is
+        written.
 
     Raises:
         BadInput: an option, a file named by an option, or the robot violates a rule;
@@ -112,7 +114,7 @@ def sweep(
 
 
 def options_by_old_names(**options: Any) -> SweepOptions:
-    """Return the options of a sweep from the keywords of the last release.
+    """Convert the keywords of the last release to options of a sweep.
 
     Args:
         options: ``reading``, ``play_alone``, ``wrench``, ``linearisation``,

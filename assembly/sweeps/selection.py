@@ -1,4 +1,4 @@
-"""Selection of the variables that a sweep computes and stores, by their names."""
+"""Selection by name of the variables that a sweep computes and stores."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,7 +14,7 @@ from forcefit.assembly.sweeps.quantities import (
 )
 from forcefit.inputs.errors import BadInput, nearest, quoted
 
-DEFAULT = "default"  # stands for the variables that are stored if none are named
+DEFAULT = "default"  # stands for the variables stored if none are named
 MODES = 6  # default number of natural frequencies
 _STIFFNESS = (
     "compliance", "stiffness", "eigen_stiffness", "stiffness_condition", "share",
@@ -27,15 +27,15 @@ _NEEDED = (
 
 
 def select(question: Question, texts: Sequence[str]) -> Question:
-    """Restrict the quantities of a sweep to the named ones.
+    """Restrict a sweep to named quantities.
 
     Args:
-        question: quantities that the other options request.
+        question: quantities requested by all other options.
         texts: names of data variables, separated by commas; ``"default"`` stands for
-            those that are stored if none are named.
+            those stored if none are named.
 
     Returns:
-        The requested quantities; variables that are not named are not computed.
+        The requested quantities, so that no other variables are computed.
 
     Raises:
         BadInput: a variable is unknown, or an option that it requires is missing.
@@ -81,7 +81,7 @@ def _for(question: Question, kept: dict[str, Variable]) -> Question:
 
 
 def quantities_text() -> str:
-    """Return all variables of sweeps as text: name, unit, meaning, required option."""
+    """List all variables of sweeps as text: name, unit, meaning, required option."""
     from forcefit.assembly.robots import BUILT_IN
 
     robot = BUILT_IN["four_bar"]()

@@ -1,4 +1,4 @@
-"""Derivatives of K_C by any number of a robot file, including the file's effects."""
+"""Derivatives of K_C with respect to numbers in a robot file, effects included."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -14,15 +14,15 @@ from forcefit.assembly.platform_stiffness.tangent_slopes import (
 from forcefit.assembly.sweeps.parameters import Design
 from forcefit.inputs.table import BadInput
 
-# difference step relative to the number, or to 1 if it is zero; the relative error of
-# the derivative is 1e-8
+# finite-difference step relative to the number, or to 1 if it is zero; the relative
+# error of the derivative is 1e-8
 _STEP = 1e-4
-_SMALL_STEP = 1e-8  # [rad, m] step for errors, because contacts change within some um
+_SMALL_STEP = 1e-8  # [rad, m] step for errors, because contacts change within a few um
 _AS_ERROR = {"translation": "t", "rotation": "r"}
 
 
 class CannotChange(BadInput):
-    """A design number cannot be varied, because no robot exists for other values."""
+    """A design number cannot be varied, because no other value gives a valid robot."""
 
 
 def stiffness_slopes(
@@ -33,26 +33,27 @@ def stiffness_slopes(
     asked: TangentState | None = None,
     under: Mapping[str, float | str] | None = None,
 ) -> dict[str, NDArray]:
-    """Return the derivatives of the platform's compliance by design numbers.
+    """Differentiate the platform's compliance with respect to design numbers.
 
     Args:
         design: robot file, including its effects.
         paths: paths of numbers; a path without the leg's name changes the number in all
             legs together.
-        pose: nominal platform pose, which is kept constant.
-        joints: actuated coordinates, which are kept constant instead of the pose.
-        asked: state of the tangent, and its point; None for the nominal state.
+        pose: nominal platform pose, which is held constant.
+        joints: actuated coordinates, which are held constant instead of the pose.
+        asked: state and point at which the tangent is taken; None for the nominal
+            state.
         under: covariates on which effects depend.
 
     Returns:
         By path, (6, 6) derivative dC [rad/(N m) .. m/N per unit of the number], base
-        axes; NaN where a motion of the platform is free, or at a change of contact.
+        axes; NaN where the platform moves freely or at a contact change.
 
     Raises:
         BadInput: a path does not lead to a number.
-        CannotChange: the robot or its posture does not exist for a changed number, for
-            example for a changed length in an overconstrained loop.
-        CannotAssemble: the closures cannot be closed with the present errors.
+        CannotChange: no valid robot or posture exists for a changed number, for example
+            a length in an overconstrained loop.
+        CannotAssemble: the loops cannot be closed with the present errors.
         FreeMotion: a load acts along a motion without stiffness.
         SolverFailed: no equilibrium was found.
     """

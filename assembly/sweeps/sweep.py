@@ -1,8 +1,8 @@
-"""Solution of a sweep over designs, postures and draws of errors, as one data set.
+"""Computation of a sweep over designs, postures and draws of errors.
 
-The points of a sweep are all combinations designs x postures x draws; the draw changes
-fastest.  Points are divided into blocks, which any process may solve and store in any
-order.  No result depends on the process or on other blocks.
+The points of a sweep are all combinations designs x postures x draws, where the draw
+varies fastest. They are divided into blocks, which any process may solve and store in
+any order. No result depends on the process or on other blocks.
 """
 
 import signal
@@ -29,15 +29,15 @@ if TYPE_CHECKING:
     import xarray
 
 Progress = Callable[[int, int], None]
-# function that yields each block's number and results, in any order
+# function that yields number and results of each block, in any order
 Solver = Callable[["Sweep", Iterable[int]], Iterator[tuple[int, SolvedPoints]]]
 
 
 def solve_here(
     sweep: Sweep, blocks: Iterable[int]
 ) -> Iterator[tuple[int, SolvedPoints]]:
-    """Solve blocks one after the other on one thread."""
-    # more threads are slower for small matrices and change the order of summation
+    """Solve blocks one after another on one thread."""
+    # several threads are slower for small matrices and change the summation order
     with threadpool_limits(1), _interrupts_noted() as noted:
         for block in blocks:
             yield block, solve_points(sweep.question, sweep.points(block))
@@ -80,13 +80,13 @@ def run_sweep(
     Args:
         sweep: sweep to solve.
         path: path of the file; the journal is removed when the file is complete.
-        progress: called at the start and after each block with the number of points in
-            the journal and the number of all points.
+        progress: called at the start and after each block with the numbers of points in
+            the journal and of all points.
         solve: function that solves blocks: :func:`solve_here`, or
             :mod:`forcefit.assembly.sweeps.cluster`.
-        held: exit stack that keeps the journal until it is closed, while further
-            results are computed from the file. After an interruption, no block is then
-            solved again.
+        held: exit stack that keeps the journal until the stack is closed, while
+            additional results are computed from the file. No block is then solved again
+            after an interruption.
 
     Raises:
         BadInput: the journal belongs to another sweep or run, or a file cannot be
@@ -161,10 +161,10 @@ def sweep_poses(
             ``"budget"``; None if the bounds of the pose error are not computed.
 
     Returns:
-        Data set over the axes: ``margin``, ``margin_free``, ``energy``,
+        Data set over the axes, with ``margin``, ``margin_free``, ``energy``,
         ``platform_screw``; certificates, distances to singularities and ``status``;
         with an assumption also ``rotation_error`` and ``translation_error`` (lower and
-        upper).  At points without a solution, values are NaN and the status is the
+        upper).  At points without a solution, values are NaN and the status states the
         reason.
     """
     targets = grid_targets(axes)
@@ -173,5 +173,5 @@ def sweep_poses(
 
 
 def assemblable(data: "xarray.Dataset", key: str = "margin_free") -> NDArray:
-    """Return a bool array over the grid: True inside the assembly zone."""
+    """Return a bool array over the grid, True inside the assembly zone."""
     return np.asarray(data[key] <= ASSEMBLABLE)

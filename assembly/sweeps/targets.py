@@ -1,8 +1,8 @@
-"""The postures of a sweep: a grid of poses or joint coordinates, or a list of them.
+"""Postures of a sweep: a grid of poses or joint coordinates, or a list of them.
 
-A grid has one axis for each named component; a list has one axis, ``posture``.  The
-names are either ``tx ty tz rx ry rz`` for the platform's pose, or ``q.<frame>`` for the
-coordinate of an actuated joint.  A list may also use ``pose.tx``, as campaigns do.
+A grid has one axis per named component, whereas a list has a single axis, ``posture``.
+Components are either ``tx ty tz rx ry rz`` for the platform pose, or ``q.<frame>`` for
+the coordinates of actuated joints. A list may also use ``pose.tx``, as in campaigns.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,7 +16,7 @@ from forcefit.assembly.kinematics.posture import POSE
 from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, nearest, quoted, read_rows
 
-# largest number of points; more points are probably due to a wrong step
+# largest number of points; more points probably result from a wrong step
 LARGEST_GRID = 10_000_000
 _JOINT = "q."
 
@@ -26,9 +26,9 @@ class Targets:
     """Poses or joint coordinates, either on a grid or in a list.
 
     Attributes:
-        names: names of the components, ``tx`` .. or ``q.<frame>``.
-        values: for a grid, the values on the axis of each component; for a list, the
-            values of each posture [m or rad].
+        names: component names, ``tx`` .. or ``q.<frame>``.
+        values: values on the axis of each component for a grid, or values of each
+            posture for a list [m or rad].
         labels: labels of the postures of a list; None for a grid.
     """
 
@@ -49,7 +49,7 @@ class Targets:
         return self.names if self.labels is None else ("posture",)
 
     def at(self, numbers: NDArray) -> NDArray:
-        """Return the components (k, components) of the postures with given numbers."""
+        """Return the components (k, components) of postures by number."""
         if self.labels is not None:
             return np.stack([v[numbers] for v in self.values], axis=1)
         places = np.unravel_index(numbers, self.shape)
@@ -58,7 +58,7 @@ class Targets:
 
 
 def goals_of(names: Sequence[str], robot: Robot, rows: NDArray) -> NDArray:
-    """Return postures in the form that ``assembly.kinematics.posture`` expects.
+    """Convert postures to the form that ``assembly.kinematics.posture`` expects.
 
     Args:
         names: names of the components, either of a pose or of joints.
@@ -80,12 +80,12 @@ def goals_of(names: Sequence[str], robot: Robot, rows: NDArray) -> NDArray:
 
 
 def of_joints(names: Sequence[str]) -> bool:
-    """Return whether components are joint coordinates instead of a pose."""
+    """Return whether components are joint coordinates rather than a pose."""
     return any(name.startswith(_JOINT) for name in names)
 
 
 def grid_targets(axes: Mapping[str, NDArray]) -> Targets:
-    """Return the grid of all combinations of the values on each axis."""
+    """Build the grid of all combinations of the values on each axis."""
     return Targets(tuple(axes), tuple(np.asarray(v, float) for v in axes.values()))
 
 
@@ -98,7 +98,7 @@ def unit_of_target(name: str, robot: Robot) -> str:
 
 
 def parse_grid(text: str, robot: Robot | None = None) -> dict[str, NDArray]:
-    """Return the axes of a grid given as ``"tx=-0.2:0.2:0.025,tz=-0.6:-0.3:0.025"``.
+    """Parse the axes of a grid such as ``"tx=-0.2:0.2:0.025,tz=-0.6:-0.3:0.025"``.
 
     Args:
         text: for each component ``start:stop:step`` [m or rad], or one number.  The
@@ -140,7 +140,7 @@ def _check_name(whose: str, what: str, name: str, robot: Robot | None) -> None:
 def _check_columns(
     whose: str, header: Sequence[str], extra: Sequence[str], robot: Robot
 ) -> None:
-    """Reject an unknown column of a table of postures, by its name in the file."""
+    """Reject an unknown column in a table of postures, by its name in the file."""
     joints = [_JOINT + f.name for f in robot.frames if f.actuated]
     valid = [*(f"pose.{name}" for name in POSE), *joints, *extra]
     for name in header:
@@ -160,10 +160,10 @@ def _check_kind(whose: str, names: Mapping | Sequence[str]) -> None:
 
 
 def parse_values(whose: str, spec: str) -> NDArray:
-    """Return the values given as ``start:stop:step``, or as one number.
+    """Parse values given as ``start:stop:step``, or as one number.
 
     Args:
-        whose: place of the text, for messages.
+        whose: origin of the text, for messages.
         spec: the text.
 
     Returns:
@@ -196,19 +196,19 @@ def parse_values(whose: str, spec: str) -> NDArray:
 
 
 def read_targets(path: Path | str, robot: Robot, extra: Sequence[str] = ()) -> Targets:
-    """Return the postures of a CSV table with columns ``pose.tx`` or ``q.<frame>``.
+    """Read postures from a CSV table with columns ``pose.tx`` or ``q.<frame>``.
 
     Args:
         path: CSV file with a header and one row for each posture.
-        robot: robot whose actuated joints may be columns; joints without a column keep
-            their ``position``.
-        extra: names of further columns of numbers, which become components.
+        robot: robot whose actuated joints may be columns; joints without a column stay
+            at their ``position``.
+        extra: names of additional numeric columns, which become components.
 
     Returns:
-        The postures in the order of the file.
+        The postures in file order.
 
     Raises:
-        BadInput: the table is invalid; the message contains line and column.
+        BadInput: the table is invalid; the message states line and column.
     """
     path = Path(path)
     rows = [row for row in enumerate(read_rows(path), 1) if any(map(str.strip, row[1]))]
@@ -243,7 +243,7 @@ def read_targets(path: Path | str, robot: Robot, extra: Sequence[str] = ()) -> T
 
 
 def _cell(whose: str, text: str) -> float:
-    """Return the number in a cell of the table."""
+    """Parse the number in a table cell."""
     try:
         value = float(text)
     except ValueError:
@@ -254,7 +254,7 @@ def _cell(whose: str, text: str) -> float:
 
 
 def _check_labels(path: Path, labels: Sequence[str]) -> None:
-    """Reject a table of postures in which two rows have the same id."""
+    """Reject a table of postures with equal ids in two rows."""
     if len(set(labels)) < len(labels):
         twice = next(label for label in labels if labels.count(label) > 1)
         raise BadInput(f"{path}: id: found {quoted(twice)} twice; expected unique ids")

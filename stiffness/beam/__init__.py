@@ -1,4 +1,4 @@
-"""Closed forms for links: sections, straight and curved beams, and their stress.
+"""Closed-form link models: sections, straight and curved beams, and their stress.
 
 Start with ``beam.py``, which computes the compliance of a cantilever.
 """

@@ -1,4 +1,4 @@
-"""Straight beams in closed form.
+"""Closed-form compliance of straight beams.
 
 ========  ======================================================  =====
 symbol    meaning                                                 unit
@@ -39,11 +39,11 @@ def beam_compliance(
     axis: ArrayLike = (1.0, 0.0, 0.0),
     up: ArrayLike | None = None,
 ) -> NDArray:
-    r"""Return the tip compliance of a straight cantilever of constant section.
+    r"""Compute the tip compliance of a straight cantilever of constant section.
 
-    The link is clamped at its base, and the screw is read at its tip.  Bending,
-    torsion, stretching and (Timoshenko) shear are included.  Warping restraint, taper
-    and the local compliance of the end fittings are not included;
+    The link is clamped at its base, and the screw refers to its tip. Bending, torsion,
+    stretching and (Timoshenko) shear are included. Warping restraint, taper and the
+    local compliance of the end fittings are neglected;
     :func:`forcefit.stiffness.fem.fea.mesh_link` includes them.
 
     Args:
@@ -51,7 +51,7 @@ def beam_compliance(
         section: lengths of the cross-section [m], as for a link of a robot:
             ``{"radius": 0.02}`` and optionally ``inner_radius``; ``width`` and
             ``height``, and optionally ``wall`` of a box or ``web`` and ``flange`` of an
-            I; or constants of another section.
+            I-section; or the constants of any other section.
         E: [Pa] Young's modulus, > 0.
         nu: [-] Poisson's ratio, in (-1, 0.5).
         theory: ``"timoshenko"``, or ``"euler"`` for bending without shear.
@@ -63,7 +63,7 @@ def beam_compliance(
         (6, 6) [rad/(N m), rad/N, m/(N m), m/N] compliance, symmetric positive definite.
 
     Raises:
-        BadInput: an argument is out of its range.
+        BadInput: an argument is out of range.
 
     Sources:
         Timoshenko & Gere, *Mechanics of Materials*: cantilever under an end load.
@@ -97,7 +97,7 @@ def beam_compliance(
 def _compliance_in_section_axes(
     length: float, section: Section, E: float, nu: float, shear: bool
 ) -> NDArray:
-    """Return the tip compliance in the section's axes x, y, z."""
+    """Compute the tip compliance in the section axes x, y, z."""
     G = E / (2 * (1 + nu))
     slope_y, slope_z = length / (E * section.I_y), length / (E * section.I_z)
     C = np.diag([
@@ -117,7 +117,7 @@ def _compliance_in_section_axes(
 
 
 def section_axes(axis: ArrayLike, up: ArrayLike | None = None) -> NDArray:
-    """Return the axes of a section as columns: x (along the beam), y and z (up).
+    """Return the axes of a section as columns: x along the beam, y, and z up.
 
     Args:
         axis: (3,) vector of any length from base to tip.
@@ -144,14 +144,14 @@ def section_axes(axis: ArrayLike, up: ArrayLike | None = None) -> NDArray:
 
 
 def unit_vector(name: str, vector: ArrayLike) -> NDArray:
-    """Normalise a vector given by the user to length one.
+    """Normalise a user-supplied vector to unit length.
 
     Args:
         name: name for error messages.
-        vector: (3,) vector of any length except zero.
+        vector: (3,) nonzero vector.
 
     Returns:
-        (3,) vector of length one.
+        (3,) unit vector.
 
     Raises:
         BadInput: the vector does not consist of three finite numbers, or is zero.
@@ -161,5 +161,5 @@ def unit_vector(name: str, vector: ArrayLike) -> NDArray:
         raise BadInput(f"{name}: found {describe(vector)}, expected 3 finite numbers")
     length = np.linalg.norm(direction)
     if length == 0:
-        raise BadInput(f"{name} is zero; expected a direction")
+        raise BadInput(f"{name} is zero; expected a nonzero direction vector")
     return direction / length

@@ -1,4 +1,4 @@
-r"""Largest von Mises stress in a straight beam under a tip wrench and its weight.
+r"""Peak von Mises stress of a straight beam under a tip wrench and its own weight.
 
 ========  ==========================================================  ======
 symbol    meaning                                                     unit
@@ -13,11 +13,11 @@ tau       shear stress along y and along z                            Pa
 ========  ==========================================================  ======
 
 In a section sigma = N / A + M_y z / I_y - M_z y / I_z.  Without weight, shear forces
-and torsion are equal in all sections and M is linear in x.  The von Mises stress of a
-fibre, sqrt(sigma^2 + 3 tau^2), is then convex in x: its largest value is at the base or
-at the tip, and only these two sections are evaluated.  With weight, forces increase as
-s W / L and moments as s^2 / 2 (e_x x W) / L.  Then 31 sections between the ends are
-evaluated too, and the sections where the moment about y or z has its extremum.
+and torsion are the same in all sections, and M is linear in x. The von Mises stress of
+a fibre, sqrt(sigma^2 + 3 tau^2), is then convex in x and attains its maximum at the
+base or at the tip, so only these two sections are evaluated. With weight, forces
+increase as s W / L and moments as s^2 / 2 (e_x x W) / L. In this case, 31 intermediate
+sections and the sections with an extremum of the moment about y or z are evaluated too.
 """
 
 import math
@@ -48,36 +48,36 @@ def peak_beam_stress(
     wrench: ArrayLike,
     weight: ArrayLike = (0.0, 0.0, 0.0),
 ) -> tuple[NDArray, NDArray]:
-    """Return the largest von Mises stress in a straight beam, and its position.
+    """Compute the peak von Mises stress of a straight beam and its position.
 
-    Axial force, bending, torsion and shear act together.  The stress is evaluated in
-    the sections at the base and at the tip.  For a beam with weight, sections between
-    them are evaluated too.  In each section, the stress is evaluated at
+    Axial force, bending, torsion and shear act together. The stress is evaluated in the
+    sections at the base and at the tip and, for a beam with weight, in sections between
+    them. In each section, the stress is evaluated at
 
     - round bar and tube: 360 points of the outer circle;
-    - solid rectangle: a grid of 33 x 33 points, corners and middles included;
+    - solid rectangle: a grid of 33 x 33 points, including corners and midpoints;
     - hollow rectangle: 33 points along each outer side.
 
-    Two local effects are not included.  The first is the stress where a joint holds the
-    ends of the link; a clamped edge is singular, see
+    Two local effects are neglected. The first is the stress where a joint holds the
+    ends of the link, since a clamped edge is singular; see
     :mod:`forcefit.stiffness.fem.stress`.  The second is the stress in the inner corners
-    of a hollow rectangle, which depends on the radius of their fillets.
+    of a hollow rectangle, which depends on their fillet radius.
 
     Args:
         section: ``radius`` and optionally ``inner_radius``, or ``width`` (along y) and
             ``height`` (along z) and optionally ``wall`` [m].
         length: [m] length of the beam, >= 0.
         wrench: (..., 6) [N m, N] wrench at the tip, in the axes of the beam.
-        weight: (3,) or (..., 3) [N] force distributed evenly over the length, in the
+        weight: (3,) or (..., 3) [N] force distributed evenly along the length, in the
             same axes.
 
     Returns:
-        (...) [Pa] largest stress, and (..., 3) [m] its position relative to the base,
-        in the axes of the beam.
+        (...) [Pa] peak stress, and (..., 3) [m] its position relative to the base, in
+        the axes of the beam.
 
     Raises:
-        BadInput: the section is given by its constants only or is invalid, or the
-            length or the wrench is invalid.
+        BadInput: the section is given only by its constants, or the section, the length
+            or the wrench is invalid.
 
     Sources:
         Timoshenko & Gere, *Mechanics of Materials*, for bending and for shear by
@@ -85,7 +85,7 @@ def peak_beam_stress(
         twisted rectangle; Bredt (1896), with the wall's own twist, for a hollow one.
 
     Example:
-        A transverse force at the tip of a bar bends it most at its base:
+        A transverse tip force bends a bar most at its base:
 
         >>> bar = {"radius": 0.04}
         >>> stress, where = peak_beam_stress(bar, 0.452, [0, 0, 0, 0, 0, 1e3])
@@ -129,7 +129,8 @@ def _sections(wrench: NDArray, weight: NDArray, length: float) -> NDArray:
         return ends
     between = np.linspace(0, length, _ALONG)[1:-1]
     with np.errstate(divide="ignore", invalid="ignore"):
-        # a moment has its extremum where the force in the other direction is zero
+        # a moment has its extremum where the transverse force in the other direction
+        # vanishes
         share = -wrench[:, 4:] / weight[:, 1:]
     extrema = length * np.clip(np.nan_to_num(share), 0, 1)
     between = np.broadcast_to(between, (len(wrench), len(between)))
@@ -142,7 +143,7 @@ def _on_sections(
     """Return (n, k, 6) [N m, N] loads on sections at distances s from the tip."""
     on = np.repeat(wrench[:, None], s.shape[1], axis=1)
     share = s / length if length else np.zeros_like(s)
-    # mean force between tip and section: half of the weight of this length is added
+    # mean force between tip and section, which includes half the weight of this length
     middle = wrench[:, None, 3:] + share[..., None] * weight[:, None] / 2
     on[..., 1] -= s * middle[..., 2]  # moment: distance from the tip times mean force
     on[..., 2] += s * middle[..., 1]
@@ -157,7 +158,7 @@ def _stresses(influence: NDArray, forces: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def section_stress(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
-    """Return the fibres of a section, and their stresses under unit moments and forces.
+    """Return the fibres of a section and their stresses under unit loads.
 
     Args:
         section: see :func:`peak_beam_stress`.
@@ -167,7 +168,7 @@ def section_stress(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
         y and tau along z for each unit moment and force about and along x, y, z.
 
     Raises:
-        BadInput: the section is given by its constants only, or is invalid.
+        BadInput: the section is given only by its constants, or is invalid.
     """
     if "area" in section:
         raise BadInput(
@@ -182,7 +183,7 @@ def section_stress(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
             f"stress: found a section of {', '.join(section) or 'nothing'}; "
             f"expected {_SHAPES}"
         )
-    # Poisson's ratio affects only the factors of shear deformation
+    # Poisson's ratio affects only the shear factors
     constants = declared_section(section, nu=0.3)
     if "radius" in section:
         return _round(constants, section["radius"], section.get("inner_radius", 0.0))
@@ -193,7 +194,7 @@ def section_stress(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
 
 
 def _bending(section: Section, y: NDArray, z: NDArray) -> NDArray:
-    """Return the (p, 3, 6) normal stress of axial force and bending; shear is zero."""
+    """Return the (p, 3, 6) normal stress of axial force and bending, without shear."""
     influence = np.zeros((len(y), 3, 6))
     influence[:, 0, 1] = z / section.I_y
     influence[:, 0, 2] = -y / section.I_z
@@ -210,7 +211,7 @@ def _round(section: Section, radius: float, hole: float) -> tuple[NDArray, NDArr
     influence[:, 1:, 0] = along * radius / section.J
     # V Q / (I b) at the neutral axis: 4/3 of the mean in a bar, 2 in a thin tube
     peak = 4 / 3 * (radius**2 + radius * hole + hole**2) / (radius**2 + hole**2)
-    # along the circle the stress varies as the sine of the angle from V
+    # along the circle, the stress varies as the sine of the angle from V
     influence[:, 1:, 4:] = peak / section.area * along[:, :, None] * along[:, None, :]
     return radius * out, influence
 
@@ -224,7 +225,7 @@ def _rectangle(
     influence = _bending(section, y, z)
     if width <= height:
         tau_y, tau_z = _torsion(y, z, width / 2, height / 2)
-    else:  # rotate by a quarter turn about x, so that the short side is along z
+    else:  # rotate by a quarter turn about x to bring the short side along z
         tau_z, minus_tau_y = _torsion(z, -y, height / 2, width / 2)
         tau_y = -minus_tau_y
     influence[:, 1, 0], influence[:, 2, 0] = tau_y / section.J, tau_z / section.J
@@ -254,7 +255,7 @@ def _hollow(
     share = np.linspace(-0.5, 0.5, _ACROSS)
     places, influences = [], []
     for turns in range(4):
-        # one routine computes the right side; the section is rotated by quarter turns
+        # only the right side is computed; the section is rotated by quarter turns
         across, up = (width, height) if turns % 2 == 0 else (height, width)
         second = section.I_y if turns % 2 == 0 else section.I_z
         out = np.round([np.cos(turns * np.pi / 2), np.sin(turns * np.pi / 2)])
@@ -263,8 +264,8 @@ def _hollow(
         influence = _bending(section, *where.T)
         b, h = across - wall, up - wall
         around = 2 * (b + h)
-        # shear flow of Bredt in the wall, plus the twist of the wall itself at the
-        # outer face
+        # Bredt's shear flow in the wall, plus the twist of the wall itself at the outer
+        # face
         twist = 2 * b * h / around / section.J + wall / section.J
         # V Q / (I b) of the flange and then of the wall; the wall ends at the hole
         inside = np.minimum(np.abs(up * share), up / 2 - wall)

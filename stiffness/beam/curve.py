@@ -1,14 +1,13 @@
-r"""Beams along a curve: tapered, bent and L-shaped, by integration of the compliance.
+r"""Tapered, bent and L-shaped beams, by integrating the compliance along a curve.
 
-The wrench at the tip of a cantilever acts through every section.  The compliance is
-therefore the integral of the compliances of its slices, each expressed at the tip,
+The tip wrench of a cantilever is transmitted through every section, so the compliance
+is the integral of the compliances of its slices, each expressed at the tip,
 
     C = integral A(s) c(s) A(s)^T ds,   A(s) = screw_map(p(s) - tip, R(s)),
 
 with c(s) = diag(1/GJ, 1/EI_y, 1/EI_z, 1/EA, 1/GA_y, 1/GA_z) per unit length in the
-section's axes R(s).  The formula is accurate for beams whose radius of curvature is
-large compared with their section.  The theory of thick curved bars and warping at kinks
-are not included.
+section's axes R(s).  The formula is accurate if the radius of curvature is large
+compared with the section. Thick curved bars and warping at kinks are not covered.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,7 +27,7 @@ _MOST_PARTS = 128
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """A smooth piece of a beam, from t = 0 at its base to t = 1.
+    """Smooth piece of a beam, from t = 0 at its base to t = 1.
 
     Attributes:
         place: function of t that returns the position (3,) [m].
@@ -37,7 +36,6 @@ class Piece:
         section: function of t that returns the section.
         up: function of t that returns a vector (3,) along the section's z axis; its
             component along the tangent is removed.  None selects the default of
-            :func:`forcefit.stiffness.beam.beam.section_axes`.
             :func:`forcefit.stiffness.beam.beam.section_axes`.
     """
 
@@ -53,7 +51,7 @@ def straight_piece(
     section: Section | Callable[[float], Section],
     up: ArrayLike | None = None,
 ) -> Piece:
-    """Return a straight piece, which is tapered if its section is a function of t.
+    """Create a straight piece, tapered if its section is a function of t.
 
     Args:
         start: (3,) [m] position of the start.
@@ -84,7 +82,7 @@ def arc_piece(
     turn: ArrayLike,
     section: Section | Callable[[float], Section],
 ) -> Piece:
-    """Return a piece along an arc of a circle; the section's z is the axis of rotation.
+    """Create a piece along a circular arc, with the section's z along the arc axis.
 
     Args:
         start: (3,) [m] position of the start.
@@ -117,7 +115,7 @@ def arc_piece(
 def _as_function(
     section: Section | Callable[[float], Section],
 ) -> Callable[[float], Section]:
-    """Return a constant or varying section as a function of t."""
+    """Convert a constant or varying section to a function of t."""
     return (lambda t: section) if isinstance(section, Section) else section
 
 
@@ -129,26 +127,25 @@ def curve_compliance(
     theory: str = "timoshenko",
     tolerance: float = 1e-10,
 ) -> NDArray:
-    """Return the tip compliance of a beam along a curve.
+    """Compute the tip compliance of a beam along a curve.
 
     Args:
         pieces: pieces from base to tip; each starts where the previous one ends.
         E: [Pa] Young's modulus, > 0.
         nu: [-] Poisson's ratio, in (-1, 0.5).
         theory: ``"timoshenko"``, or ``"euler"`` for bending without shear.
-        tolerance: [1] largest error of the integral, for entries scaled by
-            sqrt(C_ii C_jj).
+        tolerance: [1] largest integration error of entries scaled by sqrt(C_ii C_jj).
 
     Returns:
-        (6, 6) [rad/(N m) .. m/N] compliance, symmetric positive definite, read at the
-        end of the last piece, in the axes of the pieces.
+        (6, 6) [rad/(N m) .. m/N] compliance, symmetric positive definite, at the end of
+        the last piece, in the axes of the pieces.
 
     Raises:
-        BadInput: no piece is given, two pieces do not meet, an argument is out of its
+        BadInput: no piece is given, two pieces do not meet, an argument is out of
             range, or a section changes too abruptly for the integration.
 
     Example:
-        A force at the end of an L of two bars, parallel to the first, bends both:
+        A force at the end of an L-shape of two bars, parallel to the first, bends both:
 
         >>> from forcefit.stiffness.beam.sections import round_section
         >>> bar = round_section(0.01, nu=0.3)
@@ -190,16 +187,16 @@ def curve_compliance(
 def curve_mass(
     pieces: Sequence[Piece], density: float
 ) -> tuple[float, NDArray, NDArray]:
-    """Return the mass, the centre of mass and the inertia of a beam along a curve.
+    """Compute the mass, the centre of mass and the inertia of a beam along a curve.
 
     Args:
         pieces: pieces from base to tip.
         density: [kg/m^3] density.
 
     Returns:
-        Mass [kg]; centre of mass (3,) [m]; and inertia (3, 3) [kg m^2] about the
-        centre of mass.  All are in the axes of the pieces.  Sections are treated as
-        plane and normal to the curve.
+        Mass [kg]; centre of mass (3,) [m]; and inertia (3, 3) [kg m^2] about the centre
+        of mass, all in the axes of the pieces. Sections are treated as plane and normal
+        to the curve.
     """
     mass, moment, second, own = 0.0, np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3))
     for piece in pieces:
@@ -219,13 +216,13 @@ def curve_mass(
 
 
 def curve_length(pieces: Sequence[Piece]) -> float:
-    """Return the length of a beam measured along its curve.
+    """Compute the length of a beam along its curve.
 
     Args:
         pieces: straight pieces and arcs, from base to tip.
 
     Returns:
-        Length [m].
+        [m] length.
     """
     speeds = [
         [np.linalg.norm(piece.tangent((x + 1) / 2)) for x in _POINTS]
@@ -235,7 +232,7 @@ def curve_length(pieces: Sequence[Piece]) -> float:
 
 
 def _check_joined(pieces: Sequence[Piece]) -> None:
-    """Raise an error if a piece does not start where the previous one ends."""
+    """Check that each piece starts where the previous one ends."""
     for number, (one, next_one) in enumerate(
         zip(pieces[:-1], pieces[1:], strict=True), start=2
     ):
@@ -251,7 +248,7 @@ def _check_joined(pieces: Sequence[Piece]) -> None:
 def _integral(
     piece: Piece, tip: NDArray, E: float, nu: float, theory: str, parts: int
 ) -> NDArray:
-    """Return the compliance of one piece, integrated by Gauss points in equal parts."""
+    """Integrate the compliance of one piece by Gauss quadrature in equal parts."""
     G, shear = E / (2 * (1 + nu)), theory == "timoshenko"
     total = np.zeros((6, 6))
     for first in range(parts):

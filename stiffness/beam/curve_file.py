@@ -1,4 +1,4 @@
-"""Reader of beams along a curve: straight pieces, tapered pieces and arcs."""
+"""Reader of curved beams: straight pieces, tapered pieces and arcs."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -19,12 +19,12 @@ def read_curve(path: Path | str, nu: float) -> list[Piece]:
     Args:
         path: TOML file with tables ``[[piece]]``.  The ``section`` of a piece is given
             as in a robot file, or with ``wall`` (a box) or ``web`` and ``flange`` (an
-            I).  A piece without ``section`` has the section of the previous piece.
-            ``end`` defines a straight piece; ``up`` is optional, and ``tip_section``
-            makes it tapered, with lengths that change linearly.  ``center`` and
-            ``turn``, a rotation vector, define an arc.  ``start`` [m] of the first
-            piece is optional; its default is the origin.
-        nu: [-] Poisson's ratio, on which shear factors depend.
+            I-section). Without ``section``, a piece has the section of the previous
+            piece. ``end`` defines a straight piece; ``up`` is optional, and
+            ``tip_section`` makes it tapered, with lengths that change linearly.
+            ``center`` and ``turn``, a rotation vector, define an arc.  ``start`` [m] of
+            the first piece is optional; its default is the origin.
+        nu: [-] Poisson's ratio, which determines the shear factors.
 
     Returns:
         The pieces from base to tip.
@@ -44,12 +44,12 @@ def read_curve(path: Path | str, nu: float) -> list[Piece]:
 
 
 def read_pieces(tables: Sequence[Table], start: NDArray, nu: float) -> list[Piece]:
-    """Return the pieces of a beam from their tables.
+    """Read the pieces of a beam from their tables.
 
     Args:
         tables: at least one table, with the keys of :func:`read_curve`.
         start: (3,) [m] start of the first piece.
-        nu: [-] Poisson's ratio, on which shear factors depend.
+        nu: [-] Poisson's ratio, which determines the shear factors.
 
     Returns:
         The pieces from base to tip.
@@ -71,7 +71,7 @@ def read_pieces(tables: Sequence[Table], start: NDArray, nu: float) -> list[Piec
 
 
 def _section(part: Table, key: str) -> dict[str, float]:
-    """Return the lengths or constants of a section by name."""
+    """Read the lengths or constants of a section by name."""
     inner = part.table(key)
     given = {
         name: inner.number(name, "m", largest=_LARGEST) for name in list(inner.content)
@@ -83,7 +83,7 @@ def _section(part: Table, key: str) -> dict[str, float]:
 def _piece(
     part: Table, start: NDArray, section: Mapping[str, float], nu: float
 ) -> Piece:
-    """Return one piece of the curve from its table."""
+    """Read one piece of the curve from its table."""
     try:
         shape = _tapered(part, section, nu)
         if part.has("turn"):
@@ -105,7 +105,7 @@ def _piece(
 def _tapered(
     part: Table, section: Mapping[str, float], nu: float
 ) -> Section | Callable[[float], Section]:
-    """Return a constant section, or a section whose lengths change linearly."""
+    """Return a constant section, or one whose lengths vary linearly."""
     constant = declared_section(section, nu)
     if not part.has("tip_section"):
         return constant

@@ -1,4 +1,4 @@
-"""Sections of beams: round, rectangular, thin-walled, or given by their constants.
+"""Beam sections: round, rectangular, thin-walled, or given by their constants.
 
 ========  ======================================================  =====
 symbol    meaning                                                 unit
@@ -21,7 +21,7 @@ from forcefit.inputs.errors import LARGEST, BadInput, nearest
 
 @dataclass(frozen=True)
 class Section:
-    """Constants of a section for a straight beam.
+    """Section constants of a straight beam.
 
     Attributes:
         area: [m^2] area.
@@ -45,7 +45,7 @@ class Section:
 
     @property
     def size(self) -> float:
-        """[m] twice the larger radius of gyration; the radius of a solid round bar."""
+        """[m] twice the larger radius of gyration: the radius of a solid round bar."""
         return 2 * math.sqrt(max(self.I_y, self.I_z) / self.area)
 
 
@@ -64,7 +64,7 @@ def round_section(radius: float, nu: float, inner_radius: float = 0.0) -> Sectio
 
     Args:
         radius: [m] outer radius, > 0.
-        nu: [-] Poisson's ratio, in (-1, 0.5); the shear factor depends on it.
+        nu: [-] Poisson's ratio, in (-1, 0.5), which determines the shear factor.
         inner_radius: [m] radius of the hole, smaller than ``radius``; 0 if the bar is
             solid.
 
@@ -72,7 +72,7 @@ def round_section(radius: float, nu: float, inner_radius: float = 0.0) -> Sectio
         The section.
 
     Raises:
-        BadInput: a dimension or Poisson's ratio is out of its range.
+        BadInput: a dimension or Poisson's ratio is out of range.
 
     Sources:
         Cowper (1966), "The shear coefficient in Timoshenko's beam theory", for a circle
@@ -99,13 +99,13 @@ def rectangular_section(width: float, height: float, nu: float) -> Section:
     Args:
         width: [m] along the section's y, > 0.
         height: [m] along the section's z, the ``up`` of the beam, > 0.
-        nu: [-] Poisson's ratio, in (-1, 0.5); the shear factor depends on it.
+        nu: [-] Poisson's ratio, in (-1, 0.5), which determines the shear factor.
 
     Returns:
         The section.
 
     Raises:
-        BadInput: a dimension or Poisson's ratio is out of its range.
+        BadInput: a dimension or Poisson's ratio is out of range.
 
     Sources:
         Cowper (1966) for the shear factor; Timoshenko & Goodier, *Theory of
@@ -126,16 +126,16 @@ def rectangular_section(width: float, height: float, nu: float) -> Section:
 
 
 def _rectangle_torsion(width: float, height: float) -> float:
-    """Return the torsion constant from Saint-Venant's series, accurate to 1e-16."""
+    """Evaluate Saint-Venant's series for the torsion constant, accurate to 1e-16."""
     long, short = max(width, height), min(width, height)
     odd = np.arange(1.0, 2001.0, 2.0)
-    # tanh equals 1 in all but the first few terms; the remaining sum decays as n^-4
+    # tanh equals 1 except in the first few terms; the remaining sum decays as n^-4
     tail = np.sum(np.tanh(odd * math.pi * long / (2 * short)) / odd**5)
     return long * short**3 / 3 * (1 - 192 / math.pi**5 * short / long * float(tail))
 
 
 def box_section(width: float, height: float, wall: float, nu: float) -> Section:
-    """Return the section of a hollow rectangle whose walls have the same thickness.
+    """Return the section of a hollow rectangle with walls of equal thickness.
 
     Args:
         width: [m] outer width, along y.
@@ -144,11 +144,11 @@ def box_section(width: float, height: float, wall: float, nu: float) -> Section:
         nu: [-] Poisson's ratio.
 
     Returns:
-        The section.  The torsion constant is that of a closed thin wall plus the
-        torsion constant of the wall itself.  The shear factors are those of thin walls.
+        The section. Its torsion constant is that of a closed thin wall plus that of the
+        wall itself; its shear factors are those of thin walls.
 
     Raises:
-        BadInput: a dimension or Poisson's ratio is out of its range.
+        BadInput: a dimension or Poisson's ratio is out of range.
 
     Sources:
         Bredt (1896) for torsion; Cowper (1966) for the shear factor of a thin box.
@@ -174,8 +174,8 @@ def box_section(width: float, height: float, wall: float, nu: float) -> Section:
 
 def _box_shear(along: float, across: float, nu: float) -> float:
     """Return Cowper's shear factor of a thin box for a force parallel to one side."""
-    # all walls have the same thickness, so the areas of flange and web have the ratio
-    # of the side lengths
+    # with walls of equal thickness, the areas of flange and web are in the ratio of the
+    # side lengths
     m = n = across / along
     top = 10 * (1 + nu) * (1 + 3 * m) ** 2
     plain = 12 + 72 * m + 150 * m**2 + 90 * m**3
@@ -197,11 +197,11 @@ def i_section(
         nu: [-] Poisson's ratio.
 
     Returns:
-        The section.  The torsion constant is that of an open thin wall that is free to
-        warp. A shear force along y is carried by the flanges as by two rectangles.
+        The section. Its torsion constant is that of an open thin wall that is free to
+        warp. The flanges carry a shear force along y like two rectangles.
 
     Raises:
-        BadInput: a dimension or Poisson's ratio is out of its range.
+        BadInput: a dimension or Poisson's ratio is out of range.
 
     Sources:
         Cowper (1966) for the shear factors of a thin I and of a rectangle.
@@ -232,12 +232,12 @@ def i_section(
 
 
 def declared_section(given: Mapping[str, float], nu: float) -> Section:
-    """Return the section that lengths or constants describe.
+    """Build a section from its lengths or constants.
 
     Args:
         given: ``radius`` and optionally ``inner_radius``; or ``width`` and ``height``
-            and optionally ``wall`` (a box) or ``web`` and ``flange`` (an I); or the
-            attributes of a :class:`Section` [m, m^2, m^4].
+            and optionally ``wall`` (a box) or ``web`` and ``flange`` (an I-section); or
+            the attributes of a :class:`Section` [m, m^2, m^4].
         nu: [-] Poisson's ratio.
 
     Returns:
@@ -257,7 +257,7 @@ def declared_section(given: Mapping[str, float], nu: float) -> Section:
 
 
 def check_section(place: str, given: Mapping[str, float]) -> None:
-    """Raise an error if the values do not describe a section.
+    """Check that values describe a section.
 
     Args:
         place: name of the key, for the message.
@@ -287,7 +287,7 @@ def check_section(place: str, given: Mapping[str, float]) -> None:
 
 
 def check_material(who: str, E: float, nu: float) -> None:
-    """Raise an error for elastic constants that no isotropic solid can have.
+    """Check that an isotropic solid can have the given elastic constants.
 
     Args:
         who: name of the part, for the message.
@@ -302,19 +302,19 @@ def check_material(who: str, E: float, nu: float) -> None:
 
 
 def check_poisson(who: str, nu: float) -> None:
-    """Raise an error for a Poisson's ratio that no isotropic solid can have."""
+    """Check that an isotropic solid can have a given Poisson's ratio."""
     if not -1.0 < nu < 0.5:
         raise BadInput(f"{who}: nu = {nu:g} must lie between -1.0 and 0.5")
 
 
 def check_positive(who: str, name: str, value: float) -> None:
-    """Raise an error for a number that is not finite and positive."""
+    """Check that a number is finite and positive."""
     if not (math.isfinite(value) and value > 0):
         raise BadInput(f"{who}: {name} = {value:g} must be finite and > 0")
 
 
 def _check(**lengths: float) -> None:
-    """Raise an error if a length is not finite and positive."""
+    """Check that all lengths are finite and positive."""
     for name, value in lengths.items():
         if not 0 < value < float("inf"):
             raise BadInput(f"section: {name} = {value:g} m must be finite and > 0")

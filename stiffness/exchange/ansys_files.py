@@ -1,13 +1,13 @@
-"""Files of Ansys: Harwell-Boeing matrices, and the degrees of freedom of their rows.
+"""Ansys files: Harwell-Boeing matrices, and the degrees of freedom of their rows.
 
-Ansys orders the rows of a matrix internally.  The order is stated in a mapping file
-next to the matrix, which has the same name with the suffix ``.mapping``.  This file is
+Ansys orders the rows of a matrix internally. A mapping file next to the matrix, with
+the same name and the suffix ``.mapping``, states this order. It is written
 
-- either written by ``HBMAT,name,,,ASCII,STIFF,NO,YES``: lines of row, node and label
+- either by ``HBMAT,name,,,ASCII,STIFF,NO,YES``, as lines of row, node and label
   (``UX``, ...);
-- or written by ``*VEC,map,I,IMPORT,FULL,file.full,BACK`` and
-  ``*EXPORT,map,MMF,name.mapping``: a Matrix Market vector of nodes, for each of which
-  the matrix contains all degrees of freedom in sequence.
+- or by ``*VEC,map,I,IMPORT,FULL,file.full,BACK`` and ``*EXPORT,map,MMF,name.mapping``,
+  as a Matrix Market vector of nodes, for each of which the matrix contains all degrees
+  of freedom in sequence.
 
 Sources:
     Ansys Command Reference, HBMAT, *EXPORT, *VEC; Duff, Grimes, Lewis (1992), Users'
@@ -31,10 +31,10 @@ _NUMBER = re.compile(r"[+-]?\d+(?:\.\d*)?(?:[ED][+-]?\d+)?|[+-]?\.\d+(?:[ED][+-]
 
 
 def harwell_boeing(path: Path, text: str) -> csr_array:
-    """Read an assembled real matrix; a symmetric one (type RSA) is stored as one half.
+    """Read an assembled real matrix, of which type RSA stores only one half.
 
-    SciPy's reader refuses three features of files from ``HBMAT``: the type RSA,
-    right-hand sides, and exponents written with a D (SciPy 1.17).
+    The reader in SciPy 1.17 rejects three features of files written by ``HBMAT``: type
+    RSA, right-hand sides, and exponents with a D.
 
     Args:
         path: path of the file, for error messages.
@@ -44,8 +44,8 @@ def harwell_boeing(path: Path, text: str) -> csr_array:
         (n, n) matrix with both halves.
 
     Raises:
-        BadInput: the file is of a different type, or its length does not agree with its
-            header.
+        BadInput: the file is of a different type, or its length is inconsistent with
+            its header.
     """
     lines = text.split("\n")
     try:
@@ -93,12 +93,12 @@ def harwell_boeing(path: Path, text: str) -> csr_array:
 
 
 def both_halves(matrix: csr_array) -> csr_array:
-    """Return the full symmetric matrix of which one half is given."""
+    """Complete a symmetric matrix of which one half is given."""
     return csr_array(matrix + matrix.T - diags_array(matrix.diagonal()))
 
 
 def _fields(path: Path, lines: list[str], width: int) -> NDArray:
-    """Return the numbers that a text contains in fields of a fixed width."""
+    """Parse the numbers in fields of a fixed width."""
     words = [
         line[k : k + width].strip()
         for line in lines
@@ -111,13 +111,13 @@ def _fields(path: Path, lines: list[str], width: int) -> NDArray:
 
 
 def read_mapping(path: Path) -> list[int] | list[tuple[int, int]]:
-    """Return the degree of freedom of each row of a matrix from its mapping file.
+    """Read the degree of freedom of each matrix row from a mapping file.
 
     Args:
         path: mapping file.
 
     Returns:
-        Node and direction (1 to 6) of each row; or the nodes in the order of the rows.
+        Node and direction (1 to 6) of each row, or the nodes in row order.
 
     Raises:
         BadInput: the file has neither of the two forms.
@@ -160,7 +160,7 @@ def read_mapping(path: Path) -> list[int] | list[tuple[int, int]]:
 
 
 def _whole(path: Path, word: str) -> int:
-    """Return the number of a row or a node."""
+    """Parse the number of a row or a node."""
     if not re.fullmatch("[0-9]{1,12}", word):
         raise BadInput(f"{path}: found {describe(word)}, expected a number of a node")
     return int(word)

@@ -1,4 +1,4 @@
-"""Condensation of a full matrix onto two interfaces, which are nodes or rigid faces.
+"""Condensation of a full matrix onto two interfaces, each a node or a rigid face.
 
 Sources:
     Guyan (1965), Reduction of stiffness and mass matrices, AIAA Journal 3, 380.
@@ -23,20 +23,20 @@ _GRID = re.compile(r"^GRID\*?[\s,]", re.M | re.I)
 _NODE = re.compile(r"^\*NODE\s*(?:,.*)?$", re.M | re.I)
 _WORKBENCH = re.compile(r"Node Number\tX Location \((\w+)\)")
 _LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254}
-# largest distance of an interface's nodes from it, relative to the size of the body
+# largest distance of nodes from their interface, relative to the size of the body
 _ON = 1e-6
 
 
 def read_nodes(path: Path | str, unit: float) -> dict[int, NDArray]:
-    """Read the positions of nodes from lines of number, x, y and z.
+    """Read node positions from lines with number, x, y and z.
 
     Args:
-        path: file with numbers separated by commas or blanks; lines that begin with
-            ``*`` or ``#`` are ignored.  In an input file of Abaqus or CalculiX the
-            lines after ``*NODE`` are read, and in one of Nastran the ``GRID`` lines.
-            In a named selection of Ansys Workbench the lines below the heading are
-            read; decimal commas are accepted there.
-        unit: [m] unit of the file's lengths.
+        path: file with numbers separated by commas or blanks, in which lines that begin
+            with ``*`` or ``#`` are ignored. In input files of Abaqus or CalculiX, the
+            lines after ``*NODE`` are read; in those of Nastran, the ``GRID`` lines; and
+            in named selections of Ansys Workbench, the lines below the heading, where
+            decimal commas are accepted.
+        unit: [m] unit of length in the file.
 
     Returns:
         (3,) [m] position of each node, by node number.
@@ -90,7 +90,7 @@ def _node_lines(text: str) -> Iterator[tuple[int, list[str], str]]:
 
 
 def _grids(text: str) -> Iterator[tuple[int, list[str], str]]:
-    """Yield Nastran's ``GRID`` lines; a node with wide fields occupies two lines."""
+    """Yield Nastran's ``GRID`` lines, two for a node with wide fields."""
     lines = text.split("\n")
     for number, line in enumerate(lines, 1):
         if _GRID.match(line):
@@ -98,27 +98,27 @@ def _grids(text: str) -> Iterator[tuple[int, list[str], str]]:
             if head.endswith("*") and number < len(lines):
                 fields = fields[:4] + bulk_fields(lines[number])[1]
             node, system, *place = [*fields, "", ""]
-            # a coordinate system other than the basic one is refused
+            # coordinate systems other than the basic one are rejected
             yield number, [node, *([] if system.strip("0") else place)], line
 
 
 def interface_rows(
     matrix: FileMatrix, asked: str, option: str, nodes: Mapping[int, NDArray] | None
 ) -> tuple[NDArray, NDArray, NDArray | None]:
-    """Return the rows of an interface, and their motions for its unit screws.
+    """Find the rows of an interface, and their motions for its unit screws.
 
     Args:
-        matrix: matrix with its degrees of freedom.
+        matrix: matrix with the degrees of freedom of its rows.
         asked: number of a node, or an interface as in ``stiffness fea``.
         option: name of the option, for messages.
         nodes: (3,) [m] positions by number; None if unknown.
 
     Returns:
         (k,) rows; (k, 6) their motions for unit screws [R T] at the interface's point;
-        and (3,) [m] that point, None if unknown.
+        and (3,) [m] this point, None if unknown.
 
     Raises:
-        BadInput: there is no such node, a node lacks some of its six degrees of
+        BadInput: the node does not exist, a node lacks some of its six degrees of
             freedom, or the interface has no nodes.
     """
     row = {freedom: k for k, freedom in enumerate(matrix.freedoms)}
@@ -181,7 +181,7 @@ def _on(interface: Interface, places: NDArray) -> NDArray:
 def condensed(
     matrix: FileMatrix, ends: tuple[tuple[NDArray, NDArray], tuple[NDArray, NDArray]]
 ) -> tuple[NDArray, NDArray]:
-    """Condense a matrix onto two interfaces; all other degrees of freedom are unloaded.
+    """Condense a matrix onto two interfaces; other degrees of freedom are unloaded.
 
     Args:
         matrix: (n, n) stiffness matrix.
@@ -192,7 +192,7 @@ def condensed(
         the interfaces.
 
     Raises:
-        BadInput: the interfaces share rows, or other degrees of freedom are not
+        BadInput: the interfaces share rows, or some degrees of freedom are not
             connected to them.
     """
     from forcefit.stiffness.fem.sparse_solver import solve
@@ -225,6 +225,6 @@ def condensed(
                 f"{matrix.file}: found a singular stiffness between the "
                 "interfaces; expected a body in one piece that connects them"
             )
-    # from the energy of the displacement fields, in which solution errors enter squared
+    # computed from the energy of the fields, in which solution errors enter squared
     K12 = fields.T @ (K @ fields)
     return (K12 + K12.T) / 2, fields

@@ -1,4 +1,4 @@
-"""``forcefit stiffness convert``: a link as a matrix of two nodes, base and tip."""
+"""``forcefit stiffness convert``: export of a link as a matrix of two nodes."""
 
 import io
 import json
@@ -19,7 +19,7 @@ _FEM = [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]
 
 
 def read_link_results(path: Path | str) -> tuple[NDArray, NDArray]:
-    """Read K_E and the vector from tip to base from a link's ``--json`` results.
+    """Read K_E and the vector from tip to base from the ``--json`` results of a link.
 
     Args:
         path: the JSON file.
@@ -43,7 +43,7 @@ def read_link_results(path: Path | str) -> tuple[NDArray, NDArray]:
         ) from None
     if K.shape != (6, 6) or offset.shape != (3,) or not np.isfinite(K).all():
         raise BadInput(f"{path}: stiffness: expected 6 rows of 6 finite numbers")
-    # products of these numbers must not overflow
+    # products of the numbers must not overflow
     if not max(np.abs(K).max(), np.abs(offset).max()) < 1e100:
         raise BadInput(
             f"{path}: found numbers above 1e100, expected the stiffness of a "
@@ -55,17 +55,18 @@ def read_link_results(path: Path | str) -> tuple[NDArray, NDArray]:
 def link_file(
     stiffness: NDArray, base_from_tip: NDArray, to: str, unit: str = "m"
 ) -> bytes:
-    """Return the text of a file in the format of another program.
+    """Format a link as a file for another program.
 
     Args:
         stiffness: (6, 6) K_E at the tip, in SI units, rotations first.
         base_from_tip: (3,) [m] vector from tip to base.
         to: name of the format, one of ``FORMATS``.
-        unit: unit of lengths in the file; forces are in N, rotations in rad.
+        unit: unit of length in the file; forces are in N, rotations in rad.
 
     Returns:
-        The text, with translations first at each node; for ``exudyn``, ``adams`` and
-        ``mapdl`` the result of :func:`forcefit.stiffness.report.export.stiffness_for`.
+        The text, with translations before rotations at each node; for ``exudyn``,
+        ``adams`` and ``mapdl``, the result of
+        :func:`forcefit.stiffness.report.export.stiffness_for`.
 
     Raises:
         BadInput: the format or unit is unknown, or the format requires metres.
@@ -94,19 +95,19 @@ def link_file(
 
 
 def _lower(K: NDArray) -> list[tuple[int, int, float]]:
-    """Return row, column and value of the lower half's entries, column by column."""
+    """Return row, column and value of all entries in the lower half, by column."""
     return [(i, j, float(K[i, j])) for j in range(12) for i in range(j, 12)]
 
 
 def _matrix_market(K: NDArray) -> str:
-    """Return the text of a symmetric Matrix Market file."""
+    """Format a symmetric Matrix Market file."""
     rows = [f"{i + 1} {j + 1} {v!r}" for i, j, v in _lower(K)]
     head = "%%MatrixMarket matrix coordinate real symmetric\n% X Y Z RX RY RZ, twice"
     return "\n".join([head, f"12 12 {len(rows)}", *rows]) + "\n"
 
 
 def _user_element(K: NDArray) -> str:
-    """Return the text of an Abaqus ``*USER ELEMENT``, with four numbers in a line."""
+    """Format an Abaqus ``*USER ELEMENT``, with four numbers per line."""
     lines = ["*USER ELEMENT,NODES=2,LINEAR", "** ELEMENT NODES", "** 1, 2",
              "1, 2, 3, 4, 5, 6", "*MATRIX,TYPE=STIFFNESS"]  # fmt: skip
     for i in range(12):
@@ -116,7 +117,7 @@ def _user_element(K: NDArray) -> str:
 
 
 def _five_columns(K: NDArray) -> str:
-    """Return lines that contain node, direction, node, direction and value."""
+    """Format lines of node, direction, node, direction and value."""
     return "".join(
         f"{i // 6 + 1},{i % 6 + 1},{j // 6 + 1},{j % 6 + 1},{v!r}\n"
         for i, j, v in _lower(K)
@@ -124,7 +125,7 @@ def _five_columns(K: NDArray) -> str:
 
 
 def _dmig(K: NDArray) -> str:
-    """Return the text of a Nastran DMIG (form 6, symmetric) in large fields."""
+    """Format a Nastran DMIG (form 6, symmetric) in large fields."""
     lines = ["DMIG    K2GG           0       6       2       0"]
     for j in range(12):
         lines.append(f"DMIG*   {'K2GG':16}{j // 6 + 1:16}{j % 6 + 1:16}")

@@ -1,4 +1,4 @@
-"""``forcefit stiffness convert``: K_E of a link from matrices of another program."""
+"""``forcefit stiffness convert``: import of K_E from matrices of other programs."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -30,17 +30,17 @@ def import_link(
     unit: str = "m",
     order: str = ORDERS[0],
 ) -> LinkStiffness:
-    """Import a link from a stiffness matrix of 6, 12 or more degrees of freedom.
+    """Import a link from a stiffness matrix with 6, 12 or more degrees of freedom.
 
     Args:
         path: file of the stiffness matrix, see
             :mod:`forcefit.stiffness.exchange.matrix_file`.
-        mass: file of the mass matrix for the same degrees of freedom, or None.
-        nodes: file with the positions of nodes, required for interfaces of several
-            nodes.  Its node order applies to rows that the matrix file does not name.
+        mass: file of the mass matrix for the same degrees of freedom; None if unknown.
+        nodes: file with node positions, required for interfaces with several nodes. Its
+            node order applies to rows that the matrix file does not name.
         base: held node, or held interface such as ``"z=0"`` [m].
-        tip: node or interface at which the screw is read.
-        unit: unit of lengths in all files; forces are in N, rotations in rad.
+        tip: node or interface to which the screw refers.
+        unit: unit of length in all files; forces are in N, rotations in rad.
         order: order of the six degrees of freedom of a node, if the file does not name
             them.
 
@@ -91,7 +91,7 @@ def import_link(
             f"{mass}: found nodes or directions that {path} does not have, or too "
             "few; expected the same in both files"
         )
-    # a file that names its degrees of freedom omits those without mass
+    # a file that names degrees of freedom omits those without mass
     moved = fields[[row[freedom] for freedom in heavy.freedoms]]
     M12 = moved.T @ (heavy.matrix @ moved)
     kilograms, centre, inertia = mass_of_both_ends(M12, link.base - link.tip)
@@ -103,7 +103,7 @@ def import_link(
 def _ends(
     matrix: FileMatrix, base: str, tip: str, places: Mapping[int, NDArray] | None
 ) -> list[tuple[NDArray, NDArray, NDArray | None]]:
-    """Return the rows, the motions and the points of base and tip."""
+    """Find the rows, the motions and the points of base and tip."""
     return [
         interface_rows(matrix, asked, option, places)
         for asked, option in ((base, "--base"), (tip, "--tip"))
@@ -111,7 +111,7 @@ def _ends(
 
 
 def reordered(matrix: FileMatrix, order: str) -> FileMatrix:
-    """Return the matrix with its degrees of freedom in the stated order."""
+    """Reorder the degrees of freedom of a matrix as stated."""
     if matrix.named or order == ORDERS[0]:
         return matrix
     freedoms = tuple((node, (d + 2) % 6 + 1) for node, d in matrix.freedoms)
@@ -122,13 +122,13 @@ def in_metres(matrix: FileMatrix, length: float) -> FileMatrix:
     """Convert a matrix to translations in metres and energies in joules.
 
     Args:
-        matrix: matrix with forces in N, rotations in rad and translations in
+        matrix: matrix with forces in N, rotations in rad and translations in units of
             ``length``.
-        length: [m] unit of length of the matrix.
+        length: [m] unit of length in the matrix.
 
     Returns:
-        The matrix in SI units.  The unit of a mass matrix must be consistent, for
-        example tonnes with mm, N and s.
+        The matrix in SI units. Masses must be in consistent units, for example tonnes
+        with mm, N and s.
     """
     turns = np.array([direction > 3 for _, direction in matrix.freedoms])
     scale = np.where(turns, 1.0, 1.0 / length)

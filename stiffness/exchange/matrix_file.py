@@ -1,4 +1,4 @@
-"""Reader of matrices of other programs, with the degrees of freedom of their rows.
+"""Reader of matrices from other programs, with the degrees of freedom of their rows.
 
 =================  ===============================================================
 file               written by
@@ -54,7 +54,7 @@ class FileMatrix:
 
     Attributes:
         file: name of the file, for messages.
-        matrix: (n, n) matrix with both halves.
+        matrix: (n, n) matrix, both halves.
         freedoms: node and direction of each row; directions 1 to 3 are translations,
             and 4 to 6 are rotations.
         named: whether the file states the degree of freedom of each row.
@@ -72,19 +72,19 @@ def read_matrix(
     nodes: Sequence[int] | None = None,
     mapped: Path | str | None = None,
 ) -> FileMatrix:
-    """Read a matrix from a file whose format is recognised by its content.
+    """Read a matrix from a file, whose format is recognised from its content.
 
     Args:
         path: file of the matrix.
-        which: ``"stiffness"`` or ``"mass"``, for a file that contains both.
-        nodes: order of the nodes for rows that the file does not name; None for 1, 2,
-            and so on.
+        which: ``"stiffness"`` or ``"mass"``, for files that contain both.
+        nodes: node order for rows that the file does not name; None for 1, 2, and so
+            on.
         mapped: file of a matrix with the same rows; its ``.mapping`` is used if this
             matrix has none.
 
     Returns:
-        The matrix.  Unnamed rows are assigned to the ``nodes`` in their order: three
-        rows for each node, as for solids, if the number agrees, and otherwise six.
+        The matrix. Unnamed rows are assigned to the ``nodes`` in order: three rows per
+        node, as for solids, if the number of rows agrees, otherwise six.
 
     Raises:
         BadInput: the format is unknown; the matrix is not square, finite and
@@ -120,7 +120,7 @@ def read_matrix(
 
 
 def _mapped(path: Path, n: int) -> list[Freedom]:
-    """Return the degrees of freedom of n rows from the mapping file."""
+    """Read the degrees of freedom of n rows from the mapping file."""
     given = read_mapping(path)
     freedoms: list[Freedom] = []
     each = n // len(given)
@@ -143,7 +143,7 @@ def _checked(
     freedoms: list[Freedom] | None,
     nodes: Sequence[int] | None,
 ) -> FileMatrix:
-    """Return the matrix after checking that it is square, finite and symmetric."""
+    """Check that a matrix is square, finite and symmetric; return it symmetrised."""
     n = matrix.shape[0]
     if matrix.shape != (n, n) or not n:
         raise BadInput(
@@ -169,7 +169,7 @@ def _checked(
 
 
 def _in_order(path: Path, n: int, nodes: Sequence[int] | None) -> list[Freedom]:
-    """Return the degrees of freedom of n unnamed rows, three or six for each node."""
+    """Assign degrees of freedom to n unnamed rows, three or six per node."""
     numbers = range(1, n // 6 + 1) if nodes is None else nodes
     for each in (3, 6):
         if n == each * len(numbers):
@@ -184,7 +184,7 @@ def _in_order(path: Path, n: int, nodes: Sequence[int] | None) -> list[Freedom]:
 
 
 def _numpy(path: Path) -> csr_array:
-    """Read a matrix from ``.npy`` or a sparse ``.npz``; refuse pickled data."""
+    """Read a matrix from ``.npy`` or a sparse ``.npz``; reject pickled data."""
     from scipy.sparse import load_npz
 
     try:
@@ -312,7 +312,7 @@ def _named_by(path: Path, n: int) -> list[Freedom]:
 def _from_entries(
     path: Path, entries: dict[tuple[Freedom, Freedom], float]
 ) -> tuple[csr_array, list[Freedom]]:
-    """Return a matrix from entries that describe one half or both halves."""
+    """Build a matrix from entries of one half or both halves."""
     freedoms = sorted({freedom for pair in entries for freedom in pair})
     if not freedoms or len(freedoms) > LARGEST:
         raise BadInput(f"{path}: found no entries of a matrix")
@@ -323,7 +323,7 @@ def _from_entries(
 def _of_rows(
     entries: Mapping[tuple[Any, Any], float], row: Mapping[Any, int]
 ) -> csr_array:
-    """Return a matrix from entries whose rows and columns name degrees of freedom."""
+    """Build a matrix from entries with named degrees of freedom of row and column."""
     # a missing half is the transpose of the other half
     whole = {**{(b, a): v for (a, b), v in entries.items()}, **entries}
     i, j = [row[a] for a, _ in whole], [row[b] for _, b in whole]

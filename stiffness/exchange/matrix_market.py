@@ -1,4 +1,4 @@
-"""Reader of Matrix Market files: sparse or full, real, square matrices.
+"""Reader of Matrix Market files with real square matrices, sparse or full.
 
 Sources:
     Boisvert, Pozo, Remington (1996), The Matrix Market exchange formats, NISTIR 5935.
@@ -24,9 +24,9 @@ _MARKET = (
 def matrix_market(path: Path, text: str) -> csr_array:
     """Read a square matrix from the text of a Matrix Market file.
 
-    SciPy 1.17 is not used for reading, because it reads 4D3 as 4, and the entry
-    "2 1.5 1" as 0.5 in column 1, without raising an error.  Checking every line before
-    SciPy reads the file would take as long as this function.
+    SciPy 1.17 is not used, because it silently reads 4D3 as 4, and the entry "2 1.5 1"
+    as 0.5 in column 1. Checking every line beforehand would take as long as this
+    function.
 
     Args:
         path: path of the file, for error messages.
@@ -36,8 +36,8 @@ def matrix_market(path: Path, text: str) -> csr_array:
         (n, n) matrix; a missing half is the transpose of the other half.
 
     Raises:
-        BadInput: the file is of a different type, or its length does not agree with its
-            header.
+        BadInput: the file is of a different type, or its length is inconsistent with
+            its header.
     """
     head, *lines = text.split("\n")
     words = tuple(head.lower().split()[1:])
@@ -81,7 +81,7 @@ def matrix_market(path: Path, text: str) -> csr_array:
 
 
 def _numbers(path: Path, lines: list[str]) -> NDArray:
-    """Return all numbers of the lines."""
+    """Parse all numbers in the lines."""
     words = [word for line in lines for word in line.split()]
     try:
         return np.array(words, dtype=float)
@@ -90,7 +90,7 @@ def _numbers(path: Path, lines: list[str]) -> NDArray:
 
 
 def _size(path: Path, sizes: NDArray) -> int:
-    """Return the number of rows of a square matrix from the line of sizes."""
+    """Parse the number of rows of a square matrix from the line of sizes."""
     rows, columns = (*sizes.tolist(), 0.0, 0.0)[:2]
     if not rows == columns == round(min(rows, 2.0 * LARGEST)) > 0 or rows > LARGEST:
         raise BadInput(

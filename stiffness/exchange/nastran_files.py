@@ -1,8 +1,7 @@
-"""Nastran's bulk data: the fields of a line, and matrices given by ``DMIG``.
+"""Nastran bulk data: the fields of a line, and matrices given by ``DMIG``.
 
-A field has eight characters, or sixteen if the first field ends with ``*``.
-Alternatively, fields are separated by commas or blanks.  A line with commas may have
-more than eight fields.
+Fields have eight characters, or sixteen if the first field ends with ``*``, or are
+separated by commas or blanks. A line with commas may have more than eight fields.
 
 Sources:
     MSC Nastran Quick Reference Guide: Bulk Data, free and fixed fields; DMIG (form 6
@@ -27,15 +26,15 @@ _WHAT = {"K": "stiffness", "M": "mass", "K4": "structural damping",
 
 
 def bulk_fields(line: str) -> tuple[str, list[str]]:
-    """Return the fields of a line of bulk data.
+    """Split a line of bulk data into fields.
 
     Args:
         line: line whose fields have a fixed width, or are separated by commas or
         blanks.
 
     Returns:
-        The first field in capitals, including ``*``, and the other fields: four or
-        eight if the width is fixed, otherwise all.
+        The first field in capitals, including ``*``, and the remaining fields: four or
+        eight of fixed width, otherwise all.
     """
     if "," in line:
         head, *fields = [word.strip() for word in line.split(",")]
@@ -44,13 +43,13 @@ def bulk_fields(line: str) -> tuple[str, list[str]]:
     width = 16 if "*" in head else 8
     fields = [line[k : k + width].strip() for k in range(8, 72, width)]
     if any(re.search(r"\s", field) for field in (head, *fields)):
-        # a field of fixed width contains no blank between characters
+        # a fixed-width field contains no blank between characters
         head, *fields = line.split()
     return head.upper(), fields
 
 
 def dmig_entries(path: Path | str, text: str, which: str) -> Entries:
-    """Return the entries of the stiffness or mass matrix in a file.
+    """Read the entries of the stiffness or mass matrix in a file.
 
     Args:
         path: path of the file, for error messages.
@@ -58,11 +57,11 @@ def dmig_entries(path: Path | str, text: str, which: str) -> Entries:
         which: ``"stiffness"`` or ``"mass"``.
 
     Returns:
-        Value for each pair of degrees of freedom (row, column), of one or both halves.
+        Value by pair of degrees of freedom (row, column), for one half or both.
 
     Raises:
-        BadInput: the file contains no or several matrices of this kind, or the matrix
-            is not square and real.
+        BadInput: the file does not contain exactly one matrix of this kind, or the
+            matrix is not square and real.
     """
     matrices: dict[str, Entries] = {}
     forms: dict[str, str] = {}
@@ -96,14 +95,14 @@ def dmig_entries(path: Path | str, text: str, which: str) -> Entries:
 def _terms(
     path: Path | str, fields: list[str], packed: bool
 ) -> list[tuple[Freedom, float]]:
-    """Return the rows and values of the terms of a column.
+    """Parse rows and values from the terms of a column.
 
     A term consists of node, direction, real part and imaginary part.
 
     Args:
         path: path of the file, for error messages.
         fields: fields of a line after the fields that name the column.
-        packed: whether fields are separated by blanks; then no field is empty, and
+        packed: whether fields are separated by blanks, so that no field is empty and
             imaginary parts are absent.
 
     Returns:
@@ -140,7 +139,7 @@ def _terms(
 def _chosen(
     path: Path | str, names: Iterable[str], forms: Mapping[str, str], which: str
 ) -> str:
-    """Return the name of the stiffness or mass matrix, which must be the only one."""
+    """Return the name of the stiffness or mass matrix, of which only one may exist."""
     names = list(names)
     initial = {kind: letter for letter, kind in _WHAT.items()}[which]
     found = [name for name in names if forms.get(name, "") in {"1", "6", ""}]
@@ -160,6 +159,6 @@ def _chosen(
 
 
 def _kind(name: str) -> str | None:
-    """Return the kind of a matrix from its Nastran name, or None if it is unknown."""
+    """Return the kind of a matrix from its Nastran name, or None if unknown."""
     match = _OWN_NAME.fullmatch(name)
     return _WHAT[match[1]] if match else None

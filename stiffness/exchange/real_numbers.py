@@ -1,4 +1,4 @@
-"""Reader of numbers written by Fortran, whose exponents may have a D or no letter."""
+"""Reader of numbers written by Fortran, with a D or no letter before the exponent."""
 
 import re
 from pathlib import Path
@@ -9,7 +9,7 @@ _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]?\d+))?")
 
 
 def real(path: Path | str, word: str) -> float:
-    """Convert a number from a file, as written by Fortran, to a float.
+    """Convert a number written by Fortran to a float.
 
     Args:
         path: path of the file, for error messages.

@@ -16,20 +16,20 @@ from forcefit.inputs.errors import BadInput
 from forcefit.stiffness.link import LinkStiffness, check_definite, inverted
 from forcefit.stiffness.screws import screw_map, skew
 
-# residual wrench due to numbers with seven digits, relative to the scale of K12
+# residual wrench caused by numbers with seven digits, relative to the scale of K12
 _BALANCED = 1e-5
 _FARTHEST = 1e6  # [m] largest accepted distance between base and tip
 
 
 def both_ends(stiffness: ArrayLike, base_from_tip: ArrayLike) -> NDArray:
-    """Compute the matrix K12 of a link from its K_E.
+    """Compute the matrix K12 of a link from K_E.
 
     Args:
         stiffness: (6, 6) K_E at the tip.
         base_from_tip: (3,) [m] vector from tip to base.
 
     Returns:
-        (12, 12) matrix K12, base before tip, with rotations first at each.
+        (12, 12) matrix K12, base before tip, with rotations before translations.
     """
     K = np.asarray(stiffness, dtype=float)
     X = screw_map(base_from_tip)
@@ -43,20 +43,20 @@ def link_of_both_ends(
     base: ArrayLike | None = None,
     tip: ArrayLike | None = None,
 ) -> LinkStiffness:
-    """Return the link that a matrix of two interfaces describes.
+    """Build the link described by a matrix of two interfaces.
 
     Args:
         K12: (12, 12) matrix in SI units, rotations first at each interface.
         who: name of the file, for messages.
         base: (3,) [m] point of the base; None to compute it from the matrix.
-        tip: (3,) [m] point of the tip; ``base`` and ``tip`` are given together or not.
+        tip: (3,) [m] point of the tip; give both ``base`` and ``tip``, or neither.
 
     Returns:
-        The link; if the points are unknown, the tip is placed at the origin.
+        The link, with its tip at the origin if the points are unknown.
 
     Raises:
-        BadInput: K_E is not a stiffness, or the body is held elsewhere, so that the
-            matrix resists rigid motions.
+        BadInput: K_E is not a stiffness, or the matrix resists rigid motions because
+            the body is held elsewhere.
     """
     K12 = np.asarray(K12, dtype=float)
     K = K12[6:, 6:]
@@ -111,7 +111,7 @@ def mass_of_both_ends(
     mass = float(np.trace(M[3:, 3:]) / 3)
     if not mass > 0:
         raise BadInput(f"the mass matrix: found a mass of {mass:g} kg, expected > 0")
-    # from v = t + w x c: the block below the diagonal is -m [c]x
+    # v = t + w x c, so the block below the diagonal is -m [c]x
     arm = -M[3:, :3] / mass
     centre = np.array([arm[2, 1] - arm[1, 2], arm[0, 2] - arm[2, 0],
                        arm[1, 0] - arm[0, 1]]) / 2  # fmt: skip

@@ -1,4 +1,4 @@
-"""K_E from tetrahedra: elements, condensation, error estimate and stress.
+"""K_E by finite elements: tetrahedra, condensation, error estimate and stress.
 
 Start with ``fea.py``, which refines the mesh until the estimated error is small enough.
 """

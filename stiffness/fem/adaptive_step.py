@@ -1,11 +1,11 @@
 """One step of adaptive refinement: solve, estimate the error, mark, refine.
 
 The error indicator (:mod:`forcefit.stiffness.fem.error_indicator`) is multiplied by an
-effectivity index.  This is the change of the stiffness in the last refinement, divided
+effectivity index, which is the change of the stiffness in the last refinement divided
 by the change of the indicator.
 
-K_h is an upper bound of the exact stiffness K, and the estimate E bounds the
-difference. K therefore lies between K_h - E and K_h.  The middle of this interval is
+K_h is an upper bound on the exact stiffness K, and the estimate E bounds the
+difference, so K lies between K_h - E and K_h. The midpoint of this interval is
 returned, because its error is at most half of E on the same mesh.
 """
 
@@ -44,8 +44,8 @@ from forcefit.stiffness.mesh.refine import refine
 from forcefit.stiffness.mesh.regions import is_jagged
 from forcefit.stiffness.mesh.solid import Solid
 
-# Effectivity index assumed on the first mesh, where it cannot be computed.  It was
-# measured as 0.6 to 1.1 on the training parts of
+# Effectivity index assumed on the first mesh, where it cannot be computed. Measured
+# values range from 0.6 to 1.1 on the training parts of
 # benchmarks/evidence/stiffness_random_parts.py.
 DEFAULT_EFFECTIVITY = 2.0
 SAFETY_FACTOR = 1.3
@@ -53,16 +53,16 @@ SAFETY_FACTOR = 1.3
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """The solution on one mesh.
+    """Solution on one mesh.
 
     Attributes:
         solid: solid of straight tetrahedra.
-        mesh: cubic elements; along singular edges they are parts of the tetrahedra.
+        mesh: cubic elements, which are parts of the tetrahedra along singular edges.
         material: (t, 3) lambda [Pa], mu [Pa], density [kg/m^3] of each element.
         solution: condensed stiffness and fields.
         errors: (s, 6, 6) local error indicators: contribution of each tetrahedron of
             the solid to K_h - K, before multiplication by the effectivity index.
-        geometry_errors: (s, 6, 6) local errors due to the geometry of curved elements.
+        geometry_errors: (s, 6, 6) local geometry errors of curved elements.
         volume_error: [1] relative difference of the volumes of elements and part.
     """
 
@@ -90,15 +90,15 @@ def solve_level(
     interface: str,
     check: Callable[[int], None] | None = None,
 ) -> Level:
-    """Return the stiffness, fields and local error indicators of one mesh.
+    """Compute the stiffness, fields and local error indicators on one mesh.
 
     Args:
-        solid: straight tetrahedra; tetrahedra that would be inverted when curved, or
-            that touch two singular edges, are bisected first.
+        solid: straight tetrahedra, of which those that would be inverted when curved,
+            or that touch two singular edges, are bisected first.
         materials: materials; the first fills the link, later ones fill their regions.
         centers: (2, 3) [m] centres of base and tip.
         interface: kind of the interfaces, one of ``KINDS``.
-        check: function that is called with the number of unknowns before the solution.
+        check: callback that receives the number of unknowns before the solution.
 
     Returns:
         The solution on cubic elements with a layer along the singular edges.
@@ -123,15 +123,14 @@ def solve_level(
     indicated = error_matrices(
         mesh, solution.fields, lam, mu, singular, solution.stiffness
     )
-    # at singular edges s_3 is reliable, but tractions overestimate the error by a
-    # factor 2
+    # at singular edges s_3 is reliable, whereas tractions overestimate the error by a
+    # factor of 2
     free = np.flatnonzero((mesh.patch > max(ENDS)) & ~singular[mesh.owner])
     residual = np.zeros_like(indicated)
     tractions = traction_errors(mesh, solution.fields, lam, mu, free)
     np.add.at(residual, mesh.owner[free], tractions)
     sizes = 1 / np.diag(solution.stiffness)
-    # two indicators, inside and at the surface, estimate the same error; the larger is
-    # used
+    # two indicators, inside and at the surface, estimate the same error; use the larger
     larger = np.einsum("tii,i->t", residual - indicated, sizes) > 0
     indicated[larger] = residual[larger]
     errors, geometry = np.zeros((2, len(solid.cells), 6, 6))
@@ -152,16 +151,16 @@ def solve_level(
 def estimated_error(
     history: Sequence[tuple[NDArray, NDArray, NDArray]],
 ) -> tuple[NDArray, float]:
-    """Return the estimated error of the stiffness on the last mesh.
+    """Estimate the error of the stiffness on the last mesh.
 
     Args:
         history: totals of the :class:`Level` of each mesh, finest last.
 
     Returns:
-        (6, 6) estimate of K_h minus the exact stiffness, without the error of the
-        geometry, and the effectivity index of the worst motion.  The index is the
-        change of the stiffness in the last refinement over the change of the indicated
-        error, times a safety factor.
+        (6, 6) estimate of K_h minus the exact stiffness, without the geometry error,
+        and the effectivity index of the worst motion. The index is the change of the
+        stiffness in the last refinement divided by the change of the indicated error,
+        times a safety factor.
     """
     K, indicated, _ = history[-1]
     factors = np.full(6, DEFAULT_EFFECTIVITY)
@@ -171,7 +170,7 @@ def estimated_error(
         effectivity = np.full(6, DEFAULT_EFFECTIVITY)
         np.divide(np.diag(coarse - K), drop, out=effectivity, where=drop > 0)
         factors = SAFETY_FACTOR * np.clip(effectivity, 1.0, 2 * DEFAULT_EFFECTIVITY)
-    # one index for each motion, because errors in torsion and bending are at different
+    # one index per motion, because errors in torsion and in bending occur at different
     # places
     root = np.sqrt(factors)
     estimate = np.outer(root, root) * indicated
@@ -182,21 +181,20 @@ def estimated_error(
 def middle_stiffness(
     K_h: NDArray, E: NDArray, geometry: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return the middle of the interval in which the exact stiffness lies.
+    """Return the midpoint of the interval that contains the exact stiffness.
 
     Args:
-        K_h: (6, 6) stiffness of a mesh, an upper bound except for the error of the
-            geometry.
+        K_h: (6, 6) stiffness of a mesh, an upper bound except for the geometry error.
         E: (6, 6) estimate of the error of K_h, positive semidefinite.
-        geometry: (6, 6) indicated error of the geometry, of either sign.
+        geometry: (6, 6) indicated geometry error, of either sign.
 
     Returns:
-        (6, 6) stiffness K_h - E / 2, and (6, 6) the magnitude of its error.  If less
-        than half of K_h would remain for a motion, less of E is subtracted there.
+        (6, 6) stiffness K_h - E / 2, and (6, 6) magnitude of its error. If less than
+        half of K_h would remain for a motion, a smaller part of E is subtracted there.
     """
     largest = eigh(scaled(E, K_h), scaled(K_h, K_h), eigvals_only=True)[-1]
     part = 0.5 / max(1.0, largest)
-    # geometry errors of either sign may cancel in K, but not in the estimate
+    # geometry errors of opposite sign may cancel in K, but not in the estimate
     return K_h - part * E, (1 - part) * E + np.abs(geometry)
 
 
@@ -205,8 +203,8 @@ def refine_level(level: Level, growth: float) -> Solid:
 
     Args:
         level: the mesh to refine.
-        growth: factor on the number of elements that are selected.  Neighbours must
-            also be bisected for a conforming mesh; the total factor is about growth^2.
+        growth: factor on the number of selected elements. A conforming mesh requires
+            that neighbours are bisected too, so the total factor is about growth^2.
 
     Returns:
         The finer mesh.
@@ -219,8 +217,8 @@ def refine_level(level: Level, growth: float) -> Solid:
     shares = np.maximum(shares, 1e-12 * shares.max())
 
     def halvings(limit: float) -> NDArray:
-        # the error of an element decreases as h^4 to h^7, at least by 2^1.5 in each
-        # bisection
+        # the error of an element decreases as h^4 to h^7, and thus by at least 2^1.5
+        # per bisection
         return np.clip(np.round(np.log2(shares) / 1.5 - limit), 0, 6).astype(int)
 
     low, high = -200.0, 200.0

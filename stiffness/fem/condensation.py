@@ -1,14 +1,15 @@
 """Static condensation of a solid onto two interfaces of six degrees of freedom each.
 
-The kind of the interfaces states how a joint is coupled to the surface:
+The interface kind determines how a joint is coupled to the surface:
 
-- ``rigid`` (RBE2): all nodes of an interface move with the joint as a rigid body, as
-  if the interface were bolted to a much stiffer part. - ``distributing`` (RBE3): the
-  base is rigid.  The wrench at the tip is distributed over the interface as tractions
-  that vary linearly.  This interface can deform.  The screw of the tip is the mean
-  motion of the interface: the rigid motion that fits the displacements best, by least
-  squares over the area. - ``distributing-both``: both interfaces are distributing, so
-  that the stiffness does not depend on which end is the tip.
+- ``rigid`` (RBE2): all nodes of an interface move with the joint as a rigid body, as if
+  the interface were bolted to a much stiffer part.
+- ``distributing`` (RBE3): the base is rigid, while the wrench at the tip is distributed
+  over the interface as tractions that vary linearly.  The tip interface can deform.
+  Its screw is the mean motion of the interface, which is the rigid motion that fits the
+  displacements best in the least-squares sense over the area.
+- ``distributing-both``: both interfaces are distributing, so the stiffness does not
+  depend on which end is the tip.
 
 Each kind is more compliant than the previous one.
 """
@@ -29,12 +30,12 @@ KINDS = ("rigid", "distributing", "distributing-both")
 
 @dataclass(frozen=True, eq=False)
 class Condensed:
-    """The stiffness of a link on one mesh, with its displacement fields.
+    """Stiffness of a link on one mesh, with its displacement fields.
 
     Attributes:
         stiffness: (6, 6) stiffness at the tip's centre, with the base held.
         fields: (n, 3, 6) [m] displacements for unit screws of the tip.
-        unknowns: number of unknowns of the solved system.
+        unknowns: number of unknowns in the solved system.
         kind: kind of the interfaces, one of ``KINDS``.
     """
 
@@ -72,7 +73,7 @@ def condense(
 
 
 def rigid_motions(points: NDArray, center: NDArray) -> NDArray:
-    """Return the displacements of points for unit screws read at a centre.
+    """Return the displacements of points for unit screws about a centre.
 
     Args:
         points: (n, 3) [m] points.
@@ -86,12 +87,12 @@ def rigid_motions(points: NDArray, center: NDArray) -> NDArray:
 
 
 def _product(upper: csr_array, fields: NDArray) -> NDArray:
-    """Return the product of K and displacement fields from the upper triangle of K."""
+    """Multiply K, given by its upper triangle, by displacement fields."""
     return upper @ fields + upper.T @ fields - upper.diagonal()[:, None] * fields
 
 
 def _rigid(mesh: Elements, upper: csr_array, tip_center: NDArray) -> Condensed:
-    """Return the solution for fixed base nodes and tip nodes moved by unit screws."""
+    """Solve for fixed base nodes, with tip nodes moved by unit screws."""
     fields = np.zeros((len(mesh.nodes), 3, 6))
     base = np.unique(mesh.faces[mesh.patch == 0])
     tip = np.unique(mesh.faces[mesh.patch == 1])
@@ -102,7 +103,7 @@ def _rigid(mesh: Elements, upper: csr_array, tip_center: NDArray) -> Condensed:
     flat = fields.reshape(-1, 6)
     loads = -_product(upper, flat)[free]
     flat[free] = solve(upper[free][:, free], loads)
-    # from the energy of the displacement fields, in which solution errors enter squared
+    # computed from the energy of the fields, in which solution errors enter squared
     K = flat.T @ _product(upper, flat)
     return Condensed((K + K.T) / 2, fields, int(free.sum()))
 
@@ -110,7 +111,7 @@ def _rigid(mesh: Elements, upper: csr_array, tip_center: NDArray) -> Condensed:
 def _distributing_tip(
     mesh: Elements, upper: csr_array, tip_center: NDArray
 ) -> Condensed:
-    """Return the solution for fixed base nodes and wrenches spread over the tip."""
+    """Solve for fixed base nodes, with wrenches distributed over the tip."""
     flat = _distributed_loads(mesh, 1, tip_center).reshape(-1, 6)
     free = np.ones(len(mesh.nodes), dtype=bool)
     free[np.unique(mesh.faces[mesh.patch == 0])] = False
@@ -119,7 +120,7 @@ def _distributing_tip(
 
 
 def _distributing_both(mesh: Elements, upper: csr_array, centers: NDArray) -> Condensed:
-    """Return the solution for wrenches distributed over the tip and over the base."""
+    """Solve for wrenches distributed over the tip and over the base."""
     base, tip = (_distributed_loads(mesh, k, centers[k]) for k in (0, 1))
     # unit wrenches at the tip and their reactions at the base
     to_base = screw_map(centers[0] - centers[1])
@@ -128,13 +129,12 @@ def _distributing_both(mesh: Elements, upper: csr_array, centers: NDArray) -> Co
     supports = _isostatic_supports(mesh)
     free = np.ones(len(flat), dtype=bool)
     free[supports] = False
-    # motion of the tip relative to the mean motion of the base; the supports carry no
-    # load
+    # motion of the tip relative to the mean motion of the base, with unloaded supports
     return _from_loads(upper, flat, free)
 
 
 def _from_loads(upper: csr_array, loads: NDArray, free: NDArray) -> Condensed:
-    """Return the stiffness from the work of six load cases on their displacements."""
+    """Compute the stiffness from the work of six load cases on their displacements."""
     u = np.zeros_like(loads)
     u[free] = solve(upper[free][:, free], loads[free])
     C = loads.T @ u
@@ -144,7 +144,7 @@ def _from_loads(upper: csr_array, loads: NDArray, free: NDArray) -> Condensed:
 
 
 def _distributed_loads(mesh: Elements, patch: int, center: NDArray) -> NDArray:
-    """Return (n, 3, 6) nodal loads of unit wrenches; transposed: mean motions."""
+    """Return (n, 3, 6) nodal loads of unit wrenches; transposed, mean motions."""
     faces = mesh.faces[mesh.patch == patch]
     nodes, index = np.unique(faces, return_inverse=True)
     index = index.reshape(faces.shape)
@@ -161,7 +161,7 @@ def _distributed_loads(mesh: Elements, patch: int, center: NDArray) -> NDArray:
 
 
 def _isostatic_supports(mesh: Elements) -> NDArray:
-    """Return the (6,) fixed unknowns of an isostatic support at three distant nodes."""
+    """Return the (6,) unknowns fixed by an isostatic support at three distant nodes."""
     points = mesh.nodes
     first = int(np.argmin(points @ [1.0, 0.3, 0.1]))
     apart = np.linalg.norm(points - points[first], axis=1)

@@ -10,10 +10,10 @@ w      quadrature weights times the Jacobian's determinant        (t, q)
 
 The m nodes of an element are those of its lattice
 (:mod:`forcefit.stiffness.mesh.lagrange`): 20 in a cubic tetrahedron, 10 in a quadratic
-one.  The stiffness is assembled from the scalar gradients of all elements together:
-K[ai, bj] = sum_q w (lam G_ai G_bj + mu G_aj G_bi + mu d_ij G_a . G_b).  This is much
-faster than the evaluation of a weak form. Straight tetrahedra are integrated exactly.
-For curved ones, the quadrature rule is exact for two additional degrees.
+one. The stiffness is assembled for all elements at once from scalar gradients: K[ai,
+bj] = sum_q w (lam G_ai G_bj + mu G_aj G_bi + mu d_ij G_a . G_b).  This is much faster
+than evaluating a weak form. Straight tetrahedra are integrated exactly; for curved
+ones, the quadrature rule is exact for two more degrees.
 """
 
 from collections.abc import Iterator
@@ -36,7 +36,8 @@ from forcefit.stiffness.mesh.lagrange import (
 from forcefit.stiffness.mesh.quadrature import quadrature
 from forcefit.stiffness.mesh.solid import Solid
 
-# cubic; for an error of 0.1 %, quadratic elements need several times as many unknowns
+# cubic, because quadratic elements require several times more unknowns for an error of
+# 0.1 %
 ORDER = 3
 # derivatives of the barycentric coordinates with respect to the reference coordinates
 _COORDINATES = np.vstack([-np.ones(3), np.eye(3)])
@@ -49,10 +50,10 @@ class Elements:
 
     Attributes:
         order: order of the polynomials, 2 or 3.
-        nodes: (n, 3) [m] nodes, corners first; boundary nodes lie on the exact shapes.
+        nodes: (n, 3) [m] nodes, corners first, with boundary nodes on the exact shapes.
         cells: (t, m) nodes of each tetrahedron.
         faces: (f, k) nodes of each boundary triangle.
-        patch: (f,) number of each face's patch; 0 is the base interface, 1 the tip.
+        patch: (f,) patch number of each face; 0 is the base interface, 1 the tip.
         owner: (f,) tetrahedron of each boundary triangle.
         curved: (t,) bool, True for a curved tetrahedron.
     """
@@ -89,12 +90,13 @@ class Chunk(NamedTuple):
 def isoparametric(
     solid: Solid, order: int = ORDER, parts: Parts | None = None
 ) -> Elements:
-    """Return isoparametric elements whose boundary nodes lie on the exact shapes.
+    """Create isoparametric elements with boundary nodes on the exact shapes.
 
     Args:
         solid: the straight tetrahedra.
         order: order of the polynomials, 2 or 3.
-        parts: pieces into which the tetrahedra are cut; each becomes an element.
+        parts: pieces into which the tetrahedra are cut, each of which becomes an
+            element.
 
     Returns:
         The elements.
@@ -103,8 +105,7 @@ def isoparametric(
     cells, count = numbered(parts.corners, order)
     nodes = np.zeros((count, 3))
     L = (lattice(order) / order) @ parts.places
-    # only a few different cuts occur, so all pieces with the same cut are treated
-    # together
+    # only a few different cuts occur, so pieces with the same cut are treated together
     cuts = parts.places.reshape(len(L), 16)
     _, first, cut = np.unique(cuts, axis=0, return_index=True, return_inverse=True)
     for k, example in enumerate(first):
@@ -158,7 +159,7 @@ def integration(mesh: Elements, some: NDArray | None = None) -> Iterator[Chunk]:
 
 
 def _chunks(members: NDArray, nodes: int) -> Iterator[NDArray]:
-    """Yield groups of elements whose matrices fit into the memory of a batch."""
+    """Yield groups of elements whose matrices fit into one batch of memory."""
     step = max(1, _CHUNK // (9 * nodes**2))
     for first in range(0, len(members), step):
         yield members[first : first + step]
@@ -167,7 +168,7 @@ def _chunks(members: NDArray, nodes: int) -> Iterator[NDArray]:
 def gradients_on_faces(
     mesh: Elements, faces: NDArray
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Return the points and weights for integrals of stresses over boundary triangles.
+    """Return quadrature data for integrals of stresses over boundary triangles.
 
     Args:
         mesh: the tetrahedra.
@@ -200,7 +201,7 @@ def gradients_on_faces(
 
 
 def _jacobians(dN: NDArray, corners: NDArray) -> NDArray:
-    """Return (c, q, 3, 3) derivatives of position by reference coordinates (axis 2)."""
+    """Return (c, q, 3, 3) derivatives of position by reference coordinate (axis 2)."""
     q, m, _ = dN.shape
     flat = dN.transpose(0, 2, 1).reshape(3 * q, m) @ corners
     return np.asarray(flat.reshape(len(corners), q, 3, 3)).swapaxes(2, 3)
@@ -226,7 +227,7 @@ def node_gradients(
 
 
 def triangle_areas(mesh: Elements, faces: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the shape functions and weights for integrals over curved triangles.
+    """Return quadrature data for integrals over curved triangles.
 
     Args:
         mesh: the mesh with the triangles' nodes.
@@ -247,7 +248,7 @@ def _face_vectors(mesh: Elements, faces: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def triangle_rule(order: int) -> tuple[NDArray, NDArray, NDArray]:
-    """Return a quadrature on a triangle, exact for products of two shape functions.
+    """Return a triangle quadrature that is exact for products of two shape functions.
 
     Args:
         order: order of the polynomials.
@@ -298,8 +299,8 @@ def assemble(mesh: Elements, lam: NDArray, mu: NDArray) -> csr_array:
         block = np.where(swapped[part, None], turned, block)
         place = position[part].ravel()
         for k in range(9):
-            # np.bincount would allocate sums for all pairs between the first and the
-            # last pair of the batch
+            # np.bincount would allocate sums for all pairs between the first and last
+            # pair in the batch
             np.add.at(values[k], place, block[:, k].ravel())
     return _upper(values, code // count, code % count, int(count))
 
@@ -307,7 +308,7 @@ def assemble(mesh: Elements, lam: NDArray, mu: NDArray) -> csr_array:
 def _node_blocks(
     mesh: Elements, lam: NDArray, mu: NDArray, a: NDArray, b: NDArray
 ) -> Iterator[tuple[NDArray, NDArray]]:
-    """Yield element indices (c,) and stiffnesses (c, 9, p) of the node pairs a, b."""
+    """Yield element indices (c,) and stiffnesses (c, 9, p) of node pairs a, b."""
     L, weights = quadrature(2 * (mesh.order - 1))
     _, dN = shape_functions(mesh.order, L)
     # integrals of products of derivatives, in the coordinates of a straight element
@@ -336,10 +337,10 @@ def _hooke(S: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
 
 
 def _upper(values: NDArray, row: NDArray, column: NDArray, count: int) -> csr_array:
-    """Return the upper triangle from the (9, k) blocks of node pairs, row by row."""
+    """Build the upper triangle from the (9, k) blocks of node pairs, row by row."""
     start = np.searchsorted(row, np.arange(count + 1))
     width = np.diff(start)
-    # a node's diagonal block is first: its second row lacks one entry, its third row
+    # a node's diagonal block comes first; its second row lacks one entry, its third row
     # two
     indptr = np.zeros(3 * count + 1, dtype=np.int32)
     lengths = np.stack([3 * width, 3 * width - 1, 3 * width - 2], axis=1)

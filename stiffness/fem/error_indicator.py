@@ -1,24 +1,23 @@
-r"""A posteriori error indicator of a finite element stiffness, element by element.
+r"""Element-wise a posteriori error indicator for a finite element stiffness.
 
-The stiffness of cubic elements is too large by the energy of the discretisation error.
-The stresses of a cubic element are quadratic.  In every element they are split into
-three parts: a constant mean, a linear part, and a quadratic part.  s_2 is the energy of
-the linear part, and s_3 is the energy of the quadratic part.  Let the error e_p of
-elements of degree p decrease as p^-b.  Then the decay
-s_3 / s_2 = (e_2 - e_3) / (e_1 - e_2) determines b, and b determines the ratio
-e_3 / (e_2 - e_3) of the remaining error to s_3.  The ratio is nearly zero in a smooth
-field, and one or more otherwise.  For elements at a singular edge it is set to 1.2.
+The stiffness of cubic elements exceeds the exact one by the energy of the
+discretisation error. The stresses in a cubic element are quadratic and are split into a
+constant mean, a linear part of energy s_2, and a quadratic part of energy s_3. Assume
+that the error e_p of elements of degree p decreases as p^-b. Then the decay s_3 / s_2 =
+(e_2 - e_3) / (e_1 - e_2) determines b, and thus the ratio e_3 / (e_2 - e_3) of the
+remaining error to s_3. This ratio is nearly zero in a smooth field, and one or more
+otherwise. For elements at a singular edge it is set to 1.2.
 
-At the free edge of a twisted plate the stresses change direction within a boundary
-layer, whose width is a third of the wall thickness.  An element that is much wider than
-the wall does not resolve this layer.  The large linear stresses of the plate increase
-s_2 and thus suggest a smooth field, but residual tractions t remain on the free
-surface. Let l be the smallest height of the face.  A surface wave of half wavelength l
-balances the tractions and decays as exp(-pi x / l).  Its energy is the integral of t^2
-/ (2 mu) l / pi.  The indicator is the larger one of both estimates.
+At the free edge of a twisted plate, the stresses change direction within a boundary
+layer, whose width is a third of the wall thickness. An element much wider than the wall
+does not resolve this layer: the large linear stresses of the plate increase s_2 and
+thus suggest a smooth field, but residual tractions t remain on the free surface. They
+are balanced by a surface field of half wavelength l, the smallest height of the face,
+which decays as exp(-pi x / l) and whose energy is the integral of t^2 / (2 mu) l / pi.
+The indicator is the larger of the two estimates.
 
-The indicator does not include the error of the geometry, which is the distance of the
-curved elements from the exact shapes: see :func:`geometry_errors`.
+The indicator does not include the geometry error, that is, the distance of the curved
+elements from the exact shapes; see :func:`geometry_errors`.
 
 Sources:
     Mavriplis (1990) for an error estimate from the decay of an element's coefficients;
@@ -36,7 +35,7 @@ from forcefit.stiffness.surface.primitives import Plane, Shape
 from forcefit.stiffness.surface.true_surface import TrueSurface
 
 VOIGT = np.array([[0, 0], [1, 1], [2, 2], [1, 2], [0, 2], [0, 1]])
-_SAME_MODULUS = 1e-6  # relative difference up to which moduli count as equal
+_SAME_MODULUS = 1e-6  # relative difference below which moduli count as equal
 _CHUNK = 1024  # number of faces in a batch
 # ratio of the remaining error e_3 to the indicator s_3 at a singular edge,
 # calibrated on the example links in meshes/
@@ -68,7 +67,7 @@ def error_matrices(
             scaled.
 
     Returns:
-        (t, k, k) [unit of the stiffness] contributions; their sum estimates K_h - K.
+        (t, k, k) [unit of the stiffness] contributions, whose sum estimates K_h - K.
     """
     errors = np.zeros((len(mesh.cells), *stiffness.shape))
     for part, L, weights, _, G, w in integration(mesh):
@@ -94,7 +93,7 @@ def error_matrices(
 def traction_errors(
     mesh: Elements, fields: NDArray, lam: NDArray, mu: NDArray, free: NDArray
 ) -> NDArray:
-    """Return the energies of the fields that would balance residual surface tractions.
+    """Compute the energies of fields that balance residual surface tractions.
 
     Args:
         mesh: the tetrahedra.
@@ -124,7 +123,7 @@ def traction_errors(
 
 
 def _smallest_height(mesh: Elements, faces: NDArray) -> NDArray:
-    """Return (f,) [m] the smaller one of triangle height and element depth."""
+    """Return (f,) [m] the smaller of triangle height and element depth."""
     a, b, c = np.moveaxis(mesh.nodes[mesh.faces[faces, :3]], 1, 0)
     across = np.cross(b - a, c - a)
     twice = np.linalg.norm(across, axis=1)
@@ -151,9 +150,9 @@ def geometry_errors(
         fields: (n, 3, k) [m] displacements of k unit load cases.
         lam: (t,) [Pa] Lame's first constant.
         mu: (t,) [Pa] shear modulus.
-        surface: surface used for patches that meet others smoothly, where an element
-            may lie on both sides of their border.  If it is None, each face is
-            compared with the shape of its patch.
+        surface: surface used for patches that join others smoothly, where an element
+            may lie on both sides of the border. If None, each face is compared with the
+            shape of its patch.
 
     Returns:
         (f, k, k) [unit of the stiffness] contribution of each boundary triangle: the
@@ -209,8 +208,8 @@ def material_errors(
 
     Returns:
         (t, k, k) [unit of the stiffness] contributions, positive if an element is too
-        stiff.  A contribution equals the energy of the part of the element in the
-        other material, times the ratio of the moduli.
+        stiff. Each is the energy of the element's part in the other material, times the
+        ratio of the moduli.
     """
     cases = fields.shape[2]
     errors = np.zeros((len(mesh.cells), cases, cases))
@@ -218,8 +217,8 @@ def material_errors(
         places = np.einsum("qa,tax->tqx", N, mesh.nodes[mesh.cells[part]])
         own = mu[part][:, None]
         true = shear_at(places.reshape(-1, 3)).reshape(w.shape)
-        # tractions are continuous across the face, so the compliant side stores more
-        # energy
+        # tractions are continuous across the face, so the more compliant side stores
+        # more energy
         ratio = np.maximum(own / true, true / own)
         sign = np.where(own > true, 1.0, -1.0) * (np.abs(ratio - 1) > _SAME_MODULUS)
         some = np.flatnonzero(sign.any(axis=1))
@@ -233,7 +232,7 @@ def material_errors(
 
 
 def _energy_roots(G: NDArray, u: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
-    """Return (c, q, k, 7) roots of the energy density: deviatoric and bulk parts."""
+    """Return (c, q, k, 7) roots of the energy density, deviatoric and bulk parts."""
     count, points, nodes, _ = G.shape
     cases = u.shape[3]
     slope = u.transpose(0, 3, 2, 1).reshape(count, 1, 3 * cases, nodes) @ G
@@ -249,7 +248,7 @@ def _energy_roots(G: NDArray, u: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
 
 
 def _energy_products(roots: NDArray, w: NDArray) -> NDArray:
-    """Return the (c, k, k) integrals of products of energy roots for pairs of cases."""
+    """Integrate products of energy roots for pairs of load cases (c, k, k)."""
     count, _, cases, _ = roots.shape
     flat = (
         (roots * np.sqrt(w)[:, :, None, None]).swapaxes(1, 2).reshape(count, cases, -1)

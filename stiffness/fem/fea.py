@@ -1,9 +1,9 @@
-"""A link's stiffness from its surface by finite elements, with an error estimate.
+"""Finite element stiffness of a link from its surface, with an error estimate.
 
-A surface is meshed into tetrahedra, from which a stiffness and an estimate of its error
-are computed (:mod:`forcefit.stiffness.fem.adaptive_step`).  The elements that
-contribute most to the error are refined until the required accuracy is reached or the
-budget is used.
+A surface is meshed into tetrahedra, on which the stiffness and its error estimate are
+computed (:mod:`forcefit.stiffness.fem.adaptive_step`). The elements that contribute
+most to the error are refined until the required accuracy is reached or the budget is
+exhausted.
 """
 
 import logging
@@ -53,18 +53,18 @@ from forcefit.stiffness.surface.surface import Surface, read_surface
 P = ParamSpec("P")
 R = TypeVar("R")
 _LOG = logging.getLogger("forcefit.finite_elements")
-_SETUP = 2.0  # [s] part of the solution time that does not depend on the mesh
-# share of the time budget for the mesher; the remaining time is for the solver
+_SETUP = 2.0  # [s] mesh-independent part of the solution time
+# fraction of the time budget for the mesher; the remaining time is for the solver
 _MESHER = 0.6
 
 
 @dataclass(frozen=True)
 class Budget:
-    """Limits of the computing cost of a solution.
+    """Limits on the computing cost of a solution.
 
     Attributes:
         seconds: [s] time after which no finer mesh is started.
-        unknowns: [-] largest number of unknowns, on which the memory depends.
+        unknowns: [-] largest number of unknowns, which limits the memory.
         levels: [-] largest number of meshes, including the first one.
     """
 
@@ -75,13 +75,13 @@ class Budget:
 
 @dataclass(frozen=True)
 class FemOptions:
-    """Options of the solution of a link: accuracy, interfaces and cost.
+    """Solution options: accuracy, interfaces and cost.
 
     Attributes:
-        accuracy: [-] required error, for entries scaled by sqrt(K_ii K_jj).
+        accuracy: [-] required error of entries scaled by sqrt(K_ii K_jj).
         interface: ``"rigid"``, ``"distributing"`` (the tip) or ``"distributing-both"``,
             see :mod:`forcefit.stiffness.fem.condensation`.
-        budget: limits of the computing cost.
+        budget: limits on the computing cost.
         cache: folder in which meshes are stored; by default the user's cache folder.
     """
 
@@ -106,11 +106,11 @@ _STANDARD = FemOptions()
 
 @dataclass(frozen=True, eq=False)
 class MeshedLink:
-    """A link with the solution on its finest mesh, from which stresses are computed.
+    """A link and its solution on the finest mesh, from which stresses are computed.
 
     Attributes:
-        link: the stiffness with its error, the mesh report and the mass properties.
-        level: the finest mesh with its stiffness, fields and materials.
+        link: stiffness with its error, mesh report and mass properties.
+        level: finest mesh with its stiffness, fields and materials.
         centers: (2, 3) [m] centres of the base and the tip interface.
     """
 
@@ -122,7 +122,7 @@ class MeshedLink:
 
 
 def _accepting_material(function: Callable[P, R]) -> Callable[P, R]:
-    """Return the function, which also accepts a material as in the last release."""
+    """Make a function accept a material as in the last release."""
 
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -149,18 +149,18 @@ def mesh_link(
     unit: str = "m",
     options: FemOptions = _STANDARD,
 ) -> LinkStiffness:
-    """Compute the stiffness of a link of one material from a surface file.
+    """Compute the stiffness of a single-material link from a surface file.
 
     Args:
         surface: file of the closed surface (STL, OBJ, PLY, VTK, MSH, STEP).
-        base: held interface, in metres and in the axes of the surface; or a text such
-            as ``"z=0"``, see
+        base: held interface, in metres and surface axes; or a text such as ``"z=0"``,
+            see
             :func:`forcefit.stiffness.surface.interface.parse_interface`.
-        tip: interface that moves, in the same form.
+        tip: moving interface, in the same form.
         E: [Pa] Young's modulus, > 0.
         nu: [-] Poisson's ratio, in (-1, 0.5).
         density: [kg/m^3] density; 0 for a link without mass.
-        unit: unit of length of the surface file.
+        unit: unit of length in the surface file.
         options: options of the solution.
 
     Returns:
@@ -192,23 +192,23 @@ def solve_link(
     options: FemOptions = _STANDARD,
     point_masses: Sequence[PointMass] = (),
 ) -> MeshedLink:
-    """Solve a link to a required accuracy.
+    """Compute the stiffness of a link to a required accuracy.
 
     Args:
         surface: surface of the link.
         base: held interface.
-        tip: interface that moves.
-        materials: the first material fills the link, and later ones fill their
-            regions; or one material for each solid of a STEP file.
+        tip: moving interface.
+        materials: the first material fills the link, and later ones fill their regions;
+            or one material for each solid in a STEP file.
         options: options of the solution.
-        point_masses: point masses that contribute to mass, centre and inertia.
+        point_masses: point masses, which contribute to mass, centre and inertia.
 
     Returns:
         The link and its finest mesh.
 
     Raises:
         BadInput: an interface is invalid, the interfaces share an edge, no material is
-            given, or a solid named by a material does not exist.
+            given, or a material names a solid that does not exist.
     """
     start, busy = time.monotonic(), _processor_seconds()
     check_materials(materials)
@@ -234,7 +234,7 @@ def solve_link(
 def solve_bar(
     section: Mapping[str, float], material: Material, options: FemOptions = _STANDARD
 ) -> MeshedLink:
-    """Solve a straight bar of unit length along z, extruded without a mesher.
+    """Compute the stiffness of a bar of unit length along z, extruded directly.
 
     Args:
         section: lengths of the section relative to the bar's length, see
@@ -243,7 +243,7 @@ def solve_bar(
         options: options of the solution.
 
     Returns:
-        The bar and its finest mesh.  The base is at z = 0, the tip at z = 1; the
+        The bar and its finest mesh, with the base at z = 0 and the tip at z = 1. The
         section's y and z are along x and y.
     """
     centers = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -260,7 +260,7 @@ def _refined(
     start: float,
     pace: float = 1.0,
 ) -> tuple[Level, NDArray, NDArray, dict[str, Any]]:
-    """Solve on successively finer meshes, up to the accuracy or the end of the budget.
+    """Solve on successively finer meshes until accuracy or budget is reached.
 
     Args:
         first: coarsest mesh.
@@ -268,10 +268,10 @@ def _refined(
         centers: (2, 3) [m] centres of base and tip.
         options: options of the solution.
         start: [s] start of the time budget.
-        pace: [-] present slowness of this machine, relative to an idle one.
+        pace: [-] current slowdown of this machine relative to an idle one.
 
     Returns:
-        The finest mesh, the (6, 6) stiffness, the size of its error, and the cost.
+        The finest mesh, the (6, 6) stiffness, the magnitude of its error, and the cost.
     """
     accuracy, interface, budget = options.accuracy, options.interface, options.budget
     begun = time.monotonic()
@@ -284,15 +284,14 @@ def _refined(
     while True:
         E, factor = estimated_error(history)
         K, error = middle_stiffness(history[-1][0], E, history[-1][2])
-        # a relative error of the volume may cause the same relative error of K in every
-        # motion
+        # a relative volume error may cause the same relative error of K in every motion
         error = error + level.volume_error * np.diag(np.diag(K))
         worst = float(np.abs(scaled(error, K)).max())
         _LOG.info("%d unknowns, error %.2g", level.solution.unknowns, worst)
         if worst <= accuracy or len(history) == budget.levels:
             break
         if level.volume_error > max(accuracy, 0.7 * worst):
-            break  # the facets of the file limit the accuracy
+            break  # the facets in the file limit the accuracy
         growth = _wanted_growth(history, sizes, worst / accuracy)
         pace = _pace(level.solution.unknowns, time.monotonic() - begun)
         solid = _affordable_mesh(level, growth, budget, start, pace)
@@ -315,7 +314,7 @@ def _refined(
 
 
 def interface_center(surface: Surface, interface: Interface, name: str) -> NDArray:
-    """Return the point at which the screws of an interface are read.
+    """Return the reference point for the screws of an interface.
 
     Args:
         surface: surface of the link.
@@ -323,7 +322,7 @@ def interface_center(surface: Surface, interface: Interface, name: str) -> NDArr
         name: base or tip, for messages.
 
     Returns:
-        (3,) [m] the given point of a disc or bore, or the area centroid of a plane.
+        (3,) [m] given point of a disc or bore, or area centroid of a plane.
 
     Raises:
         BadInput: no part of the surface lies on the interface.
@@ -334,7 +333,7 @@ def interface_center(surface: Surface, interface: Interface, name: str) -> NDArr
     areas = np.linalg.norm(surface.normals()[members], axis=1)
     corners = surface.points[surface.triangles[members]]
     center = np.average(corners.mean(axis=1), axis=0, weights=areas)
-    # coordinates in STL are single precision, so the centre is moved exactly onto the
+    # STL coordinates are single precision, so the centre is moved exactly onto the
     # plane
     height = (center - interface.point) @ interface.direction
     center = center - height * interface.direction
@@ -348,13 +347,13 @@ def first_mesh(
     budget: Budget,
     cache: Path | str | None = None,
 ) -> Solid:
-    """Return a coarse mesh that resolves the walls of the part, to be refined further.
+    """Create a coarse starting mesh that resolves the walls of the part.
 
     Args:
         surface: surface of the link.
         base: the held interface.
-        tip: the interface that moves.
-        budget: budget, whose seconds limit the mesher.
+        tip: the moving interface.
+        budget: budget, whose time limits the mesher.
         cache: folder in which meshes are stored; by default the user's cache folder.
 
     Returns:
@@ -362,7 +361,8 @@ def first_mesh(
 
     Raises:
         BadInput: no part of the surface is on an interface.
-        MeshFailed: three attempts did not give a usable mesh, or the time is over.
+        MeshFailed: three attempts did not produce a usable mesh, or the time is
+            exhausted.
     """
     wall = 2 * surface.volume / surface.area / surface.diagonal
     envelope, edge = min(2e-3, wall / 8), 0.1 * surface.diagonal
@@ -396,18 +396,18 @@ def first_mesh(
 
 
 def _pace(unknowns: int, seconds: float) -> float:
-    """Return the measured solution time relative to the expected one, at least 1."""
+    """Return the ratio of measured to expected solution time, at least 1."""
     return max(1.0, (seconds - _SETUP) / expected_cost(unknowns)[1])
 
 
 def _processor_seconds() -> float:
-    """Return the processor time [s] of this process and of its finished children."""
+    """Return the processor time [s] of this process and its finished children."""
     return sum(os.times()[:4])
 
 
 def _pace_so_far(elapsed: float, busy: float) -> float:
     """Return the ratio of elapsed time to processor time, at least 1."""
-    # short times are unreliable; on Windows the time of the mesher is not measured
+    # short times are unreliable; on Windows, the mesher's time is not measured
     if elapsed < _SETUP or os.name == "nt":
         return 1.0
     return max(1.0, elapsed / max(busy, 0.1 * elapsed))
@@ -416,7 +416,7 @@ def _pace_so_far(elapsed: float, busy: float) -> float:
 def _refuse_cost(
     unknowns: int, budget: Budget, spent: float, pace: float = 1.0
 ) -> None:
-    """Raise an error if the solution on the first mesh would exceed the budget."""
+    """Reject a first mesh on which the solution would exceed the budget."""
     memory, seconds = expected_cost(unknowns)
     seconds *= pace
     if unknowns > budget.unknowns or spent + seconds > budget.seconds:
@@ -432,7 +432,7 @@ def _wanted_growth(
     history: Sequence[tuple[NDArray, ...]], sizes: Sequence[int], excess: float
 ) -> float:
     """Return the factor on the number of elements that divides the error by excess."""
-    rate = 1.3  # rate of convergence in the number of elements; 2 for a smooth field
+    rate = 1.3  # convergence rate in the number of elements; 2 for a smooth field
     if len(history) > 1:
         before, now = (np.max(np.diag(e) / np.diag(K)) for K, e, _ in history[-2:])
         measured = math.log(max(before / now, 1.0)) / math.log(sizes[-1] / sizes[-2])
@@ -443,7 +443,7 @@ def _wanted_growth(
 def _affordable_mesh(
     level: Level, growth: float, budget: Budget, start: float, pace: float = 1.0
 ) -> Solid | None:
-    """Return a finer mesh within the budget, with the wanted growth if possible."""
+    """Refine the mesh within the budget, by the wanted growth if possible."""
     part = growth**0.55 - 1  # about as many elements are bisected as neighbours
     solid = refine_level(level, 1 + part)
     added = len(solid.cells) / len(level.solid.cells) - 1
@@ -473,7 +473,7 @@ def _meshed(
     options: FemOptions,
     point_masses: Sequence[PointMass],
 ) -> MeshedLink:
-    """Return the link with all results of its finest mesh."""
+    """Return the link with all results on its finest mesh."""
     density = level.material[:, 2]
     mass, center, inertia = mass_properties(level.mesh, density, point_masses)
     link = LinkStiffness(

@@ -11,7 +11,7 @@ from forcefit.stiffness.fem.elements import Elements, integration
 
 @dataclass(frozen=True, eq=False)
 class PointMass:
-    """A point mass on the link, which does not change the stiffness.
+    """A point mass on the link, without effect on the stiffness.
 
     Attributes:
         mass: [kg] mass.
@@ -25,16 +25,16 @@ class PointMass:
 def mass_properties(
     mesh: Elements, density: NDArray, point_masses: Sequence[PointMass] = ()
 ) -> tuple[float, NDArray, NDArray]:
-    """Return mass, centre of mass and inertia of the elements and point masses.
+    """Compute mass, centre of mass and inertia of the elements and point masses.
 
     Args:
         mesh: the tetrahedra.
         density: (t,) [kg/m^3] density of each element.
-        point_masses: point masses that are added to the elements.
+        point_masses: point masses to add to the elements.
 
     Returns:
-        Mass [kg], centre of mass (3,) [m], inertia (3, 3) [kg m^2] about the centre of
-        mass; all are zero if the mass is zero.
+        Mass [kg], centre of mass (3,) [m], and inertia (3, 3) [kg m^2] about the centre
+        of mass; all zero if the mass is zero.
     """
     origin = mesh.nodes.mean(axis=0)
     mass, first, second = 0.0, np.zeros(3), np.zeros((3, 3))

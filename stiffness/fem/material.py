@@ -1,4 +1,4 @@
-"""Materials of a link, and the regions in which they apply."""
+"""Materials of a link and the regions in which they apply."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -16,18 +16,18 @@ from forcefit.stiffness.mesh.regions import Region, region_of_places
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """An isotropic material, and its region in the link.
+    """An isotropic material and its region in the link.
 
     Attributes:
         E: [Pa] Young's modulus.
         nu: [-] Poisson's ratio.
         density: [kg/m^3] density; 0 for a link without mass.
         where: function that returns which points (n, 3) [m], in the mesh's axes, are in
-            the region of this material.  If regions overlap, the last material applies.
-            An element has the material at its centre.
+            the region of this material. Where regions overlap, the last material
+            applies. An element takes the material at its centre.
         faces: faces of the region, along which the mesh is cut.
-        solid: name of the solid of a STEP file that consists of this material, or
-            ``one+other`` for two solids; replaces ``where`` and ``faces``.
+        solid: name of the solid in a STEP file that consists of this material, or
+            ``one+other`` for two solids, in place of ``where`` and ``faces``.
     """
 
     E: float
@@ -46,7 +46,7 @@ class Material:
 def material_of_elements(
     mesh: Elements, materials: Sequence[Material], cut_region: NDArray | None = None
 ) -> NDArray:
-    """Return the material of each element, evaluated at its centre.
+    """Evaluate the material of each element at its centre.
 
     Args:
         mesh: the tetrahedra.
@@ -70,7 +70,7 @@ def material_of_elements(
 
 
 def material_at(points: NDArray, materials: Sequence[Material]) -> NDArray:
-    """Return the material at points of a link.
+    """Evaluate the material at points of a link.
 
     Args:
         points: (n, 3) [m] points.
@@ -94,7 +94,7 @@ def regions_of(materials: Sequence[Material]) -> tuple[Region, ...]:
         materials: materials; the first fills the link, later ones fill their regions.
 
     Returns:
-        The regions; where they overlap, later ones apply.
+        The regions, of which later ones apply where they overlap.
     """
     return tuple(
         Region(material.where or _everywhere, material.faces)
@@ -107,7 +107,7 @@ def _everywhere(points: NDArray) -> NDArray:
 
 
 def check_materials(materials: Sequence[Material]) -> None:
-    """Raise an error if a link has no material.
+    """Check that a link has a material.
 
     Args:
         materials: materials of the link.

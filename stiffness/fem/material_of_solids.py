@@ -1,4 +1,4 @@
-"""Regions of materials that are assigned to solids of a STEP file."""
+"""Regions of materials assigned to solids in a STEP file."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,14 +19,14 @@ from forcefit.stiffness.surface.triangle_graph import TriangleGraph
 def placed_materials(
     surface: Surface, materials: Sequence[Material]
 ) -> tuple[Material, ...]:
-    """Find the region of each material that names solids of a STEP file.
+    """Find the region of each material that names solids in a STEP file.
 
     Args:
         surface: surface of the link, with its solids.
         materials: the first material fills the link, or each solid has a material.
 
     Returns:
-        The materials with regions instead of names of solids.
+        The materials, with regions in place of solid names.
 
     Raises:
         BadInput: a named solid does not exist, solids overlap, or a solid has no
@@ -61,7 +61,8 @@ def placed_materials(
         _placed(solids, names, material) if material.solid else material
         for names, material in zip(members, materials, strict=True)
     ]
-    # if each solid has a material, the first one also fills space outside other solids
+    # if each solid has a material, the first one also fills the space outside all
+    # solids
     first = replace(materials[0], solid="") if materials[0].solid else materials[0]
     return first, *placed[1:]
 
@@ -80,7 +81,7 @@ def _members(name: str, solids: FilledSolids, material: Material) -> tuple[str, 
 def _placed(
     solids: FilledSolids, names: tuple[str, ...], material: Material
 ) -> Material:
-    """Return a material with the region and the boundary faces of its solids."""
+    """Replace solid names by the region and the boundary faces of the solids."""
     triangles, within = solids.around(names)
     triangles = orient_shells(triangles)[0]
     used, index = np.unique(triangles, return_inverse=True)

@@ -1,4 +1,4 @@
-"""Texts that describe parts of another material (boxes, solids) and point masses."""
+"""Text notation for parts of another material (boxes, solids) and point masses."""
 
 from functools import partial
 
@@ -22,12 +22,12 @@ _MASS = '"1.5/0,0,0.452", kilograms and a place in metres'
 
 
 def parse_part(option: str, text: str) -> Material:
-    """Parse a material that fills a box or solids of a STEP file.
+    """Parse a material that fills a box or solids in a STEP file.
 
     Args:
         option: name of the option, for the error message.
         text: ``x=a..b,y=a..b,z=a..b/young=..,poisson=..,density=..``, where omitted
-            axes are unbounded, or ``solid=one+other/young=..``; the density is
+            axes are unbounded, or ``solid=one+other/young=..``. The density is
             optional.
 
     Returns:
@@ -89,11 +89,11 @@ def read_parts(link: Table) -> tuple[str, ...]:
 
 
 def scaled_part(text: str, factor: float) -> str:
-    """Multiply the Young's modulus in the text of a part by a factor.
+    """Multiply Young's modulus in the text of a part by a factor.
 
     Args:
         text: text of :func:`parse_part`.
-        factor: [1] factor on the modulus.
+        factor: [1] factor applied to the modulus.
 
     Returns:
         Text of the same part with the new modulus.
@@ -125,7 +125,7 @@ def parse_mass(option: str, text: str) -> PointMass:
 
 
 def _planes(low: NDArray, high: NDArray) -> tuple[CutFace, ...]:
-    """Return the faces of a box, except for faces at infinity."""
+    """Return the faces of a box, except those at infinity."""
     axes = np.eye(3)
     return tuple(
         CutFace(Plane(end[k] * axes[k], axes[k]))

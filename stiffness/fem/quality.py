@@ -1,4 +1,4 @@
-"""Quality measures of a mesh of tetrahedra, for reports."""
+"""Quality measures of tetrahedral meshes, for reports."""
 
 from typing import Any
 
@@ -10,11 +10,11 @@ from forcefit.stiffness.mesh.lagrange import EDGES
 from forcefit.stiffness.mesh.solid import Solid, element_quality
 from forcefit.stiffness.surface.surface import directed_edges
 
-_FLAT = 0.01  # quality below which tetrahedra are inaccurate and ill-conditioned
+_FLAT = 0.01  # quality below which a tetrahedron is inaccurate and ill-conditioned
 
 
 def mesh_report(solid: Solid, mesh: Elements) -> dict[str, Any]:
-    """Return element counts, sizes and quality measures of a mesh.
+    """Compute element counts, sizes and quality measures of a mesh.
 
     Args:
         solid: the straight tetrahedra.
@@ -26,9 +26,9 @@ def mesh_report(solid: Solid, mesh: Elements) -> dict[str, Any]:
         ``worst_quality`` and ``mean_quality``; ``smallest_angle`` and ``largest_angle``
         [rad] between two faces of a tetrahedron; ``flat_elements``, the number of
         elements with a quality below 0.01; ``drawn_out``, whether the section of a bar
-        was extruded to long elements, which are not counted as flat.  Quality and
-        angles are those of the tetrahedra before layers along singular edges are cut
-        off, because the layers are thin on purpose.
+        was extruded into long elements, which do not count as flat. Quality and angles
+        are evaluated before layers along singular edges are cut off, because these
+        layers are thin on purpose.
     """
     quality, angles = element_quality(solid), dihedral_angles(solid)
     edges = np.sort(directed_edges(solid.faces), axis=1)
@@ -66,7 +66,7 @@ def volume_error(solid: Solid, mesh: Elements) -> float:
 
 
 def dihedral_angles(solid: Solid) -> NDArray:
-    """Return the angles between the faces of tetrahedra.
+    """Compute the angles between the faces of tetrahedra.
 
     Args:
         solid: straight tetrahedra.
@@ -80,7 +80,7 @@ def dihedral_angles(solid: Solid) -> NDArray:
     for i, j in EDGES:
         k, l = (v for v in range(4) if v not in (i, j))
         along = corners[:, j] - corners[:, i]
-        # the positions of the other two corners, projected onto the plane normal to the
+        # positions of the two opposite corners, projected onto the plane normal to the
         # edge
         one, other = (np.cross(along, corners[:, v] - corners[:, i]) for v in (k, l))
         across = np.linalg.norm(np.cross(one, other), axis=1)

@@ -1,7 +1,7 @@
-"""Solution of symmetric positive definite systems with many right-hand sides.
+"""Sparse solver for symmetric positive definite systems with many right-hand sides.
 
-If the package of MKL is installed, MKL's PARDISO solves the system.  Otherwise SciPy's
-SuperLU is used, which needs about ten times the time and twice the memory.
+If the MKL package is installed, its PARDISO solver is used. Otherwise SciPy's SuperLU
+is used, which takes about ten times as long and twice the memory.
 """
 
 import os
@@ -44,7 +44,7 @@ def solver_name() -> str:
 
 
 def _mkl() -> str | None:
-    """Return the path of the MKL library, found in the file list of its package."""
+    """Locate the MKL library in the file list of its package."""
     try:
         listed = files("mkl") or []
     except PackageNotFoundError:
@@ -63,8 +63,7 @@ def solve(upper: csr_array, loads: NDArray, solver: str | None = None) -> NDArra
     Args:
         upper: (n, n) upper triangle of a symmetric positive definite matrix K.
         loads: (n, k) right-hand sides.
-        solver: ``"PARDISO"`` or ``"SuperLU"``; by default the faster one that is
-            installed.
+        solver: ``"PARDISO"`` or ``"SuperLU"``; by default the fastest one installed.
 
     Returns:
         (n, k) solutions.
@@ -88,13 +87,13 @@ def solve(upper: csr_array, loads: NDArray, solver: str | None = None) -> NDArra
 
 
 def _solve_with_pardiso(upper: csr_array, loads: NDArray) -> NDArray:
-    """Solve with PARDISO for symmetric positive definite matrices."""
+    """Solve with PARDISO, as symmetric positive definite matrix."""
     import pypardiso
 
     solver = pypardiso.PyPardisoSolver(mtype=2)
     for number, value in _SETTINGS.items():
         solver.set_iparm(number, value)
-    # pypardiso requires csr_matrix instead of csr_array, and sorted 32 bit indices
+    # pypardiso requires csr_matrix instead of csr_array, with sorted 32-bit indices
     matrix = csr_matrix(upper)
     matrix.sort_indices()
     try:
@@ -109,7 +108,7 @@ def _solve_with_pardiso(upper: csr_array, loads: NDArray) -> NDArray:
 
 
 def expected_cost(unknowns: int) -> tuple[float, float]:
-    """Estimate the cost of a solution from measurements with 40 k to 850 k unknowns.
+    """Estimate the solution cost from measurements with 40 k to 850 k unknowns.
 
     Args:
         unknowns: number of rows of the matrix.

@@ -1,11 +1,11 @@
-"""Stress in a link under a wrench at its tip.
+"""Stress in a link under a tip wrench.
 
-Stresses superpose linearly, so six displacement fields are sufficient, one for each
-component of the wrench.  At the edge of a rigid interface the elastic solution is
-singular: the largest stress grows without bound as the mesh is refined, so it is not a
-physical value.  Stresses are therefore reported only beyond a certain distance from the
-interfaces.  The default distance is the radius of the interface, and the report states
-it.  The stress within this distance and the effect of a real joint are not included.
+Stresses superpose linearly, so six displacement fields suffice, one for each component
+of the wrench. At the edge of a rigid interface, the elastic solution is singular: the
+largest stress grows without bound as the mesh is refined and has no physical meaning.
+Stresses are therefore reported only beyond a certain distance from the interfaces, by
+default the interface radius, which the report states. Stresses within this distance and
+the effect of a real joint are not covered.
 """
 
 from collections.abc import Mapping
@@ -39,16 +39,16 @@ _CHUNK = 4096  # number of elements in a batch: 4096 x 20 x 36 numbers are 24 MB
 
 @dataclass(frozen=True, eq=False)
 class StressSource:
-    """The solved mesh from which a stress field was computed.
+    """Solved mesh from which a stress field was computed.
 
     Attributes:
         level: the solved mesh with n nodes, numbered by
             :func:`forcefit.stiffness.fem.stress_error.nodes_by_material`.
-        far: (n,) bool, True for nodes outside the excluded distance from interfaces.
+        far: (n,) bool, True for nodes beyond the excluded distance from interfaces.
         singular: (n,) bool, True for nodes on re-entrant edges without a fillet.
         faceted: (n,) bool, True for nodes on surfaces whose shape was not recognised.
-        left_out: (n,) bool, True for nodes where the mesh deviates from the surface;
-            their stresses are not reported.
+        left_out: (n,) bool, True for nodes where the mesh deviates from the surface,
+            whose stresses are not reported.
     """
 
     level: Level
@@ -60,20 +60,19 @@ class StressSource:
 
 @dataclass(frozen=True, eq=False)
 class StressInfluence:
-    """Stresses of unit tip wrenches at the nodes of a mesh, away from interfaces.
+    """Nodal stresses due to unit tip wrenches, away from interfaces.
 
     Attributes:
         places: (p, 3) [m] positions of the nodes, in the link's axes.
         influence: (p, 6, 6) [Pa/(N m), Pa/N] stress xx yy zz yz xz xy for each
-            component of the wrench at the tip.  If the own weight of the link was
-            included (:func:`forcefit.stiffness.fem.own_weight.with_own_weight`), the
-            shape is (p, 9, 6), and the last three rows [Pa per m/s^2] are for gravity.
-            A wrench then has nine components, with gravity last.
+            component of the wrench at the tip.  If the link's own weight is included
+            (:func:`forcefit.stiffness.fem.own_weight.with_own_weight`), the shape is
+            (p, 9, 6), where the last three rows [Pa per m/s^2] are for gravity. A
+            wrench then has nine components, with gravity last.
         away: [m] smallest distance of these nodes from an interface.
-        reentrant_edges: whether some of the nodes are on re-entrant edges without a
-            fillet, where the elastic stress is also singular.
-        source: mesh from which the stresses were computed; if it is None, errors are
-            unknown.
+        reentrant_edges: whether some nodes lie on re-entrant edges without a fillet,
+            where the elastic stress is singular too.
+        source: mesh from which the stresses were computed; None if errors are unknown.
     """
 
     places: NDArray
@@ -94,18 +93,18 @@ class StressInfluence:
         if self.reentrant_edges:
             words += (
                 "; some of them on inner edges without a fillet or between two "
-                "materials, where stress is singular too and grows with the mesh's "
-                "fineness"
+                "materials, where the stress is singular too and grows as the mesh is "
+                "refined"
             )
         if self.source is not None and self.source.left_out.any():
             words += (
-                f"; {self.source.left_out.sum()} nodes are left out, where the mesh "
-                "does not follow the part's surface"
+                f"; {self.source.left_out.sum()} nodes are omitted because the mesh "
+                "does not follow the part's surface there"
             )
         return words
 
     def stresses(self, wrench: ArrayLike) -> NDArray:
-        """Return the stresses of a tip wrench.
+        """Compute the stresses due to a tip wrench.
 
         Args:
             wrench: (6,) [N m, N] at the tip, in the link's axes.
@@ -116,7 +115,7 @@ class StressInfluence:
         return np.einsum("pws,w->ps", self.influence, np.asarray(wrench, dtype=float))
 
     def peak(self, wrench: ArrayLike) -> tuple[float, NDArray]:
-        """Return the largest von Mises stress of a tip wrench, and its position.
+        """Find the largest von Mises stress due to a tip wrench, and its position.
 
         Args:
             wrench: (6,) [N m, N] at the tip, in the link's axes.
@@ -129,13 +128,13 @@ class StressInfluence:
         return float(values[worst]), self.places[worst]
 
     def peak_error(self, wrench: ArrayLike) -> float:
-        """Estimate the error of the peak stress of a tip wrench due to the mesh.
+        """Estimate the mesh error of the peak stress due to a tip wrench.
 
         Args:
             wrench: (6,) [N m, N] at the tip, in the link's axes.
 
         Returns:
-            [Pa] error; infinite where the stress is singular, NaN if the mesh is
+            [Pa] error; infinite where the stress is singular, and NaN if the mesh is
             unknown.
         """
         if self.source is None:
@@ -152,27 +151,27 @@ class StressInfluence:
         return estimated_error(level, motion, node, zone, self.source.left_out)
 
     def relative_error(self) -> float:
-        """Return the largest relative error of the peaks of six unit wrenches."""
+        """Return the largest relative error of the peaks for six unit wrenches."""
         unit = np.eye(6, self.influence.shape[1])
         return max(self.peak_error(w) / self.peak(w)[0] for w in unit)
 
 
 @dataclass(frozen=True, eq=False)
 class PeakStress:
-    """The largest von Mises stress of one wrench at the tip of a meshed link.
+    """Peak von Mises stress in a meshed link under one tip wrench.
 
     Attributes:
         wrench: (6,) [N m, N] at the tip, in the link's axes.
-        von_mises: [Pa] the peak stress.
-        error: [Pa] estimated error due to the mesh; infinite where stress is singular.
+        von_mises: [Pa] peak stress.
+        error: [Pa] estimated mesh error; infinite where the stress is singular.
         place: (3,) [m] position of the peak.
         region: description of the evaluated points.
         away: [m] smallest distance of these points from an interface.
         beam: [Pa] peak stress and (3,) [m] its position by the beam formula, over the
-            part of the beam that is at least ``away`` from base and tip; None if no
-            section is given.
-        beam_whole: [Pa] peak stress by the beam formula over the whole length; NaN if
-            no section is given.
+            part of the beam at least ``away`` from base and tip; None without a
+            section.
+        beam_whole: [Pa] peak stress by the beam formula over the whole length; NaN
+            without a section.
     """
 
     wrench: NDArray
@@ -194,7 +193,7 @@ def peak_stress(
     away: float | None = None,
     gravity: ArrayLike | None = None,
 ) -> PeakStress:
-    """Compute the peak stress of a tip wrench, by elements and by the beam formula.
+    """Compute the peak stress due to a tip wrench by elements and by beam theory.
 
     Args:
         solved: result of :func:`forcefit.stiffness.fem.fea.solve_link`.
@@ -206,7 +205,7 @@ def peak_stress(
         gravity: (3,) [m/s^2] in the link's axes, for the link's own weight.
 
     Returns:
-        The peak stress, with its position and region.
+        The peak stress with its position and region.
 
     Raises:
         BadInput: all nodes are within this distance, the beam formula does not cover
@@ -214,7 +213,7 @@ def peak_stress(
     """
     w = np.asarray(wrench, dtype=float)
     if section is not None:
-        # an invalid section is refused before the long computation
+        # reject an invalid section before the long computation
         peak_beam_stress(section, 0.0, np.zeros(6))
     field, acting = stress_influence(solved, away), w
     if gravity is not None:
@@ -236,7 +235,7 @@ def peak_stress(
     whole, _ = peak_beam_stress(section, length, in_beam, weight)
     near_tip = in_beam.copy()
     near_tip[:3] += np.cross([field.away, 0, 0], in_beam[3:])
-    # weight of the end piece, in which stress is not evaluated
+    # weight of the end piece, where stress is not evaluated
     beyond = weight * field.away / length
     near_tip[:3] += np.cross([field.away / 2, 0, 0], beyond)
     near_tip[3:] += beyond
@@ -257,11 +256,11 @@ def peak_stress(
 
 
 def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInfluence:
-    """Return the stresses of the six unit tip wrenches of a solved link.
+    """Compute the stresses in a solved link due to six unit tip wrenches.
 
     Args:
         solved: result of :func:`forcefit.stiffness.fem.fea.solve_link`; a node between
-            two materials counts once for each material.
+            two materials counts once per material.
         away: [m] excluded distance from interfaces; by default the interface radius.
 
     Returns:
@@ -278,7 +277,7 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
     distance = max(radii) if away is None else away
     clamped = np.unique(mesh.faces[mesh.patch <= 1])
     gap = cKDTree(mesh.nodes[clamped]).query(mesh.nodes[node])[0]
-    far = gap >= distance * (1 - 1e-9)  # a node at exactly this distance is included
+    far = gap >= distance * (1 - 1e-9)  # include a node at exactly this distance
     if not far.any():
         raise BadInput(
             f"stress: found no node {distance:.4g} m away from the interfaces; "
@@ -308,7 +307,7 @@ def _peaks_on_facets(field: StressInfluence, wrench: NDArray) -> bool:
 
 def _motions(level: Level) -> NDArray:
     """Return (k, k) tip motions due to unit wrenches and, if solved, unit gravity."""
-    # the stiffness of these fields is used, so that they balance the wrench exactly
+    # uses the stiffness of these fields, so that they balance the wrench exactly
     motions = np.eye(level.solution.fields.shape[2])
     motions[:6, :6] = inverted(level.solution.stiffness)
     return motions
@@ -324,7 +323,7 @@ def _interface_radius(mesh: Elements, patch: int) -> float:
 
 
 def _nodal_stresses(level: Level) -> NDArray:
-    """Return the (n, k, 6) averaged nodal stresses for each unit screw."""
+    """Average the nodal stresses (n, k, 6) for each unit screw."""
     cells, nodes = nodes_by_material(level)
     screws = np.eye(level.solution.fields.shape[2])
     total = np.zeros((len(nodes), len(screws), 6))

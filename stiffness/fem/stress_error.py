@@ -1,13 +1,13 @@
-r"""Estimated error of a peak stress, from differences between neighbouring elements.
+r"""Error estimate for a peak stress, from differences between neighbouring elements.
 
-At a common node, the stresses of neighbouring elements differ by about the error of the
-mesh.  The mean of these stresses is the nodal stress.  The estimated error is a factor
-times the root mean square of the largest deviations from the mean.  It is computed over
-the nodes of the elements at the peak, and over all nodes where the stress is nearly as
-large.  The factor is needed because the peak is the largest of many values with errors.
-Nodes where the mesh deviates from the surface of the part are excluded; if their
-stresses are larger, the difference is added to the error.  At a singularity neither the
-stress nor the error is defined.
+At a common node, the stresses in neighbouring elements differ by about the mesh error.
+Their mean is the nodal stress. The estimated error is the root mean square of the
+largest deviations from this mean, times a factor. The root mean square is taken over
+the nodes of the elements at the peak and over all nodes with nearly as large a stress;
+the factor accounts for the fact that the peak is the largest of many values with
+errors. Nodes where the mesh deviates from the surface of the part are excluded, but if
+their stresses are larger, the difference is added to the error. At a singularity,
+neither the stress nor the error is defined.
 
 Sources:
     Zienkiewicz & Zhu (1987), A simple error estimator, for the use of recovered
@@ -28,19 +28,19 @@ from forcefit.stiffness.surface.facets import Facets
 if TYPE_CHECKING:
     from forcefit.stiffness.fem.adaptive_step import Level
 
-# ratio of the error of a peak to the differences around it: at most 1.6, median 0.3,
-# for 9 shouldered bars in tension, torsion and bending on their first meshes
+# ratio of peak error to the differences around the peak: at most 1.6, median 0.3, for 9
+# shouldered bars in tension, torsion and bending on their first meshes
 SAFETY_FACTOR = 1.6
-# cosine of the largest angle at which two patches form a smooth surface
+# cosine of the largest angle between two patches of a smooth surface
 _SMOOTH = np.cos(np.radians(5.0))
-# distance of a face from the exact shape, relative to its size, above which the face
-# counts as deviating; cubic faces follow a fillet to 1e-4
+# distance from the exact shape, relative to the face size, above which a face counts as
+# deviating; cubic faces follow a fillet to 1e-4
 _OFF = 5e-3
 ZONE = 0.9  # fraction of the peak above which a stress counts as nearly as large
 
 
 def von_mises(stress: ArrayLike) -> NDArray:
-    """Return the von Mises equivalent stress.
+    """Compute the von Mises equivalent stress.
 
     Args:
         stress: (..., 6) [Pa] components xx yy zz yz xz xy.
@@ -55,7 +55,7 @@ def von_mises(stress: ArrayLike) -> NDArray:
 
 
 def element_stresses(level: "Level", members: NDArray, motion: NDArray) -> NDArray:
-    """Return the stresses of elements at their nodes.
+    """Compute the stresses of elements at their nodes.
 
     Args:
         level: a solved mesh.
@@ -86,14 +86,14 @@ def element_stresses(level: "Level", members: NDArray, motion: NDArray) -> NDArr
 
 
 def nodes_by_material(level: "Level") -> tuple[NDArray, NDArray]:
-    """Number nodes separately for each material, because stresses jump at the border.
+    """Number nodes separately for each material, because stresses jump at interfaces.
 
     Args:
         level: a solved mesh of n nodes.
 
     Returns:
-        (t, k) new numbers of each element's nodes, and (m,) the node of each new
-        number.  m equals n for a link of one material.
+        (t, k) new numbers of each element's nodes, and (m,) node of each new number.
+        With a single material, m equals n.
     """
     cells, constants = level.mesh.cells, level.material[:, :2]
     kind = np.unique(constants, axis=0, return_inverse=True)[1].reshape(-1)
@@ -107,13 +107,13 @@ def nodes_by_material(level: "Level") -> tuple[NDArray, NDArray]:
 def estimated_error(
     level: "Level", motion: NDArray, node: int, zone: NDArray, left_out: NDArray
 ) -> float:
-    """Return the estimated error of a peak stress.
+    """Estimate the error of a peak stress.
 
     Args:
         level: a solved mesh of n nodes, numbered by :func:`nodes_by_material`.
         motion: (6,) [rad, m] screw of the tip.
         node: number of the node with the peak.
-        zone: (n,) bool, True for nodes where the stress is nearly as large.
+        zone: (n,) bool, True for nodes with nearly as large a stress.
         left_out: (n,) bool, True for nodes where the mesh deviates from the surface,
             and where the stress may be larger.
 
@@ -129,7 +129,7 @@ def estimated_error(
 
 
 def _means_and_deviations(level: "Level", motion: NDArray) -> tuple[NDArray, NDArray]:
-    """Return (n, 6) [Pa] nodal stresses, and (n,) the largest deviations from them."""
+    """Compute (n, 6) [Pa] nodal stresses, and (n,) the largest deviations from them."""
     cells, nodes = nodes_by_material(level)
     count = len(nodes)
     total, largest = np.zeros((count, 6)), np.zeros(count)
@@ -142,7 +142,7 @@ def _means_and_deviations(level: "Level", motion: NDArray) -> tuple[NDArray, NDA
 
 
 def on_inner_edges(level: "Level") -> NDArray:
-    """Return the nodes of elements at re-entrant edges or between materials.
+    """Find the nodes of elements at re-entrant edges or between materials.
 
     Args:
         level: a solved mesh of n nodes.
@@ -155,7 +155,7 @@ def on_inner_edges(level: "Level") -> NDArray:
     edges, cells = singular_edges(level.solid, ()), level.mesh.cells
     on = np.zeros(len(level.mesh.nodes), dtype=bool)
     if len(edges):
-        # coarse faces of a fillet meet at an angle, but their exact shapes do not
+        # coarse faces on a fillet meet at an angle, although their exact shapes do not
         on[edges[_meet_at_an_angle(level, edges)]] = True
     if level.solid.region is not None:
         on[edges_between(level.solid, level.solid.region)] = True
@@ -164,7 +164,7 @@ def on_inner_edges(level: "Level") -> NDArray:
 
 
 def _meet_at_an_angle(level: "Level", edges: NDArray) -> NDArray:
-    """Return (e,) bool: edges at which the shapes on both sides meet at an angle."""
+    """Return (e,) bool, True for edges where the adjacent shapes meet at an angle."""
     solid = level.solid
     count = np.int64(len(solid.points))
     pairs = np.sort(solid.faces[:, [[0, 1], [1, 2], [0, 2]]], axis=2)
@@ -184,7 +184,7 @@ def _meet_at_an_angle(level: "Level", edges: NDArray) -> NDArray:
 
 
 def off_shapes(level: "Level") -> NDArray:
-    """Return the nodes where the mesh deviates from the surface of the part.
+    """Find the nodes where the mesh deviates from the surface of the part.
 
     Args:
         level: a solved mesh of n nodes.
@@ -210,7 +210,7 @@ def off_shapes(level: "Level") -> NDArray:
 
 
 def on_facets(level: "Level") -> NDArray:
-    """Return the nodes on surfaces whose shape was not recognised.
+    """Find the nodes on surfaces whose shape was not recognised.
 
     Args:
         level: a solved mesh of n nodes.

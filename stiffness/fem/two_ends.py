@@ -1,10 +1,10 @@
-"""Stiffness and consistent mass of a meshed link for motions of both ends.
+"""Stiffness and consistent mass of a meshed link with two moving ends.
 
-Both ends are rigid and free to move.  The solid between them deforms statically (Guyan
-reduction).  The mass matrix is therefore exact for rigid motions, and as accurate as
-that of a cubic beam element for bending.  A motion of the base equals a rigid motion of
-the link minus the resulting motion of the tip, so the fields for a held base are
-sufficient.
+Both ends are rigid and free to move, and the solid between them deforms statically
+(Guyan reduction). The mass matrix is therefore exact for rigid motions, and as accurate
+as that of a cubic beam element in bending. A motion of the base equals a rigid motion
+of the link minus the resulting motion of the tip, so the fields with a held base
+suffice.
 """
 
 from dataclasses import dataclass
@@ -20,11 +20,12 @@ from forcefit.stiffness.screws import screw_map
 
 @dataclass(frozen=True, eq=False)
 class TwoEnds:
-    """Matrices of a link with two rigid ends: rows of the base centre, then of the tip.
+    """Matrices of a link with two rigid ends, with rows for the base, then the tip.
 
     Attributes:
-        stiffness: (12, 12) [N m/rad .. N/m] stiffness; rigid motions cause no force.
-        mass: (12, 12) [kg m^2 .. kg] mass matrix; zero if the density is zero.
+        stiffness: (12, 12) [N m/rad .. N/m] stiffness, for which rigid motions cause no
+            force.
+        mass: (12, 12) [kg m^2 .. kg] mass matrix, which is zero if the density is zero.
     """
 
     stiffness: NDArray
@@ -48,7 +49,7 @@ def two_ends(solved: MeshedLink) -> TwoEnds:
     if held.kind != "rigid":
         held = condense(mesh, constants[:, 0], constants[:, 1], solved.centers)
     base, tip = solved.centers
-    # motion of the tip relative to the rigid motion that the base causes
+    # motion of the tip relative to the rigid motion caused by the base
     against = np.hstack([-screw_map(base - tip), np.eye(6)])
     K = against.T @ held.stiffness @ against
     fields = np.einsum("nik,kj->nij", held.fields, against)

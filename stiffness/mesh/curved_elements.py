@@ -1,11 +1,11 @@
-"""Nodes of curved elements, placed on the exact shapes of a solid's boundary.
+"""Nodes of curved elements, placed on the exact boundary shapes of a solid.
 
 The nodes of straight elements form a lattice.  Nodes on boundary edges are moved onto
-the shapes of their patches.  Inner faces follow their edges, and nodes on boundary
-faces are then moved onto their shapes.  The mesh is conforming, and its geometric error
-is the interpolation error of the shapes.  Cubic edges and faces interpolate the shapes
-at points for which this error has zero mean, so the error of a volume decreases with
-the sixth power of the element size h.
+the shapes of their patches, inner faces follow their edges, and nodes on boundary faces
+are then moved onto their shapes. The mesh is conforming, and its geometric error is the
+interpolation error of the shapes. Cubic edges and faces interpolate the shapes at
+points where this error has zero mean, so the volume error decreases with the sixth
+power of the element size h.
 """
 
 from collections.abc import Callable
@@ -32,7 +32,7 @@ _LARGEST_MOVE = 0.05  # largest displacement of a node, relative to the part's s
 # ratio of the smallest to the largest Jacobian determinant in an element, below which
 # the element counts as inverted
 _INVERTED = 0.05
-_PASSES = 3  # largest number of passes that bisect inverted elements
+_PASSES = 3  # largest number of passes to bisect inverted elements
 # solution of 9 t^3 - 10 t^2 + 3.6 t = 0.4: value of two of three coordinates L
 _SAMPLE = 0.2128543571118083
 
@@ -46,8 +46,8 @@ class CurvedElements:
         nodes: (n, 3) [m] positions of the nodes.
         patch: (t, 4) patch of each face, in the order of ``FACES``; -1 inside.
         curved: (t,) bool, True for an element that is not straight.
-        inverted: (t,) bool, True for an element whose Jacobian changed sign; such an
-            element was straightened.
+        inverted: (t,) bool, True for an element that was straightened because its
+            Jacobian changed sign.
     """
 
     cells: NDArray
@@ -58,15 +58,14 @@ class CurvedElements:
 
 
 def curved_elements(solid: Solid, order: int) -> CurvedElements:
-    """Return the curved elements of a solid.
+    """Create the curved elements of a solid.
 
     Args:
         solid: straight tetrahedra.
         order: order of the elements, 2 or 3.
 
     Returns:
-        The elements; an inverted element is straightened step by step until it is
-        valid.
+        The elements, of which inverted ones are straightened stepwise until valid.
     """
     corners = np.sort(solid.cells, axis=1)
     cells, count = numbered(corners, order)
@@ -109,7 +108,7 @@ def curved_elements(solid: Solid, order: int) -> CurvedElements:
 
 
 def patches_of_cells(faces: NDArray, patch: NDArray, corners: NDArray) -> NDArray:
-    """Return the patch of each face of tetrahedra.
+    """Find the patch of each face of the tetrahedra.
 
     Args:
         faces: (f, 3) corners of the triangles on patches.
@@ -136,14 +135,14 @@ def patches_of_cells(faces: NDArray, patch: NDArray, corners: NDArray) -> NDArra
 
 
 def refine_inverted(solid: Solid, order: int) -> Solid:
-    """Bisect the elements that would be inverted when their faces are curved.
+    """Bisect elements that would be inverted when their faces are curved.
 
     Args:
         solid: straight tetrahedra.
-        order: order of the elements that will be made from them.
+        order: order of the elements to be created.
 
     Returns:
-        The solid with finer elements where a wall is thin compared with its curvature.
+        The solid, refined where a wall is thin relative to its radius of curvature.
     """
     for _ in range(_PASSES):
         inverted = curved_elements(solid, order).inverted
@@ -171,11 +170,11 @@ def _cubic_edges(
 
 
 def _face_nodes_by_edges(moved: NDArray) -> NDArray:
-    """Return (t, 4, 3) displacements of face nodes from those of edges (t, 20, 3)."""
+    """Compute (t, 4, 3) displacements of face nodes from those of edges (t, 20, 3)."""
     # along an edge the displacement is L_a L_b (c_0 + c_1 (L_b - L_a)), extended over
     # the faces; at the middle of a face each of its edges adds c_0 / 9
     carried = np.zeros((len(moved), 4, 3))
-    # at the thirds L_a L_b is 2 / 9, so c_0 is the mean of the two nodes times 9 / 2
+    # at the thirds, L_a L_b is 2 / 9, so c_0 is the mean of the two nodes times 9 / 2
     mean = moved[:, 4:16].reshape(-1, 6, 2, 3).mean(axis=2)
     for f, face in enumerate(FACES):
         around = [np.isin(edge, face).all() for edge in EDGES]
@@ -186,7 +185,7 @@ def _face_nodes_by_edges(moved: NDArray) -> NDArray:
 def _cubic_faces(
     corners: NDArray, patch: NDArray, shapes: tuple[Shape | None, ...], reach: float
 ) -> NDArray:
-    """Return (f, 3) displacements of face middles, given those of all other nodes."""
+    """Return (f, 3) displacements of face midpoints, given those of all other nodes."""
     # interpolated at three points; there the cubic that equals the quartic x^2, with x
     # = L_1 L_2 + L_2 L_3 + L_3 L_1, along the edges also has the integral of x^2, so
     # that the error of a shape has zero mean
@@ -204,7 +203,7 @@ def _cubic_faces(
 def _straightened(
     straight: NDArray, curved: NDArray, cells: NDArray, order: int
 ) -> tuple[NDArray, NDArray]:
-    """Return nodes after inverted elements are straightened, and these elements."""
+    """Straighten inverted elements; return the nodes and these elements."""
     nodes = curved.copy()
     suspects = np.flatnonzero((curved != straight)[cells].any(axis=(1, 2)))
     places = np.concatenate([quadrature(6)[0], lattice(order) / order])
@@ -220,7 +219,7 @@ def _straightened(
             break
         inverted[bad] = True
         touched = np.unique(cells[bad])
-        # the loop ends because straight elements are never inverted
+        # the loop terminates because straight elements are never inverted
         kept = 0.5 if step < 4 else 0.0
         nodes[touched] += (1 - kept) * (straight - nodes)[touched]
     return nodes, inverted

@@ -1,9 +1,9 @@
-"""A mesh cut along the smooth outline of an interface.
+"""Cutting of a mesh along the smooth outline of an interface.
 
-The mesher reproduces only sharp edges.  Where an interface continues into a fillet,
-triangles of the mesh cross the outline of the interface, and its area would be wrong by
-parts of these triangles.  Corners near the outline are therefore moved onto it, and
-edges that still cross it are split.
+The mesher reproduces only sharp edges. Where an interface continues into a fillet, mesh
+triangles cross the outline of the interface, and its area would be off by parts of
+these triangles. Corners near the outline are therefore moved onto it, and edges that
+still cross it are split.
 """
 
 from dataclasses import replace
@@ -30,7 +30,7 @@ def cut_along(solid: Solid, outline: SmoothOutline) -> Solid:
         outline: outline of an interface.
 
     Returns:
-        The solid; each triangle at the outline is in the patch on its side.
+        The solid, with each triangle at the outline assigned to the patch on its side.
     """
 
     def crossing(finer: Solid, on: NDArray, ends: NDArray) -> tuple[NDArray, NDArray]:
@@ -53,7 +53,7 @@ def _boundary_edges(solid: Solid, outline: SmoothOutline) -> NDArray:
 
 
 def _corners_on(solid: Solid, outline: SmoothOutline) -> NDArray:
-    """Return (n,) bool, True for corners that count as being on the outline."""
+    """Return (n,) bool, True for corners that count as on the outline."""
     pairs = _boundary_edges(solid, outline)
     length = np.linalg.norm(
         solid.points[pairs[:, 0]] - solid.points[pairs[:, 1]], axis=1
@@ -95,12 +95,12 @@ def _crossing_edges(
 
 
 def _sides(solid: Solid, outline: SmoothOutline, on: NDArray) -> NDArray:
-    """Return (f,) patches; a triangle at the outline is assigned by its side of it."""
+    """Return (f,) patches, where triangles at the outline are assigned by side."""
     patch = solid.patch.copy()
     near = np.flatnonzero(_members(solid, outline) & on[solid.faces].any(axis=1))
     corners = solid.points[solid.faces[near]]
     away = outline.outside(corners.reshape(-1, 3)).reshape(-1, 3)
-    # a corner on the outline is on neither side
+    # a corner on the outline belongs to neither side
     mean = np.where(on[solid.faces[near]], 0.0, away).sum(axis=1)
     mean = np.where(on[solid.faces[near]].all(axis=1), away.sum(axis=1), mean)
     patch[near] = np.where(mean > 0, outline.patches[1], outline.patches[0])

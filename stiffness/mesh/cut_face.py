@@ -1,8 +1,8 @@
-"""Cutting of a mesh along a plane or curved face inside a link.
+"""Cutting of a mesh along a plane or a curved face inside a link.
 
-First, tetrahedra that are too large to follow a curved face are bisected.  Then corners
-near the face are moved onto it, and edges that still cross it are split.  The cut is
-extended slightly beyond the border of the face, so that it also divides the tetrahedra
+Tetrahedra that are too large to follow a curved face are bisected first. Corners near
+the face are then moved onto it, and edges that still cross it are split. The cut
+extends slightly beyond the border of the face, so that it also divides the tetrahedra
 that contain this border.
 """
 
@@ -26,15 +26,15 @@ from forcefit.stiffness.surface.primitives import Plane, Shape, project
 # distance within which a corner is moved onto the face, relative to its shortest edge
 _NEAR = 0.3
 _REACH = 0.005  # largest displacement of a corner, relative to the part's size
-# smallest ratio of a tetrahedron's volumes after and before its corners are moved
+# smallest ratio of a tetrahedron's volume after and before its corners are moved
 _LEAST = 0.2
 # distance up to which a corner counts as on the face, relative to the part's size;
 # shapes are accurate to 2e-6
 ON_FACE = 1e-6
 # cosine of the largest rotation of the normal of a curved face along an edge
 _TURN = np.cos(np.radians(35.0))
-_PASSES = 12  # largest number of passes that bisect too large tetrahedra
-_HALVINGS = 12  # number of bisections to find where an edge crosses a curved face
+_PASSES = 12  # largest number of passes to bisect oversized tetrahedra
+_HALVINGS = 12  # number of bisections to locate where an edge crosses a curved face
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class CutFace:
 
     Attributes:
         shape: shape of the face.
-        facets: facets of the face; None if it is the whole shape.
+        facets: facets of the face; None for the whole shape.
     """
 
     shape: Shape
@@ -57,7 +57,7 @@ class CutFace:
             reach: (n,) [m] distance that counts as near, for each point.
 
         Returns:
-            (n,) bool, True for a point that is nearer than its ``reach``.
+            (n,) bool, True for a point closer than its ``reach``.
         """
         near = np.abs(self.shape.signed(points)[0]) <= reach
         if self.facets is not None and near.any():
@@ -66,7 +66,7 @@ class CutFace:
 
 
 def faces_inside(cells: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the faces that are shared by two tetrahedra.
+    """Find the faces shared by two tetrahedra.
 
     Args:
         cells: (t, 4) corners of the tetrahedra.
@@ -82,7 +82,7 @@ def faces_inside(cells: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def face_code(corners: NDArray, points: int) -> NDArray:
-    """Return a number for each triangle that identifies its corners in any order.
+    """Return a number that identifies the corners of each triangle in any order.
 
     Args:
         corners: (..., 3) corners in any order.
@@ -104,7 +104,7 @@ def cut(solid: Solid, face: CutFace) -> Solid:
         face: face inside the solid.
 
     Returns:
-        The solid; the triangles on the face are added to its ``inner`` triangles.
+        The solid, with the triangles on the face added to its ``inner`` triangles.
     """
     if not isinstance(face.shape, Plane):
         solid = _resolved(solid, face)
@@ -123,8 +123,8 @@ def without_chords(solid: Solid) -> Solid:
         solid: solid with ``inner`` triangles.
 
     Returns:
-        The solid without such edges.  Otherwise a tetrahedron could have two sides on a
-        curved face, and would become flat when these sides are curved.
+        The solid without such edges. Otherwise, a tetrahedron could have two sides on a
+        curved face and become flat when these sides are curved.
     """
     for number in np.unique(solid.inner_patch):
         if isinstance(solid.shapes[number], Plane):
@@ -181,7 +181,7 @@ def _crossing(
     found = _share_of_crossing(face.shape, start, end, low[across], high[across])
     share[across] = found
     if face.facets is not None:
-        # the edges of tetrahedra that the face intersects are near the face
+        # edges of tetrahedra that the face intersects are near the face
         _, of_cell = edges_of(solid.cells, len(solid.points))
         length = np.linalg.norm(np.diff(solid.points[ends], axis=1)[:, 0], axis=1)
         reach = np.zeros(len(ends))
@@ -196,7 +196,7 @@ def _crossing(
 def _share_of_crossing(
     shape: Shape, start: NDArray, end: NDArray, low: NDArray, high: NDArray
 ) -> NDArray:
-    """Return (e,) fractions of edges at which they cross a shape, found numerically."""
+    """Find numerically the fractions (e,) at which edges cross a shape."""
     left, right = np.zeros(len(low)), np.ones(len(low))
     for _ in range(0 if isinstance(shape, Plane) else _HALVINGS):
         middle = (left + right) / 2
@@ -209,7 +209,7 @@ def _share_of_crossing(
 
 
 def _with_cut(solid: Solid, on: NDArray, face: CutFace) -> Solid:
-    """Return the solid after adding the triangles on a face to its inner triangles."""
+    """Add the triangles on a face to the inner triangles of a solid."""
     number, count = len(solid.shapes), len(solid.points)
     solid = replace(solid, shapes=(*solid.shapes, face.shape))
     faces, owners = faces_inside(solid.cells)
@@ -241,7 +241,7 @@ def _onto(solid: Solid, face: CutFace) -> tuple[Solid, NDArray]:
         np.maximum.at(longest, ends[:, k], length)
     near = height < reach
     near[near] = face.is_near(solid.points[near], longest[near])
-    # corners beyond the border are moved too, because the cut is extended
+    # corners beyond the border are moved too, because the cut extends beyond it
     near |= height < ON_FACE * size
     target, on = _targets(solid, face.shape, near, reach, ON_FACE * size)
     already, before = on & (height < ON_FACE * size), solid.volumes()

@@ -1,16 +1,16 @@
-r"""Layers of thin elements along the edges at which the stress is singular.
+r"""Layers of thin elements along edges at which the stress is singular.
 
 Strains increase as r^(a - 1) with a < 1 near two kinds of edges: re-entrant edges of
-the part, and edges that separate a clamped from a free face.  There, elements of
-uniform size converge slowly, whatever the degree of their polynomials.  A layer of
-elements that are thin across the edge, and as long along it as their neighbours,
-removes most of the error at little cost.
+the part, and edges that separate a clamped from a free face.  Elements of uniform size
+converge slowly there, regardless of their polynomial degree. A layer of elements that
+are thin across the edge, and as long along it as their neighbours, removes most of the
+error at little cost.
 
 A tetrahedron with an edge on a singular edge is cut into a wedge along this edge and a
-remaining part.  The cut divides the other edges in the same ratio, measured from the
-singular edge.  A tetrahedron with only a corner on a singular edge is cut into a small
-tetrahedron and a remaining part.  Neighbours cut their common face at the same points.
-The cuts are made in the coordinates of the curved element, so that thin layers follow a
+remaining part.  The cut divides its remaining edges in the same ratio, measured from
+the singular edge.  A tetrahedron with only a corner on a singular edge is cut into a
+small tetrahedron and a remaining part.  Neighbours cut their common face at the same
+points. Cuts are made in the coordinates of the curved element, so thin layers follow a
 round edge.
 """
 
@@ -30,21 +30,20 @@ from forcefit.stiffness.mesh.regions import Region, material_edges
 from forcefit.stiffness.mesh.solid import Solid, moved_onto_shapes
 
 ENDS = (0, 1)  # patches of base and tip; distributed tractions end at their outlines
-# ratio of layer thickness to element size; 0.15 to 0.3 are equally accurate
+# ratio of layer thickness to element size; values from 0.15 to 0.3 are equally accurate
 LAYER_SHARE = 0.25
-# largest number of passes that split edges between singular edges; 3 to 12 are
-# sufficient for the parts in meshes/
+# largest number of passes to split edges between singular edges; 3 to 12 suffice for
+# the parts in meshes/
 _PASSES = 100
-# cosine of 35 degrees: stress at a flatter re-entrant edge is hardly singular
+# cosine of 35 degrees: the stress at a flatter re-entrant edge is hardly singular
 _REENTRANT = np.cos(np.radians(35.0))
 # edges that are cut, for a singular corner or a singular edge; singular corners first
 _CUT_EDGES = {1: [[0, 1], [0, 2], [0, 3]], 2: [[0, 2], [0, 3], [1, 2], [1, 3]]}
 # Pieces of a cut tetrahedron: a small tetrahedron and a prism, or two prisms.  Corners
-# have the numbers 0 to 3, and cut points follow from 4 in the order above.  Each prism
-# is divided into three tetrahedra.  The diagonal of each side starts at its smallest
-# number, so that neighbours agree (Dompierre et al. 1999).  The numbers of corners
-# increase, and cut points come after them, so the diagonals are the same in all
-# tetrahedra.
+# are numbered 0 to 3, and cut points from 4 on, in the order above. Each prism is
+# divided into three tetrahedra. The diagonal of each side starts at the smallest
+# number, so that neighbours agree (Dompierre et al. 1999). Because corner numbers
+# increase and cut points come last, the diagonals are the same in all tetrahedra.
 _PARTS = {
     1: np.array([[0, 4, 5, 6], [1, 3, 2, 6], [1, 6, 2, 5], [1, 6, 5, 4]]),
     2: np.array([
@@ -56,7 +55,7 @@ _PARTS = {
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """Tetrahedra of a solid cut into smaller tetrahedra, the parts.
+    """Tetrahedra of a solid, cut into smaller tetrahedra (parts).
 
     Attributes:
         corners: (t, 4) numbers of the parts' corners, increasing in each row; a number
@@ -72,14 +71,14 @@ class Parts:
 
 
 def whole_elements(solid: Solid) -> Parts:
-    """Return uncut tetrahedra, each as a single part."""
+    """Return all tetrahedra uncut, each as a single part."""
     count = len(solid.cells)
     places = np.broadcast_to(np.eye(4), (count, 4, 4))
     return Parts(np.sort(solid.cells, axis=1), places, np.arange(count))
 
 
 def singular_edges(solid: Solid, held: tuple[int, ...]) -> NDArray:
-    """Return the edges of a solid at which stresses are singular.
+    """Find the edges of a solid at which stresses are singular.
 
     Args:
         solid: solid with patches.
@@ -94,7 +93,7 @@ def singular_edges(solid: Solid, held: tuple[int, ...]) -> NDArray:
     code = edge_code(pairs, count).ravel()
     order = np.argsort(code, kind="stable")
     code, owner = code[order], order // 3
-    # where two bodies touch, an edge has four faces; any pairing of these is valid
+    # where two bodies touch, an edge has four faces, and any pairing of them is valid
     code, left, right = code[::2], owner[::2], owner[1::2]
     border = solid.patch[left] != solid.patch[right]
     clamped = np.isin(solid.patch[left], held) | np.isin(solid.patch[right], held)
@@ -111,7 +110,7 @@ def singular_edges(solid: Solid, held: tuple[int, ...]) -> NDArray:
 def graded_edges(
     solid: Solid, held: tuple[int, ...], regions: tuple[Region, ...]
 ) -> NDArray:
-    """Return the singular edges, including boundary edges between two materials.
+    """Find the singular edges, including boundary edges between two materials.
 
     Args:
         solid: solid with patches.
@@ -137,7 +136,7 @@ def split_joining_edges(
 
     Returns:
         A solid in which each tetrahedron has at most one corner or one edge on singular
-        edges.  After a hundred passes, a few tetrahedra may still have more.
+        edges, except for a few that may remain after a hundred passes.
     """
     settled = False
     for _ in range(_PASSES):
@@ -160,7 +159,7 @@ def split_joining_edges(
                 return solid
             solid, settled = moved_onto_shapes(solid), True
             continue
-        # edges that are the longest such edge of all their tetrahedra are split first
+        # first split edges that are the longest such edge in all their tetrahedra
         rank[~joining] = -1
         highest = rank[of_cell].max(axis=1)
         own = rank[of_cell] == np.maximum(highest, 0)[:, None]
@@ -185,7 +184,7 @@ def layered(
         regions: regions of the link.
 
     Returns:
-        The parts; a tetrahedron without a singular corner or edge remains uncut.
+        The parts. Tetrahedra without a singular corner or edge remain uncut.
     """
     parts = whole_elements(solid)
     count = len(solid.points)
@@ -195,7 +194,7 @@ def layered(
     while (several := touched[parts.corners].sum(axis=1) > 2).any():
         touched[parts.corners[several]] = False
     on = touched[parts.corners]
-    # singular corners come first; the orientation of the tetrahedron does not matter
+    # singular corners come first; the orientation of the tetrahedron is irrelevant
     order = np.argsort(~on, axis=1, kind="stable")
     corners = np.take_along_axis(parts.corners, order, axis=1)
     places = np.take_along_axis(parts.places, order[:, :, None], axis=1)

@@ -1,4 +1,4 @@
-"""Assignment of a mesh's boundary to the patches of a surface."""
+"""Assignment of a mesh boundary to the patches of a surface."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from forcefit.stiffness.surface.true_surface import TrueSurface
 
 
 class MeshFailed(BadInput):
-    """Error for a valid surface of which the mesher made no usable mesh."""
+    """The mesher produced no usable mesh of a valid surface."""
 
 
 def fit_to_patches(
@@ -29,11 +29,11 @@ def fit_to_patches(
         patches: patches of the surface, with their shapes.
 
     Returns:
-        The solid; a corner is moved less if it would invert a tetrahedron.
+        The solid. A corner is moved less if it would otherwise invert a tetrahedron.
 
     Raises:
-        MeshFailed: the volume of the mesh differs from that of the part by more than
-            2 %, the number of holes differs, or an interface has no face.
+        MeshFailed: the volumes of mesh and part differ by more than 2 %, the number of
+            holes differs, or an interface has no face.
     """
     points, cells = _positive_cells(points, cells)
     faces = boundary_faces(cells)
@@ -52,7 +52,7 @@ def fit_to_patches(
         )
     if (least := float(element_quality(solid).min())) <= 0:
         raise MeshFailed(f"{surface.name}: an element is inverted, quality {least:.2g}")
-    # a lost hole in a thin wall hardly changes the volume, but it changes the stiffness
+    # losing a hole in a thin wall hardly changes the volume, but changes the stiffness
     holes, expected = (euler_characteristic(f) for f in (faces, surface.triangles))
     if holes != expected:
         raise MeshFailed(
@@ -68,7 +68,7 @@ def fit_to_patches(
 
 
 def _positive_cells(points: NDArray, cells: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the points that are used, and the cells reoriented to positive volume."""
+    """Return the used points, and the cells reoriented to positive volume."""
     used, cells = np.unique(cells, return_inverse=True)
     points, cells = points[used], cells.reshape(-1, 4)
     a, b, c, d = np.moveaxis(points[cells], 1, 0)
@@ -80,7 +80,7 @@ def _positive_cells(points: NDArray, cells: NDArray) -> tuple[NDArray, NDArray]:
 def _nearest_patch(
     points: NDArray, faces: NDArray, surface: Surface, patches: Patches
 ) -> NDArray:
-    """Return the patch of each boundary face: the nearest with a similar normal."""
+    """Find the nearest patch with a similar normal for each boundary face."""
     import pyvista
 
     mesh = pyvista.PolyData.from_regular_faces(surface.points, surface.triangles)

@@ -1,10 +1,10 @@
-"""Improvement of badly shaped tetrahedra by moving corners and splitting inner edges.
+"""Improvement of poorly shaped tetrahedra by moving corners and splitting inner edges.
 
-When corners are moved onto the shapes of the part, tetrahedra may become flat.  This is
-most frequent where two shapes meet tangentially and all corners of a tetrahedron are on
-the boundary.  An inner edge of such a tetrahedron is split.  Then corners are moved, on
-their shapes or inside the part, to the position at which the worst adjacent tetrahedron
-has the best quality.
+When corners are moved onto the shapes of the part, tetrahedra may become flat, in
+particular where two shapes meet tangentially and all corners of a tetrahedron are on
+the boundary. An inner edge of such a tetrahedron is split. Corners are then moved, on
+their shapes or inside the part, to the position that maximises the quality of the worst
+adjacent tetrahedron.
 
 Source: Freitag & Ollivier-Gooch (1997), local optimisation of the worst element.
 """
@@ -29,10 +29,10 @@ from forcefit.stiffness.mesh.solid import (
 from forcefit.stiffness.mesh.split_crossing import one_of_each
 from forcefit.stiffness.surface.primitives import project
 
-# quality below which a tetrahedron is improved; tetrahedra of pytetwild are better
+# quality below which a tetrahedron is improved; those from pytetwild are better
 POOR = 0.08
 _ROUNDS = 4
-# number of steps in the search for a corner's position; without improvement a step is
+# number of steps in the search for a corner position; a step without improvement is
 # halved
 _STEPS = 10
 _DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
@@ -47,8 +47,9 @@ def fitted(solid: Solid, limit: float | None = None) -> Solid:
             or a lower value if the tetrahedra of the solid are worse.
 
     Returns:
-        The solid, with more tetrahedra if some had to be split.  If the improvement
-        fails, some corners remain off their shapes, as in :func:`moved_onto_shapes`.
+        The solid, with additional tetrahedra if some had to be split. If the
+        improvement fails, some corners remain off their shapes, as in
+        :func:`moved_onto_shapes`.
     """
     least = float(element_quality(solid).min())
     # elements of an extruded bar are long by design
@@ -71,7 +72,7 @@ def fitted(solid: Solid, limit: float | None = None) -> Solid:
 
 
 def _split_inside(solid: Solid, limit: float) -> Solid:
-    """Split an inner edge of each poor tetrahedron all of whose corners are outside."""
+    """Split an inner edge of poor tetrahedra with all corners on the boundary."""
     boundary = np.zeros(len(solid.points), dtype=bool)
     boundary[solid.faces] = True
     ends, of_cell = edges_of(solid.cells, len(solid.points))

@@ -1,4 +1,4 @@
-r"""Polynomials on tetrahedra and triangles, defined by values at lattice points.
+r"""Lagrange polynomials on tetrahedra and triangles, by values at lattice points.
 
 ====== ========================================================== ==========
 symbol meaning                                                    shape
@@ -9,10 +9,10 @@ dN     derivatives of N, with L_1 .. L_(c-1) as variables          (q, m, c-1)
 ====== ========================================================== ==========
 
 c is 4 for a tetrahedron and 3 for a triangle.  The lattice of degree p consists of all
-points whose barycentric coordinates are multiples of 1 / p.  They are ordered: corners,
-points on edges, points on faces, inner points.  The corners of each element are in
-increasing order of their numbers.  Two elements therefore have the nodes of a common
-edge or face in the same order, and half of the elements are left-handed.
+points whose barycentric coordinates are multiples of 1 / p.  They are ordered as
+corners, points on edges, points on faces and inner points. The corners of each element
+are numbered in increasing order, so that two elements list the nodes of a common edge
+or face in the same order; half of the elements are then left-handed.
 """
 
 from functools import lru_cache
@@ -47,7 +47,7 @@ def lattice(degree: int, corners: int = 4) -> NDArray:
 
 
 def _partitions(total: int, parts: int) -> list[tuple[int, ...]]:
-    """Return all ways to split a total into positive parts, in ascending order."""
+    """List all ways to split a total into positive parts, in ascending order."""
     if parts == 1:
         return [(total,)]
     return [
@@ -58,7 +58,7 @@ def _partitions(total: int, parts: int) -> list[tuple[int, ...]]:
 
 
 def shape_functions(degree: int, L: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the polynomials that equal 1 at one lattice point and 0 at the others.
+    """Evaluate the polynomials that equal 1 at one lattice point and 0 at all others.
 
     Args:
         degree: degree of the polynomials.
@@ -68,7 +68,7 @@ def shape_functions(degree: int, L: NDArray) -> tuple[NDArray, NDArray]:
         N (q, m) and dN (q, m, c - 1).
 
     Sources:
-        Silvester (1969): products of one polynomial for each coordinate.
+        Silvester (1969): products of one polynomial per coordinate.
     """
     count, corners = L.shape
     P = np.ones((degree + 1, count, corners))
@@ -88,7 +88,7 @@ def shape_functions(degree: int, L: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def numbered(corners: NDArray, degree: int) -> tuple[NDArray, int]:
-    """Number the lattice points of elements; shared points have the same number.
+    """Number the lattice points of elements, with equal numbers for shared points.
 
     Args:
         corners: (t, 4) numbers of the corners, increasing in each row.
@@ -126,7 +126,7 @@ def face_nodes(degree: int) -> NDArray:
         degree: degree of the polynomials.
 
     Returns:
-        (4, k) indices; a row for each of ``FACES``, in the order of the lattice of a
+        (4, k) indices, one row for each of ``FACES``, in the lattice order of a
         triangle.
     """
     whole = [tuple(point) for point in lattice(degree)]

@@ -1,11 +1,11 @@
-"""Tetrahedra from surfaces, with exact interfaces and curved faces.
+"""Tetrahedral meshes of surfaces, with exact interfaces and curved faces.
 
-Pytetwild makes the tetrahedra in a separate process with a time limit, from a surface
-with fewer triangles (:mod:`forcefit.stiffness.surface.decimate`).  The boundary of the
-mesh follows this surface only within a tolerance, the envelope.  Every boundary
-triangle is therefore assigned to a patch of the surface, and its nodes are projected
-onto the exact shape of the patch.  Meshes are stored and found again by a hash of their
-input, because pytetwild is slow and does not reproduce a mesh.
+Pytetwild creates the tetrahedra in a separate process with a time limit, from a surface
+with fewer triangles (:mod:`forcefit.stiffness.surface.decimate`).  The mesh boundary
+follows this surface only within a tolerance, the envelope, so every boundary triangle
+is assigned to a patch of the surface and its nodes are projected onto the exact shape
+of the patch. Because pytetwild is slow and not reproducible, meshes are cached under a
+hash of their input.
 """
 
 import hashlib
@@ -34,9 +34,9 @@ from forcefit.stiffness.surface.surface import Surface, read_surface
 __all__ = ["Interface", "Solid", "mesh_solid", "parse_interface", "read_surface"]
 
 _WORKER = Path(__file__).with_name("mesh_worker.py")
-# library that makes meshes reproducible; usable only with the GNU C++ library
+# library that makes meshes reproducible, usable only with the GNU C++ library
 _SAME_NUMBERS = Path(__file__).with_name("same_random_numbers.so")
-# version of the format of stored meshes; increase it if their content changes
+# format version of stored meshes, to be increased if their content changes
 _FORMAT = 4
 
 
@@ -51,27 +51,27 @@ def mesh_solid(
     cache: Path | str | None = None,
     patches: Patches | None = None,
 ) -> Solid:
-    """Return the tetrahedra of a surface; read them if they were stored before.
+    """Mesh a surface with tetrahedra, or read a mesh stored earlier.
 
     Args:
         surface: surface of the link.
         base: the held interface.
         tip: the loaded interface.
-        edge: [m] requested length of edges; by default a twentieth of the diagonal.
-        envelope: [-] largest deviation of the mesh from the coarser surface that the
-            mesher reads, relative to the diagonal; the coarser surface may deviate from
-            the given one by the same amount.
+        edge: [m] requested edge length; by default a twentieth of the diagonal.
+        envelope: [-] largest deviation of the mesh, relative to the diagonal, from the
+            coarser surface that the mesher reads, which itself may deviate from the
+            given surface by the same amount.
         time_limit: [s] time limit of the mesher.
         cache: folder of meshes; by default
             :func:`forcefit.inputs.cache_folder.cache_folder`.
-        patches: patches of the surface with these interfaces; computed if None.
+        patches: patches of the surface for these interfaces; computed if None.
 
     Returns:
         The solid.
 
     Raises:
         BadInput: no part of the surface is on an interface.
-        MeshFailed: the mesher exceeded its time limit or made no mesh.
+        MeshFailed: the mesher exceeded its time limit or produced no mesh.
     """
     patches = patches or find_patches(surface, base, tip)
     edge = surface.diagonal / 20 if edge is None else edge
@@ -88,7 +88,7 @@ def mesh_solid(
 
 
 def _from_cache(path: Path) -> tuple[NDArray, NDArray] | None:
-    """Return points and cells of a stored mesh; None for a missing or damaged file."""
+    """Read points and cells of a stored mesh; None for a missing or damaged file."""
     try:
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as stored:
             points, cells = stored["points"], stored["cells"]
@@ -117,13 +117,12 @@ def _tetrahedralize(
         given, made = Path(folder, "surface.npz"), Path(folder, "mesh.npz")
         points, triangles = coarser_surface(surface, envelope * surface.diagonal)
         np.savez(given, points=points, triangles=triangles, settings=[edge, envelope])
-        # -P prevents modules in the current folder from replacing others of the same
-        # name
+        # -P prevents modules in the current folder from shadowing installed modules
         command = [sys.executable, "-P", str(_WORKER), str(given), str(made)]
         if _SAME_NUMBERS.exists():
             command.append(str(_SAME_NUMBERS))
         try:
-            # the mesher writes a file into its current folder
+            # the mesher writes a file to its current folder
             run = subprocess.run(
                 command,
                 timeout=time_limit,

@@ -13,21 +13,20 @@ from types import ModuleType
 import numpy as np
 
 # largest number of optimisation passes of the mesher; simple parts need fewer, and for
-# parts whose walls meet at acute angles twelve passes are as good as eighty
+# parts with walls at acute angles, twelve passes are as good as eighty
 _PASSES = 12
 
 
 def main(given: Path, made: Path, library: str | None = None) -> None:
-    """Read a surface and mesher settings, and write the points and cells of its mesh.
+    """Read a surface and mesher settings, and write the points and cells of a mesh.
 
     Args:
         given: file with ``points`` (n, 3) [m], ``triangles`` (m, 3) and ``settings``:
-            edge length [m], and envelope as a share of the diagonal.
+            edge length [m], and envelope relative to the diagonal.
         made: output file with ``points`` (n, 3) [m] and ``cells`` (t, 4).
         library: library that makes the mesher reproducible, or None.
     """
-    # loaded before the mesher, because the first loaded definition of a function is
-    # used
+    # loaded before the mesher, because the first loaded definition of a function wins
     if library is not None:
         ctypes.CDLL(library, mode=ctypes.RTLD_GLOBAL)
     # pytetwild imports pyvista only to add a method to its classes, which takes half a

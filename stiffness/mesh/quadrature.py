@@ -1,8 +1,8 @@
-"""Quadrature rules on the reference triangle and the reference tetrahedron.
+"""Quadrature rules on the reference triangle and tetrahedron.
 
-Each point of a rule is written as a word with a letter for each barycentric coordinate:
+Each quadrature point is written as a word with one letter per barycentric coordinate:
 ``aab`` is the point (a, a, b).  Points whose words consist of the same letters have the
-same weight.  All weights are positive, because negative weights would amplify rounding
+same weight.  All weights are positive, because negative weights would amplify round-off
 errors and could make an energy of stresses negative.
 
 Sources: Hammer and Stroud (1956) for degree 2; Radon (1948) for 5 and Dunavant (1985)
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 
 class _Rule(NamedTuple):
-    """A quadrature rule that is exact up to a degree.
+    """A quadrature rule that is exact up to a given degree.
 
     Attributes:
         degree: degree up to which polynomials are integrated exactly.
@@ -105,7 +105,7 @@ _TETRAHEDRON = (
 
 @lru_cache(maxsize=16)
 def quadrature(degree: int, corners: int = 4) -> tuple[NDArray, NDArray]:
-    """Return a rule on the reference element that is exact to at least a degree.
+    """Return a rule on the reference element that is exact to at least a given degree.
 
     Args:
         degree: degree of the polynomials, at most 6.
@@ -125,5 +125,5 @@ def quadrature(degree: int, corners: int = 4) -> tuple[NDArray, NDArray]:
     words = rule.points.split()
     letters = np.array([[ord(c) - ord("a") for c in word] for word in words])
     L = np.array(rule.coordinates)[letters]
-    L[:, 0] = 1 - L[:, 1:].sum(axis=1)  # corrects the rounding of tabulated values
+    L[:, 0] = 1 - L[:, 1:].sum(axis=1)  # removes round-off of tabulated values
     return L, np.array([rule.weights["".join(sorted(word))] for word in words])

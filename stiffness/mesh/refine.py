@@ -1,9 +1,9 @@
 """Local refinement of tetrahedra by longest-edge bisection (Rivara).
 
-An edge is split only if it is the longest edge of all tetrahedra around it.  Otherwise
-neighbouring tetrahedra are split first.  The mesh is therefore conforming after every
-step.  Boundary triangles are split together with their tetrahedra and remain in their
-patch.  New corners are moved onto the shape of the patch.
+An edge is split only if it is the longest edge of all tetrahedra around it; otherwise
+neighbouring tetrahedra are split first. The mesh is therefore conforming after every
+step. Boundary triangles are split together with their tetrahedra and remain in their
+patch, and new corners are moved onto the shape of the patch.
 """
 
 from dataclasses import dataclass, replace
@@ -31,11 +31,11 @@ class Refined:
 
 
 def refine(solid: Solid, halvings: NDArray) -> Refined:
-    """Bisect tetrahedra as requested, and neighbours as needed for a conforming mesh.
+    """Bisect tetrahedra as requested, and neighbours as required for a conforming mesh.
 
     Args:
         solid: solid to refine.
-        halvings: (t,) number of times that the volume of each tetrahedron is halved.
+        halvings: (t,) number of times to halve the volume of each tetrahedron.
 
     Returns:
         The finer solid.
@@ -60,7 +60,7 @@ def split_edges(
     """Split edges and their tetrahedra, with at most one edge in each tetrahedron.
 
     Args:
-        solid: solid to refine; new corners are not yet moved onto its shapes.
+        solid: solid to refine. New corners are not moved onto its shapes here.
         ends: (e, 2) corners of all edges, from :func:`edges_of`.
         of_cell: (t, 6) edges of each tetrahedron, from :func:`edges_of`.
         split: (e,) bool, True for edges to split.
@@ -68,8 +68,8 @@ def split_edges(
             edges.
 
     Returns:
-        The solid, and the indices (r,) of the bisected tetrahedra.  The first half of
-        each remains at its index, and the second halves are appended in this order.
+        The solid, and the indices (r,) of the bisected tetrahedra. The first half of
+        each keeps its index, and the second halves are appended in this order.
     """
     count = len(solid.points)
     middle = np.full(len(ends), -1)
@@ -103,14 +103,14 @@ def split_edges(
 
 
 def edges_of(cells: NDArray, points: int) -> tuple[NDArray, NDArray]:
-    """Return the edges of tetrahedra.
+    """Find the edges of tetrahedra.
 
     Args:
         cells: (t, 4) corners.
         points: total number of corners.
 
     Returns:
-        (e, 2) corners of the edges, in increasing order; and (t, 6) the edges of each
+        (e, 2) corners of the edges, in increasing order, and (t, 6) edges of each
         tetrahedron.
     """
     ends = np.sort(cells[:, EDGES].reshape(-1, 2), axis=1)
@@ -140,7 +140,7 @@ def length_ranks(points: NDArray, ends: NDArray) -> NDArray:
         ends: (e, 2) corners.
 
     Returns:
-        (e,) rank of each edge, 0 for the shortest; of two equally long edges the first
+        (e,) rank of each edge, 0 for the shortest. Of two equally long edges, the first
         has the lower rank.
     """
     length = np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1)
@@ -150,11 +150,11 @@ def length_ranks(points: NDArray, ends: NDArray) -> NDArray:
 
 
 def chosen_by_all(of_cell: NDArray, chosen: NDArray, edges: int) -> NDArray:
-    """Return the edges that are chosen by all tetrahedra to which they belong.
+    """Find the edges chosen by all tetrahedra around them.
 
     Args:
         of_cell: (t, 6) edges of each tetrahedron, from :func:`edges_of`.
-        chosen: edge chosen by each tetrahedron that chooses one.
+        chosen: edge chosen by each tetrahedron, if it chooses one.
         edges: number of edges.
 
     Returns:
@@ -167,7 +167,7 @@ def chosen_by_all(of_cell: NDArray, chosen: NDArray, edges: int) -> NDArray:
 def _terminal_edges(
     points: NDArray, ends: NDArray, of_cell: NDArray, wanted: NDArray
 ) -> NDArray:
-    """Return (e,) bool: longest edges of all their cells, to split for wanted cells."""
+    """Return (e,) bool, longest edges of all their cells to split for wanted cells."""
     rank = length_ranks(points, ends)
     longest = np.take_along_axis(
         of_cell, rank[of_cell].argmax(axis=1)[:, None], axis=1
@@ -183,7 +183,7 @@ def _terminal_edges(
 
 
 def _halved(cells: NDArray, middle: NDArray, pairs: NDArray) -> tuple[NDArray, NDArray]:
-    """Return bisected cells, second halves appended, and indices of the cells."""
+    """Bisect cells, with second halves appended; return them and their indices."""
     row, which = np.nonzero(middle >= 0)
     new = middle[row, which]
     first, second = cells[row].copy(), cells[row].copy()

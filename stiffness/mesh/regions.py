@@ -1,7 +1,8 @@
-"""Regions of different materials, and a mesh cut along the faces between them.
+"""Regions of different materials, and mesh cutting along the faces between them.
 
-Known faces between regions, such as planes of a box or faces between two solids, become
-faces of tetrahedra.  In later steps their corners remain on the shapes of these faces.
+Known faces between regions, such as the planes of a box or the faces between two
+solids, become faces of tetrahedra, whose corners stay on the shapes of these faces from
+then on.
 """
 
 from collections.abc import Callable
@@ -24,17 +25,17 @@ from forcefit.stiffness.mesh.refine import edge_code
 from forcefit.stiffness.mesh.solid import Solid
 
 _POOR = 0.2  # quality at which a tetrahedron can still follow a curved face
-# fraction of a piece's volume in one region at which the whole piece is assigned to it
+# fraction of a piece's volume in a region above which the whole piece belongs to it
 _AGREED = 0.9
 
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """Region of a link that consists of one material.
+    """Region of a link made of one material.
 
     Attributes:
         where: function that returns which points (n, 3) [m] are in the region.
-        faces: faces along which the mesh is cut; without faces, whole elements are
+        faces: faces along which the mesh is cut. Without faces, whole elements are
             assigned to the region.
     """
 
@@ -43,14 +44,14 @@ class Region:
 
 
 def region_of_cells(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
-    """Return the region of each tetrahedron.
+    """Find the region of each tetrahedron.
 
     Args:
         solid: straight tetrahedra.
         regions: regions; later ones have precedence.
 
     Returns:
-        (t,) number of the region, starting from 1; 0 outside all regions.
+        (t,) region number, starting from 1; 0 outside all regions.
     """
     centers = solid.points[solid.cells].mean(axis=1)
     return region_of_places(centers, regions, solid.region)
@@ -59,7 +60,7 @@ def region_of_cells(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
 def region_of_places(
     places: NDArray, regions: tuple[Region, ...], cut_region: NDArray | None
 ) -> NDArray:
-    """Return the region of points inside tetrahedra.
+    """Find the region of points inside tetrahedra.
 
     Args:
         places: (n, 3) [m] points.
@@ -68,7 +69,7 @@ def region_of_places(
             only regions along whose faces the mesh was cut; None if it was not cut.
 
     Returns:
-        (n,) number of the region, starting from 1; 0 outside all regions.
+        (n,) region number, starting from 1; 0 outside all regions.
     """
     label = np.zeros(len(places), dtype=int) if cut_region is None else cut_region
     for number, region in enumerate(regions, 1):
@@ -86,7 +87,7 @@ def cut_by_regions(solid: Solid, regions: tuple[Region, ...]) -> Solid:
         regions: regions of the link.
 
     Returns:
-        The solid with the region of each tetrahedron and with the triangles between
+        The solid, with the region of each tetrahedron and the triangles between
         regions.
     """
     if not any(region.faces for region in regions):
@@ -109,7 +110,7 @@ def cut_by_regions(solid: Solid, regions: tuple[Region, ...]) -> Solid:
 
 
 def is_jagged(solid: Solid, regions: tuple[Region, ...]) -> bool:
-    """Return whether a face between two regions passes through tetrahedra.
+    """Check whether a face between two regions passes through tetrahedra.
 
     Args:
         solid: straight tetrahedra.
@@ -128,7 +129,7 @@ def is_jagged(solid: Solid, regions: tuple[Region, ...]) -> bool:
 
 
 def material_edges(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
-    """Return the boundary edges between two regions, where stresses are singular.
+    """Find the boundary edges between two regions, where stresses are singular.
 
     Args:
         solid: straight tetrahedra.
@@ -143,7 +144,7 @@ def material_edges(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
 
 
 def edges_between(solid: Solid, region: NDArray) -> NDArray:
-    """Return the edges of the boundary at which two regions meet.
+    """Find the boundary edges at which two regions meet.
 
     Args:
         solid: straight tetrahedra.
@@ -163,7 +164,7 @@ def edges_between(solid: Solid, region: NDArray) -> NDArray:
 
 
 def _owners(solid: Solid) -> NDArray:
-    """Return (f,) the tetrahedron to which each boundary triangle belongs."""
+    """Return the tetrahedron (f,) behind each boundary triangle."""
     known = face_code(solid.cells[:, FACES], len(solid.points)).ravel()
     order = np.argsort(known)
     wanted = face_code(solid.faces, len(solid.points))
@@ -172,7 +173,7 @@ def _owners(solid: Solid) -> NDArray:
 
 
 def _places_inside(solid: Solid) -> NDArray:
-    """Return (t, 3) [m] a point inside each tetrahedron, away from cut faces."""
+    """Return a point (t, 3) [m] inside each tetrahedron, away from cut faces."""
     on = np.zeros(len(solid.points), dtype=bool)
     on[solid.inner] = True
     off = ~on[solid.cells]
@@ -182,7 +183,7 @@ def _places_inside(solid: Solid) -> NDArray:
 
 
 def _pieces(solid: Solid) -> NDArray:
-    """Return (t,) the piece between cuts to which each element belongs."""
+    """Return the piece (t,) between cuts that contains each element."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -196,7 +197,7 @@ def _pieces(solid: Solid) -> NDArray:
 
 
 def _between_regions(solid: Solid) -> Solid:
-    """Return the solid without those cuts that do not separate two regions."""
+    """Remove the cuts that do not separate two regions."""
     assert solid.region is not None
     faces, owners = faces_inside(solid.cells)
     one, other = solid.region[owners].T
@@ -205,7 +206,7 @@ def _between_regions(solid: Solid) -> Solid:
     kept = np.isin(known, between)
     inner, patch = [solid.inner[kept]], [solid.inner_patch[kept]]
     lacking = faces[~np.isin(between, known)]
-    # a corner that was moved onto the boundary may be on the face too
+    # a corner moved onto the boundary may be on the face too
     close = ON_FACE * float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     for number in np.unique(solid.inner_patch):
         shape = solid.shapes[number]

@@ -1,9 +1,9 @@
-"""Meshes of slender and thin-walled straight bars recognised from their surfaces.
+"""Meshes of slender or thin-walled straight bars, recognised from their surfaces.
 
-The mesher makes elements of similar length in all directions.  For a rod that is a
-thousand times longer than thick, or a tube whose wall is a hundredth of its radius, it
-needs minutes or does not end.  Extruding the section of such a bar requires only a few
-thousand elements.
+The mesher creates elements of similar length in all directions. For a rod a thousand
+times longer than thick, or a tube whose wall is a hundredth of its radius, it takes
+minutes or does not terminate, whereas extruding the section of such a bar requires only
+a few thousand elements.
 """
 
 import math
@@ -24,11 +24,11 @@ from forcefit.stiffness.surface.true_surface import TrueSurface
 _SLENDER = 50.0
 # ratio of wall to width (for a tube, to diameter) below which a section is thin-walled
 _THIN = 0.04
-_LAYERS = 60.0  # number of layers along a bar, without the thin layers at its ends
+_LAYERS = 60.0  # number of layers along a bar, not counting the thin layers at its ends
 # length of a layer relative to the width of the section, for a bar that is not slender
 _LONGEST = 2.0
 _PARALLEL = 1e-6  # [rad] largest angle between directions that count as parallel
-_SAME = 1e-6  # largest difference of equal positions, relative to the length
+_SAME = 1e-6  # largest difference between equal positions, relative to the length
 _SAME_VOLUME = 1e-3
 # largest sine of the angle between a triangle of a straight side and the axis, and one
 # minus the smallest sine of the angle between a triangle of an end and the axis
@@ -36,7 +36,7 @@ _NEARLY = 0.1
 
 
 def slender_bar(surface: Surface, base: Interface, tip: Interface) -> Solid | None:
-    """Return the mesh of a slender or thin-walled straight bar.
+    """Mesh a slender or thin-walled straight bar.
 
     Args:
         surface: surface of the link.
@@ -44,9 +44,9 @@ def slender_bar(surface: Surface, base: Interface, tip: Interface) -> Solid | No
         tip: the loaded interface.
 
     Returns:
-        A mesh in the axes of the surface, to be refined further.  None if the link is
-        not a round bar, tube, rectangle or box between base and tip, or if it is
-        neither slender nor thin-walled.
+        A starting mesh in the axes of the surface. None if the link is not a round bar,
+        tube, rectangle or box between base and tip, or if it is neither slender nor
+        thin-walled.
 
     Raises:
         BadInput: no part of the surface is on an interface.
@@ -60,7 +60,7 @@ def slender_bar(surface: Surface, base: Interface, tip: Interface) -> Solid | No
         return None
     along = (surface.points - base.point) @ axis
     reach = np.abs([along.min(), along.max() - length]).max()
-    # this test is faster than recognising shapes
+    # this check is faster than recognising shapes
     if reach > 10 * _SAME * length or not _prismatic(surface, axis):
         return None
     patches = find_patches(surface, base, tip)
@@ -84,7 +84,7 @@ def _prismatic(surface: Surface, axis: NDArray) -> bool:
     """Return whether all triangles are nearly parallel or normal to the axis.
 
     Triangles on a cylinder are exactly parallel to its axis only if one of their edges
-    is, which is not so in triangulations of STEP files.
+    is, which is not the case in triangulations of STEP files.
     """
     a, b, c = np.moveaxis(surface.points[surface.triangles], 1, 0)
     normal = np.cross(b - a, c - a)
@@ -95,7 +95,7 @@ def _prismatic(surface: Surface, axis: NDArray) -> bool:
 def _section(
     shapes: tuple[Shape, ...], axis: NDArray
 ) -> tuple[dict[str, float], NDArray, NDArray] | None:
-    """Return the section's lengths, a point on the axis, and the first direction."""
+    """Recognise the section's lengths, a point on the axis, and the first direction."""
     if all(isinstance(shape, Cone) for shape in shapes):
         return _round_section([s for s in shapes if isinstance(s, Cone)], axis)
     if all(isinstance(shape, Plane) for shape in shapes) and len(shapes) in (4, 8):
@@ -106,7 +106,7 @@ def _section(
 def _round_section(
     cones: list[Cone], axis: NDArray
 ) -> tuple[dict[str, float], NDArray, NDArray] | None:
-    """Return the section of a solid or hollow circle."""
+    """Recognise the section of a solid or hollow circle."""
     if len(cones) > 2 or not cones:
         return None
     largest = max(cones, key=lambda cone: cone.radius)
@@ -128,7 +128,7 @@ def _round_section(
 def _angular_section(
     planes: list[Plane], axis: NDArray
 ) -> tuple[dict[str, float], NDArray, NDArray] | None:
-    """Return the section of a rectangle, or of a box with equal wall thicknesses."""
+    """Recognise the section of a rectangle, or of a box with equal wall thicknesses."""
     first = planes[0].normal
     second = np.cross(axis, first)
     middle = np.mean([plane.point for plane in planes], axis=0)

@@ -1,4 +1,4 @@
-"""A link as tetrahedra with straight edges, whose corners are on the exact shapes."""
+"""Straight-edged tetrahedra of a link, with corners on the exact shapes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -17,7 +17,7 @@ FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A link as tetrahedra with straight edges, and the shapes of its boundary.
+    """Straight-edged tetrahedra of a link, and the shapes of its boundary.
 
     Attributes:
         points: (n, 3) [m] corners; they are on the exact shapes as far as these are
@@ -27,11 +27,11 @@ class Solid:
         patch: (f,) number of each face's patch; 0 is the base interface, 1 the tip.
         shapes: shape of each patch; None if the shape is unknown, so that the nodes of
             the patch are not moved.
-        walls: for each pair of an interface and a patch that continues it smoothly, the
-            wall through their common line, see
+        walls: wall through the common line of an interface and a patch that continues
+            it smoothly, for each such pair, see
             :mod:`forcefit.stiffness.surface.smooth_outline`.
         surface: surface that the mesh approximates; None if the shapes of the patches
-            are sufficient.
+            suffice.
         inner: (k, 3) corners of triangles inside the link, between regions.
         inner_patch: (k,) index of the shape of each inner triangle.
         region: (t,) region of each tetrahedron, see
@@ -60,7 +60,7 @@ class Solid:
 def meeting_shapes(
     solid: Solid, key: tuple[int, ...], points: NDArray
 ) -> tuple[Shape, ...]:
-    """Return the shapes on which corners of a solid must be.
+    """Return the shapes on which corners of a solid must lie.
 
     Args:
         solid: straight tetrahedra.
@@ -68,13 +68,13 @@ def meeting_shapes(
         points: (n, 3) [m] positions of the corners.
 
     Returns:
-        The shapes of the patches, or their replacement where two patches meet smoothly.
+        The shapes of the patches, or their substitutes where two patches meet smoothly.
     """
     return _meeting_shapes(key, solid.shapes, solid.walls, points) if key else ()
 
 
 def corner_groups(solid: Solid) -> list[tuple[tuple[int, ...], NDArray]]:
-    """Group the corners that must be on shapes by the shapes on which they must be.
+    """Group the boundary corners by the shapes on which they must lie.
 
     Args:
         solid: straight tetrahedra.
@@ -94,7 +94,7 @@ def _meeting_shapes(
     points: NDArray,
 ) -> tuple[Shape, ...]:
     """Return the shapes that intersect in the points shared by several patches."""
-    # tangent shapes do not determine their common line, but the wall through it does
+    # tangent shapes determine their common line poorly, but the wall through it does
     standing = {pair: wall for pair, wall in walls.items() if set(pair) <= set(key)}
     replaced = {other for _, other in standing}
     known = [s for p in key if p not in replaced and (s := shapes[p]) is not None]
@@ -105,7 +105,7 @@ def _meeting_shapes(
 
 
 def _tangent(one: Shape | None, other: Shape, points: NDArray) -> bool:
-    """Return whether two shapes have the same normals at given points."""
+    """Check whether two shapes have the same normals at given points."""
     if one is None:
         return False
     along = np.einsum("ni,ni->n", one.signed(points)[1], other.signed(points)[1])
@@ -113,7 +113,7 @@ def _tangent(one: Shape | None, other: Shape, points: NDArray) -> bool:
 
 
 def element_quality(solid: Solid) -> NDArray:
-    """Return the quality of tetrahedra.
+    """Compute the quality of tetrahedra.
 
     Args:
         solid: straight tetrahedra.
@@ -126,7 +126,7 @@ def element_quality(solid: Solid) -> NDArray:
 
 
 def tetrahedra_quality(corners: NDArray) -> NDArray:
-    """Return the quality of tetrahedra: 6 sqrt(2) volume over the cubed rms edge.
+    """Compute the quality of tetrahedra: 6 sqrt(2) volume over the cubed rms edge.
 
     Args:
         corners: (t, 4, 3) [m] positions of the corners.
@@ -142,7 +142,7 @@ def tetrahedra_quality(corners: NDArray) -> NDArray:
 
 
 def boundary_faces(cells: NDArray) -> NDArray:
-    """Return the faces that belong to one tetrahedron only.
+    """Find the faces that belong to a single tetrahedron.
 
     Args:
         cells: (t, 4) corners of tetrahedra with positive volume.
@@ -162,7 +162,7 @@ def boundary_faces(cells: NDArray) -> NDArray:
 def node_patches(
     nodes: int, members: NDArray, patch: NDArray
 ) -> list[tuple[tuple[int, ...], NDArray]]:
-    """Group nodes by the set of patches on which they are.
+    """Group nodes by the set of patches on which they lie.
 
     Args:
         nodes: number of nodes.
@@ -170,7 +170,7 @@ def node_patches(
         patch: (f,) patch of each face.
 
     Returns:
-        Pairs of a set of patches and the nodes that are on exactly these patches.
+        Pairs of a set of patches and the nodes on exactly these patches.
     """
     pairs = np.column_stack([members.ravel(), np.repeat(patch, members.shape[1])])
     pairs = np.unique(pairs, axis=0)
@@ -218,8 +218,8 @@ def corners_on_shapes(solid: Solid) -> NDArray:
         solid: solid whose corners may be off the shapes of their patches.
 
     Returns:
-        (n, 3) [m] positions; a boundary corner that is farther from its shapes than a
-        hundredth of the part's size is not moved.
+        (n, 3) [m] positions. A boundary corner farther from its shapes than a hundredth
+        of the part's size is not moved.
     """
     size = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     groups = corner_groups(solid)
@@ -227,13 +227,13 @@ def corners_on_shapes(solid: Solid) -> NDArray:
 
 
 def moved_onto_shapes(solid: Solid) -> Solid:
-    """Move corners onto their shapes, but less where tetrahedra would be inverted.
+    """Move corners onto their shapes, less so where tetrahedra would be inverted.
 
     Args:
         solid: solid whose corners may be off the shapes of their patches.
 
     Returns:
-        The solid with its corners moved.
+        The solid with moved corners.
     """
     target = corners_on_shapes(solid)
     share = np.ones(len(target))

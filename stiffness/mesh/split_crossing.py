@@ -1,4 +1,4 @@
-"""Splitting of the edges of a mesh that cross a surface, until no edge crosses it."""
+"""Splitting of mesh edges until none crosses a given surface."""
 
 from collections.abc import Callable
 
@@ -20,9 +20,9 @@ def split_crossing(
     Args:
         solid: solid to split.
         on: (n,) bool, True for a corner on the surface.
-        crossing: function of a solid, (n,) its corners on the surface, and its edges
-            (e, 2).  The function returns which edges cross the surface, and at which
-            fraction of their length.
+        crossing: function of a solid, its corners on the surface (n,), and its edges
+            (e, 2), which returns the edges that cross the surface and the fraction of
+            their length at which they do.
 
     Returns:
         The solid, and (n,) bool, True for its corners on the surface.
@@ -41,14 +41,14 @@ def split_crossing(
 
 
 def one_of_each(wanted: NDArray, of_cell: NDArray) -> NDArray:
-    """Select edges that can be split together: at most one in each tetrahedron.
+    """Select edges that can be split together, at most one in each tetrahedron.
 
     Args:
         wanted: (e,) bool, True for edges to be split.
         of_cell: (t, 6) edges of each tetrahedron.
 
     Returns:
-        (e,) bool, True for the selected edges; at least one if any is wanted.
+        (e,) bool, True for the selected edges, at least one if any is wanted.
     """
     order = np.where(wanted, np.arange(len(wanted), 0, -1), 0)
     first = of_cell[np.arange(len(of_cell)), order[of_cell].argmax(axis=1)]

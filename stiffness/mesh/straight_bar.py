@@ -1,12 +1,12 @@
-"""Tetrahedra of straight bars from their sections, without a mesher.
+"""Tetrahedral meshes of straight bars, extruded from their sections.
 
-A triangulated section is extruded along z in layers.  The layers are thin at the held
-ends and thicker between them, where the displacement field is that of a beam.  The
-prism over a triangle in a layer is split into three tetrahedra.  The diagonal of each
-side starts at the smallest corner number, so that neighbours split a common side in the
-same way (Dompierre et al. 1999).  A wall of any thickness is spanned by one element.
-Because the elements are long along the bar and around a tube, a few thousand are
-sufficient; a mesher with edges of equal length would need millions.
+A triangulated section is extruded along z in layers, which are thin at the held ends
+and thicker in between, where the displacement field is that of a beam.  The prism over
+a triangle in a layer is split into three tetrahedra.  The diagonal of each side starts
+at the smallest corner number, so that neighbours split a common side in the same way
+(Dompierre et al. 1999).  One element spans a wall of any thickness. Because the
+elements are long along the bar and around a tube, a few thousand suffice, where a
+mesher with edges of equal length would need millions.
 """
 
 import math
@@ -19,10 +19,10 @@ from forcefit.stiffness.mesh.solid import Solid, boundary_faces
 from forcefit.stiffness.surface.primitives import Cone, Plane, Shape
 
 _AROUND = 8  # smallest number of elements around a full circle
-# largest distance between an arc and its chord, relative to the bar's length;
-# refinement is limited by it
+# largest distance between an arc and its chord, relative to the bar's length, which
+# limits the refinement
 _OFF = 0.008
-# largest squared angle of an element over wall / radius, so that chords stay inside
+# largest squared angle of an element over wall / radius, which keeps chords inside
 _IN_WALL = 1.0
 _FLAT = 4.0  # largest ratio of width to height of an element in the section
 _GROWTH = 2.0  # ratio of the thicknesses of consecutive layers
@@ -40,7 +40,7 @@ def straight_bar(section: Mapping[str, float], longest: float = _LONGEST) -> Sol
         longest: thickness of the thickest layer, relative to the section's width.
 
     Returns:
-        A mesh to be refined further, with patch 0 at z = 0 and patch 1 at z = 1.
+        A starting mesh with patch 0 at z = 0 and patch 1 at z = 1.
     """
     flat, triangles = _round(section) if "radius" in section else _angular(section)
     heights = _heights(_thinnest(section), longest * float(np.ptp(flat[:, 0])))
@@ -73,7 +73,7 @@ def _thinnest(section: Mapping[str, float]) -> float:
 
 
 def _heights(first: float, longest: float) -> NDArray:
-    """Return heights from 0 to 1 of layers that become thicker towards the middle."""
+    """Return layer heights from 0 to 1, with thicker layers towards the middle."""
     steps = [min(first, 0.25)]
     while sum(steps) < 0.5:
         steps.append(min(_GROWTH * steps[-1], longest))
@@ -82,7 +82,7 @@ def _heights(first: float, longest: float) -> NDArray:
 
 
 def _round(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
-    """Return the points and triangles of a disc or a ring."""
+    """Triangulate a disc or a ring."""
     radius, inner = section["radius"], section.get("inner_radius", 0.0)
     angle = min(
         2 * np.pi / _AROUND, math.sqrt(_IN_WALL * (radius - inner) / radius),
@@ -103,7 +103,7 @@ def _round(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
 
 
 def _angular(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
-    """Return the points and triangles of a rectangle, a box or an I-section."""
+    """Triangulate a rectangle, a box or an I-section."""
     width, height = section["width"], section["height"]
     x_cuts, y_cuts = [width / 2], [height / 2]
     if "wall" in section:
@@ -132,7 +132,7 @@ def _angular(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
 
 
 def _divided(cuts: NDArray, longest: float) -> NDArray:
-    """Add cuts so that no gap between two cuts exceeds ``longest``."""
+    """Add cuts until no gap between two cuts exceeds ``longest``."""
     parts = [
         np.linspace(low, high, math.ceil((high - low) / longest - 1e-9) + 1)[:-1]
         for low, high in zip(cuts, cuts[1:], strict=False)
@@ -143,10 +143,10 @@ def _divided(cuts: NDArray, longest: float) -> NDArray:
 def _sides(
     section: Mapping[str, float], corners: NDArray
 ) -> tuple[NDArray, tuple[Shape | None, ...]]:
-    """Return (f,) the side on which each face (f, 3, 3) is, and the sides' shapes."""
+    """Return the side (f,) of each face (f, 3, 3), and the shapes of the sides."""
     if "radius" in section:
         radii = [r for r in (section["radius"], section.get("inner_radius")) if r]
         off = np.linalg.norm(corners[:, 0, :2], axis=1)[:, None] - radii
         return np.abs(off).argmin(axis=1), tuple(Cone(0 * _UP, _UP, r) for r in radii)
-    # the sides normal to x and those normal to y are flat and meet at an edge
+    # sides normal to x and sides normal to y are flat and meet at an edge
     return np.ptp(corners[:, :, :2], axis=1).argmin(axis=1), (None, None)

@@ -1,4 +1,4 @@
-"""Results for K_E: text, comparison with a beam, export, and libraries.
+"""Reports on K_E: text, comparison with a beam, export, and libraries.
 
 Start with ``library.py`` for many links, or with ``compare.py`` for one link.
 """

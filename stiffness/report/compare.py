@@ -1,16 +1,14 @@
-"""Comparison of a beam with finite elements: the difference and its physical cause.
+"""Comparison of beam theory with finite elements, with the cause of the difference.
 
-A beam's section warps and contracts freely, but a rigid face prevents both.  The ends
-of a solid link are therefore stiffer than those of the beam.  The solid is as stiff as
-a beam that is shorter by a fixed multiple of the section's size r: K / K_beam = 1 + c r
-/ L.  The coefficient c depends only on the section and on Poisson's ratio.  The
-difference vanishes as the link becomes slender.  If it does not, one of the two models
-is wrong.
+The section of a beam warps and contracts freely, whereas a rigid face prevents both, so
+the ends of a solid link are stiffer than those of the beam. The solid is as stiff as a
+beam that is shorter by a fixed multiple of the section size r: K / K_beam = 1 + c r /
+L. The coefficient c depends only on the section and on Poisson's ratio. The difference
+vanishes as the link becomes slender; if it does not, one of the two models is wrong.
 
-The most common mistake is a section with exchanged width and height, or a missing
-``up``.  The beam is then rotated about its axis.  The beam is therefore also compared
-after rotations by multiples of 90 degrees, and a rotation that agrees much better is
-reported.
+The most common mistake is to swap width and height of the section, or to omit ``up``,
+so that the beam is rotated about its axis. Rotations of the beam by multiples of 90
+degrees are therefore compared too, and one that agrees much better is reported.
 """
 
 from dataclasses import dataclass
@@ -23,22 +21,22 @@ from forcefit.results.display import html_table, short_repr
 from forcefit.stiffness.link import LinkStiffness, scaled
 from forcefit.stiffness.screws import rotation_matrix, screw_map
 
-# largest difference after a reported rotation, relative to the original difference
+# largest difference after a reported rotation, relative to the difference before it
 _MUCH_BETTER = 0.25
-_TURNS = (90, 180, 270)  # [deg] rotations of the beam about its axis that are tried
+_TURNS = (90, 180, 270)  # [deg] trial rotations of the beam about its axis
 
 
 @dataclass(frozen=True, eq=False)
 class LinkComparison:
-    """A link computed by a beam formula and by finite elements.
+    """A link computed both by a beam formula and by finite elements.
 
     Attributes:
         beam: link by the beam formula.
         fea: link by finite elements, with the same tip and axes.
         difference: (6, 6) [1] fea minus beam, scaled by sqrt(K_ii K_jj) of the beam.
         length: [m] length from base to tip along the beam.
-        size: [m] size of the section: twice the radius of gyration, which for a round
-            bar is its radius.
+        size: [m] section size: twice the radius of gyration, which is the radius of a
+            round bar.
     """
 
     beam: LinkStiffness
@@ -51,7 +49,7 @@ class LinkComparison:
 
     @property
     def slenderness(self) -> float:
-        """Ratio L / r of the length to the section's size."""
+        """Ratio L / r of the length to the section size."""
         return self.length / self.size
 
     @property
@@ -75,7 +73,7 @@ class LinkComparison:
             for angle in _TURNS
         }
         noise = 2 * self.fea.relative_error_estimate
-        # of several rotations whose difference is mesh error and rounding, use the
+        # of several rotations that differ only by mesh error and round-off, use the
         # smallest
         least = min(remaining.values()) + noise + 1e-9 * worst
         best = min(angle for angle in remaining if remaining[angle] <= least)
@@ -100,8 +98,8 @@ class LinkComparison:
         turns, shifts = (" ".join(f"{v:.2f}" for v in part) for part in (c[:3], c[3:]))
         chord = float(np.linalg.norm(self.fea.tip - self.fea.base))
         bent = (
-            "  A solid's corner is stiffer than two beams that meet in a point: c "
-            "includes more than the end effect."
+            "  The corner of a solid is stiffer than two beams that meet at a point, "
+            "so c includes more than the end effect."
         )
         return (
             f"L / r = {self.slenderness:.3g}.  Held faces cannot warp or shrink: "
@@ -112,7 +110,7 @@ class LinkComparison:
 
 
 def _turned_difference(comparison: LinkComparison, rotation: NDArray) -> float:
-    """Return the largest difference [1] after rotating the beam about its tip."""
+    """Compute the largest difference [1] after rotating the beam about its tip."""
     axis = rotation / np.linalg.norm(comparison.fea.tip - comparison.fea.base)
     A = screw_map(np.zeros(3), rotation_matrix(axis))
     K = A @ comparison.beam.stiffness @ A.T
@@ -125,19 +123,19 @@ def compare_link(
     size: float,
     length: float | None = None,
 ) -> LinkComparison:
-    """Compare the stiffnesses of one link by a beam formula and by finite elements.
+    """Compare the stiffness of a link by beam theory and by finite elements.
 
     Args:
         beam: link by the beam formula.
         fea: link by finite elements, with the same tip and axes.
-        size: [m] size of the section; for a round bar its radius.
+        size: [m] section size; the radius of a round bar.
         length: [m] length of the beam; by default from base to tip.
 
     Returns:
         The comparison.
 
     Raises:
-        BadInput: the distance of the tips exceeds 1e-6 m and 0.1 % of the length.
+        BadInput: the distance between the tips exceeds 1e-6 m and 0.1 % of the length.
     """
     length = float(np.linalg.norm(fea.tip - fea.base)) if length is None else length
     gap = float(np.linalg.norm(fea.tip - beam.tip))
@@ -153,7 +151,7 @@ def compare_link(
 
 
 def entries_that_matter(stiffness: NDArray) -> list[tuple[int, int]]:
-    """Return the upper entries of a stiffness above a thousandth of their scale.
+    """Find the upper entries of a stiffness above a thousandth of their scale.
 
     Args:
         stiffness: (6, 6) stiffness.

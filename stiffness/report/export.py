@@ -11,31 +11,30 @@ from forcefit.inputs.table import BadInput, nearest
 from forcefit.stiffness.report.library import Entry
 from forcefit.stiffness.screws import SCREW
 
-# programs whose order is translations first; in forcefit rotations are first
+# programs with translations first, whereas forcefit has rotations first
 PROGRAMS = ("exudyn", "adams", "mapdl")
 _SWAPPED = [3, 4, 5, 0, 1, 2]
 
 
 def translations_first(matrix: ArrayLike) -> NDArray:
-    """Rearrange a stiffness or compliance to the order [T R] / [F M].
+    """Reorder a stiffness or compliance to [T R] / [F M].
 
     Args:
         matrix: (6, 6) matrix in the order [R T] / [m f].
 
     Returns:
-        (6, 6) rearranged matrix.
+        (6, 6) reordered matrix.
     """
     return np.asarray(matrix, dtype=float)[np.ix_(_SWAPPED, _SWAPPED)]
 
 
 def stiffness_for(program: str, stiffness: ArrayLike, name: str = "link") -> str:
-    """Return K_E as text for another program, in SI units.
+    """Format K_E as text for another program, in SI units.
 
     Args:
         program: ``"exudyn"`` for ``stiffness`` of a RigidBodySpringDamper; ``"adams"``
-            for the K matrix of a FIELD statement; ``"mapdl"`` for the lower triangle
-            of a MATRIX27 stiffness between the nodes I (base) and J (tip), which are at
-            the same position.
+            for the K matrix of a FIELD statement; ``"mapdl"`` for the lower triangle of
+            a MATRIX27 stiffness between the coincident nodes I (base) and J (tip).
         stiffness: (6, 6) K_E in the order [R T] / [m f].
         name: name of the link, for comments.
 
@@ -67,7 +66,7 @@ def stiffness_for(program: str, stiffness: ArrayLike, name: str = "link") -> str
 
 
 def library_csv(entries: Sequence[Entry]) -> str:
-    """Return a library as CSV: the parameters of each entry, then the upper half of K.
+    """Format a library as CSV: parameters of each entry, then the upper half of K.
 
     Args:
         entries: entries of one library.

@@ -1,9 +1,8 @@
-"""Libraries of link stiffnesses on disk, with the origin of each stiffness.
+"""Libraries of link stiffnesses on disk, with provenance.
 
-A library is a folder with one JSON file for each entry.  An entry contains the
-stiffness and its error, the mesh report, the parameters, the material, a hash of the
-geometry, the version of the program, and the date.
-:mod:`forcefit.stiffness.report.library_build` makes entries.
+A library is a folder with one JSON file per entry. An entry contains the stiffness and
+its error, the mesh report, parameters and material, a hash of the geometry, the program
+version, and the date. :mod:`forcefit.stiffness.report.library_build` creates entries.
 """
 
 import itertools
@@ -27,12 +26,12 @@ FORMAT = "forcefit link 1"
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """A stored link.
+    """A stored link stiffness.
 
     Attributes:
         key: name of the entry in the library.
         stiffness: (6, 6) stiffness at the tip, in the link's axes.
-        stiffness_error: (6, 6) estimate of the error of the stiffness.
+        stiffness_error: (6, 6) estimated error of the stiffness.
         tip: (3,) [m] position of the tip.
         parameters: lengths [m] and material constants of the link, by name.
         about: complete content of the file.
@@ -72,7 +71,7 @@ def read_entry(path: Path | str, key: str) -> Entry:
 
 
 def _entry(file: Path) -> Entry:
-    """Return the content of an entry's file."""
+    """Read the file of an entry."""
     try:
         about = json.loads(read_text(file))
         if about.get("format") != FORMAT:
@@ -109,7 +108,7 @@ def _entry(file: Path) -> Entry:
 
 
 def read_compliance(path: Path | str, key: str) -> NDArray:
-    """Return the compliance of one entry.
+    """Read the compliance of one entry.
 
     Args:
         path: the library's folder.
@@ -148,25 +147,24 @@ def look_up(
 ) -> tuple[NDArray, NDArray]:
     """Interpolate the stiffness between entries whose parameters form a grid.
 
-    Stiffnesses of links are nearly products of powers of their lengths.  Therefore the
-    logarithms of the diagonal, and the scaled other entries, are interpolated by
-    polynomials of the logarithms of the parameters.  The polynomials use up to four
-    neighbours along each axis.
+    Link stiffnesses are nearly products of powers of lengths, so the logarithms of the
+    diagonal entries and the scaled off-diagonal entries are interpolated by polynomials
+    in the logarithms of the parameters, through up to four neighbours along each axis.
 
     Args:
         entries: entries of a full grid.
         wanted: value of every parameter; a parameter with a single value in the grid
             may be omitted.
         family: name of a family of parts given by surfaces; if empty, the grid of a
-            shape is used, or the only family.
+            shape or the only family is used.
 
     Returns:
-        (6, 6) stiffness, and (6, 6) estimate of its error.  The estimate is the change
-        when the farthest entry along each axis is left out, plus the entries' errors.
+        (6, 6) stiffness and (6, 6) estimate of its error, which is the change when the
+        farthest entry along each axis is omitted, plus the errors of the entries.
 
     Raises:
         BadInput: a parameter is unknown, missing or outside the grid, or the entries do
-            not fill a grid.
+            not form a full grid.
     """
     entries = _grid_of(entries, family)
     names = list(entries[0].parameters)
@@ -214,7 +212,7 @@ def look_up(
 
 def _grid_of(entries: Sequence[Entry], family: str) -> list[Entry]:
     """Return the entries of a family, or the entries on the grid of a shape."""
-    # single parts do not belong to a grid
+    # single parts are not on a grid
     families = sorted({e.about["family"] for e in entries if e.about.get("family")})
     grid = [entry for entry in entries if "surface" not in entry.about]
     if family and family not in families:

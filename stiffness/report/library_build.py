@@ -1,7 +1,7 @@
-"""Building of a library from a file: a grid of one shape, and parts by surface.
+"""Building of libraries from a file: a grid of one shape, and parts by surface.
 
-An entry is written completely or not at all.  A build can therefore be interrupted and
-continued, and several processes can share it.
+Each entry is written completely or not at all, so a build can be interrupted and
+resumed, and several processes can share it.
 """
 
 import itertools
@@ -47,7 +47,7 @@ class Spec:
         method: ``"beam"`` or ``"fea"``.
         grid: values of each parameter: lengths [m], ``young`` [Pa] and so on.
         accuracy: required relative error of the finite elements.
-        links: parts given by their surfaces, in addition to or instead of the grid.
+        links: parts given by surfaces, in addition to the grid or in its place.
     """
 
     folder: Path
@@ -72,12 +72,12 @@ def read_spec(path: Path | str) -> Spec:
     """Read a build file.
 
     Args:
-        path: TOML file with ``library`` and ``accuracy``.  It contains ``shape``,
-            ``method`` and a table ``grid`` of lists of numbers; or tables ``[[link]]``
-            of parts given by their surfaces; or both.
+        path: TOML file with ``library`` and ``accuracy``, and either ``shape``,
+            ``method`` and a table ``grid`` of lists of numbers, or tables ``[[link]]``
+            of parts given by surfaces, or both.
 
     Returns:
-        The content; the library folder is relative to the folder of the file.
+        The content, with the library folder relative to the folder of the file.
 
     Raises:
         BadInput: the file, a name or a value is invalid.
@@ -128,7 +128,7 @@ def read_spec(path: Path | str) -> Spec:
 
 
 def _is_number(value: object) -> bool:
-    """Return whether a value is a number of valid size, but not a boolean."""
+    """Check whether a value is a number of valid size other than a boolean."""
     proper = isinstance(value, int | float) and not isinstance(value, bool)
     return proper and -LARGEST <= value <= LARGEST  # type: ignore[operator]
 
@@ -139,7 +139,7 @@ def _lengths(point: Mapping[str, float]) -> dict[str, float]:
 
 
 def entry_key(spec: Spec, point: Mapping[str, float]) -> str:
-    """Return the name of an entry, which is unique for its parameters.
+    """Return the name of an entry, unique for its parameters.
 
     Args:
         spec: content of the library.
@@ -157,12 +157,12 @@ def build_library(
     workers: int = 1,
     update: Callable[[int, int], None] | None = None,
 ) -> list[Path]:
-    """Compute the entries that the library does not contain yet.
+    """Compute the entries that are missing from the library.
 
     Args:
         spec: content of the library.
         workers: number of processes.
-        update: function that is called with the numbers of finished and of all entries.
+        update: callback that receives the numbers of finished and of all entries.
 
     Returns:
         Paths of all entries of the library.
@@ -211,7 +211,7 @@ def _make_folder(folder: Path, write: bool = True) -> None:
 
 
 def _key(spec: Spec, wanted: dict[str, float] | SurfaceLink) -> str:
-    """Return the name of an entry of the grid, or of a part given by its surface."""
+    """Return the name of a grid entry, or of a part given by its surface."""
     if isinstance(wanted, SurfaceLink):
         return wanted.name
     return entry_key(spec, wanted)
@@ -246,7 +246,7 @@ def _make_entry(spec: Spec, wanted: dict[str, float] | SurfaceLink) -> None:
 
 
 def _solve_point(spec: Spec, point: dict[str, float]) -> tuple[LinkStiffness, str]:
-    """Return the link at a point of the grid, and a hash of its geometry."""
+    """Compute the link at a grid point, and a hash of its geometry."""
     lengths, E, nu = _lengths(point), point["young"], point["poisson"]
     tip = np.array([0.0, 0.0, lengths["length"]])
     if spec.method == "beam":

@@ -1,9 +1,7 @@
-"""Library entries of parts given by their surfaces: single parts and families.
+"""Library entries for parts given by surfaces: single parts and families.
 
 A family is a table of surface files and sizes, between which ``look_up`` interpolates.
-
-An entry is computed again if the content of its surface file or another setting has
-changed.
+An entry is recomputed if the content of its surface file or any setting has changed.
 """
 
 import hashlib
@@ -27,23 +25,22 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
 @dataclass(frozen=True)
 class SurfaceLink:
-    """A part given by its surface, for a library.
+    """A library part given by its surface.
 
     Attributes:
         name: name of the entry in the library.
         surface: surface file, relative to the folder of the build file or absolute.
         base: text of the held interface.
-        tip: text of the interface that moves.
+        tip: text of the moving interface.
         young: [Pa] Young's modulus.
         poisson: [-] Poisson's ratio.
-        density: [kg/m^3] density; if 0, mass and inertia are not computed.
-        unit: unit of the surface file.
+        density: [kg/m^3] density; 0 to omit mass and inertia.
+        unit: unit of length in the surface file.
         interface: one of :data:`forcefit.stiffness.fem.condensation.KINDS`.
         accuracy: [1] required relative error of every entry of K.
-        family: name of a family of parts that differ in their sizes; empty for a single
-            part.
-        sizes: [m] sizes of this part of a family, by name.
-        parts: texts of parts of another material, as on the command line.
+        family: name of a family of parts that differ in size; empty for a single part.
+        sizes: [m] sizes of this part in a family, by name.
+        parts: texts for regions of another material, as on the command line.
     """
 
     name: str
@@ -62,15 +59,15 @@ class SurfaceLink:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Sizes and material constants by name, as for an entry of a grid."""
+        """Sizes and material constants by name, as for a grid entry."""
         given = dict(self.sizes) | {"young": self.young, "poisson": self.poisson}
         return given | ({"density": self.density} if self.density else {})
 
     def request(self) -> dict[str, Any]:
-        """Return all data on which the entry depends, including a hash of the surface.
+        """Collect all data on which the entry depends, including a hash of the surface.
 
         Returns:
-            Plain values; equal settings have equal values.
+            Plain values, which are equal for equal settings.
 
         Raises:
             BadInput: the surface file cannot be read.
@@ -123,7 +120,7 @@ def read_surface_links(root: Table, accuracy: float) -> tuple[SurfaceLink, ...]:
 
     Args:
         root: root table of the file.
-        accuracy: required accuracy of parts for which the file does not state one.
+        accuracy: required accuracy of parts without one in the file.
 
     Returns:
         The parts in the order of the file.
@@ -149,7 +146,7 @@ def read_surface_links(root: Table, accuracy: float) -> tuple[SurfaceLink, ...]:
 
 
 def _add(links: dict[str, SurfaceLink], link: SurfaceLink, table: Table) -> None:
-    """Add a part; raise an error if another part has the same name."""
+    """Add a part; reject a name that is already in use."""
     if link.name in links:
         found = f"found {quoted(link.name)} twice, expected other names"
         raise table.bad("name", found)
@@ -157,7 +154,7 @@ def _add(links: dict[str, SurfaceLink], link: SurfaceLink, table: Table) -> None
 
 
 def _link(table: Table, surface: Path, accuracy: float) -> SurfaceLink:
-    """Read the keys that the tables of links and families have in common."""
+    """Read the keys common to the tables of links and families."""
     from forcefit.stiffness.fem.condensation import KINDS
     from forcefit.stiffness.fem.part_text import read_parts
 
@@ -186,13 +183,13 @@ def family_of(common: SurfaceLink, file: Path) -> list[SurfaceLink]:
     """Read the parts of a family from a CSV table of files and sizes.
 
     Args:
-        common: settings of all parts, with the name of the family; the texts of
-            interfaces may contain sizes in braces, such as ``"z={length}"``.
-        file: table with a column ``surface``, relative to its folder, and a column for
-            each size [m].
+        common: common settings of all parts, with the name of the family. Interface
+            texts may contain sizes in braces, such as ``"z={length}"``.
+        file: table with a column ``surface``, relative to the table's folder, and a
+            column for each size [m].
 
     Returns:
-        A part for each row.
+        One part per row.
 
     Raises:
         BadInput: the table, a file or an interface is invalid.
@@ -230,7 +227,7 @@ def family_of(common: SurfaceLink, file: Path) -> list[SurfaceLink]:
 
 
 def _size(place: str, name: str, cell: str) -> float:
-    """Return the length [m] in a cell."""
+    """Parse the length [m] in a cell."""
     try:
         value = float(cell)
     except ValueError:
@@ -242,7 +239,7 @@ def _size(place: str, name: str, cell: str) -> float:
 
 
 def _filled(interface: Any, sizes: Mapping[str, float]) -> Any:
-    """Replace the sizes in the text of an interface by their values."""
+    """Replace size names in the text of an interface by their values."""
     if not isinstance(interface, str):
         return interface
     for name, value in sizes.items():
@@ -251,14 +248,14 @@ def _filled(interface: Any, sizes: Mapping[str, float]) -> Any:
 
 
 def is_current(file: Path, link: SurfaceLink) -> bool:
-    """Return whether an entry exists and was computed with the present settings.
+    """Check whether an entry exists and was computed with the current settings.
 
     Args:
         file: file of the entry.
         link: the requested part.
 
     Returns:
-        Whether the entry can be used; False if its file is damaged.
+        True if the entry can be used; False if its file is damaged.
 
     Raises:
         BadInput: the surface file cannot be read.

@@ -1,4 +1,4 @@
-"""Page of a link's stiffness by finite elements: K_E, its error and its mesh."""
+"""HTML report on a link's finite element stiffness: K_E, its error and mesh."""
 
 import math
 from typing import Any
@@ -29,14 +29,14 @@ _UNITS = {"surface_volume": "m^3", "surface_area": "m^2",
 
 
 def link_page(link: LinkStiffness, provenance: Provenance) -> str:
-    """Return the report page of a link that was computed by finite elements.
+    """Format the report page of a link computed by finite elements.
 
     Args:
         link: result of :func:`forcefit.stiffness.fem.fea.solve_link`.
         provenance: command and files.
 
     Returns:
-        HTML that does not refer to other files.
+        Self-contained HTML.
     """
     place = ", ".join(f"{v:g}" for v in link.tip)
     return page(
@@ -60,7 +60,7 @@ def link_page(link: LinkStiffness, provenance: Provenance) -> str:
 
 
 def _errors(link: LinkStiffness) -> str:
-    """Return the chart of the estimated errors of the entries of K_E."""
+    """Plot the estimated errors of the entries of K_E."""
     errors = 100 * link.relative_errors
     return matrix(
         errors, SCREW, "error [%]",
@@ -70,7 +70,7 @@ def _errors(link: LinkStiffness) -> str:
 
 
 def _verdict(link: LinkStiffness) -> str:
-    """Return a sentence with the estimated error, the requirement and the doubts."""
+    """Format a sentence on the estimated error, the requirement and any doubts."""
     mesh, error = link.mesh, 100 * link.relative_error_estimate
     outcome = "reached" if mesh["reached"] else "not reached within the budget"
     text = (
@@ -82,14 +82,14 @@ def _verdict(link: LinkStiffness) -> str:
 
 
 def _good(link: LinkStiffness) -> bool | None:
-    """Return whether the accuracy is reached; None if the surface is doubtful."""
+    """Return whether the accuracy was reached; None if the surface is doubtful."""
     if not link.mesh["reached"]:
         return False
     return None if _doubtful(link) else True
 
 
 def _doubtful(link: LinkStiffness) -> list[str]:
-    """Return sentences that describe doubts about the surface and its mesh."""
+    """List doubts about the surface and its mesh as sentences."""
     mesh = link.mesh
     found = [f"Repaired: {one}." for one in mesh["repairs"]]
     if not mesh["closed"]:
@@ -103,13 +103,13 @@ def _doubtful(link: LinkStiffness) -> list[str]:
 
 
 def _doubts(link: LinkStiffness) -> str:
-    """Return the section on doubts about the surface; empty if there are none."""
+    """Format the section on doubts about the surface; empty without doubts."""
     found = _doubtful(link)
     return section("Doubts about the surface", listed(found)) if found else ""
 
 
 def _tiles(link: LinkStiffness) -> list[Tile]:
-    """Return tiles with the error, the smallest stiffnesses, the mesh and the mass."""
+    """Return tiles for the error, the smallest stiffnesses, the mesh and the mass."""
     K = np.diag(link.stiffness)
     turn, shift = int(np.argmin(K[:3])), 3 + int(np.argmin(K[3:]))
     tiles = [
@@ -129,7 +129,7 @@ def _tiles(link: LinkStiffness) -> list[Tile]:
 
 
 def _matrices(link: LinkStiffness) -> str:
-    """Return the tables of K_E and of its inverse."""
+    """Format the tables of K_E and its inverse."""
     return section(
         "Stiffness and compliance",
         paragraph("K_E [N m/rad, N/rad; N m/m, N/m], wrench = K_E screw:"),
@@ -143,12 +143,12 @@ def matrix_table(
     values: NDArray, rows: tuple[str, ...], name: str,
     columns: tuple[str, ...] = SCREW,
 ) -> str:  # fmt: skip
-    """Return a (6, 6) matrix as an HTML table.
+    """Format a (6, 6) matrix as an HTML table.
 
     Args:
-        values: (6, 6) stiffness or compliance.  Entries that are rounding errors
-            relative to sqrt(K_ii K_jj) are shown as zero; entries that are not finite
-            are shown as ``rigid``.
+        values: (6, 6) stiffness or compliance.  Entries that are round-off relative to
+            sqrt(K_ii K_jj) are shown as zero; entries that are not finite are shown as
+            ``rigid``.
         rows: names of the rows.
         name: name of the table.
         columns: names of the columns.
@@ -171,7 +171,7 @@ def stiffness_unit(i: int, j: int) -> str:
 
 
 def _mesh(link: LinkStiffness) -> str:
-    """Return the section on the mesh and on the mass."""
+    """Format the section on the mesh and the mass."""
     rows: list[list[Cell]] = [
         [in_words(key), _cell(key, link.mesh[key])] for key in _MESH if key in link.mesh
     ]
@@ -185,7 +185,7 @@ def _mesh(link: LinkStiffness) -> str:
 
 
 def _cell(key: str, value: Any) -> Cell:
-    """Return a value of the mesh report with its unit."""
+    """Return a value from the mesh report with its unit."""
     if isinstance(value, str):
         return value
     unit = _UNITS.get(key) or unit_of(key)

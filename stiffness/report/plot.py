@@ -1,4 +1,4 @@
-"""Figures of stiffnesses; each function takes a result and returns a figure."""
+"""Figures of stiffnesses. Each function takes a result and returns a figure."""
 
 from typing import TYPE_CHECKING
 
@@ -22,14 +22,13 @@ if TYPE_CHECKING:
 
 
 def plot_comparison(comparison: LinkComparison) -> "Figure":
-    """Plot K_E by finite elements and by a beam, and their difference.
+    """Plot K_E by finite elements and by beam theory, and their difference.
 
     Args:
         comparison: comparison of one link by two methods.
 
     Returns:
-        A figure with a pair of bars for each significant entry, and a map of
-        differences.
+        A figure with a pair of bars per significant entry, and a map of differences.
     """
     from matplotlib.figure import Figure
 
@@ -55,7 +54,7 @@ def plot_comparison(comparison: LinkComparison) -> "Figure":
 
 
 def _plot_entries(axes: "Axes", links: "Sequence[LinkStiffness]") -> None:
-    """Plot the entries above one thousandth of their scale, as bars for each link."""
+    """Plot the entries above a thousandth of their scale, as bars for each link."""
     entries = entries_that_matter(links[0].stiffness)
     width = 0.8 / len(links)
     for k, link in enumerate(links):
@@ -73,13 +72,13 @@ def _plot_entries(axes: "Axes", links: "Sequence[LinkStiffness]") -> None:
 
 
 def plot_slenderness(sweep: SlendernessSweep) -> "Figure":
-    """Plot the difference between elements and beam over L / r, with the fitted curve.
+    """Plot the difference between elements and beam over L / r with its fit.
 
     Args:
         sweep: comparisons of one section at several lengths.
 
     Returns:
-        A figure with a curve for each significant entry; error bars show mesh errors.
+        A figure with one curve per significant entry, and mesh errors as error bars.
     """
     from matplotlib.figure import Figure
 
@@ -88,7 +87,7 @@ def plot_slenderness(sweep: SlendernessSweep) -> "Figure":
     ratio = sweep.slenderness
     fine = np.geomspace(ratio.min(), ratio.max(), 200)
     errors = [100 * c.fea.relative_error_estimate for c in sweep.comparisons]
-    # the entries of a round section occur in equal pairs, of which only one is plotted
+    # entries of a round section occur in equal pairs, of which only one is plotted
     plotted: list[tuple[int, int]] = []
     for entry in entries_that_matter(sweep.comparisons[0].beam.stiffness):
         c, d = sweep.end_effect[entry], sweep.second[entry]
@@ -121,7 +120,7 @@ def plot_stress(
     section: "Mapping[str, float] | None" = None,
     up: ArrayLike | None = None,
 ) -> "Figure":
-    """Plot the von Mises stress of one wrench from base to tip.
+    """Plot the von Mises stress due to one wrench from base to tip.
 
     Args:
         everywhere: stresses of unit wrenches at all nodes, including the interfaces.
@@ -132,8 +131,8 @@ def plot_stress(
         up: (3,) vector along the section's z axis.
 
     Returns:
-        A figure with a dot for each node.  A line shows the largest stress in each
-        section of the beam.  The region that was evaluated is white.
+        A figure with one dot per node. A line shows the largest stress in each section
+        of the beam, and the evaluated region is white.
     """
     from matplotlib.figure import Figure
 

@@ -1,4 +1,4 @@
-"""Results for a link's stiffness as plain values and as text."""
+"""Link stiffness results as plain values and as text."""
 
 import math
 from typing import TYPE_CHECKING, Any
@@ -51,7 +51,7 @@ def comparison_results(comparison: LinkComparison) -> dict[str, Any]:
         comparison: comparison of one link by two methods.
 
     Returns:
-        Both links, the difference of each entry, and a text that explains it.
+        Both links, the difference of each entry, and an explanatory text.
     """
     return {
         "beam": link_results(comparison.beam),
@@ -72,7 +72,7 @@ def sweep_results(sweep: "SlendernessSweep") -> dict[str, Any]:
         sweep: comparisons of one section at several lengths.
 
     Returns:
-        Both stiffnesses at each length, their differences, and an explanation as text.
+        Both stiffnesses at each length, their differences, and an explanatory text.
     """
     return {
         "size": sweep.comparisons[0].size,
@@ -119,7 +119,7 @@ def stress_results(peak: "PeakStress") -> dict[str, Any]:
 
 
 def link_text(link: LinkStiffness) -> str:
-    """Return a link as text: its stiffness, estimated error and mesh.
+    """Format a link as text: its stiffness, estimated error and mesh.
 
     Args:
         link: a link.
@@ -164,7 +164,7 @@ def link_text(link: LinkStiffness) -> str:
 
 
 def comparison_text(comparison: LinkComparison) -> str:
-    """Return a comparison of beam and finite elements as text.
+    """Format a comparison of beam and finite elements as text.
 
     Args:
         comparison: comparison of one link by two methods.
@@ -186,7 +186,7 @@ def comparison_text(comparison: LinkComparison) -> str:
 
 
 def sweep_text(sweep: "SlendernessSweep") -> str:
-    """Return a sweep over slenderness as text.
+    """Format a sweep over slenderness as text.
 
     Args:
         sweep: comparisons of one section at several lengths.
@@ -211,7 +211,7 @@ def sweep_text(sweep: "SlendernessSweep") -> str:
 
 
 def stress_text(peak: "PeakStress") -> str:
-    """Return the peak stress of a wrench as text.
+    """Format the peak stress of a wrench as text.
 
     Args:
         peak: peak stress by finite elements, and by the beam formula for a known
@@ -234,7 +234,7 @@ def stress_text(peak: "PeakStress") -> str:
 
 
 def _stress_error(peak: "PeakStress") -> str:
-    """Return the estimated error of a stress, or the reason why it is not defined."""
+    """Format the estimated error of a stress, or the reason why it is undefined."""
     if not math.isfinite(peak.error):
         return "none, the peak lies on an inner edge where stress has no finite value"
     share = peak.error / peak.von_mises if peak.von_mises else 0.0
@@ -242,13 +242,13 @@ def _stress_error(peak: "PeakStress") -> str:
 
 
 def _megapascals(stress: float, place: NDArray) -> str:
-    """Return a text with a stress and its position."""
+    """Format a stress and its position as text."""
     where = ", ".join(f"{v:.4g}" for v in np.where(np.abs(place) < 1e-9, 0, place))
     return f"{value_text('von_mises', stress)} at ({where}) m"
 
 
 def matrix_text(stiffness: NDArray) -> str:
-    """Return a stiffness as text, with named rows and columns.
+    """Format a stiffness as text, with named rows and columns.
 
     Args:
         stiffness: (6, 6) stiffness.
@@ -260,7 +260,7 @@ def matrix_text(stiffness: NDArray) -> str:
 
 
 def _matrix(matrix: NDArray, form: str) -> list[str]:
-    """Return the text lines of a 6 by 6 matrix; rounding errors are shown as zero."""
+    """Format a 6 by 6 matrix as lines of text, with round-off shown as zero."""
     head = "   " + "".join(f"{name:>14}" for name in SCREW)
     noise = 1e-12 * np.abs(matrix).max()
     rows = np.where(np.abs(matrix) < noise, 0.0, matrix)

@@ -1,13 +1,13 @@
-r"""Comparison of beam and finite elements over slenderness: the end effect.
+r"""End effect: comparison of beam theory and finite elements over slenderness.
 
-One section is compared at several lengths.  Near a rigid face the section cannot warp
-or contract.  The size of this zone depends on the section but not on the length.  The
-link is therefore as stiff as a beam that is shorter by a fixed length:
+One section is compared at several lengths. Near a rigid face, the section cannot warp
+or contract. The size of this zone depends on the section but not on the length, so the
+link is as stiff as a beam that is shorter by a fixed length:
 
     K / K_beam = 1 + c r / L + d (r / L)^2.
 
-c depends on the section, the interfaces and Poisson's ratio.  The residual after these
-two terms should not exceed the error of the meshes.
+The coefficient c depends on the section, the interfaces and Poisson's ratio. The
+residual of the fit should not exceed the mesh errors.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -39,7 +39,7 @@ class SlendernessSweep:
     Attributes:
         comparisons: comparisons of beam and finite elements, shortest link first.
         end_effect: (6, 6) [1] fitted c, for K scaled by sqrt(K_ii K_jj) of the beam.
-        end_effect_error: (6, 6) [1] error of c due to the estimated mesh errors.
+        end_effect_error: (6, 6) [1] error of c caused by the estimated mesh errors.
         second: (6, 6) [1] fitted coefficient d of the second-order term.
         residual: (n, 6, 6) [1] differences minus the fit.
     """
@@ -82,7 +82,7 @@ def sweep_slenderness(
     interface: str = "rigid",
     update: Callable[[int, int], None] | None = None,
 ) -> SlendernessSweep:
-    """Compare a section's beam theory and finite elements at several lengths.
+    """Compare beam theory and finite elements for one section at several lengths.
 
     Args:
         section: ``radius`` and optionally ``inner_radius``, or ``width`` and ``height``
@@ -93,10 +93,10 @@ def sweep_slenderness(
             :attr:`forcefit.stiffness.beam.sections.Section.size`.
         accuracy: [1] required relative error of the finite elements.
         interface: kind of the interfaces of the solid.
-        update: function that is called with the numbers of finished and of all lengths.
+        update: callback that receives the numbers of finished and of all lengths.
 
     Returns:
-        The comparisons and the fit.
+        The comparisons with the fit.
 
     Raises:
         BadInput: the section is not of these kinds, or fewer than two lengths are

@@ -1,4 +1,4 @@
-"""Surfaces of common link shapes from lengths; the axis is z, and the base is z = 0."""
+"""Surfaces of common link shapes from lengths, along z with the base at z = 0."""
 
 from collections.abc import Mapping
 
@@ -10,7 +10,7 @@ from forcefit.stiffness.beam.curve import Piece, straight_piece
 from forcefit.stiffness.beam.sections import Section, declared_section, round_section
 from forcefit.stiffness.surface.surface import Surface, check_surface
 
-# names of the lengths of each shape, and the default values of optional lengths
+# names of the lengths of each shape, with defaults of optional lengths
 SHAPES: dict[str, dict[str, float | None]] = {
     "round": {"length": None, "radius": None},
     "tube": {"length": None, "radius": None, "inner_radius": None},
@@ -22,7 +22,7 @@ _FACETS = 64
 
 
 def check_shape(shape: str, lengths: Mapping[str, float]) -> None:
-    """Raise an error for an unknown shape or for wrong names of lengths.
+    """Reject an unknown shape or wrong names of lengths.
 
     Args:
         shape: one of ``SHAPES``.
@@ -51,14 +51,14 @@ def check_shape(shape: str, lengths: Mapping[str, float]) -> None:
 
 
 def shape_surface(shape: str, lengths: Mapping[str, float]) -> Surface:
-    """Return the closed surface of a shape.
+    """Create the closed surface of a shape.
 
     Args:
         shape: one of ``SHAPES``.
         lengths: lengths [m] by name.
 
     Returns:
-        The surface; the corners of its facets lie on the exact shape.
+        The surface, with facet corners on the exact shape.
 
     Raises:
         BadInput: the shape or a length is invalid.
@@ -88,7 +88,7 @@ def _prism(
     name: str,
     hole: NDArray | None = None,
 ) -> Surface:
-    """Return the surface between two outlines, closed by fans or by rings."""
+    """Create the surface between two outlines, closed by fans or by rings."""
     count = len(base)
     inner = np.zeros((1, 2)) if hole is None else hole
     layers = [base, tip, inner, inner]
@@ -111,12 +111,12 @@ def _prism(
 
 
 def shape_beam(shape: str, lengths: Mapping[str, float], nu: float) -> list[Piece]:
-    """Return the beam that corresponds to a shape, along z with its height along y.
+    """Create the beam equivalent to a shape, along z with its height along y.
 
     Args:
         shape: one of ``SHAPES``.
         lengths: lengths [m] by name.
-        nu: [-] Poisson's ratio, on which shear factors depend.
+        nu: [-] Poisson's ratio, which determines the shear factors.
 
     Returns:
         A list with the single piece of the beam.

@@ -1,9 +1,8 @@
-"""Reduction of the number of triangles of a surface, on which meshing time depends.
+"""Reduction of the number of surface triangles, to save meshing time.
 
-CAD programs make long thin triangles for bars and bores.  These cost pytetwild much
-time, because it cuts its first tetrahedra along all triangles.  The corners of the mesh
-are later projected onto the exact shapes of the part, so the surface that the mesher
-reads may be coarser.
+CAD programs create long thin triangles for bars and bores. These slow pytetwild down,
+because it cuts its first tetrahedra along all triangles. Mesh corners are later
+projected onto the exact shapes of the part, so the mesher may read a coarser surface.
 """
 
 import numpy as np
@@ -12,22 +11,22 @@ from numpy.typing import NDArray
 from forcefit.stiffness.surface.surface import Surface, directed_edges, signed_volume
 
 _VOLUME = 0.01  # accepted relative difference of the enclosed volumes
-# numbers of triangles that are tried, relative to the original number, in this order
+# trial numbers of triangles relative to the original number, in this order
 _PARTS = 0.01 * 1.4 ** np.arange(13)
 
 
 def coarser_surface(surface: Surface, tolerance: float) -> tuple[NDArray, NDArray]:
-    """Return a coarser surface within a tolerance, the best of a dozen attempts.
+    """Coarsen a surface within a tolerance; return the best of a dozen attempts.
 
     Args:
         surface: closed surface.
         tolerance: [m] largest distance between both surfaces, evaluated at the corners
-            of the given surface, and at the corners, edge midpoints and centres of the
+            of the given surface and at the corners, edge midpoints and centres of the
             coarser surface.
 
     Returns:
-        Points (n, 3) [m] and triangles (m, 3) of a closed surface with the same genus
-        and the same volume within 1 %; the given surface if no attempt succeeds.
+        Points (n, 3) [m] and triangles (m, 3) of a closed surface with the same genus,
+        and the same volume within 1 %. If no attempt succeeds, the given surface.
 
     Sources:
         Garland & Heckbert (1997) for the quadric decimation, as implemented in VTK.
@@ -60,13 +59,13 @@ def coarser_surface(surface: Surface, tolerance: float) -> tuple[NDArray, NDArra
 
 
 def _distance(mesh: object, points: NDArray) -> float:
-    """Return the distance [m] from a mesh of the point that is farthest from it."""
+    """Return the distance [m] of the farthest point from a mesh."""
     _, near = mesh.find_closest_cell(points, return_closest_point=True)  # type: ignore[attr-defined]
     return float(np.linalg.norm(near - points, axis=1).max())
 
 
 def _closed(triangles: NDArray) -> bool:
-    """Return whether every edge belongs to two triangles."""
+    """Check whether every edge belongs to two triangles."""
     edges = np.sort(directed_edges(triangles), axis=1)
     return bool((np.unique(edges, axis=0, return_counts=True)[1] == 2).all())
 

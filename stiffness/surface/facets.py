@@ -1,10 +1,10 @@
-"""A curved patch of unknown shape, smoothed by Phong tessellation.
+"""Curved patches of unknown shape, smoothed by Phong tessellation.
 
-A point of a facet is projected onto the tangent planes at the three corners.  The facet
-is lifted there by half of the weighted mean of these projections (Boubekeur & Alexa
-2008, Phong tessellation).  Along each edge the smaller of the two projections is used.
-For an arc of half-angle a, the error is about a^4 times the radius; for flat facets it
-is about a^2 times the radius.
+A point on a facet is projected onto the tangent planes at the three corners, and the
+facet is lifted there by half of the weighted mean of these projections (Boubekeur &
+Alexa 2008, Phong tessellation). Along each edge, the smaller of the two projections is
+used. For an arc of half-angle a, the error is about a^4 times the radius, compared with
+about a^2 times the radius for flat facets.
 """
 
 from dataclasses import dataclass, field
@@ -18,7 +18,7 @@ from forcefit.stiffness.surface.surface import area_vectors
 
 @dataclass(frozen=True, eq=False)
 class Facets:
-    """A patch of triangles that are lifted to approximate a smooth surface.
+    """A patch of triangles, lifted to approximate a smooth surface.
 
     Attributes:
         points: (n, 3) [m] corners of the triangles.
@@ -39,7 +39,7 @@ class Facets:
         object.__setattr__(self, "normals", self._corner_normals())
 
     def _corner_normals(self) -> NDArray:
-        """Return the normals at corners: means of facet normals weighted by angle."""
+        """Return the corner normals, averages of facet normals weighted by angle."""
         facing = area_vectors(self.points, self.triangles)
         facing /= np.maximum(np.linalg.norm(facing, axis=1), 1e-300)[:, None]
         corners = self.points[self.triangles]
@@ -86,8 +86,8 @@ class Facets:
 
 def _rises(corners: NDArray, normals: NDArray, limited: bool) -> NDArray:
     """Return (e, 3) [m] four times the lifts at the midpoints of edges."""
-    # If the tangent planes at both ends differ, the smaller lift is used.  If the lifts
-    # have different signs, as where a flat side meets a fillet, the lift is zero.
+    # Of the lifts at the two ends, the smaller is used. If they have different signs,
+    # as where a flat side meets a fillet, the lift is zero.
     along = corners[:, 0] - corners[:, 1]
     heights = np.stack([
         np.einsum("ei,ei->e", sign * along, normals[:, k])

@@ -1,4 +1,4 @@
-"""Solids of a STEP file that together form one link, and the faces between them."""
+"""Solids in a STEP file that together form one link, and the faces between them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ class FilledSolids:
         names: names of the solids.
         points: (n, 3) [m] corners.
         triangles: (m, 3) indices of points; solids that touch share triangles.
-        sides: (m, 2) index in ``names`` of the solid on each side; -1 if there is none.
+        sides: (m, 2) index in ``names`` of the solid on each side, or -1.
         overlaps: descriptions of pairs of solids that overlap.
     """
 

@@ -1,4 +1,4 @@
-"""Interfaces between a link and its joints: a plane of the surface, a disc, a bore."""
+"""Interfaces between a link and its joints: planes of the surface, discs, bores."""
 
 import math
 from collections.abc import Mapping
@@ -19,14 +19,14 @@ _EXPECTED = '"z=0.452", "bore=px,py,pz/ax,ay,az/r", a table {plane, radius} or {
 
 @dataclass(frozen=True, eq=False)
 class Interface:
-    """The part of a link's surface that a joint holds, in the mesh's axes.
+    """Part of a link's surface that a joint holds, in mesh axes.
 
     Attributes:
         kind: ``"plane"`` for the part of the surface on a plane; ``"disc"`` for the
             part of the plane within a radius of the point; ``"bore"`` for a cylindrical
             seat.
-        point: (3,) [m] point on the plane; centre of the disc; or the point on the axis
-            of the bore at which screws are read.
+        point: (3,) [m] point on the plane, centre of the disc, or reference point for
+            screws on the axis of the bore.
         direction: (3,) unit normal of the plane, or axis of the bore.
         radius: [m] radius of the disc or the bore; infinite for a plane.
     """
@@ -59,7 +59,7 @@ class Interface:
         return f"{self.kind}={p}/{d}{radius}"
 
     def distance(self, points: ArrayLike) -> NDArray:
-        """Return the distance of points from the interface's plane or cylinder.
+        """Compute the distance of points from the interface's plane or cylinder.
 
         Args:
             points: (..., 3) [m] points.
@@ -76,7 +76,7 @@ class Interface:
 
 
 def parse_interface(text: object, place: str = "interface") -> Interface:
-    """Parse an interface from the form used on the command line or in a robot file.
+    """Parse an interface as written on the command line or in a robot file.
 
     Args:
         text: ``"z=0.452"`` (also x, y), ``"bore=px,py,pz/ax,ay,az/r"``,
@@ -138,14 +138,14 @@ def _from_table(table: Mapping) -> Interface:
 
 
 def _refuse_unknown(table: Mapping, known: set[str], place: str) -> None:
-    """Raise an error for an unknown key of a table."""
+    """Reject an unknown key in a table."""
     for key in table:
         if key not in known:
             raise BadInput(f'{place}unknown key "{key}"{nearest(str(key), known)}')
 
 
 def _vector(table: Mapping, key: str) -> NDArray:
-    """Return three finite numbers of a table."""
+    """Read three finite numbers from a table."""
     value = table.get(key)
     array = number_array(value.tolist() if isinstance(value, np.ndarray) else value)
     if array is None or array.shape != (3,) or not np.isfinite(array).all():
@@ -155,7 +155,7 @@ def _vector(table: Mapping, key: str) -> NDArray:
 
 
 def _length(table: Mapping, key: str, name: str) -> float:
-    """Return a positive length of a table."""
+    """Read a positive length from a table."""
     value = table.get(key)
     array = number_array([value])
     if array is None or not (np.isfinite(array[0]) and array[0] > 0):

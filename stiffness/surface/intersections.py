@@ -5,15 +5,15 @@ from numpy.typing import NDArray
 
 
 def crossing_triangles(points: NDArray, triangles: NDArray) -> NDArray:
-    """Find the pairs of intersecting triangles that have no common vertex.
+    """Find pairs of intersecting triangles without a common vertex.
 
     Args:
         points: (n, 3) [m] corners.
         triangles: (m, 3) indices of points.
 
     Returns:
-        (k, 2) indices of triangles.  An edge of one triangle passes through the inside
-        of the other. Triangles that only touch are not included.
+        (k, 2) indices of triangles of which an edge of one passes through the inside of
+        the other. Triangles that merely touch are not included.
     """
     pairs = _near_pairs(points, triangles)
     shared = (
@@ -26,7 +26,7 @@ def crossing_triangles(points: NDArray, triangles: NDArray) -> NDArray:
 
 
 def _near_pairs(points: NDArray, triangles: NDArray) -> NDArray:
-    """Return the pairs (i, j) of triangles whose bounding boxes overlap."""
+    """Find the pairs (i, j) of triangles whose bounding boxes overlap."""
     corners = points[triangles]
     low, high = corners.min(axis=1), corners.max(axis=1)
     axis = int(np.argmax(np.ptp(points, axis=0)))
@@ -49,7 +49,7 @@ def _near_pairs(points: NDArray, triangles: NDArray) -> NDArray:
 
 
 def _edge_through(points: NDArray, triangles: NDArray, pairs: NDArray) -> NDArray:
-    """Return whether an edge of the first triangle passes through the second."""
+    """Check whether an edge of the first triangle passes through the second."""
     a, b, c = np.moveaxis(points[triangles[pairs[:, 1]]], 1, 0)
     normal = np.cross(b - a, c - a)
     size = np.linalg.norm(normal, axis=1)
@@ -57,7 +57,7 @@ def _edge_through(points: NDArray, triangles: NDArray, pairs: NDArray) -> NDArra
     for k in range(3):
         p = points[triangles[pairs[:, 0], k]]
         q = points[triangles[pairs[:, 0], (k + 1) % 3]]
-        # signed volumes tell on which side of the plane, and of each edge, a line
+        # signed volumes give the side of the plane, and of each edge, on which a line
         # passes
         dp = np.einsum("ij,ij->i", normal, p - a)
         dq = np.einsum("ij,ij->i", normal, q - a)

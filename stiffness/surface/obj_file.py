@@ -1,7 +1,7 @@
 """Reader of Wavefront OBJ files: points and polygons.
 
-Texture coordinates, normals, groups and materials do not define the shape.  They are
-not read, so faces may refer to texture coordinates and normals that are absent.
+Texture coordinates, normals, groups and materials do not affect the shape and are not
+read, so faces may even refer to texture coordinates and normals that are absent.
 """
 
 from collections.abc import Iterator
@@ -55,7 +55,7 @@ def read_obj(path: Path) -> tuple[NDArray, list[list[int]]]:
 
 
 def _statements(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """Yield line numbers and the words of each line; a backslash continues a line."""
+    """Yield number and words of each line, where a backslash continues a line."""
     text = path.read_bytes().removeprefix(b"\xef\xbb\xbf").decode("latin-1")
     words: list[str] = []
     for number, line in enumerate(text.split("\n"), 1):
@@ -67,6 +67,6 @@ def _statements(path: Path) -> Iterator[tuple[int, list[str]]]:
 
 
 def _corner(word: str, points: int) -> int:
-    """Return the index of a corner, given from 1 or, if negative, from the end."""
+    """Return the index of a corner, counted from 1 or, if negative, from the end."""
     index = int(word.partition("/")[0])
     return index - 1 if index >= 0 else points + index

@@ -1,4 +1,4 @@
-"""Division of a surface into smooth patches with their exact shapes."""
+"""Division of a surface into smooth patches with exact shapes."""
 
 from dataclasses import dataclass
 
@@ -20,8 +20,8 @@ class Patches:
 
     Attributes:
         patch: (m,) patch number of each triangle; 0 is the base interface, 1 the tip.
-        shapes: shape of each patch; lifted facets if no simpler shape was recognised.
-        outlines: parts of the interface outlines at which the surface continues
+        shapes: shape of each patch, or lifted facets if no shape was recognised.
+        outlines: parts of the interface outlines across which the surface continues
             smoothly.
     """
 
@@ -42,8 +42,8 @@ def find_patches(surface: Surface, base: Interface, tip: Interface) -> Patches:
         The patches.
 
     Raises:
-        BadInput: no part of the surface is on an interface, or both interfaces are the
-            same.
+        BadInput: no part of the surface is on an interface, or both interfaces
+            coincide.
     """
     patch = np.full(len(surface.triangles), -1)
     shapes: list[Shape] = []
@@ -67,7 +67,7 @@ def find_patches(surface: Surface, base: Interface, tip: Interface) -> Patches:
 def _outlines(
     graph: TriangleGraph, patch: NDArray, shapes: list[Shape]
 ) -> list[SmoothOutline]:
-    """Return the outlines where an interface continues smoothly into another patch."""
+    """Find outlines across which an interface continues smoothly into another patch."""
     one, other = patch[graph.left], patch[graph.right]
     smooth = (graph.cosine > SHARP) & (one != other)
     found = []
@@ -99,7 +99,7 @@ def interface_shape(interface: Interface) -> Shape:
 
 
 def refuse_common_edges(surface: Surface, base: Interface, tip: Interface) -> None:
-    """Raise an error if interfaces share an edge: the stiffness would be infinite.
+    """Reject interfaces that share an edge, because the stiffness would be infinite.
 
     Args:
         surface: surface of the link.

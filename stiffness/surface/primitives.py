@@ -1,8 +1,8 @@
-"""Smooth shapes that are recognised in the patches of a surface.
+"""Smooth shapes recognised in the patches of a surface.
 
-The vertices of a faceted surface lie on the true surface, but its convex sides lie
-inside.  Therefore, a patch whose vertices all lie on a plane, cone (or cylinder),
-sphere or torus is replaced by this shape, and the nodes of the mesh are moved onto it.
+The vertices of a faceted surface lie on the true surface, but its facets cut convex
+sides short. A patch whose vertices all lie on a plane, cone (or cylinder), sphere or
+torus is therefore replaced by this shape, and the mesh nodes are moved onto it.
 
 The method ``signed(points)`` of every shape returns signed distances (n,) [m] and their
 gradients (n, 3).
@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 S = TypeVar("S", bound="Shape")
-# largest numbers of residual evaluations: of a fit, and of a fit that may still succeed
+# largest numbers of residual evaluations, of any fit and of a fit that may still
+# succeed
 _CALLS = (25, 100)
 # largest residual of a fit that may still succeed, relative to the size of the points
 _MAY_FIT = 0.02
@@ -34,7 +35,7 @@ class Shape(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """Plane of all points x with normal . (x - point) = 0."""
+    """Plane: all points x with normal . (x - point) = 0."""
 
     point: NDArray
     normal: NDArray
@@ -108,7 +109,7 @@ def project(points: NDArray, shapes: tuple[Shape, ...]) -> NDArray:
         shapes: one to three shapes, or more if they share a point.
 
     Returns:
-        (n, 3) [m] projected points, from Newton's method; each step is the shortest one
+        (n, 3) [m] projected points, by Newton's method, whose step is the shortest one
         that removes all distances to first order.
     """
     points = points.copy()
@@ -116,8 +117,8 @@ def project(points: NDArray, shapes: tuple[Shape, ...]) -> NDArray:
         pairs = [shape.signed(points) for shape in shapes]
         distances = np.stack([d for d, _ in pairs], axis=1)
         gradients = np.stack([g for _, g in pairs], axis=1)
-        # for tangent shapes, small singular values are cut off, because the equations
-        # are inconsistent in these directions
+        # truncate small singular values, because the equations of tangent shapes are
+        # inconsistent in these directions
         inverse = np.linalg.pinv(gradients, rcond=0.05)
         step = np.einsum("nij,nj->ni", inverse, distances)
         points -= step
@@ -131,7 +132,7 @@ def fit_plane(points: NDArray, normals: NDArray) -> Plane:
 
     Args:
         points: (n, 3) [m] points.
-        normals: (k, 3) facet normals; they orient the plane.
+        normals: (k, 3) facet normals, which orient the plane.
 
     Returns:
         The plane.
@@ -158,7 +159,7 @@ def fit_sphere(points: NDArray, normals: NDArray) -> Sphere:
 
 
 def _circle(points: NDArray) -> tuple[NDArray, float]:
-    """Return centre and radius of the circle or sphere fitted to points."""
+    """Fit a circle or sphere to points; return centre and radius."""
     # |x|^2 = 2 x . c + (r^2 - |c|^2) is linear in c and in the term in parentheses
     system = np.column_stack([2 * points, np.ones(len(points))])
     squares = np.sum(points**2, axis=1)
@@ -171,7 +172,7 @@ def fit_cone(points: NDArray, normals: NDArray) -> Cone:
 
     Args:
         points: (n, 3) [m] points.
-        normals: (k, 3) facet normals, from which the axis is first estimated.
+        normals: (k, 3) facet normals, from which an initial axis is estimated.
 
     Returns:
         The cone.
@@ -198,7 +199,8 @@ def fit_torus(points: NDArray, normals: NDArray) -> Torus:
         normals: (k, 3) facet normals, which determine only the orientation.
 
     Returns:
-        The torus with the smallest residual of three fits with different initial axes.
+        The torus with the smallest residual among three fits with different initial
+        axes.
     """
     center = points.mean(axis=0)
     size = float(np.ptp(points, axis=0).max())
@@ -226,7 +228,7 @@ def fit_torus(points: NDArray, normals: NDArray) -> Torus:
 def _refined_fit(
     shape: Callable[[NDArray], S], start: NDArray, points: NDArray, size: float
 ) -> S:
-    """Return the shape with the least squared residuals, by nonlinear least squares."""
+    """Fit a shape by nonlinear least squares."""
     from scipy.optimize import least_squares
 
     if len(points) < len(start):

@@ -1,9 +1,10 @@
 """Recognition of planes, cones, spheres and tori in a faceted surface.
 
-The surface between sharp edges is one shape, or several shapes that meet tangentially.
-Candidate shapes are fitted to a few facets around a seed facet.  A candidate is
-accepted if connected facets lie on it and if these are facets of a curved shape.  The
-second condition is needed because corners of a few flat faces may also lie on a circle.
+The surface between sharp edges consists of one shape or of several shapes that meet
+tangentially. Candidate shapes are fitted to a few facets around a seed facet. A
+candidate is accepted if connected facets lie on it and if these are facets of a curved
+shape. The second condition is needed because the corners of a few flat faces may lie on
+a circle too.
 """
 
 from collections.abc import Callable
@@ -22,17 +23,17 @@ from forcefit.stiffness.surface.primitives import (
 )
 from forcefit.stiffness.surface.triangle_graph import SHARP, TriangleGraph
 
-# largest numbers of seeds that may fail in a part: for shapes of strips, for any shape
+# largest numbers of failed seeds in a part, for strip shapes and for any shape
 _MISSES = (60, 20)
 # accepted relative difference of the areas of facets
 _CONGRUENT = 1e-6
 _CONE = 10  # smallest number of points that identify a cone
-# slope below which a cone counts as a cylinder, for which seven points are sufficient
+# slope below which a cone counts as a cylinder, for which seven points suffice
 _CYLINDER = 1e-4
 _FEW = 12  # smallest number of flat faces of a faceted curve
-_STEP = 2e-3  # [rad] smallest difference at which two angles count as different
-_MANY = 5  # number of different angles at which points count as on a circle
-# smallest width, relative to the widest facet, at which a facet counts as equally wide
+_STEP = 2e-3  # [rad] smallest difference between two distinct angles
+_MANY = 5  # number of distinct angles from which points count as on a circle
+# smallest width relative to the widest facet for a facet to count as equally wide
 _EVEN = 0.75
 # lift relative to the part's median, above which a face or edge counts as straight
 _LIFT = 4.0
@@ -49,8 +50,8 @@ def recognise(graph: TriangleGraph, part: NDArray) -> list[tuple[NDArray, Shape]
         part: (k,) triangles of the part between sharp edges.
 
     Returns:
-        Triangles and shape of each patch: one shape for the whole part, or several
-        shapes.  Triangles outside recognised shapes are flat faces or lifted facets.
+        Triangles and shape of each patch, which may be the whole part. Triangles
+        outside recognised shapes become flat faces or lifted facets.
     """
     shape = fitted_shape(graph, part)
     if shape is not None and graph.fits(shape, part).all():
@@ -72,7 +73,7 @@ def recognise(graph: TriangleGraph, part: NDArray) -> list[tuple[NDArray, Shape]
 
 
 class _Lifts:
-    """Lifts of a part's edges, computed as if the part were one curved shape."""
+    """Lifts of a part's edges, computed as if the part were a single curved shape."""
 
     def __init__(self, graph: TriangleGraph, part: NDArray) -> None:
         self._facets = graph.lifted(part)
@@ -88,7 +89,7 @@ class _Lifts:
 
 
 def fitted_shape(graph: TriangleGraph, part: NDArray, kinds: int = 4) -> Shape | None:
-    """Return the simplest shape of which the triangles can be facets, or None.
+    """Find the simplest shape of which the triangles can be facets.
 
     Args:
         graph: triangle graph of the surface.
@@ -96,16 +97,17 @@ def fitted_shape(graph: TriangleGraph, part: NDArray, kinds: int = 4) -> Shape |
         kinds: number of kinds to try, in the order plane, cone, sphere, torus.
 
     Returns:
-        The shape; None if no shape fits or if the corners are too few to identify one.
+        The shape, or None if no shape fits or there are too few corners to identify
+        one.
     """
     points = graph.points[np.unique(graph.triangles[part])]
     normals = graph.normals[part]
-    # a few of the corners decide whether a shape is fitted to all corners
+    # a few corners decide whether a shape is fitted to all corners
     few = points[:: max(1, len(points) // 50)]
     tries: list[tuple[Callable[[NDArray, NDArray], Shape], int]] = [
         (fit_plane, 3),
         (fit_cone, 7),
-        (fit_sphere, 9),  # the eight corners of a four-sided frustum are on a sphere
+        (fit_sphere, 9),  # the eight corners of a four-sided frustum lie on a sphere
         (fit_torus, 12),
     ]
     for fit, least in tries[:kinds]:
@@ -123,15 +125,15 @@ def fitted_shape(graph: TriangleGraph, part: NDArray, kinds: int = 4) -> Shape |
 
 
 def _lies_on(shape: Shape, points: NDArray, graph: TriangleGraph) -> bool:
-    """Return whether points lie on a shape within the tolerance of the surface."""
+    """Check whether points lie on a shape within the tolerance of the surface."""
     return bool(np.abs(shape.signed(points)[0]).max() < graph.tolerance)
 
 
 def _is_faceted(shape: Shape, points: NDArray) -> bool:
-    """Return whether points on a shape are corners of facets along its curvature."""
+    """Check whether points on a shape are corners of facets along its curvature."""
     # The corners of any two adjacent flat faces, and of three symmetric ones, lie on a
-    # circle.  Therefore three facets as wide as the widest are required, or many
-    # facets.
+    # circle.  Either three facets as wide as the widest, or many facets, are therefore
+    # required.
     if not isinstance(shape, Cone | Torus):
         return True
     offset = points - shape.point
@@ -150,7 +152,7 @@ def _is_faceted(shape: Shape, points: NDArray) -> bool:
 
 
 def _even(angles: NDArray) -> bool:
-    """Return whether there are many different angles, or three equally wide facets."""
+    """Check for many distinct angles, or three equally wide facets."""
     angles = np.sort(angles)
     gaps = np.diff(np.r_[angles, angles[0] + 2 * np.pi])
     if gaps[-1] > _STEP:  # if the arc is not closed, the largest gap is outside it
@@ -166,7 +168,7 @@ def _even(angles: NDArray) -> bool:
 def _pieces(
     graph: TriangleGraph, lifts: _Lifts, part: NDArray, strips: bool, most: int
 ) -> list[tuple[NDArray, Shape]]:
-    """Return pieces of recognised shape; with ``strips`` only planes and cones."""
+    """Find pieces of recognisable shape; with ``strips``, only planes and cones."""
     inside = np.zeros(len(graph.triangles), dtype=bool)
     inside[part] = True
     waiting, flat = inside.copy(), graph.flat_faces(part)
@@ -186,7 +188,7 @@ def _pieces(
         if not shapes and not strips:
             missed.append(seed)
             if misses == most and (kinds := _kinds(missed, order, area)) is not None:
-                # facets congruent with failed seeds, for example around a shaft, are
+                # facets congruent to failed seeds, for example around a shaft, are
                 # tried last
                 order, misses, missed = np.where(kinds, order - 2.0, order), 0, []
         if shapes:
@@ -228,7 +230,7 @@ def _evenness(
 def _shapes_around(
     graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int, strips: bool
 ) -> list[tuple[NDArray, Shape]]:
-    """Return the shapes fitted around a seed, each with the connected facets on it."""
+    """Fit shapes around a seed; return each with the connected facets on it."""
     part = np.flatnonzero(inside)
     if strips:
         near = [ring(graph, inside, flat, seed, 0), _chain(graph, inside, flat, seed)]
@@ -249,7 +251,7 @@ def _shapes_around(
 def _is_proper(
     graph: TriangleGraph, lifts: _Lifts, piece: NDArray, shape: Shape
 ) -> bool:
-    """Return whether a piece is a separate shape, not facets of a curved shape."""
+    """Check whether a piece is a separate shape and not facets of a curved shape."""
     # two coplanar triangles may form a single facet of another shape
     straight = not isinstance(shape, Cone) or _is_straight(graph, lifts, piece, shape)
     return len(piece) > 2 and straight
@@ -258,7 +260,7 @@ def _is_proper(
 def _is_straight(
     graph: TriangleGraph, lifts: _Lifts, piece: NDArray, shape: Cone
 ) -> bool:
-    """Return whether a cone's rulings are straight, not facets of a curved shape."""
+    """Check whether a cone's rulings are straight and not facets of a curved shape."""
     # two rings of corners on any surface of revolution lie on a cone
     inside = np.zeros(len(graph.triangles), dtype=bool)
     inside[piece] = True
@@ -277,7 +279,7 @@ def _is_straight(
 def ring(
     graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int, rings: int
 ) -> NDArray:
-    """Return a seed's flat face and the rings of faces that meet it smoothly.
+    """Return a seed's flat face and the rings of faces that join it smoothly.
 
     Args:
         graph: triangle graph of the surface.
@@ -301,7 +303,6 @@ def ring(
 def _chain(graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int) -> NDArray:
     """Return a seed's flat face and two faces on each side, across long edges."""
     # strips of a cylinder or cone are adjacent across long edges, whatever their ends
-    # are
     touch = inside[graph.left] & inside[graph.right] & (graph.cosine > SHARP)
     left, right = flat[graph.left[touch]], flat[graph.right[touch]]
     length = np.linalg.norm(np.diff(graph.points[graph.ends[touch]], axis=1), axis=2)
@@ -322,9 +323,8 @@ def _chain(graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int) -> N
 
 def _flat_or_lifted(graph: TriangleGraph, part: NDArray) -> list[tuple[NDArray, Shape]]:
     """Divide a part of unknown shape into single flat faces and lifted facets."""
-    # facets of a curved surface have similar lifts, because programs that make them
-    # keep a tolerance; a facet with a much larger lift is a flat face that meets a
-    # fillet
+    # facets of a curved surface have similar lifts, because CAD programs apply a
+    # tolerance; a facet with a much larger lift is a flat face that meets a fillet
     flat = graph.flat_faces(part)
     faces = np.unique(flat[part])
     if len(faces) < _FEW:

@@ -1,8 +1,8 @@
-"""Outline of an interface where the surface continues without a sharp edge.
+"""Outlines of an interface across which the surface continues without a sharp edge.
 
-Where a held face continues into a fillet, both shapes touch along a line that their
-equations determine poorly.  The wall is the surface through this line that is normal to
-the face.  It determines the line well, because face and wall meet at a right angle.
+Where a held face continues into a fillet, the two shapes touch along a line that is
+poorly determined by their equations. The wall is the surface through this line normal
+to the face. Because face and wall meet at a right angle, they determine the line well.
 """
 
 from dataclasses import dataclass
@@ -17,15 +17,15 @@ from forcefit.stiffness.surface.primitives import Shape, fit_cone, fit_plane
 _CORNER = np.cos(np.radians(35.0))
 # largest distance of a point on the wall, relative to the size of the outline
 _ON_WALL = 1e-5
-_CIRCLE = 10  # number of corners that distinguishes a circle from a polygon
+_CIRCLE = 10  # number of corners from which a polygon counts as a circle
 
 
 @dataclass(frozen=True, eq=False)
 class SmoothOutline:
-    """Part of an interface's outline at which another patch continues smoothly.
+    """Part of an interface's outline across which another patch continues smoothly.
 
     Attributes:
-        patches: numbers of the interface and of the other patch.
+        patches: patch numbers of the interface and of its neighbour.
         wall: surface through the outline, normal to the interface.
         ends: (e, 2, 3) [m] ends of the outline's edges.
         side: 1 if the wall's signed distance is positive outside the interface, else
@@ -57,16 +57,16 @@ class SmoothOutline:
 def smooth_outline(
     points: NDArray, edges: NDArray, normals: NDArray, patches: tuple[int, int]
 ) -> SmoothOutline:
-    """Return the outline that given edges form, with its wall.
+    """Build the outline formed by given edges, and its wall.
 
     Args:
         points: (n, 3) [m] points of the surface.
         edges: (e, 2) indices of points, counterclockwise around the interface.
         normals: (e, 3) unit normals of the interface's triangles at the edges.
-        patches: numbers of the interface and of the other patch.
+        patches: patch numbers of the interface and of its neighbour.
 
     Returns:
-        The outline.  The wall is a plane or a cone if one fits; otherwise it consists
+        The outline, whose wall is a plane or a cone if one fits, and otherwise consists
         of facets through the edges.
     """
     ends = points[edges]
@@ -81,7 +81,7 @@ def smooth_outline(
 
 
 def _wall(points: NDArray, edges: NDArray, normals: NDArray, outward: NDArray) -> Shape:
-    """Return the plane, cone or faceted wall through the edges, normal to the face."""
+    """Fit a plane, cone or faceted wall through the edges, normal to the face."""
     size = float(np.linalg.norm(np.ptp(points[edges.ravel()], axis=0)))
     across = size * normals[:, None]  # added at both ends of an edge
     standing = np.concatenate([points[edges] + across, points[edges] - across])
@@ -98,7 +98,7 @@ def _wall(points: NDArray, edges: NDArray, normals: NDArray, outward: NDArray) -
 def _faceted_wall(
     ends: NDArray, edges: NDArray, across: NDArray, outward: NDArray
 ) -> Facets:
-    """Return two triangles for each edge; at a corner, edges do not share points."""
+    """Return two triangles per edge; at a corner, edges do not share points."""
     corners = np.concatenate([ends - across, ends + across], axis=1)
     label = np.arange(4 * len(ends)).reshape(-1, 4)
     begins = {int(start): k for k, start in enumerate(edges[:, 0])}

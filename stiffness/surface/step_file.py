@@ -1,6 +1,6 @@
-"""Reader of STEP files by gmsh: the names of solids, and fine triangles.
+"""Reader of STEP files by gmsh: names of solids, and fine triangles.
 
-A damaged file can crash gmsh and its process, so these functions run in a separate
+Because a damaged file can crash gmsh and its process, these functions run in a separate
 process (:mod:`forcefit.stiffness.surface.surface_worker`).
 """
 
@@ -17,13 +17,13 @@ from forcefit.inputs.packages import naming_packages
 from forcefit.inputs.table import BadInput, nearest, quoted
 
 _FACETS = 48  # number of facets around a full circle
-# overlap, relative to a solid's volume, up to which it counts as rounding in the file
+# overlap relative to a solid's volume below which it counts as rounding in the file
 _TOUCHING = 1e-6
 _ALL, _AND = "*", "+"  # signs in a name: all solids of a file; several solids as one
 
 
 def read_solids(path: Path) -> tuple[list[str], list[float], list[list[float]]]:
-    """Read the names, volumes and bounding boxes of the solids of a STEP file.
+    """Read the names, volumes and bounding boxes of the solids in a STEP file.
 
     Args:
         path: path of the file.
@@ -51,7 +51,7 @@ def _gmsh_model(path: Path) -> Generator[Any, None, None]:
         gmsh.initialize(interruptible=False)
     except BadInput:
         raise
-    except Exception as error:  # gmsh's Python file may exist without its library
+    except Exception as error:  # gmsh's module may be present without its library
         raise BadInput(
             f"{path}: STEP needs the package gmsh, which does not start: {error}"
         ) from None
@@ -71,12 +71,12 @@ def _gmsh_model(path: Path) -> Generator[Any, None, None]:
 
 @dataclass(frozen=True, eq=False)
 class StepTriangles:
-    """Triangles of selected solids; touching solids share triangles.
+    """Triangles of selected solids, which share triangles where they touch.
 
     Attributes:
         points: (n, 3) [m] corners.
         triangles: (m, 3) indices of points.
-        sides: (m, 2) index in ``names`` of the solid on each side; -1 if there is none.
+        sides: (m, 2) index in ``names`` of the solid on each side, or -1.
         names: names of the solids; empty if the faces in the file belong to no solid.
         overlaps: descriptions of pairs of solids that overlap.
     """
@@ -89,7 +89,7 @@ class StepTriangles:
 
 
 def read_step(path: Path, solid: str) -> StepTriangles:
-    """Read fine triangles of the solids of a STEP file, converted to metres.
+    """Read fine triangles of the solids in a STEP file, converted to metres.
 
     Args:
         path: path of the file.
@@ -174,15 +174,15 @@ def chosen_solids(model: Any, path: Path, solid: str) -> dict[str, int]:
 
 
 def sides(model: Any, owners: Mapping[int, int]) -> dict[int, tuple[int, int]]:
-    """Return the faces of solids, with the solids on both sides of each face.
+    """Find the faces of solids, with the solids on both sides of each face.
 
     Args:
         model: gmsh model of the file.
         owners: number of the solid to which each volume belongs.
 
     Returns:
-        For each face tag the numbers of both solids, -1 if there is none; all faces of
-        the model if no face belongs to a volume.
+        For each face tag, the numbers of both solids, -1 for none; all faces of the
+        model if no face belongs to a volume.
     """
     found: dict[int, list[int]] = {}
     for volume, owner in owners.items():
@@ -223,7 +223,7 @@ def _fragments(
 
 
 def _bodies(model: Any, volumes: list[int]) -> int:
-    """Return the number of bodies that volumes with common faces form."""
+    """Count the bodies formed by volumes with common faces."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

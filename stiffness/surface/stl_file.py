@@ -1,8 +1,7 @@
-"""Reader of STL files in text and binary form, which needs only NumPy.
+"""Reader of STL files in text and binary form, based on NumPy alone.
 
-Like other programs, the reader accepts keywords in capitals, a truncated or missing
-last line, bytes after the last triangle, and a placeholder instead of the number of
-triangles.
+Like most programs, the reader accepts keywords in capitals, a truncated or missing last
+line, bytes after the last triangle, and a placeholder for the number of triangles.
 """
 
 import re
@@ -15,14 +14,14 @@ from forcefit.inputs.table import BadInput, describe
 
 _HEAD = 84  # bytes before the triangles of a binary file: header and count
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("tag", "<u2")])
-# placeholders that programs write instead of the number of triangles
+# placeholders that programs write in place of the number of triangles
 _UNKNOWN_COUNTS = (0, 2**32 - 1)
 # the name of a solid ends at its first facet or at the end of the line
 _NAME = re.compile(rb"(?im)^[ \t]*(?:end)?solid\b.*?(?=\bfacet\s+normal\b|\r|\n|\Z)")
 
 
 def read_stl(path: Path) -> tuple[NDArray, NDArray]:
-    """Read the points and triangles of an STL file; equal points are not merged.
+    """Read the points and triangles of an STL file, without merging equal points.
 
     Args:
         path: path of an existing file.
@@ -46,7 +45,7 @@ def _count(content: bytes) -> int:
 
 
 def _is_text(content: bytes) -> bool:
-    """Return whether a file is text; a binary header may also begin with "solid"."""
+    """Check whether a file is text; a binary header may begin with "solid" too."""
     size = _HEAD + _TRIANGLE.itemsize * _count(content)
     if len(content) >= _HEAD and len(content) == size:
         return False
@@ -74,7 +73,7 @@ def _binary(path: Path, content: bytes) -> NDArray:
 def _text(path: Path, content: bytes) -> NDArray:
     """Return the (m, 3, 3) corners of the triangles in a text file."""
     words = _NAME.sub(b" ", content.removeprefix(b"\xef\xbb\xbf")).lower().split()
-    found = np.array(words, dtype=object)  # an array of str would need more memory
+    found = np.array(words, dtype=object)  # an array of str would take more memory
     facets = np.flatnonzero(found == b"facet")
     vertices = np.flatnonzero(found == b"vertex")
     owner = np.searchsorted(facets, vertices)  # 0 means before the first facet

@@ -1,4 +1,4 @@
-"""Surface of a link, read from a file, checked, and repaired with a report."""
+"""Surface of a link: read from a file, checked, and repaired with a report."""
 
 import hashlib
 import math
@@ -20,21 +20,21 @@ FORMATS = (".stl", ".obj", ".ply", ".vtk", ".vtp", ".msh", ".step", ".stp")
 _LARGEST_LINK = 20.0
 _SMALLEST_LINK = 1e-3  # [m] smallest accepted diagonal
 _STATED = "stated in the file"
-# accepted mean number of vertices within 1e-7 of the size from each, which limits
+# accepted mean number of vertices within 1e-7 of the size around each vertex, to limit
 # memory
 _CROWD = 100
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A closed surface of triangles, counterclockwise when seen from outside.
+    """A closed surface of triangles, counterclockwise as seen from outside.
 
     Attributes:
         points: (n, 3) [m] corners.
         triangles: (m, 3) indices of points.
         name: name of the file, for messages.
-        repairs: descriptions of the repairs.
-        solids: solids of a STEP file that contains several; otherwise None.
+        repairs: descriptions of the repairs made.
+        solids: solids of a STEP file with several solids; otherwise None.
     """
 
     points: NDArray
@@ -46,7 +46,7 @@ class Surface:
     __repr__, _repr_html_ = short_repr, html_table
 
     def normals(self) -> NDArray:
-        """Return (m, 3) [m^2] outward normals; their lengths are the areas."""
+        """Return (m, 3) [m^2] outward normals, with the areas as their lengths."""
         return area_vectors(self.points, self.triangles)
 
     @property
@@ -65,14 +65,14 @@ class Surface:
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
 
     def digest(self) -> str:
-        """Return a hash of the coordinates and triangles, with all their digits."""
+        """Return a hash of the coordinates, with all digits, and the triangles."""
         content = hashlib.sha256(np.ascontiguousarray(self.points).tobytes())
         content.update(np.ascontiguousarray(self.triangles, dtype=np.int64).tobytes())
         return content.hexdigest()
 
 
 def area_vectors(points: NDArray, triangles: NDArray) -> NDArray:
-    """Return the normals of triangles, each with the length of the triangle's area.
+    """Compute the normals of triangles, each with the triangle's area as length.
 
     Args:
         points: (n, 3) [m] points.
@@ -86,7 +86,7 @@ def area_vectors(points: NDArray, triangles: NDArray) -> NDArray:
 
 
 def signed_volume(points: NDArray, triangles: NDArray) -> float:
-    """Return the volume inside a closed surface; negative if the surface is inside out.
+    """Compute the volume inside a closed surface; negative if it is inside out.
 
     Args:
         points: (n, 3) [m].
@@ -101,31 +101,31 @@ def signed_volume(points: NDArray, triangles: NDArray) -> float:
 
 
 def directed_edges(triangles: NDArray) -> NDArray:
-    """Return the directed edges of triangles, in the orientation of each triangle.
+    """Return the edges of triangles, directed by the orientation of each triangle.
 
     Args:
         triangles: (m, 3) indices.
 
     Returns:
-        (3 m, 2) indices of points; three rows for each triangle.
+        (3 m, 2) indices of points, three rows per triangle.
     """
     return triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
 
 
 def read_surface(path: Path | str, unit: str = "m") -> Surface:
-    """Read a surface from a file; raise an error if it does not enclose a solid.
+    """Read a surface from a file, and check that it encloses a solid.
 
     Args:
         path: STL, OBJ, PLY, VTK, VTP or MSH file, or STEP file if gmsh is installed;
             ``part.step#name`` selects one of several solids in a STEP file.
-        unit: unit of length of the file: m, cm, mm, um or inch; a STEP file states its
-            unit, which is used instead.
+        unit: unit of length in the file: m, cm, mm, um or inch. The unit stated in a
+            STEP file takes precedence.
 
     Returns:
         The surface in metres, closed and oriented outward.
 
     Raises:
-        BadInput: the file cannot be read, or does not contain a closed surface of
+        BadInput: the file cannot be read or does not contain a closed surface of
             plausible size.
     """
     if unit not in UNITS:
@@ -142,7 +142,7 @@ def read_surface(path: Path | str, unit: str = "m") -> Surface:
 def _read_triangles(
     path: Path, solid: str
 ) -> tuple[NDArray, NDArray, FilledSolids | None]:
-    """Return points and triangles in the unit of the file, and its solids."""
+    """Read points and triangles in the unit of the file, and its solids."""
     if path.suffix.lower() not in FORMATS:
         hint = nearest(path.suffix, FORMATS)
         raise BadInput(f"{path}: unknown kind of surface file{hint}")
@@ -158,7 +158,7 @@ def _read_triangles(
 def check_surface(
     points: NDArray, triangles: NDArray, name: str, unit: str = "m"
 ) -> Surface:
-    """Check and repair a surface given by its triangles.
+    """Check and repair a triangulated surface.
 
     Args:
         points: (n, 3) [m].
@@ -172,7 +172,7 @@ def check_surface(
 
     Raises:
         BadInput: the surface is empty, open, self-intersecting, not finite or of
-            implausible size; it consists of several bodies; or more than two triangles
+            implausible size, it consists of several bodies, or more than two triangles
             share an edge.
     """
     if len(triangles) == 0:
@@ -201,14 +201,14 @@ def check_surface(
 
 
 def _place(point: NDArray) -> str:
-    """Return the coordinates of a point as text for a message."""
+    """Format the coordinates of a point as text for a message."""
     return "(" + ", ".join(f"{v:.4g}" for v in point) + ") m"
 
 
 def _check_coordinates(
     points: NDArray, triangles: NDArray, name: str, unit: str
 ) -> None:
-    """Raise an error for coordinates that are not finite, or a size of a wrong unit."""
+    """Reject coordinates that are not finite, and a size that suggests a wrong unit."""
     used = points[np.unique(triangles)]
     wrong = ~np.isfinite(used).all(axis=1)
     if wrong.any():
@@ -235,7 +235,7 @@ def _merge(
 
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     tree, near = cKDTree(points), 1e-7 * size
-    # the pairs would be too many to be listed
+    # there would be too many pairs to list
     if tree.count_neighbors(tree, near) > _CROWD * len(points):
         raise BadInput(
             f"{name}: most of its {len(points)} vertices are less than "
@@ -261,7 +261,7 @@ def _merge(
 
 
 def _check_closed(points: NDArray, triangles: NDArray, name: str) -> None:
-    """Raise an error unless exactly two triangles share every edge."""
+    """Check that exactly two triangles share every edge."""
     edges = np.sort(directed_edges(triangles), axis=1)
     edges, count = np.unique(edges, axis=0, return_counts=True)
     if (count == 1).any():
@@ -279,7 +279,7 @@ def _check_closed(points: NDArray, triangles: NDArray, name: str) -> None:
 
 
 def _encloses(points: NDArray, outer: NDArray, inner: NDArray) -> bool:
-    """Return whether a shell lies in the box of another one and starts inside it."""
+    """Check whether a shell lies in the box of another one and starts inside it."""
     a, b = points[inner].reshape(-1, 3), points[outer].reshape(-1, 3)
     in_box = (a.min(axis=0) >= b.min(axis=0)) & (a.max(axis=0) <= b.max(axis=0))
     return bool(in_box.all()) and _inside(a[0], points, outer)
@@ -288,7 +288,7 @@ def _encloses(points: NDArray, outer: NDArray, inner: NDArray) -> bool:
 def _orient(
     points: NDArray, triangles: NDArray, name: str
 ) -> tuple[NDArray, list[str]]:
-    """Orient all triangles outward; raise an error for several bodies."""
+    """Orient all triangles outward; reject several bodies."""
     triangles, shell, flipped = orient_shells(triangles)
     repairs = (
         [f"{flipped} triangles reoriented to agree with their neighbours"]
@@ -322,8 +322,8 @@ def orient_shells(triangles: NDArray) -> tuple[NDArray, NDArray, int]:
         triangles: (m, 3) indices of points.
 
     Returns:
-        The triangles, (m,) the shell to which each triangle belongs, and the number of
-        reoriented triangles.
+        The triangles, the shell (m,) of each triangle, and the number of reoriented
+        triangles.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import breadth_first_order, connected_components
@@ -332,9 +332,9 @@ def orient_shells(triangles: NDArray) -> tuple[NDArray, NDArray, int]:
     directed = directed_edges(triangles)
     owner = np.repeat(np.arange(count), 3)
     order = np.lexsort(np.sort(directed, axis=1).T)
-    first, second = order[::2], order[1::2]  # edges of a closed surface occur in pairs
+    first, second = order[::2], order[1::2]  # edges in a closed surface occur in pairs
     left, right = owner[first], owner[second]
-    # neighbouring triangles whose orientations differ
+    # neighbouring triangles with different orientation
     same = directed[first, 0] == directed[second, 0]
     ends = (np.r_[left, right], np.r_[right, left])
     graph = coo_array((np.r_[same, same] + 1.0, ends), (count, count)).tocsr()
@@ -356,7 +356,7 @@ def orient_shells(triangles: NDArray) -> tuple[NDArray, NDArray, int]:
 
 
 def _inside(point: NDArray, points: NDArray, triangles: NDArray) -> bool:
-    """Return whether a surface encloses a point, where its solid angle is 4 pi."""
+    """Check whether a surface encloses a point, where its solid angle is 4 pi."""
     a, b, c = np.moveaxis(points[triangles] - point, 1, 0)
     la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
     top = np.einsum("ij,ij->i", a, np.cross(b, c))

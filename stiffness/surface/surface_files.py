@@ -1,8 +1,8 @@
 """Readers of surface files.
 
-STL files are read by forcefit.  Other formats are read by VTK, meshio or gmsh.  A
-damaged file can crash these packages and their process.  They therefore run in a
-separate process (:mod:`forcefit.stiffness.surface.surface_worker`).
+STL files are read by forcefit, and all other formats by VTK, meshio or gmsh. Because a
+damaged file can crash these packages and their process, they run in a separate process
+(:mod:`forcefit.stiffness.surface.surface_worker`).
 """
 
 import io
@@ -26,14 +26,14 @@ _TIME_LIMIT = 300.0  # [s] time limit of a reader; gmsh takes 1 s for 35 000 tri
 
 
 def named_solid(path: Path | str) -> tuple[Path, str]:
-    """Split a path into the surface file and the name of a solid in a STEP file.
+    """Split a path into a surface file and the name of a solid in a STEP file.
 
     Args:
         path: path of a file, or ``part.step#name``; ``part.step#one+other`` or
             ``part.step#*`` selects several solids as one.
 
     Returns:
-        The file, and the name of the solid, which is empty if the path contains none.
+        The file and the name of the solid, which is empty if the path has none.
     """
     file, mark, name = str(path).rpartition("#")
     if mark and Path(file).suffix.lower() in STEP:
@@ -44,15 +44,15 @@ def named_solid(path: Path | str) -> tuple[Path, str]:
 def read_triangles(
     path: Path | str, solid: str = ""
 ) -> tuple[NDArray, NDArray, FilledSolids | None]:
-    """Read the points and triangles of a surface file; a STEP file is read in metres.
+    """Read the points and triangles of a surface file, in metres for STEP.
 
     Args:
         path: an existing file of a known kind.
-        solid: name of one of several solids of a STEP file.
+        solid: name of one of several solids in a STEP file.
 
     Returns:
-        (n, 3) points and (m, 3) indices of points; and, for several solids of a STEP
-        file, the solids that they bound.
+        (n, 3) points, (m, 3) indices of points and, for several solids in a STEP file,
+        the solids that they bound.
 
     Raises:
         BadInput: the content does not match the suffix of the file, or the package that
@@ -78,7 +78,7 @@ def read_triangles(
 
 @dataclass(frozen=True)
 class StepSolid:
-    """A solid of a STEP file.
+    """A solid in a STEP file.
 
     Attributes:
         name: name after ``#``, as in ``part.step#name``.
@@ -94,13 +94,13 @@ class StepSolid:
 
 
 def step_solids(path: Path | str) -> list[StepSolid]:
-    """List the solids of a STEP file.
+    """List the solids in a STEP file.
 
     Args:
         path: path of the file.
 
     Returns:
-        The solids in the order of the file, converted to metres.
+        The solids in file order, converted to metres.
 
     Raises:
         BadInput: the file cannot be read or contains no solid, or gmsh is not
@@ -118,12 +118,11 @@ def step_solids(path: Path | str) -> list[StepSolid]:
 
 
 def _in_own_process(wanted: str, path: Path, solid: str = "") -> dict[str, NDArray]:
-    """Run a reader that may crash, hang or use too much memory; return its arrays."""
+    """Run a reader that may crash, hang or exhaust memory; return its arrays."""
     kind = path.suffix[1:].upper()
     with tempfile.TemporaryDirectory(prefix="forcefit-") as folder:
         made = Path(folder, "read.npz")
-        # -P prevents modules in the current folder from replacing others of the same
-        # name
+        # -P prevents modules in the current folder from shadowing installed modules
         module = "forcefit.stiffness.surface.surface_worker"
         command = [sys.executable, "-P", "-m", module, wanted, str(path), str(made)]
         search = {"PYTHONPATH": os.pathsep.join(sys.path)}

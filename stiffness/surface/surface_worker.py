@@ -1,10 +1,10 @@
-"""Program that reads a user's file with VTK, meshio or gmsh, which may crash.
+"""Program that reads a user's file with VTK, meshio or gmsh, any of which may crash.
 
 ``python -m forcefit.stiffness.surface.surface_worker triangles|solids FILE READ.npz
 [SOLID]``
 
-:mod:`forcefit.stiffness.surface.surface_files` runs this program in a separate process.
-A damaged file can therefore crash only that process.
+:mod:`forcefit.stiffness.surface.surface_files` runs this program in a separate process,
+so that a damaged file can crash only that process.
 """
 
 import sys
@@ -21,7 +21,7 @@ from forcefit.stiffness.surface.step_file import read_solids, read_step
 
 
 def main(wanted: str, path: Path, made: Path, solid: str = "") -> None:
-    """Read a file, and write the requested data or the reason why it was refused.
+    """Read a file, and write the requested data or the reason for rejecting it.
 
     Args:
         wanted: "triangles", or "solids" for a STEP file.
@@ -31,7 +31,7 @@ def main(wanted: str, path: Path, made: Path, solid: str = "") -> None:
             :class:`forcefit.stiffness.surface.step_file.StepTriangles`; or with
             ``names`` (n,), ``volumes`` (n,) and ``boxes`` (n, 6); or with ``refused``,
             one line of text.
-        solid: name of one of several solids of a STEP file.
+        solid: name of one of several solids in a STEP file.
     """
     _limit_memory()
     try:
@@ -43,7 +43,7 @@ def main(wanted: str, path: Path, made: Path, solid: str = "") -> None:
 
 
 def _solids(path: Path) -> dict[str, Any]:
-    """Return the names, volumes and bounding boxes of the solids in a STEP file."""
+    """Read the names, volumes and bounding boxes of the solids in a STEP file."""
     names, volumes, boxes = read_solids(path)
     return {
         "names": np.array(names, dtype=str),
@@ -53,7 +53,7 @@ def _solids(path: Path) -> dict[str, Any]:
 
 
 def _triangles(path: Path, solid: str) -> dict[str, Any]:
-    """Return the points and triangles; for STEP also the solids on both sides."""
+    """Read the points and triangles; for STEP also the solids on both sides."""
     if path.suffix.lower() in {".step", ".stp"}:
         step = read_step(path, solid)
         return {
@@ -69,7 +69,7 @@ def _triangles(path: Path, solid: str) -> dict[str, Any]:
 
 
 def _limit_memory() -> None:
-    """Limit the memory of this process, so that an excessive size causes an error."""
+    """Limit the memory of this process, so that an excessive size raises an error."""
     try:
         import os
         import resource
@@ -92,7 +92,7 @@ def _with_vtk(path: Path) -> tuple[NDArray, NDArray]:
 
 
 def _obj(path: Path) -> tuple[NDArray, NDArray]:
-    """Read a surface from an OBJ file; VTK splits the polygons into triangles."""
+    """Read a surface from an OBJ file, with polygons split into triangles by VTK."""
     import pyvista
 
     points, faces = read_obj(path)
@@ -103,7 +103,7 @@ def _obj(path: Path) -> tuple[NDArray, NDArray]:
 
 
 def _check_points(path: Path, mesh: Any) -> None:
-    """Raise an error if a cell refers to an absent point, which would crash VTK."""
+    """Reject cells that refer to absent points, which would crash VTK."""
     import pyvista
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
@@ -139,7 +139,7 @@ def _volume(mesh: Any) -> Any:
 
 
 def _boundary(path: Path, mesh: Any) -> tuple[NDArray, NDArray]:
-    """Return points and triangles of a VTK mesh, or of the boundary of its volume."""
+    """Extract points and triangles of a VTK mesh, or of the boundary of its volume."""
     import pyvista
 
     _check_points(path, mesh)
@@ -153,7 +153,7 @@ def _boundary(path: Path, mesh: Any) -> tuple[NDArray, NDArray]:
 
 
 def _msh(path: Path) -> tuple[NDArray, NDArray]:
-    """Read a gmsh MSH file (2.2, 4.1): surface elements, or the volume's boundary."""
+    """Read surface elements, or the volume boundary, of a gmsh MSH file (2.2, 4.1)."""
     import meshio
     import pyvista
 

@@ -1,4 +1,4 @@
-"""Graph of neighbouring triangles of a surface, with its smooth and flat parts."""
+"""Graph of neighbouring surface triangles, with smooth and flat parts."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,12 +7,12 @@ from forcefit.stiffness.surface.facets import Facets
 from forcefit.stiffness.surface.primitives import Shape
 from forcefit.stiffness.surface.surface import Surface, directed_edges
 
-# cosine of 35 degrees; an edge with a larger angle separates two patches
+# cosine of 35 degrees; edges with a larger angle separate two patches
 SHARP = np.cos(np.radians(35.0))
 # relative to the part's size: largest distance of a point on a shape; STL rounds to
 # 1e-7
 _ON_SHAPE = 2e-6
-# largest number of seeds on a surface; triangles beyond this remain flat facets
+# largest number of seeds on a surface; remaining triangles stay flat facets
 _TRIES = 500
 
 
@@ -36,7 +36,7 @@ class TriangleGraph:
         )
 
     def connected_parts(self, members: NDArray, bend: float) -> NDArray:
-        """Number connected parts; an edge with a cosine <= ``bend`` is a border."""
+        """Number connected parts, bordered by edges with a cosine <= ``bend``."""
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
 
@@ -48,7 +48,7 @@ class TriangleGraph:
         return connected_components(graph, directed=False)[1]
 
     def smooth_parts(self, members: NDArray) -> list[NDArray]:
-        """Return the indices of the triangles of each part between sharp edges."""
+        """Return the triangle indices of each part between sharp edges."""
         label = self.connected_parts(members, SHARP)
         return [
             np.flatnonzero(members & (label == k)) for k in np.unique(label[members])
@@ -62,7 +62,7 @@ class TriangleGraph:
         return np.where(follows[:, None], ends, ends[:, ::-1])
 
     def flat_faces(self, part: NDArray) -> NDArray:
-        """Return the number of each triangle's flat face, valid only in the part."""
+        """Return the flat-face number of each triangle, valid only in the part."""
         inside = np.zeros(len(self.triangles), dtype=bool)
         inside[part] = True
         return self.connected_parts(inside, 1 - 1e-10)
@@ -73,7 +73,7 @@ class TriangleGraph:
         return Facets(self.points[used], index.reshape(-1, 3))
 
     def fits(self, shape: Shape, part: NDArray) -> NDArray:
-        """Return which triangles of a part lie on a shape, by corners and normals."""
+        """Find the triangles of a part that lie on a shape, by corners and normals."""
         corners = self.points[self.triangles[part]].reshape(-1, 3)
         distances = np.abs(shape.signed(corners)[0]).reshape(-1, 3).max(axis=1)
         centers = corners.reshape(-1, 3, 3).mean(axis=1)

@@ -12,7 +12,7 @@ from forcefit.stiffness.screws import (
 
 
 def test_rotation_about_z_moves_a_point_on_the_x_axis_along_y():
-    """At p = q + x the offset is q - p = -x; t_p = t_q + r x (p - q) = z x x = y."""
+    """At p = q + x, the offset is q - p = -x; t_p = t_q + r x (p - q) = z x x = y."""
     moved = screw_map([-1.0, 0, 0]) @ [0, 0, 1e-3, 0, 0, 0]
     np.testing.assert_allclose(moved, [0, 0, 1e-3, 0, 1e-3, 0], atol=0)
 
@@ -41,7 +41,7 @@ def test_product_of_two_screw_maps_is_the_map_of_the_composed_motion(rng):
 
 @pytest.mark.parametrize("size", [1e-6, 1e-4, 1.0])
 def test_small_screws_are_derivatives_of_finite_motions(rng, size):
-    """The error of the small screw is of second order: below its squared size."""
+    """The error of the small screw is of second order, below its squared size."""
     turn, point = size * rng.normal(size=3), rng.normal(size=3)
     moved = (rotation_matrix(turn) - np.eye(3)) @ point
     screw = screw_map(-point) @ np.r_[turn, 0, 0, 0]
@@ -51,7 +51,7 @@ def test_small_screws_are_derivatives_of_finite_motions(rng, size):
 
 @pytest.mark.parametrize("angle", [1e-14, 1e-7, 1e-3, 0.5, 2.1, 3.1, np.pi - 1e-9])
 def test_rotations_agree_with_scipy(rng, angle):
-    """To rounding, in the matrix and relative to the angle."""
+    """Agreement is to machine precision, in the matrix and relative to the angle."""
     axes = rng.normal(size=(200, 3))
     vectors = angle * axes / np.linalg.norm(axes, axis=-1)[:, None]
     matrices, theirs = rotation_matrix(vectors), Rotation.from_rotvec(vectors)
@@ -61,7 +61,9 @@ def test_rotations_agree_with_scipy(rng, angle):
 
 
 def test_rotation_vector_is_exact_for_half_turns_and_the_identity():
-    """Where the scalar part of the quaternion is 0, and where its vector part is."""
+    """These are the cases where the scalar part, or the vector part, of the quaternion
+    is 0.
+    """
     for axis in (*np.eye(3), np.array([3, 0, -4]) / 5, np.array([1, 2, 2]) / 3):
         turn = 2 * np.outer(axis, axis) - np.eye(3)
         np.testing.assert_allclose(abs(rotation_vector(turn)), np.pi * abs(axis))

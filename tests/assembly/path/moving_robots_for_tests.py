@@ -18,7 +18,7 @@ def hinge(name, parent="base", at=(0, 0, 0), **other):
 
 
 def instants(names, values, first, second):
-    """A trajectory of separate instants, which need not follow each other."""
+    """Return a trajectory of independent instants."""
     rows = [np.atleast_2d(np.array(x, dtype=float)) for x in (values, first, second)]
     return Trajectory(tuple(names), np.arange(len(rows[0])) * 1.0, *rows, "times")
 

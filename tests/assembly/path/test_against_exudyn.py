@@ -1,4 +1,4 @@
-"""Deflection of a closed robot against the dynamic solution of Exudyn, stiff limit."""
+"""Deflection of a closed-loop robot against the dynamic solution of Exudyn."""
 
 import exudyn as exu
 import exudyn.itemInterface as item
@@ -127,8 +127,8 @@ def simulated(stiffness, steps):
 
 @pytest.mark.slow
 @pytest.mark.exudyn
-def test_deflection_converges_to_the_dynamic_solution_with_the_square_of_the_period():
-    """What the quasi-static answer leaves out falls as 1 / (T f1)^2."""
+def test_quasi_static_deflection_converges_to_dynamic_solution_as_period_squared():
+    """The error of the quasi-static solution decreases as 1 / (T f1)^2."""
     table = PathTable(("tx", "ty"), np.array([START, END]))
     path = profiled(table, 101, "seventh", 1.0, duration=DURATION)
     left_out, periods = [], []

@@ -1,4 +1,4 @@
-"""Effects of a robot's file along a path, by closed forms and by single postures."""
+"""Effects in a robot file along a path, against closed forms and single postures."""
 
 from dataclasses import replace
 
@@ -85,14 +85,12 @@ def turned(robot, **given):
         ),
     ],
 )
-def test_accelerated_rod_turns_by_its_torque_over_the_stiffness_of_the_effects(
-    effects, rotation
-):
+def test_accelerated_rod_rotates_by_torque_over_effective_stiffness(effects, rotation):
     assert turned(arm(effects=effects)) == pytest.approx(-rotation, rel=1e-9)
 
 
 @pytest.mark.parametrize("state", ["nominal", "contact", "exact"])
-def test_compliance_function_deflects_under_the_torque_of_the_acceleration(state):
+def test_compliance_function_deflects_under_inertial_torque(state):
     """At q = 0.5 the drive's compliance is 1e-6 + 2e-6 q = 2e-6 rad/(N m)."""
     soft = Function("hub", ("rz",), ("q.hub",), "powers", {"0": 1e-6, "1": 2e-6},
                     kind="compliance")  # fmt: skip
@@ -110,7 +108,7 @@ def test_first_frequency_along_a_path_includes_the_compliance_of_the_drive():
     assert path_errors(robot, path).frequency == pytest.approx(expected, rel=1e-9)
 
 
-def test_errors_that_effects_add_do_not_change_the_deflection_by_acceleration():
+def test_errors_added_by_effects_do_not_change_the_inertial_deflection():
     """A rod that is 8 K warmer and 30 um longer has the same inertial loads."""
     effects = {
         "drive_compliance": {"hub": 4e3}, "link_length": {"arm": 3e-5},
@@ -124,7 +122,7 @@ def test_errors_that_effects_add_do_not_change_the_deflection_by_acceleration():
     assert found.inertial[0, 2] == pytest.approx(-TORQUE / 4e3, rel=1e-9)
 
 
-def test_time_of_an_effect_is_the_time_of_the_first_instant_plus_that_of_the_path():
+def test_effect_time_is_the_start_time_plus_the_path_time():
     growing = Function("arm", ("tx",), ("time",), "powers", {"1": 1e-6})
     path = instants(["q.hub"], [[0.0]] * 3, [[0.0]] * 3, [[0.0]] * 3)
     path = replace(path, times=np.array([5.0, 6.0, 8.0]))
@@ -135,7 +133,7 @@ def test_time_of_an_effect_is_the_time_of_the_first_instant_plus_that_of_the_pat
 
 
 def at_rest(robot, gravity=None, load=None, **given):
-    """A path through three poses of the robot of the paper at zero speed."""
+    """A path through three poses of the paper's robot at zero speed."""
     values = np.array([[-0.05, -0.5], [0.0, -0.45], [0.06, -0.42]])
     path = instants(["tx", "tz"], values, np.zeros((3, 2)), np.zeros((3, 2)))
     found = path_errors(robot, path, gravity=gravity, load=load, under=WARM, **given)
@@ -170,8 +168,10 @@ def test_path_at_zero_speed_equals_single_postures_with_the_same_effects(name):
     np.testing.assert_array_equal(found.inertial, 0.0)
 
 
-def test_path_with_clearances_and_errors_of_effects_equals_single_postures():
-    """Without loads, clearances leave the pose open, but the energy is unique."""
+def test_path_with_clearances_and_effect_errors_equals_single_postures():
+    """Without loads, clearances leave the pose undetermined, but the energy is
+    unique.
+    """
     effects = {name: EFFECTS[name] for name in ERRORS}
     robot = replace(heavy("irsbot2"), effects=effects)
     found, applied = at_rest(robot, assumption="frozen")
@@ -180,7 +180,7 @@ def test_path_with_clearances_and_errors_of_effects_equals_single_postures():
     assert (found.status == "ok").all()
 
 
-def test_self_weight_along_a_path_equals_the_option_gravity():
+def test_self_weight_effect_along_a_path_equals_the_gravity_option():
     path = instants(["q.hub"], [[0.3]], [[2.0]], [[ALPHA]])
     springs = {"drive_compliance": {"hub": 4e3}}
     known = path_errors(
@@ -222,20 +222,20 @@ def test_self_weight_along_a_path_equals_the_option_gravity():
         ),
     ],
 )  # fmt: skip
-def test_effect_that_a_path_cannot_include_is_refused_by_name(changes, message):
+def test_effect_unsupported_along_a_path_is_rejected_by_name(changes, message):
     path = instants(["q.hub"], [[0.0]], [[0.0]], [[ALPHA]])
     with pytest.raises(BadInput, match=message):
         path_errors(arm(**changes), path)
 
 
-def test_state_of_a_nonlinear_effect_other_than_nominal_is_refused():
+def test_nonlinear_effect_is_rejected_in_all_states_except_nominal():
     effects = {"contact_stiffening": {"hub.coefficient": 1e6, "hub.exponent": 1.5}}
     path = instants(["q.hub"], [[0.0]], [[0.0]], [[ALPHA]])
     with pytest.raises(BadInput, match='nonlinear law at frame "hub"'):
         path_errors(arm(effects=effects), path, state="contact")
 
 
-def test_unknown_covariate_of_a_path_is_refused():
+def test_unknown_covariate_of_a_path_is_rejected():
     path = instants(["q.hub"], [[0.0]], [[0.0]], [[ALPHA]])
     with pytest.raises(BadInput, match='--under: unknown covariate "heat"'):
         path_errors(arm(), path, under={"heat": 1.0})

@@ -30,7 +30,7 @@ def pendulum():
     ("from_vertical", "axial", "transverse"),
     [(90.0, 0.0, 4.905), (30.0, 42.4786, 2.4525), (0.0, 49.05, 0.0)],
 )
-def test_hinge_of_a_falling_rod_carries_the_forces_of_the_textbook(
+def test_hinge_forces_of_a_falling_rod_equal_textbook_values(
     from_vertical, axial, transverse
 ):
     """Released level: alpha = 3 g sin / 2 L, omega^2 = 3 g cos / L; no moment.
@@ -52,7 +52,7 @@ def test_hinge_of_a_falling_rod_carries_the_forces_of_the_textbook(
     assert np.linalg.norm(np.cross(along, force)) == pytest.approx(transverse, abs=1e-4)
 
 
-def test_drive_torques_of_two_links_equal_those_of_lagrange():
+def test_drive_torques_of_two_links_equal_lagrange_equations():
     """Rods of 3 and 2 kg, 0.4 and 0.3 m, in a horizontal and in a vertical plane."""
     frames = (
         hinge("shoulder"),
@@ -87,8 +87,10 @@ def lagrange(weight):
     ]  # fmt: skip
 
 
-def test_rotating_beam_stretches_by_rho_omega_squared_length_cubed_over_3_E():
-    """16.07 um, and rho omega^2 L^2 / 2 = 3.375 MPa at its start."""
+def test_rotating_beam_elongation_equals_closed_form():
+    """rho omega^2 L^3 / 3 E = 16.07 um, and rho omega^2 L^2 / 2 = 3.375 MPa at its
+    start.
+    """
     robot, path = spinning_beam(100.0, 0.0)
     found = path_errors(robot, path)
     assert found.arrays["platform_screw"][0, 3] == pytest.approx(
@@ -98,8 +100,9 @@ def test_rotating_beam_stretches_by_rho_omega_squared_length_cubed_over_3_E():
     assert found.arrays["stress"][0, 0] == pytest.approx(3.375e6, rel=1e-9)
 
 
-def test_beam_on_an_accelerated_hub_bends_by_11_q_L4_over_120_E_I():
-    """q = rho A alpha L at the tip; the sections' own turning adds rho I alpha L^3/3EI.
+def test_bending_of_a_beam_on_an_accelerated_hub_equals_closed_form():
+    """11 q L^4 / 120 E I with q = rho A alpha L at the tip; rotary inertia adds rho I
+    alpha L^3/3EI.
 
     At the start the moment is q L^2 / 3 and the stress 4 M / pi r^3.
     """
@@ -121,8 +124,8 @@ def test_beam_on_an_accelerated_hub_bends_by_11_q_L4_over_120_E_I():
 
 
 @pytest.mark.parametrize("theory", ["euler", "timoshenko"])
-def test_beam_in_pieces_deflects_as_the_whole_beam(theory):
-    """The ends' loads are exact, short thick beams with shear included."""
+def test_beam_split_into_pieces_deflects_like_the_whole_beam(theory):
+    """The end loads are exact, even for short thick beams with shear."""
     screws = []
     for pieces in (1, 2, 7):
         robot, path = spinning_beam(
@@ -135,7 +138,7 @@ def test_beam_in_pieces_deflects_as_the_whole_beam(theory):
         np.testing.assert_allclose(screw, screws[0], atol=1e-9 * size)
 
 
-def test_section_at_the_start_of_a_beam_transmits_the_wrench_of_the_hub():
+def test_base_section_of_a_beam_transmits_the_hub_wrench():
     """Equilibrium of the whole beam: its load and a tool beside its tip."""
     robot, path = spinning_beam(80.0, 3000.0, radius=0.03, axis=(0.3, -0.5, 1))
     tool = Frame("tool", "piece0", [0.1, 0.05, -0.07], mass=1.2,
@@ -155,7 +158,7 @@ def test_section_at_the_start_of_a_beam_transmits_the_wrench_of_the_hub():
 
 
 def test_path_loads_at_rest_equal_the_weight_in_the_static_solution():
-    """The uniform weight is the case of equal accelerations."""
+    """Uniform weight corresponds to equal accelerations everywhere."""
     robot, path = spinning_beam(0.0, 0.0, pieces=2, theory="timoshenko")
     found = path_errors(robot, path, gravity=[1.0, -9.0, 2.0])
     static = solve_assembly(home_posture(robot), gravity=[1.0, -9.0, 2.0])

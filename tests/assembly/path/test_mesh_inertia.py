@@ -1,4 +1,4 @@
-"""Inertia of links given by a mesh, against the same link as a beam."""
+"""Inertia of mesh links against that of the same link as a beam."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -67,8 +67,8 @@ def with_mass(M):
     return replace(link, solution=MeshSolution(solved, E, "", M))
 
 
-def test_mass_matrix_of_a_thin_rod_gives_the_loads_of_the_beam():
-    """Without turning sections both are the same integrals of a linear load."""
+def test_mass_matrix_of_a_thin_rod_gives_the_beam_loads():
+    """Without rotary inertia, both are the same integrals of a linear load."""
     beam = BeamLink({"radius": RADIUS}, E, 0.3, RHO, "euler")
     by_beam = inertial_loads(turned_arm(beam), G)
     thin = replace(by_beam.beams[3], m=np.zeros((1, 3)))
@@ -84,8 +84,10 @@ def test_mass_matrix_of_a_thin_rod_gives_the_loads_of_the_beam():
     np.testing.assert_allclose(base, expected[1], atol=1e-12 * size)
 
 
-def test_loads_of_a_mesh_add_up_to_those_of_a_rigid_body():
-    """Newton and Euler for a solid cylinder, whatever its mass matrix between them."""
+def test_mesh_link_loads_sum_to_the_rigid_body_load():
+    """Newton-Euler equations of a solid cylinder, which hold for any condensed mass
+    matrix.
+    """
     second = np.pi * RADIUS**4 / 4
     motion = turned_arm(with_mass(rod_mass(second)))
     found = inertial_loads(motion, G)
@@ -106,8 +108,8 @@ def test_loads_of_a_mesh_add_up_to_those_of_a_rigid_body():
 
 
 @pytest.mark.slow
-def test_loads_of_a_meshed_bar_equal_those_of_the_beam():
-    """A bar of L / r = 11: the ends' shares differ by its short shape, 2 % at most."""
+def test_meshed_bar_loads_equal_beam_loads():
+    """For a short bar of L / r = 11, the end loads differ by at most 2 %."""
     solid = MeshLink(MESHES / "distal_plain.stl", "z=0", "z=0.452", E, 0.3, RHO)
     solid = solved_link(Frame("tip", translation=[LENGTH, 0, 0], link=solid))
     beam = BeamLink({"radius": RADIUS}, E, 0.3, RHO)

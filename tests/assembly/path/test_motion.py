@@ -1,4 +1,4 @@
-"""Velocities and accelerations of bodies against differences of exact poses."""
+"""Velocities and accelerations of bodies against finite differences of exact poses."""
 
 import numpy as np
 import pytest
@@ -62,8 +62,8 @@ def differences(robot, names, home, t, h):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_velocities_and_accelerations_equal_differences_of_poses(name):
-    """Fourth order differences of poses that close to 1e-12."""
+def test_velocities_and_accelerations_equal_finite_differences_of_poses(name):
+    """Fourth-order differences of poses whose loops close to 1e-12."""
     robot, names = load_robot(name), CASES[name]
     pose = home_posture(robot).pose()
     home = np.array([pose[one] for one in names])
@@ -86,8 +86,8 @@ def two_links(a, b):
     return Robot("arm", "tip", (*frames, Frame("tip", "two", [b, 0, 0])))
 
 
-def test_arm_given_by_joints_moves_as_its_closed_form():
-    """Two links in a plane: the tip's velocity and acceleration by hand."""
+def test_arm_motion_from_joint_path_equals_closed_form():
+    """Two planar links, with tip velocity and acceleration computed by hand."""
     a, b = 0.4, 0.3
     robot, names = two_links(a, b), ("q.one", "q.two")
     q, rate, second = ([[0.5, 0.8]], [[3.0, -2.0]], [[20.0, 15.0]])
@@ -102,7 +102,7 @@ def test_arm_given_by_joints_moves_as_its_closed_form():
     )  # fmt: skip
 
 
-def test_drives_that_a_joint_path_does_not_name_remain_at_rest():
+def test_drives_not_named_in_a_joint_path_remain_at_rest():
     robot = load_robot("arm6")
     path = tuple(np.array([[x, y]]) for x, y in ((0.2, 0.3), (1.0, -2), (3.0, 4)))
     names = ("q.joint2", "q.joint4")
@@ -116,7 +116,7 @@ def test_drives_that_a_joint_path_does_not_name_remain_at_rest():
 
 
 def test_rotation_rate_is_correct_for_rotations_beyond_half_a_turn():
-    """A turntable whose rotation vector is counted on to 4 rad turns at 2 rad/s."""
+    """A turntable rotates at 2 rad/s while its rotation vector grows to 4 rad."""
     robot = Robot("table", "top", (hinge("drive"), Frame("top", "drive", [0.1, 0, 0])))
     path = tuple(np.array([[x]]) for x in (3.0, 2.0, 5.0))
     motion = follow_path(placed(robot, ("rz",), path[0]), ("rz",), path)
@@ -124,8 +124,8 @@ def test_rotation_rate_is_correct_for_rotations_beyond_half_a_turn():
     np.testing.assert_allclose(motion.second_rates[0, 0], 5.0, rtol=1e-12)
 
 
-def test_velocity_out_of_a_stretched_arm_is_refused():
-    """Stretched, the arm's tip cannot move along itself."""
+def test_radial_velocity_of_a_stretched_arm_is_rejected():
+    """The tip of a stretched arm cannot move along the arm."""
     robot, names = two_links(0.4, 0.3), ("tx", "ty")
     there = together([home_posture(robot)])
     path = tuple(np.array(x) for x in ([[0.7, 0.0]], [[1.0, 0.0]], [[0.0, 0.0]]))

@@ -78,7 +78,7 @@ def energy(motion, gravity):
 
 
 @pytest.mark.parametrize("name", ["irsbot2", "hexapod", "delta", "arm6"])
-def test_power_of_the_drives_is_the_rate_of_the_energy(name):
+def test_drive_power_equals_the_rate_of_change_of_energy(name):
     """Kinetic and potential energy, differenced along the path to fourth order."""
     robot, names = heavy(name), CASES[name]
     pose = home_posture(robot).pose()
@@ -100,8 +100,8 @@ def test_power_of_the_drives_is_the_rate_of_the_energy(name):
 
 
 @pytest.mark.parametrize("name", ["hexapod", "five_bar"])
-def test_inertia_of_only_the_platform_deflects_by_the_platform_compliance(name):
-    """Deflection = C times the d'Alembert wrench of the platform."""
+def test_platform_inertia_deflects_the_platform_by_its_compliance(name):
+    """The deflection is C times the d'Alembert wrench of the platform."""
     robot, names = heavy(name, density=0.0), CASES[name]
     tight = without_clearance(robot)
     pose = home_posture(tight).pose()
@@ -126,7 +126,7 @@ def test_inertia_of_only_the_platform_deflects_by_the_platform_compliance(name):
 
 
 def test_deflection_grows_with_the_square_of_the_speed():
-    """Half the duration of a path from rest to rest: four times the deflection."""
+    """Half the duration of a rest-to-rest path gives four times the deflection."""
     robot = heavy("five_bar")
     tight = without_clearance(robot)
     table = PathTable(("tx", "ty"), np.array([[0.0, 0.14], [0.02, 0.13]]))
@@ -142,7 +142,7 @@ def test_deflection_grows_with_the_square_of_the_speed():
 
 
 def test_clearance_adds_to_the_deflection_of_an_accelerated_arm():
-    """A mass on a radial clearance of 10 um rests on its outer side: + 10 um."""
+    """A mass with a radial clearance of 10 um rests on its outer side: + 10 um."""
     link = BeamLink({"radius": 0.01}, 70e9, 0.3)
     joint = Clearance(radial=1e-5)
     frames = (
@@ -162,7 +162,7 @@ def test_clearance_adds_to_the_deflection_of_an_accelerated_arm():
     assert upper >= stretch + 1e-5
 
 
-def test_weightless_robot_and_unknown_assumption_are_refused():
+def test_massless_robot_and_unknown_assumption_are_rejected():
     path = instants(["q.hub"], [[0.0]], [[1.0]], [[0.0]])
     frames = (hinge("hub"), Frame("arm", "hub", [0.3, 0, 0]))
     with pytest.raises(ValueError, match="found no moving mass"):
@@ -172,7 +172,7 @@ def test_weightless_robot_and_unknown_assumption_are_refused():
         path_errors(Robot("arm", "arm", heavy_arm), path, assumption="frosen")
 
 
-def test_robot_of_the_paper_needs_54_ms_for_100_mm_at_20_g():
+def test_paper_robot_takes_54_ms_for_100_mm_at_20_g():
     """The quintic's peak is 10/sqrt 3 D/T^2: T = 54.2 ms, 3.46 m/s at the middle."""
     robot = heavy("irsbot2")
     table = PathTable(("tx", "tz"), np.array([[-0.05, -0.5], [0.05, -0.5]]))
@@ -188,7 +188,7 @@ def test_robot_of_the_paper_needs_54_ms_for_100_mm_at_20_g():
     np.testing.assert_allclose(mirrored, found.inertial, atol=1e-6 * size)
 
 
-def test_falling_pendulum_has_no_equilibrium_at_rest_as_reference_for_its_deflection():
+def test_falling_pendulum_has_unknown_deflection_without_equilibrium_at_rest():
     """A level rod of 2 kg falls with 3 g / 4 at its centre: its hinge holds m g / 4."""
     rail = Frame("rail", rotation=[0.0, np.pi / 2, 0.0], joint="prismatic",
                  actuated=True)  # fmt: skip
@@ -253,14 +253,16 @@ def six_legs(file, kind, mass=0.0, across=0.0, about=0.0):
 
 
 def forces_of_six_legs(robot):
-    """(6,) [N] of the drives in a posture off the middle, moving and accelerated."""
+    """(6,) [N] drive forces in an off-centre posture, moving and accelerated."""
     pose, rate, second = [0.05, -0.02, 0.55, 0.1, -0.1, 0.2], [0.5] * 6, [-3.0] * 6
     path = instants(POSE, [pose], [rate], [second])
     return path_errors(robot, path, gravity=GRAVITY_ALONG_Z).arrays["drive_force"][0]
 
 
-def test_drives_carry_the_platform_where_massless_legs_spin_freely(tmp_path):
-    """Six equal legs between balls: each drive has m (g + a) / (6 cos(angle to z))."""
+def test_drive_forces_are_exact_with_massless_freely_spinning_legs(tmp_path):
+    """Six equal legs between ball joints: each drive carries m (g + a) / (6 cos(angle
+    to z)).
+    """
     robot, along = six_legs(tmp_path / "six_sps.toml", "spherical")
     pose = [0.0, 0.0, 0.5, 0.0, 0.0, 0.0]
     path = instants(POSE, [pose], [np.zeros(6)], [[0, 0, 5.0, 0, 0, 0]])
@@ -269,8 +271,10 @@ def test_drives_carry_the_platform_where_massless_legs_spin_freely(tmp_path):
     np.testing.assert_allclose(errors.arrays["drive_force"][0], expected, rtol=1e-9)
 
 
-def test_spin_of_legs_with_masses_on_their_axes_does_not_change_the_result(tmp_path):
-    """Balls at the base let them spin, universal joints do not: the same forces."""
+def test_spin_of_legs_with_mass_on_their_axes_does_not_change_drive_forces(tmp_path):
+    """Ball joints at the base allow spin and universal joints do not, with equal
+    forces.
+    """
     file = tmp_path / "six.toml"
     forces = [
         forces_of_six_legs(six_legs(file, kind, mass=0.8)[0])
@@ -280,9 +284,8 @@ def test_spin_of_legs_with_masses_on_their_axes_does_not_change_the_result(tmp_p
 
 
 def test_spin_of_round_legs_between_ball_joints_is_removed(tmp_path):
-    """Free of moments about their axes, they start and stay without spin.
-
-    So no force depends on their moment of inertia about the axis.
+    """Without moments about their axes, the legs never start to spin, so no force
+    depends on their moment of inertia about the axis.
     """
     file = tmp_path / "six.toml"
     forces = [

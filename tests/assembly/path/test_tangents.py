@@ -1,4 +1,4 @@
-"""Compliance along a path under the loads of each instant, and drives with a force."""
+"""Compliance along a path under instantaneous loads, and force-controlled drives."""
 
 from dataclasses import replace
 
@@ -29,8 +29,8 @@ def spring(k):
     return K
 
 
-def test_pressed_clearance_is_compliant_along_its_round_bound():
-    """The force m a at the bound of radius c holds it like a spring of m a / c."""
+def test_closed_clearance_is_compliant_along_its_round_bound():
+    """On a bound of radius c, the force m a acts like a spring of stiffness m a / c."""
     c, k = 2e-5, 1e7
     rail = slide("rail", joint_stiffness=spring(k))
     seat = Frame("seat", "rail", rotation=[0, -np.pi / 2, 0],
@@ -48,7 +48,9 @@ def test_pressed_clearance_is_compliant_along_its_round_bound():
 
 
 def test_centrifugal_force_stiffens_an_elastic_hinge():
-    """Lever of the dead force m omega^2 L: K = k + m omega^2 L^2 about the hinge."""
+    """The lever arm of the dead force m omega^2 L gives K = k + m omega^2 L^2 at the
+    hinge.
+    """
     k, length, rates = 200.0, 0.4, np.array([[0.0], [10.0], [25.0]])
     K = np.diag(np.full(6, np.inf))
     K[2, 2] = k
@@ -64,7 +66,7 @@ def test_centrifugal_force_stiffens_an_elastic_hinge():
     np.testing.assert_allclose(nominal[:, 2, 2], 1 / k, rtol=1e-12)
 
 
-def test_exact_state_refuses_a_link_with_a_density():
+def test_exact_state_rejects_a_link_with_density():
     link = BeamLink({"radius": 0.01}, 70e9, 0.3, 2700.0)
     tip = Frame("tip", "hub", [0.4, 0, 0], link=link)
     robot = Robot("arm", "tip", (hinge("hub"), tip))
@@ -98,7 +100,7 @@ def test_drive_with_a_force_unloads_the_other_drive():
 
 
 def test_an_interrupted_path_resumes_with_the_same_results(tmp_path):
-    """Ctrl-C after the first block: the file is that of an uninterrupted path."""
+    """Ctrl-C after the first block: the file equals that of an uninterrupted run."""
     table = PathTable(("tx",), np.array([[0.0], [0.1]]))
 
     def compute(file, progress=lambda done, total: None):

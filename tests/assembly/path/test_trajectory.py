@@ -1,4 +1,4 @@
-"""Profiles and splines against their textbook numbers; bad input of a path."""
+"""Profiles and splines against textbook values, and invalid path input."""
 
 import numpy as np
 import pytest
@@ -20,8 +20,8 @@ def line(*values, times=None):
 
 
 @pytest.mark.parametrize("profile", PEAKS)
-def test_profiles_have_the_peaks_of_the_textbook(profile):
-    """In D / T and D / T^2; from 0 to 1, at rest at both ends."""
+def test_profile_peaks_equal_textbook_values(profile):
+    """Peaks in units of D / T and D / T^2, from 0 to 1, at rest at both ends."""
     t = np.linspace(0, 1, 30_001)
     s, speed, acceleration = PROFILES[profile](t)
     peak_speed, peak_acceleration = PEAKS[profile]
@@ -41,8 +41,10 @@ def integral(values, t):
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def test_polynomial_profiles_end_without_acceleration_or_jerk():
-    """The quintic's acceleration is zero at its ends, the seventh degree's jerk too."""
+def test_polynomial_profiles_end_with_zero_acceleration_or_jerk():
+    """The acceleration vanishes at the ends of the quintic, and of degree seven also
+    the jerk.
+    """
     h = 1e-5
     for profile, order in (("quintic", 1), ("seventh", 2)):
         acceleration = PROFILES[profile](np.array([0.0, h, 2 * h]))[2]
@@ -62,7 +64,7 @@ def test_limits_of_speed_and_acceleration_determine_the_shortest_duration(profil
 
 
 def test_two_rows_with_times_are_the_quintic_profile():
-    """The spline at rest at both ends is the quintic of least jerk."""
+    """The spline at rest at both ends is the minimum-jerk quintic."""
     by_time = timed(line(0.0, 0.4, times=np.array([1.0, 3.0])), 9)
     by_profile = profiled(line(0.0, 0.4), 9, "quintic", 1.0, duration=2.0)
     for name in ("values", "first", "second"):
@@ -72,7 +74,7 @@ def test_two_rows_with_times_are_the_quintic_profile():
 
 
 def test_path_with_moving_ends_reproduces_a_quintic_motion():
-    """A spline of degree five through samples of t^5 is t^5, at unequal times too."""
+    """A quintic spline through samples of t^5 is t^5, even at unequal times."""
     times = np.array([0.0, 0.3, 0.5, 0.9, 1.4, 1.7, 2.0])
     path = timed(line(*times**5, times=times), 41, ends="moving")
     np.testing.assert_allclose(path.values[:, 0], path.times**5, atol=1e-12)
@@ -80,7 +82,9 @@ def test_path_with_moving_ends_reproduces_a_quintic_motion():
 
 
 def test_acceleration_of_a_sampled_cosine_converges_with_fourth_order():
-    """The second derivative of a quintic spline errs by h^4 away from its ends."""
+    """The second derivative of a quintic spline has an error of h^4 away from
+    its ends.
+    """
     errors = []
     for count in (11, 21, 41):
         times = np.linspace(0, 2 * np.pi, count)
@@ -92,8 +96,10 @@ def test_acceleration_of_a_sampled_cosine_converges_with_fourth_order():
     assert (orders > 3.5).all()
 
 
-def test_motion_profile_over_many_rows_has_no_jump_of_acceleration():
-    """The speed along three rows on a line is the profile's; the curve is smooth."""
+def test_motion_profile_over_many_rows_has_continuous_acceleration():
+    """Along three collinear rows, the speed is that of the profile and the curve is
+    smooth.
+    """
     path = profiled(line(0.0, 0.1, 0.4), 101, "quintic", 1.0, duration=1.0)
     straight = profiled(line(0.0, 0.4), 101, "quintic", 1.0, duration=1.0)
     np.testing.assert_allclose(path.values, straight.values, atol=1e-14)
@@ -121,7 +127,7 @@ def test_motion_profile_over_many_rows_has_no_jump_of_acceleration():
          "found 2 rows, expected at least 6"),
     ],
 )  # fmt: skip
-def test_path_that_cannot_be_computed_is_refused(call, message):
+def test_path_that_cannot_be_computed_is_rejected(call, message):
     with pytest.raises(ValueError, match=message):
         call(line(0.0, 0.1))
 
@@ -142,7 +148,7 @@ def test_path_that_cannot_be_computed_is_refused(call, message):
         ("time,pose.tx\n0,0\n1\n", "line 3: found 1 cells, expected 2"),
     ],
 )
-def test_path_file_that_breaks_a_rule_is_refused(tmp_path, content, message):
+def test_invalid_path_file_is_rejected(tmp_path, content, message):
     file = tmp_path / "path.csv"
     file.write_text(content)
     with pytest.raises(ValueError, match=message) as raised:
@@ -160,6 +166,6 @@ def test_path_file_preserves_times_names_and_ids(tmp_path):
     np.testing.assert_array_equal(path.values, [[0, 0.14], [0.01, 0.15]])
 
 
-def test_decreasing_times_are_refused_and_no_file_is_written():
+def test_decreasing_times_are_rejected_and_no_file_is_written():
     with pytest.raises(ValueError, match="path: row 2, time: found -1 s after 0 s"):
         check_path(line(0, 1, times=np.array([0.0, -1.0])))

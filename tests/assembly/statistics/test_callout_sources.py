@@ -1,4 +1,4 @@
-"""Statistics of callouts: a serial arm and a four-bar by hand."""
+"""Statistics of callouts: a serial arm and a four-bar against hand calculation."""
 
 import json
 from dataclasses import replace
@@ -34,7 +34,7 @@ def experiment(four_bar):
 
 
 def test_rotation_of_a_coupler_equals_hand_calculation(experiment):
-    """Deviation of the angle: 20 um / sqrt 3 times the root of the sum of squares."""
+    """Standard deviation of the angle: 20 um / sqrt 3 times the root sum of squares."""
     data = run_draws(experiment, 20_000)
     root = np.sqrt(sum(c**2 for c in COEFFICIENTS.values()))
     expected = root * 20e-6 / np.sqrt(3) / LEVER
@@ -42,7 +42,7 @@ def test_rotation_of_a_coupler_equals_hand_calculation(experiment):
     assert turned.std() == pytest.approx(expected, rel=0.01)
 
 
-def test_importance_of_each_callout_equals_the_share_computed_by_hand(experiment):
+def test_importance_of_each_callout_equals_hand_calculation(experiment):
     sources = experiment.sources
     slopes = experiment.energies.screws[2, -6 * len(sources.robot.frames) :]
     shares = linear_importance(
@@ -76,7 +76,7 @@ def test_independent_errors_are_added_to_callouts(four_bar):
     assert [n for n, _ in source_groups(sources, "source")][0] == "C.TX"
 
 
-def test_robot_without_tolerances_needs_a_file_of_errors(four_bar):
+def test_robot_without_tolerances_requires_an_errors_file(four_bar):
     with pytest.raises(BadInput, match=r"found no \[\[tolerance\]\]"):
         sources_of(replace(four_bar, callouts=()))
 
@@ -91,8 +91,9 @@ frame = [
 
 
 def test_clearance_of_a_fit_differs_between_draws(write_file):
-    """The tip of an exact arm on one pin moves as far as its radial clearance: 6 to 35
-    um of diameter, on average 20.5 um, with a deviation of 6.09 um."""
+    """The tip of an exact arm on one pin moves by its radial clearance. The diametral
+    clearance is 6 to 35 um, 20.5 um on average, with standard deviation 6.09 um.
+    """
     robot = read_robot(write_file(ARM))
     assert robot.frame("shoulder").clearance.radial == pytest.approx(10.25e-6)
     assert "10.25 um of 3 to 17.5" in " ".join(robot.remarks)
@@ -123,9 +124,10 @@ joint = [
 
 
 def test_larger_hole_has_a_larger_zone_and_a_larger_clearance(write_file):
-    """Hole 12 H7 of size s above its least one: ends of the bore within R = 25 um +
-    s/2, diametral clearance s + 6 to 17 um.  Uniform s in 0 to 18 um and ends in their
-    discs: the covariance of r^2 and the clearance is cov(R^2/2, s) = 398.25 um^3."""
+    """Hole 12 H7 of size s above its minimum: ends of the bore within R = 25 um + s/2,
+    diametral clearance s + 6 to 17 um. Uniform s in 0 to 18 um and ends in their discs:
+    the covariance of r^2 and the clearance is cov(R^2/2, s) = 398.25 um^3.
+    """
     sources = sources_of(read_robot(write_file(LOOSE)))
     values = sources.draw(0, 200_000, 1)
     radius = 25 * np.linalg.norm(values[:, :2], axis=1)

@@ -1,4 +1,4 @@
-"""Tolerances allotted to callouts: as independent errors, and by finite geometry."""
+"""Tolerances allocated to callouts, against independent errors and finite geometry."""
 
 from dataclasses import replace
 
@@ -58,9 +58,10 @@ def allotted(tmp_path, robot, text):
     return allocate([home_posture(robot)], plan, 0)
 
 
-def test_lengths_are_allocated_tolerances_as_independent_errors_along_them(tmp_path):
-    """The draws of an interval are those of an independent uniform error, so both
-    plans must have the same tolerances, whatever the robot file states."""
+def test_length_callouts_get_the_tolerances_of_independent_errors(tmp_path):
+    """An interval is drawn like an independent uniform error, so both plans must have
+    the same tolerances, regardless of the robot file.
+    """
     callouts = allotted(tmp_path, ARM, PLAN_OF_CALLOUTS)
     frames = allotted(tmp_path, ARM, PLAN.format(**OF_FRAMES))
     assert callouts.tolerances == pytest.approx(frames.tolerances, rel=1e-6)
@@ -68,8 +69,9 @@ def test_lengths_are_allocated_tolerances_as_independent_errors_along_them(tmp_p
 
 
 def test_width_of_a_position_meets_its_yield_in_finite_geometry(tmp_path):
-    """The tip 150 mm above a bore of 20 mm: its offset in units of the width is that
-    of both ends in discs; the allotted width is the limit over the quantile."""
+    """The tip 150 mm above a bore of 20 mm: its offset in units of the width follows
+    from both ends in discs, and the allocated width is the limit over the quantile.
+    """
     robot = Robot(
         "post",
         "tip",

@@ -1,4 +1,4 @@
-"""Capability indices against worked numbers and exact coverage."""
+"""Capability indices against hand calculation and exact coverage."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,9 @@ def test_intervals_of_cpk_1_33_from_fifty_values_equal_hand_calculation():
 
 
 def test_intervals_cover_the_true_capability_index_at_the_stated_rate():
-    """2000 samples of 30: a share of 0.95 has a standard error of 0.5 %."""
+    """With 2000 samples of 30 values, a coverage of 0.95 has a standard error
+    of 0.5 %.
+    """
     rng = np.random.default_rng(1)
     found = [capability(x, -4.0, 4.0) for x in rng.normal(size=(2000, 30))]
     assert np.mean([c.cp[1] <= 4 / 3 <= c.cp[2] for c in found]) > 0.93
@@ -48,7 +50,7 @@ def test_intervals_cover_the_true_capability_index_at_the_stated_rate():
     assert np.mean([c.cpk[1] <= 4 / 3 <= c.cpk[2] for c in one]) > 0.91
 
 
-def test_capability_without_spread_is_refused():
+def test_capability_of_constant_values_is_rejected():
     with pytest.raises(ValueError, match="do not vary"):
         capability([1.0, 1.0], 0.0, 2.0)
 
@@ -62,8 +64,10 @@ def test_intervals_of_parts_per_million_equal_hand_calculation():
     assert proportion(0, 10**6, 0.9)["upper"] * 1e6 == pytest.approx(3.0, abs=0.01)
 
 
-def test_indices_by_quantiles_of_a_disc_equal_those_of_its_radius():
-    """Rayleigh: the quantile at p is s sqrt(-2 ln(1 - p)); the limit is 4 s."""
+def test_quantile_indices_of_a_rayleigh_sample_equal_closed_forms():
+    """Rayleigh distribution: the quantile at p is s sqrt(-2 ln(1 - p)); the limit is 4
+    s.
+    """
     low, middle, tail = np.sqrt(-2 * np.log(1 - np.array([0.00135, 0.5, 0.99865])))
     x = np.linalg.norm(np.random.default_rng(2).normal(size=(400_000, 2)), axis=1)
     for index, expected in (

@@ -27,7 +27,7 @@ def generators(count, seed=3):
 
 
 def walked(rows, starts, count=1500, start=None):
-    """Many points, by default from the middle; all must be mixed."""
+    """Sample many points, by default from the centre; all walks must mix."""
     starts = np.array(starts)
     u = np.zeros((count, starts[-1])) if start is None else np.tile(start, (count, 1))
     rows = np.array(rows, dtype=float).reshape(-1, starts[-1])
@@ -63,10 +63,10 @@ def test_uniform_positions_in_a_cut_disc_equal_rejection_sampling():
 @pytest.mark.parametrize(
     "thin", [pytest.param(t, marks=pytest.mark.slow) for t in (1e-1, 1e-3, 1e-5)]
 )
-def test_uniform_clearance_mixes_near_the_edge_of_the_zone(thin):
+def test_uniform_clearance_walk_mixes_near_the_zone_edge(thin):
     """Row u0 - thin u2 = 1 with |u2| <= 1 leaves the disc's cap 1 - thin <= u0; two
-    sides stay free.  A walk with steps alike in all directions would take 1 / thin^2 of
-    them.  The density of u0 is proportional to the cap's width, sqrt(1 - u0^2).
+    sides stay free. A walk with isotropic steps would need 1 / thin^2 of them. The
+    density of u0 is proportional to the cap's width, sqrt(1 - u0^2).
     """
     u = walked(
         [[1, 0, -thin, 0, 0]], [0, 2, 3, 4, 5], start=[1 - thin / 2, 0, -0.5, 0.9, -0.9]
@@ -85,8 +85,8 @@ def test_uniform_clearance_mixes_near_the_edge_of_the_zone(thin):
     assert stats.kstest(share, "uniform").pvalue > 1e-3
 
 
-def test_walk_without_mixing_is_reported():
-    """The set has no interior, or the chains may not be doubled."""
+def test_random_walk_that_does_not_mix_is_reported():
+    """The set has no interior, or the chains must not be doubled."""
     starts, rng = np.array([0, 1, 2]), generators(1)[0]
     along = np.array([[1.0], [1.0]]) / np.sqrt(2)
     corner, to_screw = np.array([1.0, -1.0]), np.eye(6)[:, :2].copy()
@@ -97,7 +97,7 @@ def test_walk_without_mixing_is_reported():
     assert sample_uniform_position(along, starts, to_screw, middle, rng)
 
 
-def test_platform_between_two_pins_is_uniform_over_their_common_range():
+def test_platform_between_two_pins_is_distributed_uniformly_over_their_common_range():
     """Along z a pin of 2 mm on one side and of 1 mm on the other, errors 0.5 mm apart.
 
     The platform, on the first, moves from -2 to 2 mm, and on the second from 0.5 - 1 to
@@ -183,8 +183,8 @@ def test_contact_position_is_at_least_as_far_along_its_force_as_uniform(drawn):
 
 
 @pytest.mark.parametrize("play", ["most", "worst"])
-def test_unknown_clearance_position_is_refused(drawn, play):
-    """The model worst has no single position, so it is refused too."""
+def test_unknown_clearance_model_is_rejected(drawn, play):
+    """The worst model has no single position, so it is rejected too."""
     one, found = drawn
     with pytest.raises(ValueError, match=f"clearance is '{play}'") as error:
         position_clearances(one, found, play, generators(DRAWN))
@@ -192,7 +192,7 @@ def test_unknown_clearance_position_is_refused(drawn, play):
 
 
 def moved(directions, starts, rows=(), free=None, positions=None):
-    """The farthest positions along some directions, from the middle by default."""
+    """Return the farthest positions along directions, by default from the centre."""
     directions, starts = np.array(directions, dtype=float), np.array(starts)
     nu = starts[-1]
     free = np.ones(nu, dtype=bool) if free is None else np.array(free)
@@ -203,7 +203,9 @@ def moved(directions, starts, rows=(), free=None, positions=None):
 
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
 def test_farthest_positions_in_discs_and_intervals_equal_closed_forms(size, rng):
-    """A linear function is largest at d / |d| of a disc, at the sign of an interval."""
+    """A linear function is largest at d / |d| on a disc, and at the sign on an
+    interval.
+    """
     directions = rng.normal(size=(6, 3)) + 0.1
     expected = np.column_stack([
         directions[:, :2] / np.linalg.norm(directions[:, :2], axis=1)[:, None],

@@ -1,4 +1,4 @@
-"""Confidence intervals and modes against closed forms and their confidence level."""
+"""Confidence intervals and modes against closed forms and confidence levels."""
 
 from math import comb
 
@@ -15,7 +15,9 @@ from forcefit.assembly.statistics.estimates import (
 
 
 def test_mean_and_interval_of_three_numbers_equal_hand_calculation():
-    """1, 2, 4: 7/3, deviation sqrt(7/3), Student's t of two degrees 4.302653."""
+    """1, 2, 4: mean 7/3, deviation sqrt(7/3), Student's t for two degrees of freedom
+    4.302653.
+    """
     answer = mean([1.0, 2.0, 4.0])
     assert answer["value"] == pytest.approx(7 / 3, rel=1e-14)
     assert answer["deviation"] == pytest.approx((7 / 3) ** 0.5, rel=1e-14)
@@ -39,7 +41,7 @@ def test_quantile_interval_follows_from_binomial_sums(share, level):
 
 
 def test_quantile_among_infinite_values_is_a_value_of_the_sample():
-    """Between 3 and infinity there is no middle: the higher value is returned."""
+    """Between 3 and infinity there is no midpoint, so the larger value is returned."""
     x = [1.0, 2.0, 3.0, np.inf, np.inf, np.inf]
     assert quantile(x, 0.5)["value"] == np.inf
     assert quantile(x, 0.3)["value"] == 3.0
@@ -57,9 +59,8 @@ def test_interval_with_undecided_trials_covers_both_outcomes():
 
 
 def densest(x, positive):
-    """The most probable value by the sum of its kernels, on a fine grid.
-
-    Of Silverman's width 0.9 min(s, IQR / 1.349) n^(-1/5), reflected at zero if asked.
+    """Find the mode of a kernel density estimate on a fine grid, with Silverman's width
+    0.9 min(s, IQR / 1.349) n^(-1/5), reflected at zero if asked.
     """
     low, high = np.quantile(x, [0.25, 0.75])
     width = 0.9 * min(x.std(), (high - low) / 1.349) * len(x) ** -0.2

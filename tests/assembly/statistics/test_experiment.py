@@ -1,4 +1,4 @@
-"""Results of draws: two springs in series, and an arm with clearance at its pin."""
+"""Results of draws for two springs in series, and for an arm with pin clearance."""
 
 from dataclasses import replace
 
@@ -25,11 +25,11 @@ def springs(radial=PLAY, **options):
     return Experiment(home_posture(robot), sources, **options)
 
 
-def test_draws_of_pressed_springs_have_closed_form_energy_force_and_moment():
+def test_draws_of_compressed_springs_have_closed_form_energy_force_and_moment():
     """Beyond the clearance p of a gap d: k (d - p)^2 / 4, k (d - p) / 2, half of that.
 
-    Margins are d/p in both readings, as no joint is compliant; nothing is short of
-    the least energy by more than rounding.
+    Both margins are d/p, because no joint is compliant; the energy is minimal to
+    machine precision.
     """
     experiment = springs()
     values = experiment.sources.draw(0, 40, seed=1)
@@ -81,7 +81,7 @@ def test_draws_that_cannot_be_assembled_have_a_status_and_nan_results():
     assert "margin" not in rows.dtype.names
 
 
-def test_stress_of_draws_equals_single_solutions_and_is_optional(rng):
+def test_stress_of_draws_equals_single_solutions_and_can_be_omitted(rng):
     posture = place_robot(load_robot("irsbot2"), {"tx": 0.1, "tz": -0.5})
     robot = posture.robot
     sources = tolerance_sources(robot, [0, 0, 0, 2e-3, 0, 0])
@@ -99,7 +99,7 @@ def test_stress_of_draws_equals_single_solutions_and_is_optional(rng):
     assert replace(experiment, stress=False).solve(0, 1)["stress"].shape == (1, 0)
 
 
-def test_limits_on_quantities_that_are_not_computed_are_refused():
+def test_limits_on_quantities_that_are_not_computed_are_rejected():
     posture = place_robot(load_robot("irsbot2"))
     sources = tolerance_sources(posture.robot, [1e-3] * 6)
     whole = Experiment(posture, sources)

@@ -1,4 +1,4 @@
-"""Fits of bores and bearings: one clearance of a hole and a shaft at both ends.
+"""Fits of bores and bearings: hole and shaft have one clearance at both ends.
 
 12 H7/g6: hole 0 to 18 um, shaft -17 to -6 um over 12 mm, so the radial clearance is 3
 to 17.5 um, of uniform sizes 10.25 um with a deviation of sqrt(18^2 + 11^2)/sqrt(12)/2.
@@ -59,7 +59,7 @@ def test_worst_case_of_a_bore_with_a_fit_is_at_its_largest_clearance(tmp_path):
     assert worst(robot, "translation").attained == pytest.approx(175e-6, rel=1e-6)
 
 
-def test_commands_that_use_one_clearance_take_the_mean_clearance_of_a_bore(tmp_path):
+def test_commands_with_a_single_clearance_use_the_mean_clearance_of_a_bore(tmp_path):
     fitted = spindle(tmp_path, BORE)
     stated = spindle(tmp_path, 'clearance = { radial = "10.25 um", length = "40 mm" }')
     assert [f.name for f in fitted.frames] == [f.name for f in stated.frames]
@@ -82,7 +82,7 @@ def test_both_ends_of_a_bore_have_the_same_drawn_clearance(tmp_path):
     assert found.max() < 17.5e-6 * (1 + 1e-3)
 
 
-def test_two_bearings_have_independent_clearances_of_their_fits(tmp_path):
+def test_two_bearings_have_independent_fit_clearances(tmp_path):
     """Rotation (c1 + c2) / 50 mm, of variance FIRST^2 + SECOND^2."""
     robot = spindle(tmp_path, BEARINGS)
     found = drawn_rotations(robot) * 0.05
@@ -132,7 +132,7 @@ def test_cylindrical_and_universal_joints_have_bores_with_fits(tmp_path):
 
 
 @pytest.mark.parametrize("clearance", [BORE, BEARINGS])
-def test_fitted_contacts_are_kept_in_a_file_of_frames(tmp_path, clearance):
+def test_fitted_contacts_are_preserved_in_a_file_of_frames(tmp_path, clearance):
     robot = spindle(tmp_path, clearance)
     write_robot(robot, tmp_path / "frames.toml")
     again = read_robot(tmp_path / "frames.toml")
@@ -195,8 +195,8 @@ tolerance = [{ feature = "slot", datums = ["pin"], length = "100 +- 0.03 mm" }]
 def test_bolted_slot_assembles_if_its_clearance_covers_the_error(
     write_file, clearance, largest, share
 ):
-    """A rigid plate closes only if the clearance c exceeds the error e of the length:
-    e is uniform to 30 um, so the share is the mean of c over 30 um.
+    """A rigid plate closes only if the clearance c exceeds the error e of the length: e
+    is uniform up to 30 um, so the yield is the mean of c over 30 um.
 
     Three standard errors of 500 draws are 0.066.
     """

@@ -1,7 +1,6 @@
-"""Five drawings: worst cases and deviations by hand.
-
-Each formula is that of a bore within its zone, of a rotation times its lever, or of a
-contact's gap times its lever, worked without the program.
+"""Five drawings: worst cases and standard deviations against hand calculation. Each
+formula is that of a bore within its zone, of a rotation times its lever arm, or of a
+contact gap times its lever arm, worked out without the program.
 """
 
 import numpy as np
@@ -98,7 +97,7 @@ def bore_variance(radius, length, height):
 
 
 def grown_mean_square(radius, growth):
-    """Mean square of a radius that is uniform from least to largest hole."""
+    """Mean square of a radius that is uniform from smallest to largest hole."""
     return ((radius + growth) ** 3 - radius**3) / (3 * growth)
 
 
@@ -142,7 +141,7 @@ def test_worst_case_of_a_drawing_equals_hand_calculation(write_file, name):
     "name", [n for n, case in CASES.items() if case[2] is not None]
 )
 def test_standard_deviations_of_a_drawing_equal_hand_calculation(write_file, name):
-    """200 000 draws have a deviation within 0.3 % of the true one."""
+    """The standard deviation of 200 000 draws is within 0.3 % of the true one."""
     text, _, expected = CASES[name]
     moved = translations(read_robot(write_file(text)))
     assert moved.std(axis=0) == pytest.approx(np.array(expected) * um, rel=0.006)
@@ -155,7 +154,7 @@ def translations(robot):
     return errors @ prepared.platform[3:].T
 
 
-def test_variance_of_a_bracket_is_that_of_its_bore_plus_that_of_its_datum_shift(
+def test_variance_of_a_bracket_is_the_sum_of_bore_and_datum_shift_variances(
     write_file,
 ):
     """Perpendicularity 0.02 in position 0.04 on 20 mm: an own sample of both ends in

@@ -1,4 +1,4 @@
-"""Sobol's indices against the literature and closed forms."""
+"""Sobol indices against the literature and closed forms."""
 
 from dataclasses import replace
 
@@ -49,14 +49,14 @@ def test_sobol_indices_of_ishigamis_function_equal_published_values():
 
 
 def additive(scale=1.0, shift=0.0):
-    """A design of 400 draws of three numbers, and 3 x + 2 y + z of them."""
+    """A design of 400 draws of three numbers, with the result 3 x + 2 y + z."""
     A, B = np.random.default_rng(4).normal(size=(2, 400, 3))
     design = SaltelliDesign(A, B, [(n, np.array([k])) for k, n in enumerate("xyz")])
     x = design.rows(0, len(design))
     return design, scale * (x @ [3.0, 2.0, 1.0])[:, None] + shift
 
 
-def test_sobol_indices_of_a_result_that_varies_only_by_rounding_are_nan():
+def test_sobol_indices_of_a_result_that_varies_only_by_round_off_are_nan():
     design, results = additive()
     rounded = 1e6 + 1e-8 * np.sign(results)
     found = sobol_indices(design, np.hstack([results, rounded, np.nan * results]))
@@ -67,7 +67,7 @@ def test_sobol_indices_of_a_result_that_varies_only_by_rounding_are_nan():
 
 @pytest.mark.slow
 def test_sobol_indices_without_clearance_equal_the_linear_closed_form():
-    """Without clearance the platform's screw is linear in the errors."""
+    """Without clearance, the platform screw is linear in the errors."""
     robot = load_robot("irsbot2")
     robot = replace(
         robot, frames=tuple(replace(f, clearance=None) for f in robot.frames)
@@ -91,7 +91,7 @@ def test_sobol_indices_without_clearance_equal_the_linear_closed_form():
 
 
 def failing(x, share):
-    """A sum; no answer where the last number, which it does not use, is small."""
+    """A sum without a result where the last number, which it does not use, is small."""
     value = 2 * x[:, 0] + x[:, 1]
     return np.where(x[:, 2] < share, np.nan, value)[:, None]
 
@@ -104,7 +104,7 @@ THREE = [(str(i), np.array([i])) for i in range(3)]
 
 
 def test_few_failed_draws_are_omitted_and_counted():
-    """For 4 a + b, shares 4/5 and 1/5, a draw of A, B or the mixed one fails."""
+    """For 4 a + b, with shares 4/5 and 1/5, a draw of A, B or the mixed set fails."""
     found = sobol_importance(lambda x: failing(x, 0.01), three, THREE, 8000)
     np.testing.assert_allclose(found.first[0, :, 0], [0.8, 0.2, 0.0], atol=0.05)
     np.testing.assert_allclose(found.total[0, :, 0], [0.8, 0.2, 0.0], atol=0.05)
@@ -115,7 +115,9 @@ def test_few_failed_draws_are_omitted_and_counted():
 
 @pytest.fixture(scope="module")
 def stiff():
-    """Two springs 9e6 and 1e6 N/m hold a platform: it follows errors by 0.9 and 0.1."""
+    """A platform on two springs of 9e6 and 1e6 N/m, which follows errors by 0.9 and
+    0.1.
+    """
     frames = (
         Frame("one", translation=[0.5, 0, 0], link=MatrixLink(np.eye(6) * 9e6)),
         Frame("mount", translation=[1.0, 0, 0]),
@@ -127,7 +129,7 @@ def stiff():
 
 
 def test_importance_table_states_platform_motion_per_um_of_error(stiff):
-    """0.9 and 0.1 um per um; parts of 1e-5 / sqrt(3) times these."""
+    """Gains of 0.9 and 0.1 um per um, and parts of 1e-5 / sqrt(3) times these."""
     data = run_draws(stiff, 50, importance=ImportanceOptions(3000, "source"))
     said = summarise(data)
     report = said["importance"]["platform"]
@@ -144,9 +146,9 @@ def test_importance_table_states_platform_motion_per_um_of_error(stiff):
 
 
 def test_random_clearance_does_not_change_the_importance_of_errors():
-    """A disc of 0.1 mm of clearance at a driven arm's pin; the tip follows its error.
-
-    The gain is 1 um per um in every model; clearance alone moves it by 100 um.
+    """A driven arm has a clearance disc of 0.1 mm at its pin, and its tip follows its
+    error. The gain is 1 um per um in every model, although clearance alone moves the
+    tip by 100 um.
     """
     robot = arm(radial=1e-4)
     sources = tolerance_sources(robot, [0, 0, 0, 1e-6, 0, 0], ("tip",))

@@ -1,4 +1,4 @@
-"""Importance of errors: levers by hand, known indices, central differences."""
+"""Importance of errors against lever arms, known indices and central differences."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ NAMES = ["tip.RX", "tip.TX", "tip.TY"]
 
 
 def driven_arm(**options):
-    """A driven arm; its tip follows its errors, of an angle and of two lengths."""
+    """A driven arm whose tip follows its errors of an angle and two lengths."""
     robot = arm()
     sources = tolerance_sources(robot, WIDTHS, ("tip",))
     return Experiment(home_posture(robot), sources, margins=False, **options)
@@ -51,9 +51,9 @@ def solved(by="source", draws=400, **options):
 
 
 def test_platform_that_follows_each_error_has_gains_of_one():
-    """A uniform error of half width w has the deviation w / sqrt(3), as the platform.
-
-    400 draws know a deviation to 4 %; a gain is a slope, and no draw changes it.
+    """A uniform error of half width w, and hence the platform, has the standard
+    deviation w / sqrt(3), which 400 draws determine to 4 %. A gain is a slope and does
+    not depend on the draws.
     """
     data, report = solved()
     assert list(data["group"].values) == NAMES
@@ -77,7 +77,7 @@ def test_platform_that_follows_each_error_has_gains_of_one():
 
 
 def test_group_of_angles_and_lengths_has_a_standard_deviation_but_no_gain():
-    """The part of a frame is the root sum of squares of its errors' parts."""
+    """The part of a frame is the root sum of squares of the parts of its errors."""
     data, report = solved("frame")
     (one,) = report["platform"].values()
     assert one["error_unit"] == "rad, m"
@@ -89,7 +89,9 @@ def test_group_of_angles_and_lengths_has_a_standard_deviation_but_no_gain():
 
 
 def test_draws_without_a_solution_are_reported_with_the_reason():
-    """At most 5 % may be left out; beyond, the remaining draws are not independent."""
+    """At most 5 % may be omitted; beyond that, the remaining draws are not
+    independent.
+    """
     experiment = driven_arm(clearance="least")
     design = importance_design(experiment, ImportanceOptions(100, "source"))
     rows = importance_rows(experiment, design, 0, len(design))
@@ -117,9 +119,9 @@ def test_draws_without_a_solution_are_reported_with_the_reason():
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_gain_of_a_rotation_error_equals_its_lever_arm(seed):
-    """A turn of the pin moves a tip 0.4 m away by 0.4 um for each urad, along y or z.
-
-    Along x the tip stays, so the gain of RX is 0 in translation and 1 in rotation.
+    """A rotation of the pin moves a tip 0.4 m away by 0.4 um per urad, along y or z.
+    The tip does not move along x, so the gain of RX is 0 in translation and 1 in
+    rotation.
     """
     robot = arm()
     sources = tolerance_sources(robot, [1e-3, 2e-3, 3e-3, 0, 0, 0], ("pin",))
@@ -153,7 +155,9 @@ def test_gain_of_a_group_is_the_root_mean_square_weighted_by_variance():
     ],
 )
 def test_platform_slopes_equal_central_differences_also_under_load(name, load, rng):
-    """Differences of the screws of (22); springs are pressed by errors or loads."""
+    """Differences of the screws from problem (22), with springs loaded by errors or
+    loads.
+    """
     robot = load_robot(name)
     pose = {"tx": 0.1, "tz": -0.5} if name == "irsbot2" else None
     posture = place_robot(robot, pose=pose) if pose else home_posture(robot)
@@ -175,7 +179,9 @@ def shares(**intervals):
 
 
 def test_overlapping_intervals_share_ranks():
-    """a and b overlap, b and c overlap, a and c do not; d is certainly last."""
+    """The intervals of a and b overlap, as do b and c, but a and c do not; d is last
+    for certain.
+    """
     ranks = possible_ranks(
         shares(a=(0.5, 0.7), b=(0.4, 0.6), c=(0.3, 0.45), d=(0.0, 0.1))
     )

@@ -1,4 +1,4 @@
-"""Least cost within limits: a known corner, and limits that cannot be met."""
+"""Minimum cost within limits: a known corner, and limits that cannot be met."""
 
 from types import SimpleNamespace
 
@@ -35,8 +35,10 @@ class Sums:
 CORNERS = Samples(np.array([[1.0, -1, 1], [-1, -1, 1]]), 0)
 
 
-def test_least_cost_of_two_crossing_limits_is_at_their_crossing():
-    """4 t1 + t2 <= 1 and t1 + 2 t2 <= 1 cross at (1/7, 3/7), where c/t is least."""
+def test_minimum_cost_of_two_crossing_limits_is_at_their_intersection():
+    """4 t1 + t2 <= 1 and t1 + 2 t2 <= 1 intersect at (1/7, 3/7), where c/t is
+    minimal.
+    """
     t, _ = least_cost(Sums(), CORNERS, np.array([1.0, 1.0]), silent)
     np.testing.assert_allclose(t, [1 / 7, 3 / 7], rtol=5e-3)
 
@@ -51,7 +53,7 @@ def plan(limits):
     return Plan(None, np.arange(3), ("a", "b", "c"), COSTS, NONE, LOOSE, limits)
 
 
-def test_least_tolerances_beyond_a_plane_are_refused():
+def test_smallest_tolerances_beyond_a_plane_are_rejected():
     with pytest.raises(BadInput) as error:
         cheapest_within(plan({}), [PLANE], np.array([0.0, 0.21, 0.0]), LOOSE)
     assert str(error.value) == (
@@ -70,7 +72,7 @@ class Exceeded:
         return SimpleNamespace(value=2.1 + row @ t, slopes=row, signs=np.ones(3))
 
 
-def test_limit_that_perfect_parts_exceed_is_refused():
+def test_limit_exceeded_by_perfect_parts_is_rejected():
     with pytest.raises(
         BadInput, match="^even a robot without .* exceeds a limit of 2;"
     ):

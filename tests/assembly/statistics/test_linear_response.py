@@ -1,4 +1,6 @@
-"""Many draws of errors at one posture: properties, and single solutions."""
+"""Many draws of errors at one posture: properties, and comparison with single
+solutions.
+"""
 
 from dataclasses import replace
 
@@ -19,9 +21,9 @@ LOAD, GRAVITY = [1.0, 2.0, 3.0, 30.0, 10.0, -100.0], [1.0, 2.0, -9.81]
 
 
 def assert_equal_single_solutions(posture, errors, *loads):
-    """Both certify 1e-8 of the energy, so wrenches agree to about its root, 1e-4.
-
-    With a load the energy without its work is compared in the certificate.
+    """Both certify the energy to 1e-8, so wrenches agree to about its square root,
+    1e-4. Under a load, the certificate compares the energy without the work of the
+    load.
     """
     found = linear_response(posture, *loads).solve(errors)
     wrenches = found.wrenches
@@ -59,7 +61,7 @@ def test_draws_equal_single_solutions(name, scale, load, gravity):
     ("seed", "load"), [*((k, None) for k in range(20)), *((k, LOAD) for k in range(6))]
 )
 def test_draws_of_random_robots_equal_single_solutions(seed, load):
-    """Among them are rigid rows, limited joints and parts that stay open."""
+    """The robots include rigid rows, limited joints and parts that stay open."""
     robot = random_robot(np.random.default_rng(seed))
     posture = place_robot(robot)
     draws = np.random.default_rng(seed + 100).normal(size=(4, len(robot.frames), 6))
@@ -71,7 +73,7 @@ def test_draws_of_random_robots_equal_single_solutions(seed, load):
             solve_assembly(posture, load)
 
 
-def test_errors_of_a_wrong_shape_are_refused():
+def test_errors_of_a_wrong_shape_are_rejected():
     robot = load_robot("four_bar")
     posture = place_robot(robot)
     with pytest.raises(ValueError, match=r"expected \(k, 8, 6\)"):
@@ -81,7 +83,9 @@ def test_errors_of_a_wrong_shape_are_refused():
 
 
 def test_margins_are_proportional_to_the_errors_and_convex():
-    """Euler: slope . errors is the margin; the margin of a mean is at most the mean."""
+    """By Euler's theorem, slope . errors is the margin; the margin of a mean is at most
+    the mean.
+    """
     robot = load_robot("irsbot2")
     errors = drawn_errors(robot, count=40)
     ready = prepare_margins(place_robot(robot), "free")
@@ -110,7 +114,7 @@ def test_margins_of_draws_of_random_robots_equal_single_solutions(seed):
 
 
 def test_errors_that_cannot_be_closed_have_infinite_compiled_margins():
-    """A planar four-bar whose coupler is out of the plane by more than rounding."""
+    """A planar four-bar whose coupler is out of plane by more than round-off."""
     robot = load_robot("four_bar")
     tight = tuple(replace(f, clearance=None) for f in robot.frames)
     robot = replace(robot, frames=tight)

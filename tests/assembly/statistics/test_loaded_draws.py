@@ -1,4 +1,4 @@
-"""Draws of errors under loads and weight."""
+"""Draws of errors under loads and own weight."""
 
 import json
 from dataclasses import replace
@@ -26,14 +26,14 @@ LOAD = [1.0, 2.0, 3.0, 30.0, 10.0, -100.0]
 
 
 def cantilever():
-    """A steel bar of 1 m and 20 mm that hangs from nothing else."""
+    """A steel bar of 1 m length and 20 mm diameter, clamped at one end."""
     bar = BeamLink({"radius": 0.01}, 200e9, 0.3, theory="euler")
     frames = (Frame("tip", translation=[1.0, 0, 0], link=bar),)
     return home_posture(Robot("bar", "tip", frames))
 
 
-def test_draws_of_a_loaded_cantilever_store_f2_l3_over_6ei():
-    """Its root carries F L; force and moment through the body, stress F L / W."""
+def test_draws_of_a_loaded_cantilever_have_the_textbook_energy_and_stress():
+    """Energy F^2 L^3 / 6 E I, root moment F L, and stress F L / W."""
     posture, F = cantilever(), 100.0
     sources = tolerance_sources(posture.robot, [1e-3] * 3 + [1e-4] * 3)
     load = (0.0, 0.0, 0.0, 0.0, 0.0, -F)
@@ -48,8 +48,8 @@ def test_draws_of_a_loaded_cantilever_store_f2_l3_over_6ei():
 
 @pytest.mark.parametrize("play", ["uniform", "contact"])
 @pytest.mark.parametrize("load", [[0, 0, 0, 0, 0, -1], [0, 0, 0, 1, 0, 0]])
-def test_unloaded_clearances_do_no_work_on_the_load(play, load):
-    """Otherwise the least of energy minus work would have used them."""
+def test_motion_of_unloaded_clearances_does_no_work_on_the_load(play, load):
+    """Otherwise, the minimum of energy minus work would have used them."""
     robot = load_robot("3rrr")
     one = linear_response(home_posture(robot), load)
     found = one.solve(drawn_errors(robot, 4.0) / 50)
@@ -61,7 +61,7 @@ def test_unloaded_clearances_do_no_work_on_the_load(play, load):
     assert np.abs(moved @ load).max() < 1e-9 * np.abs(moved).max()
 
 
-def test_draws_under_a_load_on_a_free_motion_are_refused():
+def test_draws_under_a_load_on_a_free_motion_are_rejected():
     frames = (
         Frame("pin", joint="revolute"),
         Frame("tip", "pin", translation=[0.3, 0, 0]),
@@ -74,7 +74,9 @@ def test_draws_under_a_load_on_a_free_motion_are_refused():
 
 
 def test_statistics_command_applies_load_and_gravity(tmp_path):
-    """A hundredfold load exceeds a limit on force that the smaller load does not."""
+    """A load a hundred times larger exceeds a force limit that the smaller
+    load meets.
+    """
     robot = cantilever().robot
     write_robot(robot, tmp_path / "bar.toml")
     (tmp_path / "errors.toml").write_text(
@@ -108,9 +110,8 @@ def test_drawn_errors_replace_the_errors_of_the_robot(load):
 
 
 def test_load_and_error_together_move_a_joint_to_its_limit():
-    """A pin limited to L against a spring K turns by M / K less the error.
-
-    Where M = K L, errors of L / 2 either way leave it free, or at its bound.
+    """A pin limited to L against a spring K rotates by M / K less the error. For M = K
+    L, errors of -L / 2 or L / 2 leave it free or at its bound.
     """
     L, K = 1e-3, 2e4
     robot = Robot("pin", "end", (

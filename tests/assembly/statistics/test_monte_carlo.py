@@ -1,4 +1,4 @@
-"""Runs of draws: whole, interrupted, resumed, in threads; and their commands."""
+"""Monte Carlo runs: complete, interrupted, resumed and threaded, and their commands."""
 
 import json
 import subprocess
@@ -52,7 +52,7 @@ def experiment():
 def test_killed_run_resumes_and_writes_the_same_file(
     experiment, monkeypatch, tmp_path, at
 ):
-    """Killed among its 100 draws, and during the importance."""
+    """The run is killed during its 100 draws and again during the importance."""
     monkeypatch.setattr(monte_carlo, "BLOCK", 64)
     groups = ImportanceOptions(16, "kind")
     path, whole = tmp_path / "draws.nc", tmp_path / "whole.nc"
@@ -75,7 +75,7 @@ def test_killed_run_resumes_and_writes_the_same_file(
 
 @pytest.mark.slow
 def test_repeatedly_killed_command_resumes_and_writes_the_same_file(tmp_path):
-    """SIGKILL at growing times; finished results are never computed again."""
+    """SIGKILL after increasing times; finished results are never recomputed."""
     limits = "margin_free = 2.0\ntranslation = 8e-4"
     plan = "yield = 0.9\ndraws = 200\n" + PLAN.replace("margin_free = 1.0", limits)
     (tmp_path / "plan.toml").write_text(plan)
@@ -158,7 +158,7 @@ def test_statistics_and_tolerances_commands_write_results_and_figures(
         (["--errors", "errors.toml", "-o", "no/d.nc"], "no folder"),
     ],
 )  # fmt: skip
-def test_invalid_statistics_options_are_refused_in_one_line(
+def test_invalid_statistics_options_are_rejected_with_one_line(
     run, arguments, message, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
@@ -170,7 +170,7 @@ def test_invalid_statistics_options_are_refused_in_one_line(
     assert [p.name for p in tmp_path.iterdir()] == ["errors.toml"]
 
 
-def test_tolerances_of_a_robot_without_errors_are_refused(run):
+def test_tolerances_of_a_robot_without_errors_are_rejected(run):
     status, _, err = run("assembly", "tolerances", "four_bar", "--grid", "tx=0.2")
     assert status == 2
     assert "found no geometric_error of a frame" in err

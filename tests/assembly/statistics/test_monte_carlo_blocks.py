@@ -1,4 +1,4 @@
-"""Runs of draws in blocks, their identity, and stored results of a killed run."""
+"""Monte Carlo runs in blocks, their identity, and stored results of a killed run."""
 
 from dataclasses import replace
 
@@ -40,7 +40,7 @@ def test_block_size_and_workers_do_not_change_the_draws(arm, monkeypatch, worker
 
 
 def test_killed_run_resumes_with_another_confidence_level(arm, tmp_path):
-    """The same rows are solved; a different number of rows is refused."""
+    """The same rows are solved; a different number of rows is rejected."""
 
     def kill(done, total):
         if done:
@@ -95,7 +95,7 @@ class Killed(Exception):
 
 
 def run(path, values, computed, stop=None, whose="mine"):
-    """Squares and doubles of values, one after the other; those computed are listed."""
+    """Compute squares and doubles of values one after another; list those computed."""
 
     def both(x):
         computed.append(x)

@@ -1,4 +1,6 @@
-"""Perfect parts: clearances by hand, and limits exceeded by clearances alone."""
+"""Perfect parts: clearances against hand calculation, and limits exceeded by
+clearances.
+"""
 
 import numpy as np
 import pytest
@@ -27,7 +29,9 @@ def experiment(robot, **options):
 
 
 def test_clearance_shares_of_a_pin_sum_to_the_largest_error():
-    """The disc r is perpendicular to L t: hypot(r, L t), shares r^2 and (L t)^2."""
+    """The disc r is perpendicular to L t, so the error is hypot(r, L t) with parts r^2
+    and (L t)^2.
+    """
     parts = perfect_parts(experiment(arm(radial=RADIAL, tilt=TILT)))
     largest = np.hypot(RADIAL, ARM * TILT)
     translation = parts["translation"]
@@ -40,7 +44,7 @@ def test_clearance_shares_of_a_pin_sum_to_the_largest_error():
 
 
 def test_clearance_of_a_ball_adds_to_the_tilt_of_its_pin():
-    """Both in the same direction: shares b and L t."""
+    """Both have the same direction, with parts b and L t."""
     translation = perfect_parts(experiment(arm(ball=RADIAL, tilt=TILT)))["translation"]
     by_kind = translation["clearances"]
     assert translation["reached"] == pytest.approx(RADIAL + ARM * TILT, abs=2e-6)
@@ -61,8 +65,10 @@ def test_clearance_shares_of_a_closed_loop_sum_to_the_largest_error(name):
         assert total == pytest.approx(parts[key]["reached"], rel=5e-3)
 
 
-def test_perfect_parts_include_the_displacement_by_the_load():
-    """5 N along y press the pin to its rim: its radius, and a force of 5 N."""
+def test_perfect_parts_include_the_displacement_under_load():
+    """5 N along y press the pin against its rim: displacement of its radius,
+    force 5 N.
+    """
     parts = perfect_parts(experiment(arm(radial=RADIAL), load=(0, 0, 0, 0, 5.0, 0)))
     assert parts["translation"]["reached"] == pytest.approx(RADIAL, rel=1e-6)
     assert parts["force"]["reached"] == pytest.approx(5.0)
@@ -104,7 +110,7 @@ def test_free_platform_is_reported_without_a_bound(tmp_path, run):
 
 
 def test_limited_motion_of_a_passive_joint_has_a_separate_share():
-    """A hinge within 1e-3 rad on the arm: 0.4 mm of it, and 0.1 mm of the radius."""
+    """A hinge limited to 1e-3 rad on the arm adds 0.4 mm, and the radius 0.1 mm."""
     parts = perfect_parts(experiment(arm(passive=True, radial=RADIAL, spin=1e-3)))
     by_kind = parts["translation"]["clearances"]
     assert by_kind == pytest.approx(

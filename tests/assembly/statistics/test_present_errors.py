@@ -1,4 +1,4 @@
-"""The errors that a robot has, at several postures: bars in series with clearance."""
+"""Present errors of a robot at several postures: bars in series with clearance."""
 
 from dataclasses import replace
 
@@ -63,7 +63,7 @@ def test_present_errors_rank_the_shares_of_the_largest_margin():
 
 
 def test_present_errors_within_clearance_have_zero_energy_and_rigid_parts_nan():
-    """Rigid parts too far apart have a margin and an energy of NaN."""
+    """The margin and the energy of rigid parts too far apart are NaN."""
     within = present_errors([bars(PLAY, {"one": 0.5 * PLAY})], "rigid")
     assert within["energy_there"] == pytest.approx(0.0, abs=1e-12)
     assert within["assemblable_share"] == 1.0
@@ -113,7 +113,9 @@ def test_allocation_identity_changes_with_every_input():
 
 
 def test_singular_postures_of_a_grid_are_omitted_and_counted():
-    """Above the centre of a 3-UPU the locked platform turns; elsewhere it does not."""
+    """Above the centre of a 3-UPU, the locked platform can rotate; elsewhere
+    it cannot.
+    """
     postures, left_out = grid_postures(
         three_upu(seed=1), "tx=-0.02:0.02:0.02,ty=0,tz=0.45"
     )

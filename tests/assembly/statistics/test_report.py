@@ -1,4 +1,4 @@
-"""Reports of draws and tolerances: their numbers equal those of the JSON."""
+"""Reports on draws and tolerances: their numbers equal those in the JSON."""
 
 import json
 from pathlib import Path
@@ -21,7 +21,7 @@ ERRORS = Path(__file__).parents[3] / "examples" / "hexapod_errors.toml"
 
 
 def shown(path):
-    """A page, and its numbers by the first words of their row."""
+    """Return a page, and its numbers by the first words of each row."""
     seen = parse(path.read_text(encoding="utf-8"))
     rows = {row[0].text: row[1:] for table in seen.tables for row in table[1:]}
     assert seen.fetched == []
@@ -76,7 +76,7 @@ def test_tolerance_report_ranks_the_declared_errors(tmp_path, run):
 
 
 def test_robot_in_the_report_has_the_platform_displacement_of_its_draw():
-    """The draw nearest to the 95 % quantile, solved as a single assembly."""
+    """The draw closest to the 95 % quantile is solved as a single assembly."""
     posture = place_robot(load_robot("hexapod"))
     experiment = Experiment(
         posture, read_sources(ERRORS, posture.robot), seed=3, clearance="least"

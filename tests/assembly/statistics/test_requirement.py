@@ -45,10 +45,12 @@ def test_random_clearances_do_not_depend_on_the_batch():
         ({"energy": 1.0}, True, False),
     ],
 )
-def test_limit_below_the_pose_error_from_clearances_alone_is_refused(
+def test_limit_below_the_pose_error_from_clearances_alone_is_rejected(
     limits, worst_play, refused
 ):
-    """The posture with more clearance is named; only for the worst clearance."""
+    """The message names the posture with more clearance; this applies only to the worst
+    model.
+    """
     postures = [home_posture(arm(radial=0.5 * PLAY)), home_posture(arm(radial=PLAY))]
     plan = plan_for(postures[0].robot, [("tip", 3)], [1], limits,
                     clearance="worst" if worst_play else "least")  # fmt: skip
@@ -75,12 +77,12 @@ def test_limit_below_the_pose_error_from_clearances_alone_is_refused(
         ("energy", [("two", 4)], "two.TY"),
     ],
 )
-def test_error_that_no_clearance_or_spring_can_close_is_refused_by_name(
+def test_error_that_no_clearance_or_spring_can_close_is_rejected_by_name(
     limit, places, named
 ):
-    """Clearance in x and y takes up no error along z, and stores no energy.
-
-    Nor an error along x of a frame turned by 1e-3 rad about y, of which 1e-3 is in z.
+    """Clearance in x and y takes up no error along z, and no spring does. The same
+    holds for an error along x of a frame rotated by 1e-3 rad about y, of which 1e-3 is
+    along z.
     """
     frames = (
         Frame("slanted", translation=[0.5, 0, 0], rotation=[0, 1e-3, 0]),

@@ -1,4 +1,4 @@
-"""Quantities and their slopes: Euler's theorem, and an arm with clearance."""
+"""Limited quantities and their slopes: Euler's theorem, and an arm with clearance."""
 
 from dataclasses import replace
 
@@ -30,7 +30,9 @@ def stiff():
 @pytest.mark.parametrize("key", QUANTITIES)
 @pytest.mark.parametrize("play", ["least", "worst"])
 def test_slopes_without_clearance_satisfy_eulers_theorem(stiff, key, play):
-    """The energy is homogeneous of degree two, all other quantities of degree one."""
+    """The energy is homogeneous of degree two, and all other quantities of
+    degree one.
+    """
     prepared, sources, values = stiff
     size, slopes = respond(prepared, sources, values, key, play)
     assert (size > 0).all()
@@ -77,7 +79,9 @@ def test_slopes_of_the_largest_error_of_an_arm_equal_its_closed_form():
 @pytest.mark.parametrize("play", ["least", "contact", "uniform"])
 @pytest.mark.parametrize("key", ["rotation", "translation"])
 def test_sampled_response_uses_the_random_clearances_of_the_experiment(play, key):
-    """For each draw; the slopes are the direction of the platform's error."""
+    """This holds for each draw; the slopes are the direction of the platform's
+    error.
+    """
     posture, sources = tip()
     values = sources.draw(0, 12, seed=1)
     rows = Experiment(posture, sources, seed=1, clearance=play, margins=False).evaluate(
@@ -92,10 +96,10 @@ def test_sampled_response_uses_the_random_clearances_of_the_experiment(play, key
 
 
 @pytest.mark.parametrize("component", [3, 4])
-def test_platform_attached_to_a_pin_follows_the_part_that_is_closed_with_the_pin(
+def test_platform_attached_to_a_pin_follows_the_part_closed_with_the_pin(
     component,
 ):
-    """Rigid parts: the pin's clearance takes up the errors of the part below it."""
+    """With rigid parts, the pin clearance takes up the errors of the part below it."""
     robot = rigid_pair(radial=PLAY)
     widths = np.zeros(6)
     widths[component] = PLAY

@@ -10,7 +10,7 @@ from forcefit.inputs.table import BadInput
 
 
 class Known:
-    """A requirement whose utilisation is a given function of every error's size."""
+    """A requirement whose utilisation is a given function of the size of each error."""
 
     def __init__(self, utilisation, least=0.0, most=1e9, tolerances=1):
         self.utilisation = utilisation
@@ -20,7 +20,7 @@ class Known:
         )  # fmt: skip
 
     def utilisations(self, values):
-        """Beside a limit of which half as much is used; the lower bounds are zero."""
+        """A second limit has half the utilisation; the lower bounds are zero."""
         upper = self.utilisation(np.abs(values).max(axis=1))
         return np.zeros((2, len(values))), np.stack([upper, upper / 2])
 
@@ -49,7 +49,9 @@ def test_scaling_approaches_a_jump_from_the_admissible_side(start, within, beyon
 
 
 def test_scaling_preserves_proportions_within_the_bounds_of_the_plan():
-    """Samples (1, 1) of tolerances 1 to 4; tolerances at their loosest stay there."""
+    """Samples (1, 1) with tolerances from 1 to 4; tolerances at their upper bound stay
+    there.
+    """
     known = Known(lambda size: size / 6.0, least=0.5, most=8.0, tolerances=3)
     found = scale_uniformly(known, Samples(np.ones((1, 3)), 0), np.array([1.0, 2, 4]))
     np.testing.assert_allclose(found, [1.5, 3.0, 6.0], rtol=1e-4)
@@ -62,7 +64,9 @@ def test_scaling_preserves_proportions_within_the_bounds_of_the_plan():
 
 @pytest.mark.parametrize("allowed", [0, 1, 300])
 def test_scaling_allows_at_most_the_permitted_number_of_samples_to_fail(allowed):
-    """Sizes 1 to 1000 and a limit 6: the largest that must fit is 1000 - allowed."""
+    """For sizes 1 to 1000 and limit 6, the largest size that must fit is 1000 -
+    allowed.
+    """
     values = np.random.default_rng(1).permutation(np.arange(1.0, 1001.0))[:, None]
     known = Known(lambda size: size / 6.0)
     (found,) = scale_uniformly(known, Samples(values, allowed), np.ones(1))
@@ -70,8 +74,8 @@ def test_scaling_allows_at_most_the_permitted_number_of_samples_to_fail(allowed)
 
 
 @pytest.mark.parametrize("least", [0.0, 0.7])
-def test_limits_that_no_scale_meets_are_refused(least):
-    """Perfect parts exceed the limit twofold, or the tightest tolerances do."""
+def test_limits_that_no_scale_factor_meets_are_rejected(least):
+    """Perfect parts exceed the limit twofold, or the tightest tolerances exceed it."""
     constant = Known(lambda size: 2.0 + 0 * size, least)
     beyond = Known(lambda size: 2.0 + size, least)
     for known in (constant, beyond):
@@ -81,7 +85,9 @@ def test_limits_that_no_scale_meets_are_refused(least):
 
 @pytest.mark.parametrize(("draws", "allowed"), [(59, 0), (92, 0), (93, 1), (124, 2)])
 def test_number_of_allowed_failures_for_a_yield_equals_wilks_numbers(draws, allowed):
-    """Wilks (1942): 59, 93, 124 draws show 95 % at 95 % with 0, 1, 2 failures."""
+    """Wilks (1942): 59, 93 and 124 draws demonstrate 95 % at 95 % with 0, 1 and 2
+    failures.
+    """
     plan = SimpleNamespace(
         asked_yield=0.95, draws=draws, draws_of=lambda stream, count: (stream, count)
     )
@@ -90,7 +96,7 @@ def test_number_of_allowed_failures_for_a_yield_equals_wilks_numbers(draws, allo
     assert samples.values == (7, draws)
 
 
-def test_too_few_draws_for_a_yield_are_refused():
+def test_too_few_draws_for_a_yield_are_rejected():
     plan = SimpleNamespace(asked_yield=0.95, draws=29, draws_of=lambda *_: np.zeros(1))
     requirement = SimpleNamespace(plan=plan)
     with pytest.raises(BadInput) as error:

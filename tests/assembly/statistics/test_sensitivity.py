@@ -1,4 +1,4 @@
-"""Slopes from multipliers, against finite differences."""
+"""Derivatives from multipliers against finite differences."""
 
 from dataclasses import replace
 
@@ -49,7 +49,7 @@ def test_margin_slopes_of_the_paper_robot_equal_central_differences(
 
 @pytest.mark.parametrize("seed", range(10))
 def test_energy_slopes_of_random_robots_equal_central_differences(seed):
-    """Any frame may have errors: steps along random directions."""
+    """Any frame may have errors, so steps are taken along random directions."""
     rng = np.random.default_rng(seed)
     robot = random_robot(rng)
     posture = place_robot(robot)
@@ -78,7 +78,7 @@ def test_margin_slopes_of_a_zero_margin_are_zero():
 
 @pytest.mark.parametrize("seed", range(25))
 def test_wrench_slopes_of_random_robots_equal_central_differences(seed):
-    """A random sum of all wrenches, along a random direction of all errors."""
+    """A random combination of all wrenches, along a random direction of all errors."""
     rng = np.random.default_rng(seed)
     robot = random_robot(rng)
     ready, errors = linear_response(place_robot(robot)), robot.errors
@@ -102,7 +102,7 @@ def test_wrench_slopes_of_random_robots_equal_central_differences(seed):
 )
 @pytest.mark.parametrize("pose", POSES)
 def test_quantity_slopes_of_the_paper_robot_equal_central_differences(pose, key, rng):
-    """In random directions, at errors so large that every clearance is pressed."""
+    """Random directions, at errors so large that every clearance is closed."""
     robot = load_robot("irsbot2")
     posture = place_robot(robot, pose=pose)
     frames = tuple(f.name for f in robot.frames if f.link is not None)

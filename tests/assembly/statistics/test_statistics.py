@@ -1,4 +1,4 @@
-"""Statistics in one call, against distributions that are known in closed form."""
+"""Statistics in one call, against distributions known in closed form."""
 
 import json
 from pathlib import Path
@@ -46,7 +46,7 @@ def test_yield_of_a_normal_error_is_that_of_the_normal_distribution(tip, normal)
     assert median["lower"] < 0.67449e-4 < median["upper"]
 
 
-def test_draws_are_a_table_and_a_figure(tip, normal):
+def test_draws_convert_to_a_table_and_a_figure(tip, normal):
     file = normal.with_suffix(".nc")
     found = ff.statistics(tip, normal, draws=50, output=file)
     table = found.to_pandas()
@@ -100,17 +100,17 @@ def test_worst_pose_of_two_uniform_errors_is_the_diagonal_of_their_box(tip, tmp_
         ({"limits": {"enrgy": 1.0}}, "limit enrgy: found a quantity"),
     ],
 )
-def test_statistics_refuse_an_argument_out_of_its_range(tip, normal, options, message):
+def test_statistics_reject_an_argument_out_of_range(tip, normal, options, message):
     with pytest.raises(ff.BadInput, match=message):
         ff.statistics(tip, normal, **{"draws": 10, **options})
 
 
-def test_worst_pose_refuses_an_unknown_quantity(tip, normal):
+def test_worst_pose_rejects_an_unknown_quantity(tip, normal):
     with pytest.raises(ff.BadInput, match="quantity: found 'translaton'"):
         ff.worst_pose(tip, normal, "translaton")
 
 
-def test_statistics_without_errors_name_what_is_missing(tip):
+def test_statistics_without_errors_report_what_is_missing(tip):
     with pytest.raises(ff.BadInput, match="no --errors"):
         ff.statistics(tip)
 
@@ -123,17 +123,17 @@ def test_statistics_without_errors_name_what_is_missing(tip):
         ({"quantities": ["enrgy"]}, "enrgy"),
     ],
 )
-def test_show_refuses_options_that_do_not_fit_draws(tip, normal, options, message):
+def test_show_rejects_options_not_applicable_to_draws(tip, normal, options, message):
     found = ff.statistics(tip, normal, draws=4)
     with pytest.raises(ff.BadInput, match=message):
         ff.show(found, **options)
 
 
-def test_show_refuses_a_file_that_is_not_a_data_set(normal):
+def test_show_rejects_a_file_that_is_not_a_data_set(normal):
     with pytest.raises(ff.BadInput, match="normal.toml"):
         ff.show(normal)
 
 
-def test_show_refuses_options_of_data_sets_for_a_robot():
+def test_show_rejects_data_set_options_for_a_robot():
     with pytest.raises(ff.BadInput, match="expected them for a data set"):
         ff.show(ff.load_robot("five_bar"), quantities=["energy"])

@@ -1,4 +1,4 @@
-"""The spread of the platform's stiffness over draws of the errors."""
+"""Spread of the platform stiffness over draws of the errors."""
 
 import json
 from dataclasses import replace
@@ -33,9 +33,8 @@ def spring(row, stiffness):
 
 
 def test_stiffness_of_drawn_bushes_depends_on_their_contact():
-    """Two springs k forced together: 2 k if the gap exceeds the clearance, else k.
-
-    With less the platform hangs on its own spring alone.
+    """Two springs k forced together: 2 k if the gap exceeds the clearance. Otherwise
+    the platform hangs on its own spring alone, with k.
     """
     k, c = 1e5, 1e-4
     frames = (

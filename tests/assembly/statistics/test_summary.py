@@ -1,4 +1,4 @@
-"""The summary of given draw results, counted by hand."""
+"""Summary of given draw results, counted by hand."""
 
 import numpy as np
 import pytest
@@ -27,9 +27,9 @@ def draws(play="least", status=None, screws=None, **values):
 
 
 def test_draws_without_a_solution_count_in_every_probability():
-    """Of eight draws, two do not assemble and three assemble by clearances alone.
-
-    A margin above 1 by rounding is one; the largest gap is that of an answer.
+    """Of eight draws, two do not assemble and three assemble by clearances alone. A
+    margin that exceeds 1 by round-off counts as 1; the largest gap is that of a solved
+    draw.
     """
     data = draws(
         energy=[0.0, 0, 0, 1, 2, 3, NAN, NAN], status=[0, 0, 0, 0, 0, 0, 1, 1],
@@ -105,7 +105,7 @@ def test_quantity_is_described_by_draws_with_finite_values():
 
 @pytest.mark.parametrize(("zeros", "mode"), [(50, 7.0), (51, 0.0)])
 def test_mode_is_zero_if_more_than_half_of_the_draws_are_zero(zeros, mode):
-    """The other values are about 7; 1e-19 of the largest is rounding, 1e-17 is not."""
+    """The other values are about 7; 1e-19 of the largest is round-off, 1e-17 is not."""
     energy = np.r_[
         np.zeros(zeros - 2), 9e-19, -7e-18, np.linspace(6.9, 7.1, 100 - zeros)
     ]
@@ -133,7 +133,7 @@ def test_margins_include_draws_that_do_not_assemble():
 
 
 @pytest.mark.parametrize("key", ["force", "stress"])
-def test_limit_on_a_quantity_that_was_not_computed_is_refused(key):
+def test_limit_on_a_quantity_that_was_not_computed_is_rejected(key):
     """The quantity is missing, or has no link."""
     data = draws(energy=[1.0, 2.0], stress=np.zeros((2, 0)))
     with pytest.raises(

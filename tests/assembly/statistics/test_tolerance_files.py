@@ -23,7 +23,7 @@ from tests.robots_for_tests import NUMBERS, irsbot2_with
 
 
 class Coin:
-    """Robots of which a known share holds, for the verification alone."""
+    """Robots of which a known fraction meets the limits, to test verification alone."""
 
     asked_yield, postures, cases = 0.9, (None,), (("force", 0),)
 
@@ -42,10 +42,10 @@ class Coin:
 
 
 def test_repeated_verification_does_not_exceed_its_error_probability(monkeypatch):
-    """The last interval misses the truth in at most 5 % of all verifications.
-
-    The yield is just so low that most looks contradict it and another follows; with
-    the whole error at every look 9 % missed.  A coin cannot be tightened.
+    """The last interval misses the truth in at most 5 % of all verifications. The yield
+    is so low that most tests contradict it and another one follows; with the full error
+    probability at every test, 9 % would miss. Tolerances have no effect on these
+    robots.
     """
     monkeypatch.setattr(verification, "scale_uniformly", lambda *given: given[2])
     monkeypatch.setattr(verification, "bracketed", cache(verification.bracketed))
@@ -93,7 +93,9 @@ def test_tolerance_file_is_read_with_groups_costs_and_limits(write_file):
 
 @pytest.mark.parametrize("cost", ["logarithm", "reciprocal"])
 def test_price_of_tolerances_follows_the_cost_function(cost, write_file):
-    """Tolerances of costs 2 and 1, multiplied by e or by 2, together and separately."""
+    """Tolerances with costs 2 and 1 are multiplied by e or by 2, together and
+    separately.
+    """
     plan = read_plan(write_file(FILE.replace("logarithm", cost)), load_robot("irsbot2"))
     t = np.array([3e-4, 2e-2])
     if cost == "reciprocal":
@@ -176,7 +178,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize(("old", "new", "message"), REFUSED.values(), ids=REFUSED)
-def test_invalid_tolerance_file_is_refused_with_one_message(
+def test_invalid_tolerance_file_is_rejected_with_one_message(
     old, new, message, write_file
 ):
     path = write_file(FILE.replace(old, new, 1))
@@ -197,7 +199,7 @@ def test_errors_of_an_open_chain_have_zero_margin_shares():
 
 
 def test_present_errors_scaled_by_their_factor_just_assemble():
-    """The margin is proportional: with the scaled errors it is 1."""
+    """The margin is proportional to the errors, so with scaled errors it is 1."""
     robot = irsbot2_with(NUMBERS["cases"][0])
     postures, _ = grid_postures(robot, "tx=-0.1:0.1:0.1,tz=-0.5")
     found = present_errors(postures)
@@ -219,9 +221,8 @@ def test_present_errors_scaled_by_their_factor_just_assemble():
 def test_errors_of_a_plan_have_the_requested_range_and_deviation(
     write_file, kind, deviations, deviation
 ):
-    """Normal with a third of the tolerance by default, truncated there; or uniform.
-
-    Cutting at three deviations leaves a standard deviation of 0.9866.
+    """By default normal with a third of the tolerance, truncated at the tolerance; or
+    uniform. Truncation at three deviations leaves a standard deviation of 0.9866.
     """
     text = f"distribution = '{kind}'\n{deviations}\n"
     plan = read_plan(write_file(text + FILE), load_robot("irsbot2"))
@@ -238,14 +239,14 @@ def test_limit_is_read_with_and_without_spaces(name):
 
 
 @pytest.mark.parametrize("number", ["0", "-1e-9", "inf", "nan", "", "2 J", "1=2"])
-def test_limit_that_is_not_a_positive_number_is_refused_with_its_text(number):
+def test_limit_that_is_not_a_positive_number_is_rejected_with_its_text(number):
     with pytest.raises(BadInput) as error:
         parse_limit(f"force={number}")
     expected = f'--limit force: found "{number}", expected a number > 0'
     assert str(error.value) == expected
 
 
-def test_unknown_quantity_is_refused_with_the_nearest_name():
+def test_unknown_quantity_is_rejected_with_the_nearest_name():
     with pytest.raises(BadInput, match='unknown quantity "enrgy".*energy'):
         parse_limit("enrgy=2")
     for name in ("translation_lower", "duality_gap", "platform_screw", ""):

@@ -76,9 +76,9 @@ def test_tolerances_of_springs_in_series_share_the_energy_limit():
 
 @pytest.mark.slow
 def test_single_tolerance_is_the_clearance_over_the_yield():
-    """Uniform within t: the share within the clearance, clearance / t, is the yield.
-
-    Of 20000 training draws so many may fail that a yield of 0.8 is held with 95 %.
+    """Uniform within t: the fraction within the clearance, clearance / t, is the yield.
+    Of 20000 training draws, as many may fail as still demonstrate a yield of 0.8 with
+    95 %.
     """
     robot = rigid_pair(radial=PLAY)
     plan = plan_for(robot, [("one", 3)], [1], {"margin": 1.0}, asked_yield=0.8,
@@ -104,7 +104,7 @@ def paper():
 
 @pytest.mark.parametrize("kind", ["free", "rigid", "energy"])
 def test_worst_corner_equals_brute_force_and_is_within_its_bound(paper, kind):
-    """All 256 corners; a convex function is largest at a corner."""
+    """All 256 corners are evaluated; a convex function is largest at a corner."""
     posture, sources, t = paper
     energy = kind == "energy"
     ready = linear_response(posture) if energy else prepare_margins(posture, kind)
@@ -123,12 +123,11 @@ def test_worst_corner_equals_brute_force_and_is_within_its_bound(paper, kind):
     [(None, "reciprocal"), (1e-4, "reciprocal"), (None, "logarithm")],
 )
 def test_tolerances_within_a_force_limit_equal_lagranges_solution(clearance, cost):
-    """Two springs k in a row carry (k/2) (t1 + t2 - clearance): at most F in each pair.
-
-    Minimise sum c/t, or -sum c log t, with t1 + t2 = 2F/k + clearance in each pair by
-    itself: tolerances share it by the roots of the costs, or by the costs.  The
-    energy's proportions are others: pairs of springs of 1e6 and 1e5 N/m then do not
-    both reach the limit.
+    """Two springs k in series carry (k/2) (t1 + t2 - clearance), which is at most F in
+    each pair. Minimise sum c/t, or -sum c log t, with t1 + t2 = 2F/k + clearance in
+    each pair separately: tolerances divide it in proportion to the square roots of the
+    costs, or to the costs. For the energy the proportions differ: pairs of springs of
+    1e6 and 1e5 N/m would not both reach the limit.
     """
     k, F, c = np.array([1e6, 1e5]), 50.0, np.array([1.0, 4.0, 1.0, 1.0])
     robot = pairs_of_bars(k, clearance)
@@ -151,8 +150,8 @@ def test_tolerances_within_a_force_limit_equal_lagranges_solution(clearance, cos
 @pytest.fixture(scope="module")
 def several(paper):
     """The paper's robot: five limits of every kind at two postures, yield 0.9.
-
-    Play as it is solved: the worst takes minutes, and a test of its own.
+    Clearances are as solved, because the worst model takes minutes and has its own
+    test.
     """
     posture, sources, _ = paper
     postures = [posture, place_robot(posture.robot, pose={"tx": -0.2, "tz": -0.4})]
@@ -173,7 +172,7 @@ def test_price_for_several_limits_is_at_most_that_of_uniform_scaling(several):
 
 @pytest.mark.slow
 def test_allocated_tolerances_have_the_yield_in_new_single_solutions(several):
-    """Another seed; each draw is solved by :func:`solve_assembly`."""
+    """With another seed, each draw is solved by :func:`solve_assembly`."""
     postures, plan, found = several
     half = plan.spread(found.tolerances)
     rng, fits, largest = np.random.default_rng(12345), 0, 0.0
@@ -203,7 +202,7 @@ def largest_share(posture, limits):
 
 @pytest.mark.slow
 def test_allocation_for_the_worst_clearance_has_the_yield_in_new_draws(paper):
-    """Each draw is solved and bounded on its own; a yield of 0.9."""
+    """Each draw is solved and bounded separately, for a yield of 0.9."""
     posture, sources, _ = paper
     limit = 6e-4
     plan = Plan(sources, np.tile([0, 1], 4), ("RX", "TX"), np.array([1.0, 0.01]),
@@ -226,7 +225,9 @@ def test_allocation_for_the_worst_clearance_has_the_yield_in_new_draws(paper):
 
 
 def parallel(k1, k2):
-    """A platform between two bars along x: errors share out by the stiffnesses."""
+    """A platform between two bars along x, which follows errors by relative
+    stiffness.
+    """
     frames = (
         Frame("one", translation=[0.5, 0, 0], link=MatrixLink(np.eye(6) * k1)),
         Frame("mount", translation=[1.0, 0, 0]),
@@ -255,11 +256,11 @@ def test_tolerances_within_a_pose_error_limit_equal_lagranges_solution():
 
 
 @pytest.mark.slow
-def test_tolerances_with_a_yield_share_the_pose_error_as_squares():
+def test_tolerances_for_a_yield_share_the_squared_pose_error():
     """Normal errors of deviation t/3: the platform's is |w t| / 3, D at 90 % of it.
 
-    Minimise sum c/t with sum (w t)^2 fixed: t_i ~ (c_i / w_i^2)^(1/3).  Cutting the
-    normal at 3 deviations narrows it alike for both, by 0.9866.
+    Minimise sum c/t with sum (w t)^2 fixed: t_i ~ (c_i / w_i^2)^(1/3).  Truncation at 3
+    deviations narrows both normal distributions by 0.9866.
     """
     k, c, D = np.array([9e6, 1e6]), np.array([1.0, 4.0]), 1e-4
     robot = parallel(*k)

@@ -55,14 +55,16 @@ def shown(tolerances, costs, most=(0.1, 0.1), cost="reciprocal"):
 
 @pytest.mark.parametrize("loosest", [1e-2, 0.1, 10.0])
 def test_advice_on_tightening_does_not_depend_on_inactive_bounds(loosest):
-    """Prices are 1 / 1e-3 and 1 / 1e-4; the second, the length, has 10 of 11 parts."""
+    """Costs are 1 / 1e-3 and 1 / 1e-4, so the second, the length, has 10 of 11
+    parts.
+    """
     page = shown([1e-3, 1e-4], [1.0, 1.0], (loosest, 0.1))
     answer, note = tiles(page)["Tolerance to tighten"]
     assert (answer, note[:4]) == ("length", "91\u00a0%")
 
 
 def test_advice_for_a_logarithmic_price_follows_the_costs():
-    """t dL/dt is the cost over the multiplier, for any tolerances."""
+    """For any tolerances, t dL/dt is the cost over the multiplier."""
     answer, note = tiles(shown([1e-3, 1e-4], [3.0, 1.0], cost="logarithm"))[
         "Tolerance to tighten"
     ]
@@ -74,7 +76,9 @@ def test_advice_for_a_logarithmic_price_follows_the_costs():
 
 
 def test_advice_omits_tolerances_at_their_loosest():
-    """The angle has the higher cost but is at its loosest: the length is named."""
+    """The angle has the higher cost but is at its upper bound, so the length
+    is named.
+    """
     both = shown([1e-5, 1e-4], [1.0, 1.0], (1e-5, 0.1))
     assert tiles(both)["Tolerance to tighten"][0] == "length"
     none = shown([1e-5, 1e-4], [1.0, 1.0], (1e-5, 1e-4))

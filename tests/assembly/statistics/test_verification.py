@@ -16,7 +16,7 @@ REACH = 5 * PLAY  # both errors together
 
 
 def springs(stiffnesses, limits, clearance=None):
-    """A requirement of two bars in a row, equally stiff, at each posture."""
+    """A requirement on two equally stiff bars in series, at each posture."""
     play = None if clearance is None else Clearance(radial=clearance)
     postures = [
         home_posture(coaxial_beams(np.zeros(6), (k, k), clearance=play))
@@ -49,7 +49,9 @@ def test_certified_margin_scales_with_the_tolerances(limit, scale):
 
 
 def test_scale_is_set_by_the_tightest_limit_and_not_certified_for_a_force():
-    """Half of k (t1 + t2) is found; there is no bound for it, hence no scale."""
+    """The search finds half of k (t1 + t2), for which no bound and hence no scale
+    exists.
+    """
     requirement = springs([1e6], {"energy": 0.01, "force": 60.0})
     worst, found = prove_worst(requirement, T, silent)
     assert worst["force"][0] == pytest.approx(1e6 * REACH / 2, rel=1e-6)
@@ -61,7 +63,9 @@ def test_scale_is_set_by_the_tightest_limit_and_not_certified_for_a_force():
 
 
 class Given:
-    """A requirement with two limits at two postures, of given shares for each draw."""
+    """A requirement with two limits at two postures, with given utilisations
+    per draw.
+    """
 
     cases = [("a", 0), ("a", 1), ("b", 0), ("b", 1)]
     postures = (None, None)
@@ -71,7 +75,7 @@ class Given:
         self.bounds = np.array([lower, upper])
 
     def draws_of(self, stream, count):
-        """Their numbers: a tolerance of 2 tells that it was multiplied."""
+        """Return draw numbers; a tolerance of 2 shows that they were multiplied."""
         return np.arange(count)[:, None].astype(float)
 
     def spread(self, tolerances):

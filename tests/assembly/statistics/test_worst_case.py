@@ -1,4 +1,4 @@
-"""Worst cases of errors within tolerances against sums and squares by hand."""
+"""Worst cases of errors within tolerances against hand calculation."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ PLACES = [("one", 3), ("two", 3), ("one", 4), ("two", 4)]
 
 
 def bars(clearance=None):
-    """Bars in a row, springs alike in every direction, with or without clearance."""
+    """Bars in series, isotropic springs, with or without clearance."""
     robot = coaxial_beams(np.zeros(6), (K, K), clearance=clearance)
     return home_posture(robot), plan_for(robot, PLACES, [1] * 4, {}).sources
 
@@ -31,7 +31,9 @@ def bars(clearance=None):
 def test_worst_energy_subtracts_the_clearance_from_the_sum_of_errors(
     directions, radial
 ):
-    """k (hypot(t1 + t2, t3 + t4) - p)^2 / 4; the bound is of all t together, less p."""
+    """k (hypot(t1 + t2, t3 + t4) - p)^2 / 4; the bound uses the sum of all t,
+    less p.
+    """
     posture, sources = bars(Clearance(radial=radial) if radial else None)
     prepared = linear_response(posture)
     t = np.array([3.0, 2.0, 0.0, 0.0]) * PLAY
@@ -57,7 +59,9 @@ def test_worst_margin_and_its_bound_equal_sums_along_each_axis():
 
 
 def test_worst_energy_and_margin_of_a_ball_are_within_their_bounds():
-    """Gaps of 3, 2 and 4 balls along x, y, z: their distance; the bounds, their sum."""
+    """For gaps of 3, 2 and 4 balls along x, y and z, the worst case is their distance
+    and the bound their sum.
+    """
     robot = coaxial_beams(np.zeros(6), (K, K), clearance=Clearance(ball=PLAY))
     posture, t = home_posture(robot), np.array([3.0, 2.0, 4.0]) * PLAY
     places = [("two", 3), ("two", 4), ("two", 5)]
@@ -75,9 +79,8 @@ def test_worst_energy_and_margin_of_a_ball_are_within_their_bounds():
 
 
 def test_margin_bound_distributes_errors_over_several_clearances():
-    """Two pins in series, of 1 and 3 clearances: an error x takes x / 4 of either.
-
-    Across their axis and along it, which are cones of their own.
+    """Two pins in series have 1 and 3 clearances, so an error x takes x / 4 of each.
+    Across and along their axis are separate cones.
     """
     frames = (
         Frame("one", translation=[0.5, 0, 0]),
@@ -99,7 +102,9 @@ def test_margin_bound_distributes_errors_over_several_clearances():
 
 
 def test_error_that_no_clearance_can_close_has_an_infinite_bound():
-    """Along z of a pin; a tolerance of zero has no effect, 1e-14 m is rounding."""
+    """The error is along z of a pin; a tolerance of zero has no effect, and 1e-14 m is
+    round-off.
+    """
     robot = rigid_pair(radial=PLAY)
     posture = home_posture(robot)
     sources = plan_for(robot, [("one", 3), ("one", 5)], [1, 1], {}).sources
@@ -111,7 +116,9 @@ def test_error_that_no_clearance_can_close_has_an_infinite_bound():
 
 
 def test_energy_bound_of_a_spring_is_finite_along_its_axis_only():
-    """k t^2 / 2; rigid across the axis, where 1e-14 m is rounding, 1e-9 m is not."""
+    """k t^2 / 2 along the axis; the pair is rigid across it, where 1e-14 m is round-off
+    and 1e-9 m is not.
+    """
     spring = np.diag([np.inf] * 6)
     spring[3, 3] = K
     frames = (
@@ -132,7 +139,8 @@ def test_energy_bound_of_a_spring_is_finite_along_its_axis_only():
 def test_energy_bound_uses_the_clearance_of_each_pair_separately():
     """Two parallel pairs of bars: gaps of 1.5 and 10 clearances exceed them by 0.5, 9.
 
-    Each takes its own clearance; the bound adds up what is left: k (0.5 + 9)^2 p^2 / 4.
+    Each pair uses its own clearance; the bound sums the remaining gaps: k (0.5 + 9)^2
+    p^2 / 4.
     """
     robot = pairs_of_bars([K, K], PLAY)
     prepared = linear_response(home_posture(robot))
@@ -141,7 +149,7 @@ def test_energy_bound_uses_the_clearance_of_each_pair_separately():
     assert found == pytest.approx(K * (9.5 * PLAY) ** 2 / 4, rel=1e-4)
 
 
-def test_open_chain_has_zero_bounds_of_margin_and_energy():
+def test_open_chain_has_zero_margin_and_energy_bounds():
     robot = arm(link=MatrixLink(np.eye(6) * K), radial=PLAY)
     posture = home_posture(robot)
     sources = plan_for(robot, [("tip", 3)], [1], {}).sources

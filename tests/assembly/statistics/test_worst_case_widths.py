@@ -39,7 +39,7 @@ OF_ARM = PLAN.format(limit=f"translation = {LIMIT}", first="arm", second="hand")
 
 
 def arm(bend=0.8, **elbow):
-    """0.4 and 0.3 m, the second turned by the bend; the elbow may have a fit."""
+    """An arm of 0.4 and 0.3 m, bent at the elbow, which may have a fit."""
     return Robot(
         "arm",
         "tip",
@@ -65,7 +65,9 @@ def allotted(tmp_path, robots, text, fresh=0):
 
 
 def cheapest(bend, limit):
-    """Least 1/a + 4/b with |a u + b v| <= limit for u, v at the bend, any signs."""
+    """Minimise 1/a + 4/b with |a u + b v| <= limit for u, v at the bend, for
+    any signs.
+    """
     c = abs(np.cos(bend))
 
     def price(ratio):
@@ -77,7 +79,7 @@ def cheapest(bend, limit):
     return np.array([a, ratio * a])
 
 
-def test_least_price_of_the_lengths_of_an_arm_equals_its_closed_form(tmp_path):
+def test_minimum_cost_of_arm_lengths_equals_closed_form(tmp_path):
     found = allotted(tmp_path, [arm()], OF_ARM, fresh=500)
     best = cheapest(0.8, LIMIT)
     assert found.price == pytest.approx(1 / best[0] + 4 / best[1], rel=2e-3)
@@ -103,7 +105,7 @@ def test_all_corners_of_the_tolerances_meet_the_limit_in_finite_geometry(tmp_pat
 
 
 def test_largest_clearance_of_a_fit_follows_from_its_limits(tmp_path):
-    """A disc of 17.5 um adds to every direction of the plane."""
+    """A disc of 17.5 um adds to every direction in the plane."""
     clearance = {"clearance": Clearance(radial=10.25e-6)}
     robot = replace(arm(**clearance), fits={"elbow": "12 H7/g6"})
     found = allotted(tmp_path, [robot], OF_ARM)
@@ -112,7 +114,7 @@ def test_largest_clearance_of_a_fit_follows_from_its_limits(tmp_path):
 
 
 def test_posture_of_the_larger_error_determines_the_tolerances(tmp_path):
-    """The errors add most where the arm is straightest."""
+    """The errors add up most where the arm is straightest."""
     found = allotted(tmp_path, [arm(1.2), arm(0.8)], OF_ARM)
     alone = allotted(tmp_path, [arm(0.8)], OF_ARM)
     assert found.price == pytest.approx(alone.price, rel=1e-6)
@@ -122,7 +124,7 @@ def test_shares_of_the_lengths_in_the_rotation_of_a_four_bar_equal_hand_calculat
     tmp_path,
     write_file,
 ):
-    """Least 1/a + 4/b with (ca a + cb b)/lever <= limit: a, b as sqrt(cost/c)."""
+    """Minimise 1/a + 4/b with (ca a + cb b)/lever <= limit: a, b go as sqrt(cost/c)."""
     robot = read_robot(write_file(four_bar_file()))
     text = PLAN.format(
         limit="rotation = 1e-4", first="B on crank", second="C on rocker"
@@ -134,7 +136,7 @@ def test_shares_of_the_lengths_in_the_rotation_of_a_four_bar_equal_hand_calculat
     assert found.tolerances == pytest.approx(best, rel=2e-3)
 
 
-def test_limit_below_the_clearance_of_a_fit_is_refused(tmp_path):
+def test_limit_below_the_clearance_of_a_fit_is_rejected(tmp_path):
     clearance = {"clearance": Clearance(radial=10.25e-6)}
     robot = replace(arm(**clearance), fits={"elbow": "12 H7/g6"})
     text = PLAN.format(limit="translation = 1e-5", first="arm", second="hand")
@@ -142,7 +144,7 @@ def test_limit_below_the_clearance_of_a_fit_is_refused(tmp_path):
         allotted(tmp_path, [robot], text)
 
 
-def test_over_constrained_parts_with_clearance_are_refused(tmp_path):
+def test_over_constrained_parts_with_clearance_are_rejected(tmp_path):
     """A planar four-bar with rigid pins: their tilts do not close without force."""
     path = tmp_path / "four_bar.toml"
     text = four_bar_file("radial = 1e-5")

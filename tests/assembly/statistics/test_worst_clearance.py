@@ -1,4 +1,4 @@
-"""Clearance models: the worst clearance, and limited motion of joints, by hand."""
+"""Worst clearance model and limited joint motion against hand calculation."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def tip_errors(robot, size):
 
 
 def papers(share, **options):
-    """The paper's robot with errors of its links, a share of a few mrad."""
+    """The paper's robot with link errors, scaled from a few mrad."""
     robot = load_robot("irsbot2")
     sources = tolerance_sources(robot, [share * 4e-3] * 3 + [share * 2e-4] * 3)
     return Experiment(place_robot(robot, pose=POSE), sources, margins=False, **options)
@@ -41,7 +41,7 @@ def papers(share, **options):
 def test_screws_of_the_worst_clearance_attain_its_bounds(rng):
     """A disc of radius p and a tilt b on an arm L: rotation b, and hypot(e + p, L b).
 
-    Beside errors e along x; a draw without an answer has no bounds.
+    This is in addition to errors e along x; a draw without a solution has no bounds.
     """
     posture = home_posture(arm(radial=RADIAL, tilt=TILT))
     prepared = linear_response(posture)
@@ -65,7 +65,7 @@ def test_screws_of_the_worst_clearance_attain_its_bounds(rng):
 )
 @pytest.mark.parametrize("play", ["least", "uniform", "contact"])
 def test_no_clearance_model_exceeds_the_certified_worst_case_in_any_draw(share, play):
-    """Inside the zone, at its edge and outside; 1e-9: two solutions of (22)."""
+    """Inside the zone, at its edge and outside; 1e-9 covers two solutions of (22)."""
     worst, other = papers(share), papers(share, clearance=play)
     values = worst.sources.draw(0, 60, seed=1)
     bound, found = (e.evaluate(values, range(60)) for e in (worst, other))
@@ -77,7 +77,7 @@ def test_no_clearance_model_exceeds_the_certified_worst_case_in_any_draw(share, 
 
 
 def test_yield_falls_to_zero_with_the_worst_clearance():
-    """Clearance alone suffices to assemble: 0.1 mm holds only for least clearances."""
+    """Clearance alone suffices to assemble; 0.1 mm is met only in the least model."""
     limits, share = {"translation": 1e-4}, {}
     for play in CLEARANCE_MODELS:
         data = run_draws(
@@ -97,7 +97,9 @@ def test_yield_falls_to_zero_with_the_worst_clearance():
 
 
 def test_worst_clearance_adds_no_error_if_a_load_closes_all_clearances():
-    """A load presses the pin to one side of its disc, so it cannot move sideways."""
+    """A load presses the pin against one side of its disc, so it cannot move
+    sideways.
+    """
     robot = arm(radial=RADIAL)
     sources, load = tip_errors(robot, 1e-4), (0, 0, 0, 10.0, 0, 0)
     values = sources.draw(0, 10, seed=1)
@@ -145,7 +147,9 @@ def test_uniform_model_is_uniform_over_the_limited_motion(joint, key, component)
 @pytest.mark.parametrize("error", [0.0, 2.4e-4])
 @pytest.mark.parametrize("steel", [0.0, 1e9])
 def test_two_hinges_on_one_axis_turn_within_both_motion_limits(error, steel):
-    """|angle| <= a, |angle - error| <= b: an interval, whose ends are the contacts."""
+    """|angle| <= a and |angle - error| <= b define an interval whose ends are the
+    contacts.
+    """
     a, b = 1e-4, 1.5e-4
     link = MatrixLink(np.eye(6) * steel) if steel else None
     frames = (

@@ -1,4 +1,4 @@
-"""Worst case of an over-constrained stage whose guides and pad have clearances."""
+"""Worst case of an over-constrained stage with clearances in guides and pad."""
 
 import pytest
 
@@ -35,7 +35,7 @@ def stage(tmp_path):
 
 
 @pytest.mark.parametrize("quantity", WORST)
-def test_parts_of_a_rigid_worst_case_are_those_of_the_joints(stage, quantity):
+def test_contributions_to_a_rigid_worst_case_are_listed_by_joint(stage, quantity):
     found = worst_pose(
         linear_response(home_posture(stage)), sources_of(stage), quantity
     )
@@ -51,7 +51,7 @@ def test_every_contact_belongs_to_a_joint_of_the_drawing(stage):
     assert owners == {"x", "y", "foot"}
 
 
-def test_clearances_of_perfect_parts_are_those_of_the_joints(stage):
+def test_perfect_part_clearances_are_listed_by_joint(stage):
     reached = perfect_parts(Experiment(home_posture(stage), sources_of(stage)))
     parts = reached["rotation"]["clearances"]
     assert set(parts) <= {"x.clearance", "y.clearance", "foot.clearance"}

@@ -43,7 +43,7 @@ def of_serial(robot=SERIAL):
 
 
 def test_worst_case_of_a_serial_arm_equals_the_worst_corner_in_finite_geometry():
-    """156.18 um in direction 9.8 deg, lengths + and angles -; discs add 10 um each."""
+    """156.18 um along 9.8 deg, with lengths + and angles -; discs add 10 um each."""
     found = worst_pose(*of_serial(), "translation")
     assert found.reading == "linear"
     corners = []
@@ -66,7 +66,7 @@ def test_worst_case_of_a_serial_arm_equals_the_worst_corner_in_finite_geometry()
 
 
 def test_worst_case_of_two_ball_clearances_is_the_sum_of_their_radii():
-    """Every direction is a worst one: 20 and 15 um, both values and bounds."""
+    """Every direction is a worst one; values and bounds are 20 and 15 um."""
     balls = tuple(
         Callout(name, feature, (Datum(datum, "point"),), shape="point",
                 widths={"position": width})
@@ -84,7 +84,9 @@ def test_worst_case_of_two_ball_clearances_is_the_sum_of_their_radii():
 
 
 def test_uniform_draws_of_a_serial_arm_have_the_radius_computed_by_hand():
-    """rms 58.9 um of uniform errors and uniform discs: the sum of the variances."""
+    """The rms of 58.9 um follows from the summed variances of uniform errors
+    and discs.
+    """
     prepared, sources = of_serial()
     draws = prepared.solve(sources.errors(sources.draw(0, 50_000, 1)))
     square = (draws.platform_screw[:, 3:] ** 2).sum(axis=1).mean()
@@ -93,7 +95,9 @@ def test_uniform_draws_of_a_serial_arm_have_the_radius_computed_by_hand():
 
 
 def with_half_of_the_coupler(sources):
-    """Sources whose platform, half way along the coupler, has half of its error."""
+    """Return sources for a platform half way along the coupler, with half of
+    its error.
+    """
     robot, placed = sources.robot, []
     for one in sources.placed:
         errors = one.errors.copy()
@@ -230,8 +234,9 @@ def test_response_of_springs_without_clearance_is_linear():
 
 
 def test_rigid_legs_accept_only_errors_for_which_the_loop_closes():
-    """Two rigid legs are not over-constrained: 2 * 70 um / 0.6 m = 233.3 urad.  A third
-    one in the middle, 20 um of clearance, does not limit it; nor does the reading."""
+    """Two rigid legs are not over-constrained: 2 * 70 um / 0.6 m = 233.3 urad. A third
+    leg in the middle with 20 um of clearance does not limit it; all definitions agree.
+    """
     for positions, reading in [((-0.3, 0.3), "linear"), ((-0.3, 0.0, 0.3), "rigid")]:
         robot, sources = on_springs(positions, 20e-6, None)
         found = worst_pose(linear_response(home_posture(robot)), sources, "rotation")
@@ -240,7 +245,7 @@ def test_rigid_legs_accept_only_errors_for_which_the_loop_closes():
         assert found.bound == pytest.approx(140e-6 / 0.6, rel=1e-3)
 
 
-def test_unbounded_errors_and_loads_are_refused():
+def test_unbounded_errors_and_loads_are_rejected():
     robot, sources = on_springs((-0.3, 0.3), 20e-6)
     posture = home_posture(robot)
     unbounded = replace(sources, kind=np.full(len(sources), 1))

@@ -1,4 +1,4 @@
-"""Yields of callouts against draws in finite geometry, by code of its own."""
+"""Yields of callouts against draws in finite geometry, by independent code."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ FINITE, LINEAR = 1_000_000, 20_000
 
 
 def disc(rng, radius):
-    """Uniform points of a disc, by rejection from the square."""
+    """Sample uniform points in a disc, by rejection from the square."""
     points = rng.uniform(-1, 1, (int(1.4 * FINITE) + 1000, 2))
     return radius * points[np.hypot(*points.T) <= 1][:FINITE]
 
@@ -77,7 +77,7 @@ def _point(a, b, c, d):
 
 
 def linear_sizes(robot, seed):
-    """(k,) [m] translations of the platform by the program's draws."""
+    """(k,) [m] translations of the platform in the program's draws."""
     sources = sources_of(robot)
     draws = linear_response(home_posture(robot)).solve(
         sources.errors(sources.draw(0, LINEAR, seed))
@@ -87,7 +87,9 @@ def linear_sizes(robot, seed):
 
 @pytest.mark.slow
 def test_yields_of_callouts_equal_those_of_finite_geometry(write_file):
-    """20 cases, 95 % intervals: one miss is expected, four have a chance of 1.6 %."""
+    """With 20 cases and 95 % intervals, one miss is expected; four have a probability
+    of 1.6 %.
+    """
     four_bar = read_robot(write_file(four_bar_file()))
     inside = []
     for case in range(20):

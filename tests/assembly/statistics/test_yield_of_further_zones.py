@@ -1,6 +1,5 @@
-"""Yields of round faces, forms, envelopes, shifting datums and coupled holes.
-
-Each yield is compared with that of 10^6 parts in finite geometry, by code of its own:
+"""Yields of round faces, forms, envelopes, shifting datums and coupled holes. Each
+yield is compared with that of 10^6 parts in finite geometry, by independent code:
 planes between two planes, axes in cylinders, and pins at the ends of their clearance.
 """
 
@@ -48,7 +47,7 @@ def cube(rng, inside):
 
 
 def turned_to(axes):
-    """The least rotations from z to the directions (k, 3)."""
+    """Return the smallest rotations from z to the directions (k, 3)."""
     axes = axes / np.linalg.norm(axes, axis=1, keepdims=True)
     across = np.cross([0.0, 0.0, 1.0], axes)
     sine = np.linalg.norm(across, axis=1, keepdims=True)
@@ -225,8 +224,10 @@ CASES = [round_face, envelope, shifting_datum, tilting_datum, form, coupled_hole
 
 
 @pytest.mark.slow
-def test_yields_of_further_zones_equal_those_of_finite_geometry(tmp_path):
-    """24 cases, 95 % intervals: one miss is expected, four have a chance of 3 %."""
+def test_yields_of_additional_zones_equal_those_of_finite_geometry(tmp_path):
+    """With 24 cases and 95 % intervals, one miss is expected; four have a probability
+    of 3 %.
+    """
     inside = []
     for number in range(24):
         case, rng = CASES[number % 6], np.random.default_rng([13, number])

@@ -1,4 +1,4 @@
-"""Robots of the worked cases of the order of assembly."""
+"""Robots for the worked examples of assembly orders."""
 
 import numpy as np
 
@@ -25,7 +25,7 @@ def leg(name, k, error, s=0.0, clearance=None):
 
 
 def three_legs(clearances=(None, None, None)):
-    """Three legs on a platform that a guide leaves free along z."""
+    """Three legs on a platform that a guide allows to move along z."""
     legs = zip((1e6, 2e6, 3e6), (30e-6, -20e-6, 50e-6), clearances, strict=True)
     frames = [
         Frame("guide", "base", joint="prismatic"),
@@ -40,7 +40,7 @@ Y_AXIS = rotation_vector(np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]))
 
 
 def planar_platform(places, errors, k=1e6):
-    """A platform free along z and about y on legs at x = places."""
+    """A platform that is free along z and about y, on legs at x = places."""
     frames = [
         Frame("guide", "base", joint="prismatic"),
         Frame("turn", "guide", rotation=Y_AXIS, joint="revolute"),
@@ -59,7 +59,7 @@ def planar_platform(places, errors, k=1e6):
 
 
 def two_bars(gap):
-    """Two bars in one line between walls, together short of the distance."""
+    """Two collinear bars between walls, whose total length is too short."""
     frames = (
         Frame("bar1", "base", translation=[0, 0, 0.5], link=spring(1e6, 5)),
         Frame("joint", "bar1", geometric_error=[0, 0, 0, 0, 0, -gap]),
@@ -70,7 +70,7 @@ def two_bars(gap):
 
 
 def portal():
-    """A portal of beams on a base beam, both without axial and shear strain."""
+    """A portal of beams on a base beam, all without axial and shear strain."""
 
     def bar(width, height, up):
         area = {"area": 10.0, "I_z": width**3 * height / 12}
@@ -94,7 +94,7 @@ def portal():
 
 
 def gough_points():
-    """Return the joints' centres of a Gough platform, base and platform, (6, 3)."""
+    """Return the joint centres (6, 3) of a Gough platform, at base and platform."""
     low = np.radians([-10, 10, 110, 130, 230, 250])
     high = np.radians([310, 50, 70, 170, 190, 290])
     base = np.c_[0.5 * np.cos(low), 0.5 * np.sin(low), np.zeros(6)]

@@ -1,6 +1,5 @@
-"""Joints bolted at one pose: against cvxpy with kinematics written here.
-
-The robot is a four-bar on a stand with slotted holes; an error tilts one of its pins.
+"""Joints bolted at one pose, against cvxpy with independent kinematics. The robot is a
+four-bar on a stand with slotted holes, and an error tilts one of its pins.
 """
 
 from dataclasses import replace
@@ -98,10 +97,9 @@ def at_angle(angle):
 
 
 def energy_by_cvxpy(robot, posture, errors, locked=None):
-    """Return the least energy and the least clearance of the stand, by cvxpy.
-
-    Chains of finite transforms, screws carried to the base's origin; ``locked`` fixes
-    the stand's clearance.
+    """Compute the minimum energy and the smallest clearance of the stand by cvxpy. Uses
+    chains of finite transforms and screws at the base origin; ``locked`` fixes the
+    clearance of the stand.
     """
     at = {"base": np.eye(4)}
     carried, signs = {}, {}
@@ -163,7 +161,7 @@ def energy_by_cvxpy(robot, posture, errors, locked=None):
 def test_energy_over_the_stroke_includes_the_wrenches_from_bolting_at_one_pose(
     tmp_path, angle
 ):
-    """The screw locked in is compared through the energies that it causes."""
+    """The locked-in screw is compared through the resulting energies."""
     robot = load_robot(four_bar(tmp_path, at_angle(angle)))
     errors, screw = robot.declared_errors, robot.frame("stand").locked_at.screw
     assert errors[robot.index("pin2"), 0] == 5e-3
@@ -213,7 +211,7 @@ def test_sweep_bolts_every_draw_with_its_own_errors(tmp_path):
         assert energies == pytest.approx(alone, rel=1e-6, abs=1e-12)
 
 
-def test_robot_with_a_bolted_joint_is_written_as_it_was_read(tmp_path):
+def test_robot_with_a_bolted_joint_is_unchanged_after_writing_and_reading(tmp_path):
     robot = load_robot(four_bar(tmp_path, at_angle(0.4)))
     write_robot(robot, tmp_path / "again.toml")
     again = load_robot(tmp_path / "again.toml")
@@ -237,7 +235,7 @@ def test_invalid_pose_of_a_bolt_is_reported_in_one_line(tmp_path, key, text):
     assert "\n" not in str(caught.value)
 
 
-def test_bolting_of_a_joint_without_clearance_is_refused(tmp_path):
+def test_bolting_of_a_joint_without_clearance_is_rejected(tmp_path):
     path = tmp_path / "robot.toml"
     text = FOUR_BAR.replace("LOCKED", "").replace(
         'name = "end"', 'name = "end"\nlocked_at = "home"'
@@ -278,7 +276,7 @@ cost = 1
 
 
 def test_tolerances_of_a_bolted_robot_use_its_slot(tmp_path):
-    """4/a + 1/b is least at a = 2 C / 3, b = C / 3 where a + b <= C.
+    """4/a + 1/b is minimal at a = 2 C / 3, b = C / 3 where a + b <= C.
 
     The slot takes up 50 um, the spring of 1e6 N/m stores 0.8 mJ at 40 um: C is 90 um.
     """
@@ -293,9 +291,8 @@ def test_tolerances_of_a_bolted_robot_use_its_slot(tmp_path):
 
 @pytest.mark.parametrize("key", ["energy", "rotation", "translation"])
 def test_slopes_of_a_bolted_robot_equal_central_differences(tmp_path, key):
-    """Differences of energy and largest pose error at another pose than the bolt's.
-
-    The largest pose error is found to 1e-9 rad or m, in differences of 4e-7.
+    """Energy and largest pose error are differenced at a pose other than that of
+    bolting. The largest pose error is known to 1e-9 rad or m, with differences of 4e-7.
     """
     robot = load_robot(four_bar(tmp_path, at_angle(0.4)))
     response = linear_response(place_robot(robot, joints={"crank": 1.6}))
@@ -373,7 +370,7 @@ def test_solve_notes_where_a_joint_is_bolted(tmp_path, run):
     assert out.count('joint "stand" is bolted at') == 1
 
 
-def test_conversion_to_bodies_and_joints_keeps_bolted_joints(tmp_path, run):
+def test_conversion_to_bodies_and_joints_preserves_bolted_joints(tmp_path, run):
     path, drawn = four_bar(tmp_path, at_angle(0.4)), tmp_path / "bodies.toml"
     status, _, err = run("convert", path, "--format", "2", "-o", drawn)
     assert status == 0, err
@@ -384,7 +381,7 @@ def test_conversion_to_bodies_and_joints_keeps_bolted_joints(tmp_path, run):
     assert energies[1] == pytest.approx(energies[0], rel=1e-6)
 
 
-def test_conversion_of_a_bolt_at_a_rotation_of_the_platform_is_refused(tmp_path, run):
+def test_conversion_of_a_joint_bolted_at_a_rotated_platform_is_rejected(tmp_path, run):
     path = four_bar(tmp_path, "{ pose = { rz = 0.5 } }")
     drawn = tmp_path / "bodies.toml"
     status, _, err = run("convert", path, "--format", "2", "-o", drawn)
@@ -393,7 +390,7 @@ def test_conversion_of_a_bolt_at_a_rotation_of_the_platform_is_refused(tmp_path,
     assert not drawn.exists()
 
 
-def test_worst_case_of_a_bolted_robot_is_refused(tmp_path):
+def test_worst_case_of_a_bolted_robot_is_rejected(tmp_path):
     robot = load_robot(four_bar(tmp_path, at_angle(0.4)))
     sources = tolerance_sources(robot, np.full(6, 1e-4), ("pin2",))
     prepared = linear_response(place_robot(robot, joints={"crank": 2.0}))

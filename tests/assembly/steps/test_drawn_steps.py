@@ -1,6 +1,5 @@
-"""Steps of a drawn robot: openings are measured at the joint, in its axes.
-
-A plate on the sprung joint ``foot`` at the origin is closed to a second joint ``peg``.
+"""Assembly steps of a robot drawn as bodies and joints, with openings in joint axes. A
+plate on the elastic joint ``foot`` at the origin is joined to a second joint ``peg``.
 """
 
 import pytest
@@ -55,7 +54,7 @@ def joined(tmp_path):
     return run
 
 
-def test_slotted_hole_leaves_the_motion_along_the_axis_of_its_joint_open(joined):
+def test_slotted_hole_leaves_motion_along_its_joint_axis_free(joined):
     """The peg's z axis is the base's x axis, its x axis is y, its y axis is z.
 
     The errors along y and z of the base are closed: (ky y^2 + kz z^2) / 2.
@@ -66,7 +65,9 @@ def test_slotted_hole_leaves_the_motion_along_the_axis_of_its_joint_open(joined)
 
 
 def test_closing_wrench_of_a_ball_joint_is_a_force_through_its_centre(joined):
-    """F = d / (1/kz + r^2/k_ry), and no moment, since the ball turns freely."""
+    """F = d / (1/kz + r^2/k_ry), without moment, because the ball joint
+    rotates freely.
+    """
     step = joined(BALL, JOIN)
     force = 30e-6 / (1 / 3e6 + 0.4**2 / 2e3)
     assert step.closing_force == pytest.approx(force)

@@ -1,4 +1,4 @@
-"""Random positions in which joints are bolted: against distributions known by hand."""
+"""Random positions of bolted joints, against distributions in closed form."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ UNIFORM = {"left": "uniform"}
 
 
 def pin(name, radius, error, **more):
-    """Return a rigid leg on a bolted pin of a disc, and its end."""
+    """Return a rigid leg on a bolted pin with disc-shaped clearance, and its end."""
     bolt = LockedAt(Clearance(**radius), **more)
     return (
         Frame(name, "base", geometric_error=error, locked_at=bolt),
@@ -32,14 +32,14 @@ def pin(name, radius, error, **more):
 
 
 def bolted(robot, count=COUNT, seed=3):
-    """Return the screws locked in of many machines without other errors."""
+    """Return the locked-in screws of many machines without any other errors."""
     errors = np.repeat(robot.errors[None], count, axis=0)
     rngs = bolt_generators(robot, seed, range(count))
     return bolted_errors(robot, errors, rngs) - errors
 
 
 def platform_of_two_pins(radius, distance):
-    """A platform free along x and y on two pins that are apart by an error along x."""
+    """A platform free along x and y on two pins, offset by an error along x."""
     frames = [
         Frame("y", "base", rotation=[-np.pi / 2, 0, 0], joint="prismatic"),
         Frame("back", "y", rotation=[np.pi / 2, 0, 0]),
@@ -63,7 +63,7 @@ def test_drawn_positions_in_an_open_slot_are_uniform_over_its_disc():
 
 
 def test_drawn_positions_of_a_platform_on_two_round_pins_fill_the_lens_uniformly(rng):
-    """Uniform in the lens of two discs, drawn here by rejection."""
+    """The reference is uniform in the lens of two discs, sampled by rejection."""
     robot = platform_of_two_pins({"radial": 1e-4}, 1e-4)
     left = bolted(robot)[:, 4, 3:5] / 1e-4
     points = rng.uniform(-1, 1, (40_000, 2))
@@ -75,16 +75,18 @@ def test_drawn_positions_of_a_platform_on_two_round_pins_fill_the_lens_uniformly
         assert found.pvalue > 1e-3
 
 
-def test_pins_apart_by_two_radii_are_left_where_both_touch():
-    """A single position closes: apart by two radii, both pins touch."""
+def test_pins_two_radii_apart_are_bolted_where_both_touch():
+    """Only one position closes the loop: two radii apart, both pins touch."""
     robot = platform_of_two_pins({"radial": 1e-4}, 2e-4)
     screws = bolted(robot, 20)
     assert screws[:, 4, 3] == pytest.approx(np.full(20, 1e-4), rel=1e-5)
     assert screws[:, 4, 4] == pytest.approx(np.zeros(20), abs=1e-6)
 
 
-def test_pressed_pin_leaves_the_position_in_the_other_clearance_random():
-    """Apart by 50 um with +- 20 um, both pins press a leg; its slot across is free."""
+def test_loaded_pin_leaves_the_other_clearance_random():
+    """With an offset of 50 um and +- 20 um of clearance, both pins load a leg, whose
+    transverse slot is free.
+    """
     frames = [Frame("guide", "base", joint="prismatic"), Frame("platform", "guide")]
     frames += pin("left", {"axial": 20e-6}, np.zeros(6), **UNIFORM)
     frames += pin("right", {"axial": 20e-6}, [0, 0, 0, 0, 0, 50e-6], **UNIFORM)
@@ -118,7 +120,7 @@ def test_position_of_a_draw_does_not_depend_on_other_drawn_quantities(tmp_path):
 
 
 def test_bolting_at_a_random_free_position_requires_no_additional_energy(tmp_path):
-    """The walk keeps the strains at the pose of the bolt."""
+    """The random walk preserves the strains at the pose of bolting."""
     key = '{ joints = { crank = 0.4 }, left = "uniform" }'
     robot = load_robot(four_bar(tmp_path, key))
     experiment = experiment_of(robot)
@@ -156,14 +158,14 @@ def test_rule_for_the_bolting_position_is_equal_after_reading_and_writing(tmp_pa
 
 
 @pytest.mark.parametrize("key", ['{ left = "normal" }', "{ left = 3 }"])
-def test_unknown_rule_for_the_bolting_position_is_refused_in_one_line(tmp_path, key):
+def test_unknown_rule_for_the_bolting_position_is_rejected_in_one_line(tmp_path, key):
     with pytest.raises(BadInput) as caught:
         load_robot(four_bar(tmp_path, key))
     assert "locked_at.left: found" in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
-def test_single_robot_is_bolted_at_the_position_with_the_least_sum_of_squares():
+def test_single_robot_is_bolted_at_the_smallest_sum_of_squares():
     frames = pin("slot", {"radial": 1e-3}, np.zeros(6), **UNIFORM)
     robot = bolt_joints(Robot("slot", "slot.end", frames, ()))
     assert not robot.frame("slot").locked_at.screw.any()

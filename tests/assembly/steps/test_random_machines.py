@@ -1,7 +1,6 @@
-"""Spatial machines of random springs: against a dense model in absolute motions.
-
-The model here has one displacement of each leg's end in base axes, read at the base's
-origin, and 6 x 6 stiffnesses; the program has chains of frames and eliminates.
+"""Spatial machines of random springs, against a dense model in absolute motions. The
+model here has one displacement per leg end, in base axes at the base origin, and 6 x 6
+stiffnesses, whereas the program eliminates unknowns of chains of frames.
 """
 
 import numpy as np
@@ -76,7 +75,7 @@ def least_energy(legs, held, springs, load, count=6 * LEGS):
 
 
 def opening(i):
-    """Return the rows of the platform's screw less that of the end of leg i."""
+    """Return the rows for the platform screw minus that of the end of leg i."""
     rows = np.zeros((6, 6 * LEGS))
     rows[:, :6], rows[:, 6 * i : 6 * i + 6] = np.eye(6), -np.eye(6)
     return rows
@@ -84,7 +83,7 @@ def opening(i):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_machine_of_random_springs_has_the_energies_of_a_dense_model(seed):
-    """Fixture with a spring, a slot, a load, and releases in every machine."""
+    """Every machine has a fixture with a spring, a slot, a load, and releases."""
     rng = np.random.default_rng(seed)
     robot, legs, turn = machine(rng)
     locked = [int(c) for c in np.sort(rng.choice(6, 3, replace=False))]

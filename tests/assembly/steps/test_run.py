@@ -1,7 +1,6 @@
-"""Worked cases of the order of assembly, each built as a robot.
-
-The expected numbers are those of springs in one direction, by hand (see each test); a
-platform on three legs stands at x = sum k d / sum k.
+"""Worked examples of assembly orders, each built as a robot. The expected numbers
+follow by hand from springs in one direction (see each test); a platform on three legs
+rests at x = sum k d / sum k.
 """
 
 from dataclasses import replace
@@ -48,7 +47,9 @@ def join_leg(i, **more):
 
 
 def test_two_bars_and_a_gap_store_and_dissipate_the_energy_of_the_springs():
-    """F = g k1 k2 / (k1 + k2), E = F g / 2; a wall removed loses all of it."""
+    """F = g k1 k2 / (k1 + k2) and E = F g / 2, all of which is lost when a wall is
+    removed.
+    """
     bolt = Join("bolt", ("wall", "bar2"))
     plan = Plan((bolt, Release("wall removed", ("bolt",))))
     closed, released = assemble_in_steps(plan, two_bars(2e-4))
@@ -62,7 +63,7 @@ def test_two_bars_and_a_gap_store_and_dissipate_the_energy_of_the_springs():
 
 
 def test_plan_of_a_file_stores_the_energy_of_the_springs(tmp_path):
-    """As above: 150 N, and half of it times the gap of 0.2 mm."""
+    """As above: 150 N, and half of this force times the gap of 0.2 mm."""
     file = tmp_path / "steps.toml"
     file.write_text('[[step]]\njoin = ["wall", "bar2"]\n')
     (closed,) = ff.assemble_in_steps(file, two_bars(2e-4))
@@ -70,8 +71,8 @@ def test_plan_of_a_file_stores_the_energy_of_the_springs(tmp_path):
     assert closed.energy == pytest.approx(15e-3)
 
 
-def test_joint_closed_by_limited_force_stays_open_as_computed_with_springs():
-    """90 N of 150 N close 120 um of 200 um: 80 um open, E = 0.36 * 15 mJ."""
+def test_opening_left_by_a_limited_force_equals_spring_calculation():
+    """90 N of 150 N close 120 um of 200 um, so 80 um stay open and E = 0.36 * 15 mJ."""
     bolt = Join("bolt", ("wall", "bar2"), force_limit=90.0, leave_open=True)
     (closed,) = assemble_in_steps(Plan((bolt,)), two_bars(2e-4))
     assert closed.exceeded.all()
@@ -94,9 +95,7 @@ def test_pinned_legs_end_in_the_same_state_in_every_order(order):
     ("last", "x", "energy"),
     [(1, 22.0e-6, 2.94e-3), (2, 45.0e-6, 0.15e-3), (3, -10e-6 / 3, 0.8333333e-3)],
 )
-def test_last_leg_bolted_without_force_keeps_the_pose_given_by_the_other_legs(
-    last, x, energy
-):
+def test_last_leg_bolted_without_force_does_not_change_the_pose(last, x, energy):
     first = [i for i in (1, 2, 3) if i != last]
     steps = (*(join_leg(i) for i in first), join_leg(last, locked=Z))
     result = assemble_in_steps(Plan(steps), three_legs())[-1]
@@ -106,7 +105,7 @@ def test_last_leg_bolted_without_force_keeps_the_pose_given_by_the_other_legs(
 
 
 def test_leg_bolted_while_the_platform_is_clamped_springs_back_by_its_share():
-    """Leg 3 is free of force at 10 um: x = (k1 d1 + k2 d2 + k3 10) / sum k."""
+    """Leg 3 carries no force at 10 um: x = (k1 d1 + k2 d2 + k3 10) / sum k."""
     steps = (
         join_leg(1), join_leg(2), Fix("clamp", "platform", {"TZ": 10e-6}),
         join_leg(3, locked=Z), Release("free", ("clamp",)),
@@ -138,8 +137,10 @@ def test_result_of_bolting_the_slot_first_differs_if_the_pin_moves_the_slot(
     assert result.platform_screw[0, 5] == pytest.approx(z)
 
 
-def test_portal_welded_to_a_bent_base_retains_its_share_of_the_rotation():
-    """k_base = 2 EI / L and the portal's own stiffness against turned feet."""
+def test_portal_welded_to_a_bent_base_retains_its_part_of_the_rotation():
+    """k_base = 2 EI / L acts together with the portal's stiffness against rotation of
+    its feet.
+    """
     E = 2.1e11
     I_b, I_c = 0.06 * 0.03**3 / 12, 0.03**4 / 12
     h, L = 0.4, 0.6
@@ -162,7 +163,7 @@ def test_portal_welded_to_a_bent_base_retains_its_share_of_the_rotation():
     assert results[3].energy == pytest.approx(k_b * 1e-3 * kept, rel=1e-5)
 
 
-def test_work_of_all_steps_is_the_final_energy_and_the_losses():
+def test_total_work_equals_final_energy_plus_losses():
     steps = (
         join_leg(1), join_leg(2), Fix("clamp", "platform", {"TZ": 10e-6}),
         Preload("press", "platform", np.array([0, 0, 0, 0, 0, -30.0])),
@@ -196,7 +197,7 @@ def legs_with_pins(places, bounds, k=(None, None, 2e6)):
 
 @pytest.mark.parametrize("order", [(1, 2), (2, 1)])
 def test_platform_on_two_pins_with_clearance_is_at_a_position_that_both_allow(order):
-    """0 +- 20 um and 30 +- 20 um: the platform lies in [10, 20] um."""
+    """Pins at 0 +- 20 um and 30 +- 20 um allow platform positions in [10, 20] um."""
     posture = legs_with_pins((0.0, 30e-6), (20e-6, 20e-6))
     results = assemble_in_steps(Plan(tuple(join_leg(i) for i in order)), posture)
     z = results[-1].platform_screw[0, 5]
@@ -233,7 +234,7 @@ def test_bolted_joint_with_clearance_retains_its_position():
 
 
 def gough(errors, seventh=False):
-    """Legs of a Gough platform on a body with six freedoms: 5e6 N/m each."""
+    """Legs of a Gough platform, 5e6 N/m each, on a body with six degrees of freedom."""
     base, top = gough_points()
     if seventh:
         base, top = np.vstack([base, SEVENTH[0]]), np.vstack([top, SEVENTH[1]])
@@ -272,7 +273,7 @@ LENGTHS = np.array([40, -25, 10, -35, 20, 30]) * 1e-6
 
 
 def inverse_jacobian():
-    """Return the map from lengths to the platform's screw, from Pluecker lines."""
+    """Compute the map from leg lengths to the platform screw from Pluecker lines."""
     base, top = gough_points()
     along = (top - base) / np.linalg.norm(top - base, axis=1, keepdims=True)
     arms = top - [0, 0, 0.5]
@@ -311,7 +312,9 @@ def test_one_adjustable_leg_corrects_one_reading_but_not_the_whole_pose(
 
 
 def test_seventh_leg_cut_to_the_measured_length_is_free_of_force():
-    """Pinned it is open by gamma: S = k / (1 + sum of shares^2), W = S gamma^2/2."""
+    """If pinned, it is open by gamma: S = k / (1 + sum of shares^2), W = S
+    gamma^2/2.
+    """
     J = inverse_jacobian()
     a, b = map(np.array, SEVENTH)
     along = (b - a) / np.linalg.norm(b - a)
@@ -332,7 +335,7 @@ def test_seventh_leg_cut_to_the_measured_length_is_free_of_force():
 
 
 def test_spring_of_a_fixture_shares_the_closing_force():
-    """A leg closed against a fixture of 2e6 N/m: series of both springs."""
+    """A leg is closed against a fixture of 2e6 N/m, in series with it."""
     fix = Fix("fixture", "platform", {"TZ": 0.0}, {"TZ": 2e6})
     results = assemble_in_steps(Plan((fix, join_leg(1))), three_legs_alone())
     series = 1e6 * 2e6 / 3e6
@@ -347,7 +350,9 @@ def three_legs_alone():
 
 
 def test_weight_bends_the_leg_before_the_slot_is_bolted():
-    """100 N on leg 1 of 1e6 N/m: 100 um down; the slot of leg 2 stays there."""
+    """100 N on leg 1 of 1e6 N/m move it down by 100 um, where leg 2 is bolted in its
+    slot.
+    """
     posture = legs_with_pins((0.0, 0.0), (None, None), k=(1e6, 1e6))
     frames = [
         replace(f, mass=10.0) if f.name == "platform" else f
@@ -365,20 +370,22 @@ def test_weight_bends_the_leg_before_the_slot_is_bolted():
         assert results[1].platform_screw[0, 5] == pytest.approx(expected)
 
 
-def test_preload_on_a_part_without_support_is_refused():
+def test_preload_on_a_part_without_support_is_rejected():
     press = Preload("press", "platform", np.array([0, 0, 0, 0, 0, -10.0]))
     with pytest.raises(FreeMotion, match="nothing resists"):
         assemble_in_steps(Plan((press,)), legs_open())
 
 
 def legs_open():
-    """Three legs, the platform free before the first is joined."""
+    """Three legs on a platform that is free before the first leg is joined."""
     posture = three_legs()
     return replace(posture, robot=replace(posture.robot, closures=()))
 
 
-def test_legs_cut_to_increments_have_errors_equal_to_the_rounding_of_their_lengths(rng):
-    """All six legs cut to 10 um: x = J r, |r| <= 5 um; at most 11.9, 12.4, 6.1 um."""
+def test_pose_errors_of_legs_cut_to_increments_follow_from_length_rounding(rng):
+    """All six legs are cut in increments of 10 um: x = J r, |r| <= 5 um; at most 11.9,
+    12.4, 6.1 um.
+    """
     cuts = tuple(
         Adjust(
             f"cut {i}",
@@ -406,9 +413,10 @@ def test_legs_cut_to_increments_have_errors_equal_to_the_rounding_of_their_lengt
 
 
 @pytest.mark.parametrize(("increment", "change"), [(0.0, -50e-6), (40e-6, -40e-6)])
-def test_shim_closes_without_force_at_the_position_of_the_clearance(increment, change):
-    """Pin 1 lies in the middle of +- 20 um: leg 2, 50 um long, is cut to it; rounded
-    to 40 um, the clearance takes up the 10 um left."""
+def test_shim_closes_a_loop_without_force_at_the_clearance_position(increment, change):
+    """Pin 1 lies in the middle of +- 20 um: leg 2, 50 um long, is cut to it; rounded to
+    40 um, the clearance takes up the remaining 10 um.
+    """
     posture = legs_with_pins((0.0, 50e-6), (20e-6, None), k=(1e6, 1e6))
     shim = Adjust("shim", "leg2", ("TZ",), Measure("gap", LEG[2]), increment)
     steps = (join_leg(1), shim, join_leg(2))
@@ -422,10 +430,10 @@ def test_shim_closes_without_force_at_the_position_of_the_clearance(increment, c
 @pytest.mark.parametrize(
     ("name", "component"), [("four_bar", "TZ"), ("3rrr", "RX"), ("four_bar", "TX")]
 )
-def test_shim_of_a_robot_with_clearances_has_the_least_energy_of_all_shims(
+def test_computed_shim_minimises_the_energy_of_a_robot_with_clearances(
     name, component, rng
 ):
-    """Against a scan of the shim, each length closed with loose clearances."""
+    """The reference is a scan of shim lengths, each closed with loose clearances."""
     robot = load_robot(name)
     errors = rng.normal(size=robot.errors.shape) * np.repeat([3e-3, 3e-4], 3)
     posture = home_posture(robot.with_errors(errors))
@@ -449,9 +457,10 @@ def test_shim_of_a_robot_with_clearances_has_the_least_energy_of_all_shims(
 
 @pytest.mark.parametrize("stiffness", [(1e6, 1e6), (1e6, 3e6)])
 @pytest.mark.parametrize("weight", [10.0, -10.0])
-def test_shim_under_a_weight_shares_it_by_stiffness(stiffness, weight):
-    """The weight presses pin 1 to an end of +-20 um; the energy of both legs is least
-    where both are deformed alike, by F / (k1 + k2): leg 2 is cut to that end."""
+def test_shim_under_a_weight_distributes_it_by_stiffness(stiffness, weight):
+    """The weight presses pin 1 to an end of +-20 um; the energy of both legs is minimal
+    where both have equal deformation F / (k1 + k2): leg 2 is cut to that end.
+    """
     posture = legs_with_pins((0.0, 50e-6), (20e-6, None), k=stiffness)
     load = Preload("weight", "platform", np.array([0, 0, 0, 0, 0, weight]))
     shim = Adjust("shim", "leg2", ("TZ",), Measure("gap", LEG[2]))
@@ -463,7 +472,9 @@ def test_shim_under_a_weight_shares_it_by_stiffness(stiffness, weight):
 
 
 def test_shim_under_a_platform_that_rests_on_a_pin_restores_its_height():
-    """10 N press leg 1 by 10 um and pin 1 to -20 um: 30 um are missing at 0 um."""
+    """10 N compress leg 1 by 10 um and move pin 1 to -20 um, so 30 um are missing at 0
+    um.
+    """
     posture = legs_with_pins((0.0, 50e-6), (20e-6, None), k=(1e6, 1e6))
     load = Preload("weight", "platform", np.array([0, 0, 0, 0, 0, -10.0]))
     shim = Adjust("shim", "leg1", ("TZ",), Measure("z", "platform", Z))
@@ -486,7 +497,7 @@ def test_shims_of_many_machines_under_a_weight_are_computed_together(rng):
     assert found == pytest.approx(lengths[:, 0] - 20e-6 - lengths[:, 1], abs=1e-10)
 
 
-def test_shim_in_a_bolted_joint_among_loose_clearances_is_refused():
+def test_shim_in_a_bolted_joint_among_loose_clearances_is_rejected():
     posture = legs_with_pins((0.0, 30e-6), (20e-6, 20e-6))
     shim = Adjust("shim", "leg2", ("TZ",), Measure("gap", LEG[2]))
     steps = (join_leg(1), Join("bolt", "leg2"), shim, join_leg(2))
@@ -496,7 +507,7 @@ def test_shim_in_a_bolted_joint_among_loose_clearances_is_refused():
 
 @pytest.mark.parametrize("name", ["four_bar", "five_bar", "3rrr", "irsbot2", "delta"])
 def test_pinned_robots_with_clearances_store_the_energy_of_solve_assembly(name, rng):
-    """The compiled solver has an elimination of its own; any order ends there."""
+    """The compiled solver eliminates independently; every order leads to its energy."""
     robot = load_robot(name)
     errors = rng.normal(size=robot.errors.shape) * np.repeat([3e-3, 3e-4], 3)
     if name == "irsbot2":  # other parts of its parallelograms are rigid

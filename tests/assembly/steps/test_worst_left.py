@@ -1,4 +1,4 @@
-"""The worst position of a bolted joint: by hand, and against sampled positions."""
+"""Worst position of a bolted joint, against hand calculation and sampled positions."""
 
 import json
 from dataclasses import replace
@@ -22,14 +22,14 @@ WORST = {"left": "worst"}
 
 
 def assert_bracket(found, expected):
-    """The value attained and the bound hold the exact one, each within 1e-3 of it."""
+    """Check that value attained and bound bracket the exact value, each within 1e-3."""
     low, high = found
     assert expected * (1 - 1e-3) <= low <= expected * (1 + 1e-9)
     assert expected * (1 - 1e-9) <= high <= expected * (1 + 1e-3)
 
 
 def left(robot, rule):
-    """Return a robot whose bolted joints are left by another rule."""
+    """Return a robot whose bolted joints are left according to another rule."""
     frames = [
         replace(frame, locked_at=replace(frame.locked_at, left=rule))
         if frame.locked_at
@@ -40,7 +40,7 @@ def left(robot, rule):
 
 
 def test_worst_position_of_a_slot_with_an_arm_is_at_its_corner():
-    """Tilt of 2 mrad on an arm of 0.3 m adds to the radius of 1 mm."""
+    """A tilt of 2 mrad on an arm of 0.3 m adds to the radius of 1 mm."""
     gaps = Clearance(radial=1e-3, axial=2e-4, tilt=2e-3)
     slot = Frame("slot", "base", locked_at=LockedAt(gaps, **WORST))
     arm = Frame("arm", "slot", translation=[0, 0, 0.3])
@@ -52,7 +52,7 @@ def test_worst_position_of_a_slot_with_an_arm_is_at_its_corner():
 
 
 def test_worst_bolted_position_of_a_platform_on_two_pins_is_at_the_far_end():
-    """0 +- 20 um and 30 +- 20 um: the platform may be in [10, 20] um."""
+    """Pins at 0 +- 20 um and 30 +- 20 um allow platform positions in [10, 20] um."""
     frames = [Frame("guide", "base", joint="prismatic"), Frame("platform", "guide")]
     for name, error in (("left", 0.0), ("right", 30e-6)):
         axial = {"axial": 20e-6}
@@ -67,7 +67,9 @@ def test_worst_bolted_position_of_a_platform_on_two_pins_is_at_the_far_end():
 
 @pytest.mark.parametrize("distance", [1e-4, 1.6e-4])
 def test_worst_bolted_position_on_two_round_pins_is_at_the_edge_of_the_lens(distance):
-    """The lens of two discs of 0.1 mm, one about the nominal place, ends at 0.1 mm."""
+    """The lens of two discs of 0.1 mm, one about the nominal position, ends at
+    0.1 mm.
+    """
     robot = left(platform_of_two_pins({"radial": 1e-4}, distance), "worst")
     worst = worst_left(home_posture(bolt_joints(robot)))
     assert worst.assumption == CONVEX
@@ -76,7 +78,9 @@ def test_worst_bolted_position_on_two_round_pins_is_at_the_edge_of_the_lens(dist
 
 @pytest.mark.parametrize("angle", [0.4, 1.6])
 def test_bounds_of_a_four_bar_contain_all_sampled_positions(tmp_path, angle):
-    """Pins with clearance between springs: no position drawn is beyond the bound."""
+    """For pins with clearance between springs, no sampled position exceeds the
+    bound.
+    """
     key = '{ joints = { crank = 1.2 }, left = "worst" }'
     robot = load_robot(str(four_bar(tmp_path, key)))
     posture = place_robot(bolt_joints(robot), joints={"crank": angle})
@@ -111,7 +115,7 @@ def test_command_error_bounds_the_worst_bolted_position(tmp_path, run):
     assert found["assumption"] == BRACKET
 
 
-def test_worst_bolted_position_under_a_load_is_refused(tmp_path):
+def test_worst_bolted_position_under_a_load_is_rejected(tmp_path):
     """The worst position under a load is not defined."""
     key = '{ joints = { crank = 1.2 }, left = "worst" }'
     robot = bolt_joints(load_robot(str(four_bar(tmp_path, key))))

@@ -1,4 +1,4 @@
-"""Sweeps on many processes equal those of one process, also when a worker dies."""
+"""Sweeps on many processes equal those of one process, even if a worker dies."""
 
 import os
 import pickle
@@ -32,14 +32,14 @@ def drawn_sweep(grid):
     return Sweep(question, targets, (), 3, block_size=32)
 
 
-def test_worker_refuses_a_task_of_another_robot():
-    """For example, a mesh differs there: its content is part of the hash."""
+def test_worker_rejects_a_task_for_another_robot():
+    """A mesh may differ there, for example; its content is part of the hash."""
     question = drawn_sweep("tx=0,ty=0.13").question
     with pytest.raises(BadInput, match="found another robot on a worker"):
         solve_task(pickle.dumps(question), "0" * 64, [])
 
 
-def test_workers_with_different_sources_are_refused():
+def test_workers_with_different_sources_are_rejected():
     class Client:
         def __init__(self, **theirs):
             self.theirs = theirs
@@ -57,7 +57,7 @@ def test_workers_with_different_sources_are_refused():
 
 
 @pytest.mark.slow
-def test_unreachable_scheduler_is_refused(tmp_path):
+def test_unreachable_scheduler_is_rejected(tmp_path):
     sweep = drawn_sweep("tx=0,ty=0.13")
     for address in ("tcp://127.0.0.1:9", "nonsense:/"):
         with pytest.raises(BadInput, match="--scheduler .* cannot be reached"):
@@ -109,7 +109,7 @@ def cluster(tmp_path):
 
 @pytest.mark.slow
 def test_sweep_with_a_killed_worker_writes_the_same_file(cluster, tmp_path):
-    """A scheduler and two workers as processes; one worker gets SIGKILL."""
+    """A scheduler and two workers run as processes; one worker receives SIGKILL."""
     sweep = drawn_sweep("tx=-0.045:0.045:0.003,ty=0.10:0.15:0.003")
     run_sweep(sweep, tmp_path / "one.nc")
     killed = []

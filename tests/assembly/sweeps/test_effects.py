@@ -36,7 +36,9 @@ def swept(robot, grid, **given):
 
 
 def test_swept_arm_under_load_and_weight_equals_hand_calculation(tmp_path):
-    """M / k with M = F L cos q of a load, and m g L cos q / 2 of the beam's weight."""
+    """M / k with M = F L cos q for a load, and m g L cos q / 2 for the beam's
+    weight.
+    """
     path = arm_with(tmp_path)
     data = sweep(
         path, grid="q.drive=0:1.2:0.4", assumption="none", load=[0, 0, 0, 0, 10, 0],
@@ -77,7 +79,9 @@ LOAD = [5.0, 0, 0, 100.0, -40.0, -200.0]
 def test_swept_points_with_effects_and_functions_equal_single_postures(
     declared, under, load
 ):
-    """Screws are as flat as certified energies: sqrt(1e-8) of what closing takes."""
+    """With energies certified to 1e-8, screws agree to sqrt(1e-8) of those that close
+    the loops.
+    """
     robot = replace(irsbot2_with(NUMBERS["cases"][0]), **declared)
     data = swept(robot, GRID, under=under, linearisation="effects" in declared,
                  wrenches=("leg1.link_a",), load=load or (0.0,) * 6)  # fmt: skip
@@ -105,7 +109,7 @@ def test_swept_points_with_effects_and_functions_equal_single_postures(
 
 
 def test_sweep_stores_device_readings_with_the_pose():
-    """A device shifted by b and not rotated reads b more."""
+    """A device shifted by b without rotation reads b more."""
     shift = {"base.tx": 3e-5, "base.tz": -1e-5}
     robot = irsbot2_with(NUMBERS["cases"][0])
     data = swept(replace(robot, effects={"registration": shift}), GRID)
@@ -129,7 +133,7 @@ def test_load_without_resistance_has_the_status_no_equilibrium():
     assert "no joint or spring resists" in str(data.reason.values.ravel()[0])
 
 
-def test_sweep_refuses_bounds_under_load_and_missing_covariates(tmp_path):
+def test_sweep_rejects_bounds_under_load_and_missing_covariates(tmp_path):
     with pytest.raises(BadInput, match="--assumption none"):
         ask_sweep("irsbot2", SweepOptions(grid=GRID, load=[0, 0, 0, 0, 0, 1.0]))
     warm = 'name = "thermal_expansion"\nparameters = { tool = 2e-5 }'

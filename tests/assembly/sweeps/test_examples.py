@@ -1,4 +1,4 @@
-"""The example programs that sweep: they run and print the expected numbers."""
+"""Example programs that use sweeps run and print the expected numbers."""
 
 import re
 import subprocess

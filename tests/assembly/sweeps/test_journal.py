@@ -42,7 +42,9 @@ def small_sweep(grid="tx=-0.04:0.04:0.02,ty=0.10:0.14:0.02", **options):
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """The sweep, its file's bytes, and its journal's just before the end."""
+    """The sweep, the bytes of its file, and the bytes of its journal just before the
+    end.
+    """
     sweep, path = small_sweep(), tmp_path_factory.mktemp("whole") / "map.nc"
     kept = {}
 
@@ -55,14 +57,16 @@ def whole(tmp_path_factory):
 
 
 def kept_blocks(sweep, path):
-    """The blocks of which a journal says that they are finished."""
+    """Return the blocks that a journal lists as finished."""
     kind = record_type(sweep.question)
     with open_journal(path, sweep.identity, kind) as journal:
         return sorted(journal.places)
 
 
 def go_on(sweep, folder, journal):
-    """Finish a sweep from the bytes of a journal; its file's, and the points solved."""
+    """Finish a sweep from the bytes of a journal; return those of its file, and the
+    points solved.
+    """
     path, solved = folder / "map.nc", []
     journal_path(path).write_bytes(journal)
 
@@ -74,7 +78,7 @@ def go_on(sweep, folder, journal):
     return path.read_bytes(), solved
 
 
-def test_truncated_journal_keeps_every_block_before_the_cut(whole, tmp_path):
+def test_truncated_journal_preserves_every_block_before_the_cut(whole, tmp_path):
     """A power failure may truncate the file at any byte."""
     sweep, _, kept = whole
     sizes = [len(journal) for journal in kept.values()]
@@ -96,7 +100,7 @@ def test_resumed_sweep_writes_the_same_file(whole, tmp_path, done):
     assert solved == list(range(-(-done // 4), 4))
 
 
-def test_flipped_bit_in_a_journal_drops_only_its_record(whole, tmp_path):
+def test_flipped_bit_in_a_journal_invalidates_only_its_record(whole, tmp_path):
     """The first line and the numbers and lengths of records are covered too."""
     sweep, expected, kept = whole
     journal, first_line = kept[15], kept[15].index(b"\n") + 1
@@ -113,7 +117,7 @@ def test_flipped_bit_in_a_journal_drops_only_its_record(whole, tmp_path):
     assert go_on(sweep, tmp_path, bytes(spoilt)) == (expected, [3])
 
 
-def test_block_changed_during_the_sweep_is_refused_with_one_message(whole, tmp_path):
+def test_block_changed_during_the_sweep_is_rejected_with_one_message(whole, tmp_path):
     sweep, expected, _ = whole
     path = tmp_path / "map.nc"
 
@@ -130,8 +134,8 @@ def test_block_changed_during_the_sweep_is_refused_with_one_message(whole, tmp_p
     assert path.read_bytes() == expected
 
 
-def test_second_simultaneous_run_into_the_same_file_is_refused(whole, tmp_path):
-    """The second run starts during the first, and does not disturb it."""
+def test_second_simultaneous_run_into_the_same_file_is_rejected(whole, tmp_path):
+    """The second run starts during the first and does not disturb it."""
     sweep, expected, _ = whole
     path, said = tmp_path / "map.nc", []
 
@@ -159,8 +163,8 @@ def test_killed_run_releases_its_journal(whole, tmp_path):
     assert path.read_bytes() == expected
 
 
-def test_journal_of_different_sources_is_refused(whole, tmp_path, monkeypatch):
-    """The version is the same, but one line of the sources differs."""
+def test_journal_of_different_sources_is_rejected(whole, tmp_path, monkeypatch):
+    """The version is equal, but one line of the sources differs."""
     sweep, _, kept = whole
     copy = tmp_path / "sources" / "assembly"
     shutil.copytree(ROOT / "assembly", copy, ignore=shutil.ignore_patterns("__*__"))
@@ -207,7 +211,7 @@ def test_designs_with_different_numbers_have_different_hashes(tmp_path):
         (small_sweep(near=0.5), "found near '0.02'; expected near '0.5'"),
     ],
 )  # fmt: skip
-def test_journal_of_another_sweep_is_refused(whole, tmp_path, other, message):
+def test_journal_of_another_sweep_is_rejected(whole, tmp_path, other, message):
     _, _, kept = whole
     path = journal_path(tmp_path / "map.nc")
     path.write_bytes(kept[8])
@@ -218,7 +222,7 @@ def test_journal_of_another_sweep_is_refused(whole, tmp_path, other, message):
     assert path.read_bytes() == kept[8]
 
 
-def test_file_that_is_not_a_journal_is_refused_and_unchanged(tmp_path):
+def test_file_that_is_not_a_journal_is_rejected_and_unchanged(tmp_path):
     path = journal_path(tmp_path / "map.nc")
     path.write_text("notes\n")
     with pytest.raises(BadInput, match="found a file that is not a journal of a sweep"):
@@ -238,7 +242,7 @@ def test_block_size_does_not_change_the_results():
 
 @pytest.mark.slow
 def test_commands_killed_at_random_times_resume_and_write_the_same_file():
-    """Twenty kills here; the benchmark does hundreds."""
+    """Twenty kills suffice here; a benchmark performs hundreds."""
     kills = [sys.executable, ROOT / "benchmarks" / "kills.py", "20"]
     run = [*kills, "--seed", "5"]
     done = subprocess.run(run, capture_output=True, text=True, check=False)
@@ -250,7 +254,9 @@ COMMAND = [sys.executable, "-m", "forcefit", "assembly", "sweep", "five_bar", "-
 
 
 def start_command(folder, *words):
-    """The command in a process group of its own, stopped once its journal has grown."""
+    """Start the command in its own process group, and stop it once its journal has
+    grown.
+    """
     path = folder / "map.nc"
     errors = folder.parent / f"{folder.name}.txt"  # a pipe that is not read fills
     with (
@@ -274,7 +280,7 @@ def start_command(folder, *words):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("words", [[], ["--workers", "1"]])
-def test_ctrl_c_keeps_the_journal_and_the_command_resumes(tmp_path, words):
+def test_ctrl_c_preserves_the_journal_and_the_command_resumes(tmp_path, words):
     run = start_command(tmp_path, *words)
     os.killpg(next(run).pid, signal.SIGINT)
     status, message = next(run)

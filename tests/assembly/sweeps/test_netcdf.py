@@ -16,7 +16,7 @@ SIZE = 6_500_000  # bytes of the file below, about
 
 
 def write(path):
-    """Texts and numbers by slabs, as a sweep does; HDF5 reads back what it wrote."""
+    """Write texts and numbers by slabs, as a sweep does; HDF5 reads them back."""
     names = ("error", "message", "screw", "wrench")
     with netcdf_file(path) as file:
         file.dimensions = {"point": 6_000}
@@ -29,7 +29,7 @@ def write(path):
 
 
 def write_on_a_disk_of(size, path):
-    """The exit status of a process that may write so many bytes."""
+    """Return the exit status of a process that may write only so many bytes."""
     child = os.fork()
     if not child:
         status = 1
@@ -45,7 +45,7 @@ def write_on_a_disk_of(size, path):
 
 
 @pytest.mark.parametrize("share", [0.02, 0.1, 0.6])
-def test_full_disk_is_refused_and_leaves_no_file(tmp_path, share):
+def test_full_disk_is_rejected_and_leaves_no_file(tmp_path, share):
     """HDF5 crashed when it read back data that had not been written."""
     path = tmp_path / "sweep.nc"
     assert write_on_a_disk_of(int(share * SIZE), path) == 2
@@ -58,8 +58,10 @@ def test_file_is_written_if_the_disk_is_large_enough(tmp_path):
     assert path.stat().st_size == pytest.approx(SIZE, rel=0.3)
 
 
-def test_file_with_a_damaged_text_heap_is_refused(tmp_path):
-    """HDF5 steps from entry to entry, and never ends at a free space of size 0."""
+def test_file_with_a_damaged_text_heap_is_rejected(tmp_path):
+    """HDF5 steps from entry to entry, and would never get past a free space of
+    size 0.
+    """
     path = tmp_path / "x.nc"
     texts = {f"a{k}": f"a text of some length, number {k}" for k in range(9)}
     save_dataset(xarray.Dataset({"x": ("y", np.arange(3.0), texts)}), path)

@@ -1,4 +1,4 @@
-"""Figures of quantities by name: panels show the numbers of the file."""
+"""Figures of quantities selected by name show the numbers in the file."""
 
 import numpy as np
 import pytest
@@ -63,7 +63,7 @@ def test_single_natural_frequency_is_plotted(data):
         assert any("frequency" in title for title in titles)
 
 
-def test_unknown_or_too_many_quantities_are_refused_in_one_line(run, data, tmp_path):
+def test_unknown_or_too_many_quantities_are_rejected_in_one_line(run, data, tmp_path):
     save_dataset(data, tmp_path / "s.nc")
     for name, said in (
         ("stifness", 'no "stifness"; did you mean "stiffness"?'),
@@ -91,7 +91,9 @@ def test_histogram_of_a_signed_component_marks_its_negative_mode(arm_draws):
 
 @pytest.fixture
 def arm_draws(rng):
-    """Draws whose platform is 1 mm off against x, normally with 0.05 mm."""
+    """Draws whose platform is off by -1 mm along x, with a normal deviation of
+    0.05 mm.
+    """
     screw = np.zeros((4000, 6))
     screw[:, 3] = rng.normal(-1e-3, 5e-5, 4000)
     return xarray.Dataset(

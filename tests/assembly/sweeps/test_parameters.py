@@ -58,7 +58,7 @@ def test_every_kind_of_number_has_a_path(design, path, value, read):
 
 
 def test_path_of_a_product_of_inertia_names_its_two_axes():
-    """Given in the file: a body without moments has no such number."""
+    """The product must be in the file: a body without moments has no such number."""
     tip = Frame("tip", mass=1.0, inertia=np.diag([1.0, 2.0, 2.5]))
     design = design_of(Robot("ball", "tip", (tip,)))
     assert design.robot({"tip.inertia.xz": 0.3}).frame("tip").inertia[2, 0] == 0.3
@@ -102,14 +102,14 @@ frame = [
          "number > 0"),
     ],
 )  # fmt: skip
-def test_invalid_path_or_number_is_refused_with_one_message(design, values, message):
+def test_invalid_path_or_number_is_rejected_with_one_message(design, values, message):
     with pytest.raises(BadInput) as error:
         design.robot(values)
     assert str(error.value).startswith(message)
 
 
-def test_numbers_that_break_the_closures_are_refused(design):
-    """A frame of the parallelogram 1 mm off its home leaves its closure open."""
+def test_numbers_that_prevent_loop_closure_are_rejected(design):
+    """With a frame 1 mm off its home position, the parallelogram does not close."""
     values = {"leg1.elbow_a.translation.y": 0.2}
     design.check(values)  # a robot file could say it
     with pytest.raises(BadInput, match="does not hold in the home"):

@@ -1,4 +1,4 @@
-"""Tables of points: one row for each point, with the numbers of the data set."""
+"""Point tables have one row for each point, with the numbers in the data set."""
 
 import csv
 import itertools
@@ -46,7 +46,7 @@ def test_point_table_cells_equal_the_data_set(data):
 
 
 def test_pose_components_of_listed_postures_are_columns(tmp_path):
-    """They are no axes: three postures give three rows, not nine."""
+    """They are not axes, so three postures give three rows instead of nine."""
     poses = tmp_path / "poses.csv"
     poses.write_text("id,pose.tx,pose.ty\na,0,0.13\nb,0.01,0.14\nc,0.02,0.13\n")
     data = ff.sweep("five_bar", poses=poses, draws=None)
@@ -55,8 +55,8 @@ def test_pose_components_of_listed_postures_are_columns(tmp_path):
     assert list(table["ty", ""]) == [0.13, 0.14, 0.13]
 
 
-def test_point_table_of_a_robot_without_joints_has_its_rows(tmp_path):
-    """The joint coordinates then have no columns; the rows remain."""
+def test_point_table_of_a_robot_without_joints_has_all_rows(tmp_path):
+    """The joint coordinates have no columns, but all rows exist."""
     (tmp_path / "bar.toml").write_text(
         'platform = "tip"\n[[frame]]\nname = "tip"\nparent = "base"\n'
         "translation = [1.0, 0, 0]\n"
@@ -87,7 +87,7 @@ def test_missing_number_is_an_empty_csv_cell(data, tmp_path):
         assert (row["energy [J]"] == "") == (float(row["tx [m]"]) > 0.01)
 
 
-def test_rows_of_a_table_follow_the_named_axes_and_unknown_axes_are_refused(data):
+def test_rows_of_a_table_follow_the_named_axes_and_unknown_axes_are_rejected(data):
     table = ff.point_table(data, ["wrench_component"])
     assert list(table.index) == list(WRENCH)
     with pytest.raises(ff.BadInput, match='table: no axis "txx"; did you mean "tx"'):

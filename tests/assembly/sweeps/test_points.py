@@ -1,4 +1,4 @@
-"""Points of a sweep equal single postures."""
+"""Sweep points equal single postures."""
 
 from dataclasses import replace
 
@@ -40,7 +40,7 @@ def robot():
 
 @pytest.fixture(scope="module")
 def data(robot):
-    """Everything that can be asked for, at six postures."""
+    """All available quantities at six postures."""
     axes = parse_grid(GRID)
     question = Question(
         robot, None, (), tuple(axes), assumption="free", clearance_only=True,
@@ -50,7 +50,9 @@ def data(robot):
 
 
 def test_swept_wrenches_equal_those_of_one_posture(robot, data):
-    """Both come from multipliers certified to 1e-8 of the energy: 1e-4 of a wrench."""
+    """Both follow from multipliers certified to 1e-8 of the energy, that is 1e-4 of a
+    wrench.
+    """
     answer = solve_assembly(place_robot(robot, pose={"tx": 0.2, "tz": -0.4}))
     found = data.wrench.sel(tx=0.2, tz=-0.4, method="nearest")
     assert found.dims == ("frame", "wrench_component")
@@ -74,7 +76,7 @@ def test_swept_bounds_and_finite_motions_equal_those_of_one_posture(robot, data)
 
 
 def test_error_due_to_clearances_without_errors_has_the_robot_symmetry(data):
-    """Without errors x and -x are equal, to the bounds' gap of 1e-6."""
+    """Without errors, x and -x are equal to within the bounds' gap of 1e-6."""
     for name in ("rotation_error_clearance", "translation_error_clearance"):
         values = data[name].sel(bound="upper").values
         assert values == pytest.approx(values[::-1], abs=2e-6)
@@ -184,13 +186,13 @@ def test_point_with_a_linear_algebra_error_has_its_own_status(robot, monkeypatch
          "sweep: found 110001100 points, expected at most 10000000"),
     ],
 )  # fmt: skip
-def test_invalid_sweep_options_are_refused_with_one_message(options, message):
+def test_invalid_sweep_options_are_rejected_with_one_message(options, message):
     with pytest.raises(BadInput) as error:
         ask_sweep("irsbot2", SweepOptions(**options))
     assert message in str(error.value)
 
 
-def test_figures_need_only_the_data_set(tmp_path):
+def test_figures_require_only_the_data_set(tmp_path):
     path = tmp_path / "errors.toml"
     path.write_text(ERRORS)
     data = sweep(
@@ -215,7 +217,9 @@ def test_figures_need_only_the_data_set(tmp_path):
 
 
 def test_sweep_across_a_singular_line_marks_its_point_as_singular():
-    """Above its centre the locked 3-UPU turns; leg lengths by Pythagoras."""
+    """Above its centre, the locked 3-UPU can rotate; leg lengths follow from
+    Pythagoras.
+    """
     robot = three_upu(seed=1)
     data = sweep_poses(robot, parse_grid("tx=-0.02:0.02:0.02,ty=0,tz=0.45"))
     assert data["status"].values.ravel().tolist() == ["ok", "singular", "ok"]
@@ -226,7 +230,7 @@ def test_sweep_across_a_singular_line_marks_its_point_as_singular():
 
 
 def test_sweep_marks_postures_beyond_a_singularity():
-    """On the five-bar's axis the far arms are in line at 84.85 mm."""
+    """On the axis of the five-bar, the distal arms are collinear at 84.85 mm."""
     data = sweep_poses(load_robot("five_bar"), parse_grid("tx=0,ty=0.08:0.09:0.01"))
     assert data["status"].values.ravel().tolist() == ["beyond_singularity", "ok"]
     reason = str(data["reason"].values.ravel()[0])
@@ -235,7 +239,7 @@ def test_sweep_marks_postures_beyond_a_singularity():
 
 
 def test_sweep_marks_postures_beyond_joint_limits():
-    """Along x the orthoglide's x slide moves with its platform: p_x - r_x = L."""
+    """Along x, the orthoglide's x slide moves with its platform: p_x - r_x = L."""
     robot = load_robot("orthoglide")
     home = home_posture(robot).coordinates[robot.index("x.slide")]
     frames = tuple(
@@ -253,7 +257,7 @@ def test_sweep_marks_postures_beyond_joint_limits():
 
 
 def test_singular_point_where_finite_motions_change_the_energy_is_marked():
-    """A short rod near its dead centre stores energy only by finite motions."""
+    """A short rod near its dead centre stores energy only under finite motions."""
     rod = BeamLink({"radius": 0.01}, 70e9, 0.33)
     robot = slider_crank(0.3, rod, error=-2e-4)
     reach = sum(SLIDER_CRANK)

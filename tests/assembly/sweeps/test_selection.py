@@ -1,4 +1,4 @@
-"""Quantities selected by name are stored with the numbers of the whole sweep."""
+"""Quantities selected by name have the same values as in the full sweep."""
 
 import pytest
 import xarray
@@ -55,7 +55,7 @@ def test_default_selects_the_quantities_stored_without_names(whole):
         ("reading", "--quantities: reading needs effects that change what a device"),
     ],
 )
-def test_invalid_quantities_are_refused_with_one_message(names, message):
+def test_invalid_quantities_are_rejected_with_one_message(names, message):
     with pytest.raises(ff.BadInput) as error:
         ff.sweep("five_bar", grid=GRID, quantities=[names])
     assert str(error.value).startswith(message)
@@ -86,7 +86,7 @@ def test_sweep_command_lists_and_selects_quantities(run, tmp_path):
     assert (status, err) == (0, "")
 
 
-def test_figure_without_usual_quantities_is_refused(tmp_path):
+def test_figure_without_usual_quantities_is_rejected(tmp_path):
     data = ff.sweep("five_bar", grid=GRID, quantities=["condition"])
     with pytest.raises(ff.BadInput, match="found none of the usual quantities"):
         ff.show(data)

@@ -41,7 +41,9 @@ LOAD = (0.0, 0.0, 0.0, 0.0, 0.0, -300.0)
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
 def test_swept_tangent_includes_errors_load_and_clearances(state):
-    """Errors of the varied design; the load changes the tangent."""
+    """The tangent includes the errors of the varied design and changes with
+    the load.
+    """
     options = SweepOptions(
         grid="tx=0.1,tz=-0.5", assumption="none", state=state, load=LOAD,
         vary=["leg1.link_a.geometric_error.rx=0,0.02"],
@@ -69,7 +71,7 @@ def test_swept_tangent_reports_free_motions():
     assert float(data.stiffness.sel(wrench_component="FY").squeeze()) == 0.0
 
 
-def test_unknown_state_is_refused():
+def test_unknown_state_is_rejected():
     options = SweepOptions(grid="tx=0,tz=-0.5", assumption="none", state="exakt")
     with pytest.raises(BadInput, match='--state: found "exakt"'):
         ask_sweep("irsbot2", options)
@@ -97,6 +99,6 @@ def test_swept_frequencies_equal_those_of_single_postures():
         ("irsbot2", 2, "found no moving mass"),
     ],
 )
-def test_sweep_of_frequencies_without_mass_is_refused(robot, count, message):
+def test_sweep_of_frequencies_without_mass_is_rejected(robot, count, message):
     with pytest.raises(BadInput, match=message):
         sweep(robot, grid="tx=0,tz=-0.5", assumption="none", frequencies=count)

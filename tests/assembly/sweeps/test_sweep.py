@@ -1,4 +1,4 @@
-"""Data sets over grids."""
+"""Data sets of sweeps over grids."""
 
 import numpy as np
 import pytest
@@ -65,18 +65,20 @@ def test_saved_sweep_is_read_with_units_and_provenance(data, tmp_path):
         assert np.array_equal(back.energy, data.energy, equal_nan=True)
 
 
-def test_saving_to_a_missing_folder_is_refused(data, tmp_path):
+def test_saving_to_a_missing_folder_is_rejected(data, tmp_path):
     with pytest.raises(BadInput, match="no folder .*nowhere; expected an existing"):
         save_dataset(data, tmp_path / "nowhere" / "map.nc")
 
 
-def test_map_of_a_single_axis_is_refused(data):
+def test_map_of_a_single_axis_is_rejected(data):
     with pytest.raises(ValueError, match="two axes, this one has 1"):
         map_figure(data.isel(tx=[0]))
 
 
 def test_failed_margin_has_the_status_solver_failed_at_its_point(monkeypatch):
-    """The solver fails at one of two points; the other point keeps its result."""
+    """The solver fails at one of two points; the result at the other point is
+    unaffected.
+    """
     solve = points.zone_margin
 
     def spoilt(postures, reading, errors):
@@ -117,7 +119,7 @@ def test_sweep_of_a_robot_object_equals_that_of_its_name():
     )
 
 
-def test_varying_a_robot_object_is_refused():
+def test_varying_a_robot_object_is_rejected():
     with pytest.raises(ff.BadInput, match="--vary: found a robot in memory"):
         ff.sweep(ff.load_robot("five_bar"), grid=FIVE_BAR_GRID, vary=["a.b=1,2"])
 

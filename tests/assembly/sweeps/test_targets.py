@@ -1,4 +1,4 @@
-"""Grids of joints, and postures listed in a table."""
+"""Grids of joint coordinates, and postures listed in a table."""
 
 import numpy as np
 import pytest
@@ -68,7 +68,7 @@ def test_table_of_postures_is_read_in_its_order(robot, tmp_path):
         ("pose.tx\n1\n" + "0" * 200_000, "line 3: not CSV: field larger than"),
     ],
 )  # fmt: skip
-def test_invalid_table_of_postures_is_refused_with_one_message(
+def test_invalid_table_of_postures_is_rejected_with_one_message(
     robot, tmp_path, text, message
 ):
     path = tmp_path / "poses.csv"
@@ -112,7 +112,7 @@ def test_grid_includes_both_ends_if_the_step_fits(text, values):
         ("q.leg1.elbow=0", 'grid: unknown pose component "q.leg1.elbow"'),
     ],
 )  # fmt: skip
-def test_invalid_grid_is_refused_with_one_message(robot, text, message):
+def test_invalid_grid_is_rejected_with_one_message(robot, text, message):
     with pytest.raises(BadInput) as error:
         parse_grid(text, robot)
     assert str(error.value).startswith(message)

@@ -32,7 +32,7 @@ PAPER = {
 
 
 def assert_same(matrix, expected, tol):
-    """Compare entries after dividing by sqrt(ii jj), so rad and m weigh alike."""
+    """Compare entries scaled by sqrt(ii jj), so that rad and m have equal weight."""
     np.testing.assert_allclose(scaled(matrix - expected, expected), 0, atol=tol)
 
 
@@ -49,7 +49,7 @@ def test_stiffness_of_the_papers_link_equals_its_published_table(theory):
 
 @pytest.mark.parametrize("cut", [0.1, 0.5, 0.9])
 def test_two_beams_in_series_have_the_compliance_of_one_beam(cut, rng):
-    """C = A C1 A^T + C2 is exact, so that only rounding is allowed."""
+    """C = A C1 A^T + C2 is exact, so results agree to machine precision."""
     axis, up = rng.normal(size=3), rng.normal(size=3)
     axis /= np.linalg.norm(axis)
 
@@ -61,7 +61,7 @@ def test_two_beams_in_series_have_the_compliance_of_one_beam(cut, rng):
     assert_same(A @ beam(cut * 0.7) @ A.T + beam((1 - cut) * 0.7), beam(0.7), 1e-13)
 
 
-def test_compliance_has_the_entries_of_the_textbook():
+def test_compliance_entries_equal_textbook_values():
     """Gere: F L^3/3EI + F L/GA', F L^2/2EI, M L/EI, T L/GJ, F L/EA."""
     L, G = 0.5, E / (2 * (1 + NU))
     C = beam_compliance(L, SECTION, E, NU)
@@ -77,7 +77,7 @@ def test_compliance_has_the_entries_of_the_textbook():
     assert C[1, 5] == pytest.approx(-(L**2) / (2 * E * s.I_z), rel=1e-14)
 
 
-def test_turning_the_beam_turns_its_compliance(rng):
+def test_rotating_the_beam_rotates_its_compliance(rng):
     R = rotation_matrix(rng.normal(size=3))
     A = np.kron(np.eye(2), R)
     straight = beam_compliance(0.5, SECTION, E, NU, axis=[1, 0, 0], up=[0, 0, 1])
@@ -86,7 +86,7 @@ def test_turning_the_beam_turns_its_compliance(rng):
 
 
 def test_section_height_is_along_the_up_direction():
-    """A plate on edge is stiff against a force along its height."""
+    """A plate on edge is stiff under a force along its height."""
     plate = rectangular_section(width=0.01, height=0.1, nu=NU)
     C = beam_compliance(1.0, plate, E, NU, axis=[1, 0, 0], up=[0, 0, 1], theory="euler")
     assert C[5, 5] == pytest.approx(1 / (3 * E * 0.01 * 0.1**3 / 12), rel=1e-13)
@@ -123,7 +123,7 @@ def test_round_section_constants_equal_hand_calculation():
     ),
     (lambda: Section(1, 1, 1, 0, 1, 1), "section: J = 0 must be finite and > 0"),
 ])  # fmt: skip
-def test_invalid_beam_is_refused(call, message):
+def test_invalid_beam_is_rejected(call, message):
     with pytest.raises(BadInput) as caught:
         call()
     assert message in str(caught.value)
@@ -160,7 +160,7 @@ PARALLEL[[0, 1], [1, 0]] = np.nextafter(1.0, 0.0)
     (1e-9 * PARALLEL, "not positive definite"),
     (np.full((6, 6), math.nan), "expected (6, 6) of finite numbers"),
 ])  # fmt: skip
-def test_invalid_compliance_is_refused(C, message):
+def test_invalid_compliance_is_rejected(C, message):
     with pytest.raises(BadInput) as caught:
         LinkStiffness("test", C, tip=[0, 0, 0], base=[0, 0, 0])
     assert message in str(caught.value)
@@ -187,6 +187,6 @@ def test_section_given_by_its_lengths_bends_as_in_the_textbook(section, moment):
         (0.02, 'section: found 0.02, expected {"radius": 0.02}'),
     ],
 )
-def test_section_that_is_none_is_refused(section, message):
+def test_invalid_section_is_rejected(section, message):
     with pytest.raises(BadInput, match=re.escape(message)):
         beam_compliance(0.5, section, E=7e10, nu=0.33)

@@ -39,7 +39,7 @@ def test_stress_of_a_beam_in_tension_is_force_over_area(section):
 def test_stress_of_a_bent_beam_is_moment_over_section_modulus(
     section, modulus_y, modulus_z
 ):
-    """Section moduli of handbooks; for a long beam shear adds less than 3e-4."""
+    """Section moduli from handbooks; in a long beam, shear adds less than 3e-4."""
     for moment, modulus in ([7.0, 0.0], modulus_y), ([0.0, 7.0], modulus_z):
         stress, _ = peak_beam_stress(section, 0.0, [0, *moment, 0, 0, 0])
         assert stress == pytest.approx(7 / modulus, rel=1e-12)
@@ -56,7 +56,7 @@ def test_stress_of_a_bent_beam_is_moment_over_section_modulus(
     (PLATE, 1.5),  # 3 V / 2 A
 ])  # fmt: skip
 def test_peak_stress_under_shear_alone_equals_textbook_values(section, shape):
-    """Along both section axes, at the neutral fibre; for a thin tube to 2.5e-4."""
+    """Along both section axes, at the neutral fibre; to 2.5e-4 for a thin tube."""
     thin = 3e-4 if shape == 2.0 else 1e-12
     for axis in (4, 5):
         wrench = np.zeros(6)
@@ -101,8 +101,9 @@ def test_peak_stress_of_a_twisted_rectangle_equals_timoshenkos_table(ratio, k):
 @pytest.mark.parametrize("section", [PLATE, {"width": 0.05, "height": 0.02}])
 def test_stresses_of_a_rectangle_integrate_to_the_forces(section):
     """Integrals over the section by Simpson's rule. The tolerance for torsion is 5e-4,
-    since its stress has a kink at the short sides. Outer faces have no shear normal to
-    them."""
+    because its stress has a kink at the short sides. Outer faces have no shear normal
+    to them.
+    """
     fibres, influence = section_stress(section)
     y, z = fibres.reshape(33, 33, 2).transpose(2, 0, 1)
     sigma, tau_y, tau_z = influence.reshape(33, 33, 3, 6).transpose(2, 3, 0, 1)
@@ -206,7 +207,7 @@ def test_peak_stress_is_at_the_tip_when_a_force_cancels_the_base_moment():
     (BAR, 0.1, np.zeros(5), r"wrench has shape \(5,\)"),
     (BAR, 0.1, np.full(6, np.nan), "finite numbers"),
 ])  # fmt: skip
-def test_invalid_stress_input_is_refused(section, length, wrench, message):
+def test_invalid_stress_input_is_rejected(section, length, wrench, message):
     with pytest.raises(BadInput, match=message):
         peak_beam_stress(section, length, wrench)
 
@@ -238,7 +239,7 @@ def test_peak_stress_of_a_heavy_beam_equals_textbook_values(name):
 
 @pytest.mark.parametrize("section", SECTIONS)
 def test_peak_stress_of_a_heavy_beam_equals_the_largest_of_its_two_parts(section, rng):
-    """The wrench of the outer part at any cut loads the inner part's tip."""
+    """At any cut, the wrench of the outer part loads the tip of the inner part."""
     for _ in range(20):
         wrench, weight = rng.normal(size=6) * [1, 1, 1, 20, 20, 20], rng.normal(size=3)
         weight *= 30

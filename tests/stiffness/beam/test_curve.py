@@ -57,7 +57,7 @@ def test_compliance_of_an_l_shape_equals_that_of_two_beams_in_series():
 
 
 def test_compliance_of_a_quarter_circle_equals_castiglianos_solution():
-    """Clamped at (R, 0), pulled at (0, R): in the plane, and across it.
+    """Clamped at (R, 0), loaded at (0, R), in the plane and normal to it.
 
     x: (3 pi/4 - 2) R^3/EI + pi R/4EA;  y: pi R^3/4EI + pi R/4EA;
     z: pi R^3/4EI + (3 pi/4 - 2) R^3/GJ.
@@ -114,16 +114,16 @@ def stepped(t):
     (lambda: i_section(0.1, 0.1, 0.2, 0.01, NU), "expected web < width"),
     (lambda: i_section(0.1, math.nan, 0.01, 0.01, NU), "height = nan"),
 ])  # fmt: skip
-def test_invalid_curve_or_section_is_refused(call, message):
+def test_invalid_curve_or_section_is_rejected(call, message):
     with pytest.raises(BadInput) as caught:
         call()
     assert message in str(caught.value)
 
 
 def measured_section(solid, lengths=(0.15, 0.25)):
-    """Torsion constant and shear area that finite elements show between two lengths.
-
-    Distributing ends: their effect is the same for both lengths and drops out.
+    """Torsion constant and shear area from the difference of finite element results at
+    two lengths. The effect of the distributing ends is equal for both lengths and
+    cancels.
     """
     C = []
     for length in lengths:
@@ -138,11 +138,11 @@ def measured_section(solid, lengths=(0.15, 0.25)):
     return step / (G * grown[2]), step / (G * (grown[4] - bending))
 
 
-def test_shear_energy_of_a_round_bar_has_hutchinsons_factor_instead_of_cowpers():
+def test_shear_energy_of_a_round_bar_agrees_with_hutchinsons_factor():
     """Hutchinson (2001): 6 (1 + nu)^2 / (7 + 12 nu + 4 nu^2) = 0.9252 at nu = 0.3.
 
-    Cowper's 0.8864, which the public format asks of beams, is 4 % lower: a known
-    difference of theories, and 0.2 % of the paper's link.
+    Cowper's 0.8864, which the public format prescribes for beams, is 4 % lower: a known
+    difference between theories, which amounts to 0.2 % for the paper's link.
     """
     J, shear_area = measured_section(lambda L: bar_solid(2, round(40 * L), 0.04, L))
     factor = 6 * (1 + NU) ** 2 / (7 + 12 * NU + 4 * NU**2)

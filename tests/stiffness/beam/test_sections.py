@@ -71,7 +71,7 @@ def test_torsion_constant_of_a_rectangle_equals_saint_venants_series(width, heig
     )
 
 
-def test_section_check_accepts_inner_radius_zero_and_refuses_absurd_sizes():
+def test_section_check_accepts_inner_radius_zero_and_rejects_absurd_sizes():
     check_section("link", {"radius": 1.0, "inner_radius": 0.0})
     for size in (1e-41, 1e41, math.nan):
         with pytest.raises(BadInput, match="expected 0 or a size from"):

@@ -15,7 +15,7 @@ HEAD = "%%MatrixMarket matrix coordinate real {}\n%===\n% Creator: ANSYS Inc\n%=
 
 
 def matrix_market(K, symmetry="symmetric"):
-    """``*EXPORT,K,MMF``: the lower half, from 1 on."""
+    """``*EXPORT,K,MMF``: the lower half, numbered from 1."""
     half = tril(K).tocoo()
     entries = zip(half.row + 1, half.col + 1, half.data.tolist(), strict=True)
     lines = [f"{i} {j} {v:.16e}" for i, j, v in entries]
@@ -24,7 +24,7 @@ def matrix_market(K, symmetry="symmetric"):
 
 
 def harwell_boeing(K, kind="RSA", right_side=True):
-    """``HBMAT``: pointers, rows and values, one to a line."""
+    """``HBMAT``: pointers, rows and values, one per line."""
     half = csc_array(tril(K)) if kind == "RSA" else csc_array(K)
     half.sort_indices()
     n, entries = half.shape[0], half.nnz
@@ -43,7 +43,7 @@ def harwell_boeing(K, kind="RSA", right_side=True):
 
 
 def node_vector(numbers):
-    """``*EXPORT`` of the nodes in the order of rows."""
+    """``*EXPORT`` of the nodes in row order."""
     head = "%%MatrixMarket matrix array integer general\n% Creator: ANSYS Inc\n"
     return head + "\n".join(map(str, [f"{len(numbers)} 1", *numbers, ""]))
 
@@ -70,8 +70,9 @@ def solid(tmp_path):
 
 @pytest.mark.parametrize("symmetry", ["symmetric", "general"])
 def test_matrix_market_rows_follow_the_vector_of_nodes(solid, symmetry):
-    """One half is stored, whatever the header states;
-    rows are grouped by node in the order of the vector."""
+    """Only one half is stored, whatever the header states, and rows are grouped by node
+    in the order of the vector.
+    """
     folder, K, order = solid
     expected = import_link(folder / "k.mtx", nodes=folder / "nodes.csv", **ENDS)
     (folder / "full.mmf").write_text(matrix_market(K, symmetry))
@@ -99,7 +100,7 @@ def test_harwell_boeing_rows_follow_the_mapping_file(solid, kind):
     assert link.mass == pytest.approx(0.324)
 
 
-def test_node_table_with_decimal_commas_is_read_and_a_second_unit_is_refused(solid):
+def test_node_table_with_decimal_commas_is_read_and_a_second_unit_is_rejected(solid):
     folder, K, order = solid
     expected = import_link(folder / "k.mtx", nodes=folder / "nodes.csv", **ENDS)
     places = [line.split(",") for line in (folder / "nodes.csv").read_text().split()]
@@ -114,7 +115,7 @@ def test_node_table_with_decimal_commas_is_read_and_a_second_unit_is_refused(sol
         import_link(folder / "full.mtx", nodes=folder / "nodes.txt", unit="mm", **ENDS)
 
 
-def test_mapping_of_six_freedoms_per_node_is_read(tmp_path):
+def test_mapping_of_six_degrees_of_freedom_per_node_is_read(tmp_path):
     """A superelement of two nodes, with the second node first."""
     B = np.random.default_rng(0).normal(size=(12, 12))
     K = B @ B.T
@@ -136,7 +137,7 @@ def test_mapping_of_six_freedoms_per_node_is_read(tmp_path):
     ("1 1\n", "expected the number of a row, the number of a node and a label"),
     ("Matrix Eqn\n", "expected rows numbered from 1"),
 ])  # fmt: skip
-def test_wrong_mapping_is_refused_in_one_line(text, message, tmp_path):
+def test_wrong_mapping_is_rejected_in_one_line(text, message, tmp_path):
     (tmp_path / "k.mtx").write_text(matrix_market(csc_array(np.eye(12))))
     (tmp_path / "k.mapping").write_text(text)
     with pytest.raises(BadInput) as caught:
@@ -152,7 +153,7 @@ def test_wrong_mapping_is_refused_in_one_line(text, message, tmp_path):
     (lambda t: t.replace("1.000000000000000D+00", "1.0000x0000000000D+00", 1),
      "expected a number"),
 ])  # fmt: skip
-def test_wrong_harwell_boeing_file_is_refused(change, message, tmp_path):
+def test_wrong_harwell_boeing_file_is_rejected(change, message, tmp_path):
     text = harwell_boeing(csc_array(np.eye(12)), right_side=False)
     (tmp_path / "k.matrix").write_text(change(text))
     with pytest.raises(BadInput, match=message):
@@ -166,7 +167,7 @@ def test_wrong_harwell_boeing_file_is_refused(change, message, tmp_path):
     ("array real symmetric", "3 3\n2\n1\n0\n3\n0\n4\n"),
 ])  # fmt: skip
 def test_matrix_market_file_of_every_kind_is_read(head, numbers, tmp_path):
-    """Arrays are column by column; symmetric matrices have the lower half."""
+    """Arrays are stored by column; of symmetric matrices, the lower half is stored."""
     matrix = np.array([[2.0, 1, 0], [1, 3, 0], [0, 0, 4]])
     path = tmp_path / "k.mtx"
     path.write_text(f"%%MatrixMarket matrix {head}\n% a comment\n{numbers}")
@@ -186,7 +187,7 @@ def test_matrix_market_file_of_every_kind_is_read(head, numbers, tmp_path):
     ("array real general\n2 3\n1 1 1 1 1 1\n", "found 2 by 3 numbers"),
     ("array real general\n2 2\n1 1 x 1\n", "expected a number"),
 ])  # fmt: skip
-def test_damaged_matrix_market_file_is_refused(text, message, tmp_path):
+def test_damaged_matrix_market_file_is_rejected(text, message, tmp_path):
     """SciPy's reader accepts some of these, or allocates their stated size."""
     (tmp_path / "k.mtx").write_text(f"%%MatrixMarket matrix {text}")
     with pytest.raises(BadInput, match=message):

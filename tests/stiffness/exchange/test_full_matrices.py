@@ -53,7 +53,7 @@ def backwards(nodes):
 
 @pytest.mark.parametrize("order", [in_order, backwards])
 def test_three_column_matrix_takes_its_nodes_from_the_input_deck(order, tmp_path):
-    """Rows without names are three per node, in the order of the deck."""
+    """Unnamed rows are three per node, in the order of the deck."""
     nodes, K = full_matrix((1, 1, 2))
     write_solid(tmp_path, nodes, K)
     ends = {"base": "z=0", "tip": "z=0.2"}
@@ -66,8 +66,10 @@ def test_three_column_matrix_takes_its_nodes_from_the_input_deck(order, tmp_path
 
 
 @pytest.mark.slow
-def test_calculix_stiffness_mass_and_freedom_files_are_read(tmp_path):
-    """``.sti`` and ``.mas`` hold upper halves by columns; ``.dof`` names their rows."""
+def test_calculix_stiffness_mass_and_dof_files_are_read(tmp_path):
+    """``.sti`` and ``.mas`` contain upper halves by column; ``.dof`` names
+    their rows.
+    """
     nodes, K = full_matrix((1, 1, 2))
     write_solid(tmp_path, nodes, K)
     ends = {"base": "z=0", "tip": "z=0.2"}
@@ -127,7 +129,7 @@ def test_condensed_solid_agrees_with_exudyn(tmp_path):
 
 
 def test_nastran_grids_in_narrow_wide_and_free_fields_are_read(tmp_path):
-    """A wide-field entry takes two lines; exponents may lack their letter."""
+    """A wide-field entry occupies two lines; exponents may lack their letter."""
     path = tmp_path / "bar.bdf"
     path.write_text(
         "$ a comment\nCEND\nBEGIN BULK\n"
@@ -147,7 +149,7 @@ def test_nastran_grids_in_narrow_wide_and_free_fields_are_read(tmp_path):
     assert np.array(list(nodes.values())) == pytest.approx(np.array(expected))
 
 
-def test_nastran_grid_in_another_coordinate_system_is_refused(tmp_path):
+def test_nastran_grid_in_another_coordinate_system_is_rejected(tmp_path):
     """The line refers to a coordinate system that it does not define."""
     path = tmp_path / "bar.bdf"
     path.write_text("GRID,9,4,1.,2.,3.\n")
@@ -156,8 +158,9 @@ def test_nastran_grid_in_another_coordinate_system_is_refused(tmp_path):
 
 
 def test_stiffness_and_mass_are_selected_among_the_matrices_of_a_punch_file(tmp_path):
-    """Both are square;
-    the file also has a rectangular matrix whose name begins with M."""
+    """Both are square; the file also contains a rectangular matrix whose name begins
+    with M.
+    """
     path = tmp_path / "part.pch"
     path.write_text(
         "DMIG    KAAX           0       6       2       0\n"

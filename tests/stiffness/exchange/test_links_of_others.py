@@ -1,4 +1,4 @@
-"""Import of links from other programs: a textbook beam, refusals, export and import."""
+"""Import of links from other programs: a textbook beam, invalid input, round trips."""
 
 import json
 
@@ -45,7 +45,7 @@ def textbook_beam(length=LENGTH):
 
 
 def beam_mass():
-    """(12, 12) mass matrix of two lumps: half the beam's mass at each node."""
+    """(12, 12) lumped mass matrix, with half of the beam's mass at each node."""
     half = RHO * np.pi * RADIUS**2 * LENGTH / 2
     M = np.zeros((12, 12))
     for k in (0, 1, 2, 6, 7, 8):
@@ -54,7 +54,7 @@ def beam_mass():
 
 
 def expected_stiffness():
-    """(6, 6) of the same beam in SI, from the library's own closed form."""
+    """(6, 6) stiffness of the same beam in SI units, from the library's closed form."""
     section = round_section(RADIUS * 1e-3, NU)
     C = beam_compliance(LENGTH * 1e-3, section, E * 1e6, NU, theory="euler")
     return np.linalg.inv(C)
@@ -65,7 +65,7 @@ def assert_same(K, expected, tolerance=1e-9):
 
 
 def user_element(K, M=None, head="** 1, 2\n1, 2, 3, 4, 5, 6\n"):
-    """Abaqus' text of a symmetric matrix, four numbers a line."""
+    """Abaqus text of a symmetric matrix, four numbers per line."""
     text = f"**\n*USER ELEMENT, NODES= 2, LINEAR\n** ELEMENT NODES\n{head}"
     for kind, matrix in (("STIFFNESS", K), ("MASS", M)):
         if matrix is not None:
@@ -78,7 +78,7 @@ def user_element(K, M=None, head="** 1, 2\n1, 2, 3, 4, 5, 6\n"):
 
 
 def calculix_element(K):
-    """CalculiX' text: every freedom is a node of its own."""
+    """CalculiX text, in which every degree of freedom is a separate node."""
     order = [(1, d) for d in range(1, 7)] + [(2, d) for d in range(1, 7)]
     head = "**" + ",".join(f"{n:10}" for n, _ in order[:10]) + ",\n"
     head += "**" + ",".join(f"{n:10}" for n, _ in order[10:]) + ",\n"
@@ -129,8 +129,9 @@ def test_textbook_beam_from_every_program_has_its_stiffness(name, write, tmp_pat
 )
 @pytest.mark.parametrize("unit", ["m", "mm"])
 def test_exported_link_is_imported_with_the_same_stiffness(to, unit, tmp_path, rng):
-    """For any stiffness and offset;
-    to ten digits in Nastran's fields, to rounding otherwise."""
+    """For any stiffness and offset, to ten digits in Nastran's fields and otherwise to
+    machine precision.
+    """
     L = rng.normal(size=(6, 6))
     size = np.array([3, 2, 1, 1e4, 2e4, 3e4])
     K = (L @ L.T + np.eye(6)) * np.outer(size, size)
@@ -153,8 +154,9 @@ def test_exported_matrix_market_file_is_read_by_scipy(tmp_path):
 
 
 def test_mass_centre_and_inertia_are_computed_from_a_mass_matrix(tmp_path):
-    """Two lumps at the ends:
-    the centre is in the middle, the inertia about it m L^2 / 4."""
+    """With two lumps at the ends, the centre is in the middle and the inertia about it
+    is m L^2 / 4.
+    """
     path = tmp_path / "k.mtx"
     path.write_text(user_element(textbook_beam(), beam_mass()))
     link = import_link(path, mass=path, unit="mm")
@@ -192,7 +194,7 @@ def test_chain_of_two_half_beams_is_condensed_to_one_beam(tmp_path):
     (lambda K: K, ["--order", "x"], '--order: found "x"'),
     (lambda K: np.array(["a"]), [], "expected a square matrix of numbers"),
 ])  # fmt: skip
-def test_matrix_that_is_not_the_stiffness_of_a_link_is_refused_in_one_line(
+def test_matrix_that_is_not_the_stiffness_of_a_link_is_rejected_in_one_line(
     run, matrix, options, message, tmp_path
 ):
     path = tmp_path / "k.npy"
@@ -225,7 +227,7 @@ def test_matrix_that_is_not_the_stiffness_of_a_link_is_refused_in_one_line(
     ("k.npz", "not numpy", "not a matrix of NumPy"),
     ("k.odb", "", "found the ending .odb, expected one of"),
 ])  # fmt: skip
-def test_wrong_matrix_file_is_refused_in_one_line(run, name, text, message, tmp_path):
+def test_wrong_matrix_file_is_rejected_in_one_line(run, name, text, message, tmp_path):
     (tmp_path / name).write_text(text)
     status, out, err = run("stiffness", "convert", tmp_path / name)
     assert (status, out) == (2, "")
@@ -241,8 +243,8 @@ def rod(run, tmp_path):
     return path
 
 
-def test_rod_exported_to_nastran_and_imported_keeps_its_stiffness(run, rod):
-    """By the commands' own files: beam --json, export, import --json."""
+def test_rod_stiffness_is_preserved_by_export_to_nastran_and_import(run, rod):
+    """The commands' files are used: beam --json, export, import --json."""
     punch = rod.with_name("rod.pch")
     assert run("stiffness", "convert", rod, "--to", "nastran", "-o", punch)[0] == 0
     status, out, _ = run("stiffness", "convert", punch, "--json", "-")
@@ -251,8 +253,8 @@ def test_rod_exported_to_nastran_and_imported_keeps_its_stiffness(run, rod):
     assert_same(np.array(json.loads(out)["stiffness"]), K, 1e-8)
 
 
-def test_matrix_of_one_program_becomes_that_of_another_in_one_step(run, tmp_path):
-    """A free beam is the same body after it passed through both files."""
+def test_matrix_is_converted_from_one_program_to_another_in_one_step(run, tmp_path):
+    """A free beam is the same body after passing through both files."""
     first, second = tmp_path / "k.pch", tmp_path / "k.mtx"
     K, offset = expected_stiffness(), np.array([-0.5, 0, 0])
     first.write_bytes(link_file(K, offset, "nastran", "mm"))
@@ -276,7 +278,7 @@ def test_matrix_of_one_program_becomes_that_of_another_in_one_step(run, tmp_path
          "--tip: found together with the results k.json"),
     ],
 )  # fmt: skip
-def test_options_that_do_not_fit_a_conversion_are_refused(run, words, message):
+def test_options_not_applicable_to_a_conversion_are_rejected(run, words, message):
     status, out, err = run("stiffness", "convert", *words)
     assert (status, out) == (2, "")
     assert message in err

@@ -19,7 +19,7 @@ from tests.stiffness.exchange.test_links_of_others import (
 
 
 def columns(K, first=1):
-    """Each column's node and direction, with the rows of its lower half."""
+    """Return node and direction of each column, with the rows of its lower half."""
     for j in range(len(K)):
         rows = [i for i in range(j, len(K)) if K[i, j]]
         terms = [(i // 6 + first, i % 6 + 1, K[i, j]) for i in rows]
@@ -28,7 +28,7 @@ def columns(K, first=1):
 
 
 def between_commas(K, name):
-    """Free fields: as many terms in a line as a column has."""
+    """Free fields, with all terms of a column in one line."""
     text = f"DMIG,{name},0,6,2,0\n"
     for node, direction, terms in columns(K):
         text += f"DMIG,{name},{node},{direction}," + "".join(
@@ -39,7 +39,7 @@ def between_commas(K, name):
 
 
 def cards_between_commas(K, name):
-    """Free fields: eight a card, the others on lines that begin with a comma."""
+    """Free fields, eight per card, continued on lines that begin with a comma."""
     text = f"DMIG,{name},0,6,2,0\n"
     for node, direction, terms in columns(K):
         words = [f"{n},{d},{v:.12E}," for n, d, v in terms]
@@ -50,7 +50,7 @@ def cards_between_commas(K, name):
 
 
 def between_blanks(K, name, first=1):
-    """Free fields between blanks, in which no field can be empty."""
+    """Free fields separated by blanks, of which none can be empty."""
     text = f"DMIG {name} 0 6 2 0\n"
     for node, direction, terms in columns(K, first):
         text += f"DMIG {name} {node} {direction}"
@@ -59,7 +59,7 @@ def between_blanks(K, name, first=1):
 
 
 def large_fields(K, name):
-    """Sixteen characters a field, one term on a line."""
+    """Sixteen characters per field, one term per line."""
     text = f"DMIG    {name:8}       0       6       2       0\n"
     for node, direction, terms in columns(K):
         text += f"DMIG*   {name:16}{node:16}{direction:16}\n"
@@ -115,7 +115,7 @@ DIAGONAL = "DMIG,KAAX,0,6,2,0\n" + "".join(
     (large_fields(textbook_beam(), "K4AAX"),
      r"K4AAX \(structural damping\), expected one"),
 ])  # fmt: skip
-def test_wrong_dmig_is_refused(text, message, tmp_path):
+def test_wrong_dmig_is_rejected(text, message, tmp_path):
     path = tmp_path / "k.dmig"
     path.write_text(text)
     with pytest.raises(BadInput, match=message):

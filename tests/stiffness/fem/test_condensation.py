@@ -18,8 +18,9 @@ CENTERS = np.array([[0.02, 0.05, 0.01], [0.03, 0.02, 0.23]])
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_condensed_stiffness_equals_twice_the_energy_of_its_fields(kind):
-    """K from the whole assembled matrix; the base rests,
-    the tip's mean motion is the screw, and forces act at the interfaces alone."""
+    """K follows from the entire assembled matrix; the base is at rest, the tip's mean
+    motion is the screw, and forces act only at the interfaces.
+    """
     mesh = isoparametric(box_solid((1, 2, 2), SIZE), 2)
     solution = condense(mesh, *constants(mesh), CENTERS, kind)
     upper = assemble(mesh, *constants(mesh)).toarray()

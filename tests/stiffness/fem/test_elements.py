@@ -1,4 +1,4 @@
-"""Finite elements of links: symmetries, closed forms, rates of convergence."""
+"""Finite elements: symmetries, closed forms and convergence rates."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ MESHES = [  # order, and whether edges are cut into layers
 
 
 def full(upper):
-    """The whole matrix from its upper triangle."""
+    """Complete a matrix from its upper triangle."""
     dense = upper.toarray()
     return dense + dense.T - np.diag(np.diag(dense))
 
@@ -67,7 +67,7 @@ both_orders = pytest.mark.parametrize("order", [2, 3])
 
 @pytest.mark.parametrize(("order", "layers"), MESHES)
 def test_only_the_six_rigid_motions_store_no_energy(rng, order, layers):
-    """Curved and cut elements included: they represent linear fields exactly."""
+    """This includes curved and cut elements, which represent linear fields exactly."""
     mesh = curved_mesh(order, layers)
     K = full(assemble(mesh, *constants(mesh)))
     motions = rigid_motions(mesh.nodes, np.array([0.3, 0.2, 0.1])).reshape(-1, 6)
@@ -88,7 +88,7 @@ def test_only_the_six_rigid_motions_store_no_energy(rng, order, layers):
 
 @pytest.mark.parametrize(("order", "layers"), MESHES)
 def test_linear_field_is_exact_on_any_mesh(rng, order, layers):
-    """Patch test: inner nodes have the linear field that the boundary has."""
+    """Patch test: inner nodes follow the linear field prescribed on the boundary."""
     solid = split_joining_edges(crooked(rng), (0, 1))
     parts = layered(solid, (0, 1)) if layers else None
     mesh = isoparametric(solid, order, parts)
@@ -107,7 +107,7 @@ def test_linear_field_is_exact_on_any_mesh(rng, order, layers):
 
 @pytest.mark.parametrize("curved", [False, True])
 def test_stiffness_matrix_equals_that_of_scikit_fem(curved):
-    """A second program, which shares only the quadrature rule with this one."""
+    """scikit-fem shares only the quadrature rule with this program."""
     import skfem
     from scipy.spatial import cKDTree
     from skfem.models.elasticity import linear_elasticity
@@ -134,8 +134,9 @@ def test_stiffness_matrix_equals_that_of_scikit_fem(curved):
 
 @both_orders
 def test_strain_energy_of_a_polynomial_field_equals_its_integral(rng, order):
-    """A second method: the strain energy of u = A m, where m are all monomials of the
-    degree, by differentiating monomials and a tensor rule on the whole box."""
+    """The reference is the strain energy of u = A m, where m are all monomials of the
+    degree, from differentiated monomials and a tensor-product rule on the whole box.
+    """
     size = np.array([0.5, 0.6, 0.8])
     mesh = isoparametric(box_solid((1, 2, 2), size), order)
     powers = lattice(order)[:, 1:]
@@ -161,7 +162,7 @@ def test_strain_energy_of_a_polynomial_field_equals_its_integral(rng, order):
 
 @both_orders
 @pytest.mark.parametrize("kind", KINDS)
-def test_turning_the_mesh_turns_the_stiffness(rng, kind, order):
+def test_rotating_the_mesh_rotates_the_stiffness(rng, kind, order):
     solid = box_solid((2, 2, 3), (0.05, 0.08, 0.2))
     R = rotation_matrix(rng.normal(size=3))
     turned = Solid(
@@ -207,9 +208,11 @@ def test_stiffness_at_another_tip_follows_from_a_screw_map(order):
 def test_distributing_interfaces_reproduce_the_compliance_of_a_round_beam(
     order, rings, layers, rel
 ):
-    """Tractions are linear over the face: for moments, tension and torsion of a round
-    bar the exact solution is the beam's, without an end effect. The remaining error is
-    the circle's: h^4 for quadratic elements and h^6 for cubic ones."""
+    """Tractions are linear over the face, so for moments, tension and torsion of a
+    round bar the exact solution is that of the beam, without an end effect. The
+    remaining error is that of the circle: h^4 for quadratic elements and h^6 for cubic
+    ones.
+    """
     solid = bar_solid(rings, layers, 0.04, 0.2)
     _, solution = solved(solid, order, "distributing-both")
     C = inverted(solution.stiffness)
@@ -235,7 +238,7 @@ def test_papers_bar_with_a_distributing_tip_agrees_with_its_converged_stiffness(
 
 
 @pytest.mark.slow
-def test_excess_over_timoshenkos_beam_is_inverse_to_the_length():
+def test_excess_over_the_timoshenko_beam_is_inversely_proportional_to_length():
     """The end effect c r / L halves when the length doubles (slope -1 within 0.05)."""
     excess = []
     lengths = np.array([0.4, 0.8, 1.6])
@@ -252,7 +255,7 @@ def test_excess_over_timoshenkos_beam_is_inverse_to_the_length():
 
 @both_orders
 def test_tension_and_bending_of_a_bar_are_exact_at_zero_poissons_ratio(order):
-    """Without lateral contraction rigid ends have no end effect; K_TZ = E A / L."""
+    """Without lateral contraction, rigid ends have no end effect; K_TZ = E A / L."""
     mesh = isoparametric(box_solid((2, 2, 4), (0.03, 0.05, 0.2)), order)
     lam, mu = lame(E, 0.0)
     ones = np.ones(len(mesh.cells))

@@ -1,4 +1,4 @@
-"""Error estimates: exact fields, known errors, coverage."""
+"""Error estimates: exact fields, known errors and coverage."""
 
 from functools import cache
 
@@ -41,7 +41,7 @@ def volume(mesh):
 
 
 def test_estimated_error_is_zero_for_rigid_motions_and_constant_strains():
-    """Also on bent elements, which represent linear fields exactly."""
+    """This holds even on curved elements, which represent linear fields exactly."""
     mesh, K = bar(1, 6).mesh, bar(1, 6).solution.stiffness
     lam, mu = constants(mesh)
     singular = np.ones(len(mesh.cells), dtype=bool)
@@ -56,7 +56,7 @@ def test_estimated_error_is_zero_for_rigid_motions_and_constant_strains():
 
 
 def shifted(excess, kind="distributing-both"):
-    """Compliance of a bar, and geometry errors of a slightly larger radius."""
+    """Compliance of a bar, and geometry errors for a slightly larger radius."""
     solid = bar_solid(2, 5, R, 0.25)
     mesh = isoparametric(solid)
     lam, mu = constants(mesh)
@@ -69,9 +69,10 @@ def shifted(excess, kind="distributing-both"):
 
 @pytest.mark.parametrize("excess", [1e-3, -1e-3])
 def test_geometry_error_of_a_bar_follows_the_powers_of_its_radius(excess):
-    """Free ends: A grows with R^2, I and J with R^4; K_h - K = -4 x the excess of K in
-    bending and torsion, -2 x in tension, to first order (1 %: the circle's and the
-    square's error)."""
+    """With free ends, A grows with R^2, and I and J with R^4; K_h - K = -4 x the excess
+    of K in bending and torsion, -2 x in tension, to first order (1 %: the circle's and
+    the square's error).
+    """
     C, each = shifted(excess)
     softer = C @ each.sum(axis=0) @ C
     power = np.array([4, 4, 4, 2])

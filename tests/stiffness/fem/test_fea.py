@@ -40,9 +40,10 @@ PLANES = (parse_interface("z=0"), parse_interface("z=0.452"))
 
 @pytest.mark.slow
 def test_papers_bar_from_its_surface_agrees_within_its_estimated_error(cache):
-    """The converged bending stiffness is 1 032 277 N m/rad, that of torsion G J / L.
-    The requested accuracy is 0.5 %, and the estimate must cover the true error. The
-    mesh's own stiffness is above the true one, by no more than twice the estimate."""
+    """The converged bending stiffness is 1 032 277 N m/rad, and the torsional one G J /
+    L. The requested accuracy is 0.5 %, and the estimate must cover the true error. The
+    mesh's own stiffness is above the true one, by no more than twice the estimate.
+    """
     solution = solve_link(
         bar_surface(),
         *PLANES,
@@ -73,7 +74,7 @@ def test_papers_bar_from_its_surface_agrees_within_its_estimated_error(cache):
 
 @pytest.mark.slow
 def test_bar_of_two_materials_stretches_like_two_springs_in_series(cache):
-    """Tension only; the end effect, which both bars have, is within 2 %."""
+    """This applies to tension; the end effect of both bars is within 2 %."""
     middle = CutFace(Plane(np.array([0, 0, 0.226]), np.array([0, 0, 1.0])))
     half = Material(2 * E, NU, where=lambda p: p[:, 2] > 0.226, faces=(middle,))
     options = FemOptions(cache=cache, budget=Budget(levels=2))
@@ -89,7 +90,7 @@ def test_bar_of_two_materials_stretches_like_two_springs_in_series(cache):
     ({"accuracy": 0.0}, "accuracy = 0 must lie between"),
     ({"materials": []}, "at least one"),
 ])  # fmt: skip
-def test_wrong_options_are_refused(change, message, cache):
+def test_wrong_options_are_rejected(change, message, cache):
     given = {"materials": [Material(E, NU)], "cache": cache} | change
     materials = given.pop("materials")
     with pytest.raises(BadInput) as caught:
@@ -98,7 +99,7 @@ def test_wrong_options_are_refused(change, message, cache):
 
 
 def test_mesh_is_refined_up_to_the_budget_of_unknowns():
-    """The requested accuracy does not fit into the budget, which the results report."""
+    """The requested accuracy exceeds the budget, which the results report."""
     section, material = {"width": 0.3, "height": 0.3}, Material(E, NU)
     first = solve_bar(section, material, FemOptions(1e-3, budget=Budget(levels=1))).link
     budget = Budget(unknowns=2 * first.mesh["unknowns"])
@@ -113,13 +114,13 @@ def test_mesh_is_refined_up_to_the_budget_of_unknowns():
 
 
 @pytest.mark.parametrize("budget", [Budget(unknowns=99), Budget(seconds=1e-9)])
-def test_first_mesh_that_exceeds_the_budget_is_refused(budget):
+def test_first_mesh_that_exceeds_the_budget_is_rejected(budget):
     words = r"the coarsest mesh that follows the part has \d+ unknowns, about .* s and"
     with pytest.raises(MeshFailed, match=f"{words}.*allow more time"):
         solve_bar({"radius": 0.1}, Material(E, NU), FemOptions(budget=budget))
 
 
-def test_text_of_an_interface_that_cannot_be_read_is_named():
+def test_interface_text_that_cannot_be_parsed_is_reported():
     surface = Path(__file__).parents[3] / "meshes/tapered_arm.stl"
     with pytest.raises(BadInput, match="base: found 'q=0', expected"):
         mesh_link(surface, "q=0", "z=0.35", E=7e10, nu=0.33)

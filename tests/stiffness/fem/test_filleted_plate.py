@@ -1,4 +1,4 @@
-"""Finite elements of a filleted plate with rounded corners, as from CAD programs."""
+"""Finite elements of a filleted plate with rounded corners, as made by CAD programs."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Masses, centres and inertias of solids with point masses, by Steiner's rule."""
+"""Mass properties of solids with point masses, by Steiner's rule."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def box():
 
 
 def inertia_of_points(masses, places):
-    """About their centre: sum m (x.x I - x x^T)."""
+    """Inertia about the centre of mass: sum m (x.x I - x x^T)."""
     centre = masses @ places / masses.sum()
     x = places - centre
     squares = np.einsum("i,ij,ij->", masses, x, x)

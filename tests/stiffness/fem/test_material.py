@@ -1,4 +1,4 @@
-"""Isotropic materials: accepted values and refusals."""
+"""Isotropic materials: accepted and rejected values."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from tests.solids_for_tests import box_solid
 
 
 @pytest.mark.parametrize("density", [-1e-9, np.inf, np.nan])
-def test_wrong_density_is_refused(density):
+def test_wrong_density_is_rejected(density):
     with pytest.raises(BadInput, match="density"):
         Material(2.1e11, 0.3, density)
 

@@ -1,4 +1,4 @@
-"""Materials by the solids of a STEP file, against closed forms."""
+"""Materials assigned to solids in a STEP file, against closed forms."""
 
 from dataclasses import replace
 
@@ -29,7 +29,7 @@ def solved(surface, length, materials, accuracy=0.01):
 
 @pytest.fixture(scope="module")
 def bar():
-    """Two prisms in series; without Poisson's ratio sections stay what they are."""
+    """Two prisms in series, whose sections do not change at zero Poisson's ratio."""
     surface = bar_of_two_boxes(WIDTH, HEIGHT, NEAR, FAR)
     materials = [Material(ALUMINIUM, 0, 2700, solid="near"),
                  Material(STEEL, 0, 7800, solid="far")]  # fmt: skip
@@ -38,13 +38,13 @@ def bar():
 
 @pytest.fixture(scope="module")
 def rod():
-    """A rod of steel glued into a tube of a third of its modulus."""
+    """A steel rod glued into a tube with a third of its modulus."""
     materials = [Material(ALUMINIUM, 0, 1600), Material(STEEL, 0, 7800, solid="rod")]
     return solved(rod_in_tube(INNER, OUTER, LENGTH), LENGTH, materials)
 
 
 def test_compliance_of_prisms_in_series_equals_the_unit_load_integrals(bar):
-    """L / E A and L / E I add up; a tip force adds shear with 6 / 5 of L / G A."""
+    """L / E A and L / E I add up; a tip force adds shear, 6 / 5 of L / G A."""
     A = WIDTH * HEIGHT
     C = inverted(bar.level.solution.stiffness)
     flexible = lambda I: (FAR / STEEL + NEAR / ALUMINIUM) / I  # noqa: E731
@@ -70,7 +70,7 @@ def test_mass_and_centre_include_both_solids(bar):
 
 @pytest.mark.slow
 def test_stiffness_of_a_rod_in_a_tube_is_the_sum_of_both(rod):
-    """G J and E A add up exactly, since circles rotate as a whole."""
+    """G J and E A add up exactly, because circles rotate as a whole."""
     K = rod.level.solution.stiffness
     areas = np.pi * np.array([INNER**2, OUTER**2 - INNER**2])
     J = np.pi / 2 * np.array([INNER**4, OUTER**4 - INNER**4])
@@ -103,13 +103,13 @@ def test_stress_at_the_face_between_two_solids_is_that_of_each_material(rod):
     (["", "rood"], r'no solid "rood"; did you mean "rod"\?'),
     (["", "rod+tub"], r'no solid "tub"; did you mean "tube"\?'),
 ])  # fmt: skip
-def test_unknown_solid_or_solid_without_material_is_refused_by_name(given, message):
+def test_unknown_solid_or_solid_without_material_is_rejected_by_name(given, message):
     surface = rod_in_tube(INNER, OUTER, LENGTH)
     with pytest.raises(BadInput, match=message):
         placed_materials(surface, [Material(STEEL, 0.3, solid=name) for name in given])
 
 
-def test_solids_that_overlap_are_refused():
+def test_solids_that_overlap_are_rejected():
     surface = rod_in_tube(INNER, OUTER, LENGTH)
     solids = replace(surface.solids, overlaps=("solids a and b have 1 m^3 in common",))
     with pytest.raises(BadInput, match="a and b have 1 m.3 in common; expected solids"):
@@ -119,7 +119,7 @@ def test_solids_that_overlap_are_refused():
         )
 
 
-def test_a_surface_without_solids_is_refused():
+def test_a_surface_without_solids_is_rejected():
     surface = check_surface(*cylinder(), "part.stl")
     with pytest.raises(BadInput, match=r'part.stl: found a material of solid "rod"'):
         placed_materials(surface, [Material(STEEL, 0.3, solid="rod")])

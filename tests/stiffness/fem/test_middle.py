@@ -1,4 +1,4 @@
-"""Middle of the interval that contains a stiffness: closed forms and properties."""
+"""Midpoint of the interval that contains a stiffness: closed forms and properties."""
 
 from dataclasses import replace
 
@@ -36,8 +36,9 @@ def test_estimated_error_covers_the_whole_interval(seed, size):
 
 
 def test_middle_stiffness_does_not_depend_on_units():
-    """Millimetres in place of metres,
-    also where less than half of the error is subtracted."""
+    """Millimetres replace metres, including cases where less than half of the error is
+    subtracted.
+    """
     units = np.outer(np.repeat([1.0, 1e3], 3), np.repeat([1.0, 1e3], 3))
     for size in (1e-3, 10.0):
         K, E, g = random_definite(6), random_definite(7, size), random_definite(8, 0.1)

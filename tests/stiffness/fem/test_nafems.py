@@ -1,4 +1,4 @@
-"""NAFEMS's standard tests LE1, LE10 and LE11: our elements on structured meshes.
+"""NAFEMS standard tests LE1, LE10 and LE11 with cubic elements on structured meshes.
 
 The Standard NAFEMS Benchmarks (1990).  LE1 and LE10 are quarters of an elliptic ring:
 inner (x / 2)^2 + y^2 = 1, outer (x / 3.25)^2 + (y / 2.75)^2 = 1; E = 210 GPa, nu = 0.3.
@@ -24,7 +24,7 @@ LAM, MU = lame(210e9, 0.3)
 
 
 def ring(counts, thickness):
-    """Cubic tetrahedra of the ring; nodes in the unit box come along."""
+    """Cubic tetrahedra of the ring, together with their nodes in the unit box."""
     flat = isoparametric(box_solid(counts, (1.0, 1.0, 1.0)))
     s, t, height = flat.nodes.T
     # finer toward the inner edge and toward the x axis, where D is
@@ -144,7 +144,7 @@ def test_nafems_le10_thick_plate_has_the_published_stress():
 
 
 def heated(mesh, temperature, coefficient):
-    """(n, 3) nodal forces that stand for a temperature [K]."""
+    """(n, 3) nodal forces equivalent to a temperature [K]."""
     loads = np.zeros_like(mesh.nodes)
     modulus = (3 * LAM + 2 * MU) * coefficient
     for part, _, _, N, G, w in integration(mesh):
@@ -155,7 +155,7 @@ def heated(mesh, temperature, coefficient):
 
 
 def warmth(x):
-    """LE11's temperature, r + z."""
+    """Temperature r + z of LE11."""
     return np.hypot(x[..., 0], x[..., 1]) + x[..., 2]
 
 

@@ -1,4 +1,4 @@
-"""Stresses at nodes: exact for linear fields, the same in turned axes."""
+"""Nodal stresses: exact for linear fields, and invariant under rotation of the axes."""
 
 from types import SimpleNamespace
 
@@ -38,7 +38,9 @@ def test_von_mises_stress_equals_the_deviators_norm_in_any_axes(rng):
 
 
 def test_nodal_stress_at_a_material_boundary_is_that_of_each_material():
-    """Two materials under one strain: the stress is 3 or 7, without an average."""
+    """For two materials under the same strain, the stress is 3 or 7, without
+    averaging.
+    """
     mesh = isoparametric(box_solid((1, 1, 2), (1.0, 1.0, 2.0)), 2)
     high = mesh.nodes[mesh.cells[:, :4]].mean(axis=1)[:, 2] > 1
     field = np.zeros((len(mesh.nodes), 3, 6))

@@ -1,4 +1,4 @@
-"""Stress of a meshed link's own weight, against the beam of 1 m."""
+"""Stress in a meshed link under its own weight, against a beam of 1 m."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,9 @@ def test_bending_stress_of_a_heavy_cantilever_follows_the_weight_beyond_each_sec
 
 
 def test_peak_stress_under_own_weight_agrees_with_the_beam(bar):
-    """From 50 mm off the wall; over the whole length 6 rho g A L^2 / 2 / h^3."""
+    """Evaluated from 50 mm off the wall; over the whole length 6 rho g A L^2 /
+    2 / h^3.
+    """
     peak = peak_stress(bar, np.zeros(6), section=SECTION, up=[0, 1, 0], away=0.05,
                        gravity=[0, -G, 0])  # fmt: skip
     whole = 3 * DENSITY * G / SIDE
@@ -55,7 +57,7 @@ def test_weight_along_the_bar_causes_a_linear_axial_stress(bar):
     np.testing.assert_allclose(stress, expected, atol=2e-3 * DENSITY * G)
 
 
-def test_gravity_on_a_link_without_a_density_is_refused():
+def test_gravity_on_a_link_without_a_density_is_rejected():
     light = solve_bar({"radius": 0.2}, Material(2e11, 0.3), FemOptions(0.3))
     with pytest.raises(BadInput, match="gravity: the link has no density"):
         with_own_weight(light)

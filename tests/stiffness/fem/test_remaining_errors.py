@@ -1,4 +1,4 @@
-"""Remaining errors against the formula of their decay, tractions by hand."""
+"""Remaining errors against their decay formula, and tractions by hand."""
 
 import numpy as np
 import pytest
@@ -17,8 +17,9 @@ LAM, MU = lame(E, 0.3)
 
 
 def split_energies(mesh, stress):
-    """Energies of a stress zz less its best linear part, and of that less its mean; in
-    each element by least squares, for a unit modulus."""
+    """Energies of a stress zz minus its best linear part, and of this part minus its
+    mean, by least squares in each element for a unit modulus.
+    """
     places, weights = quadrature(6)
     quadratic, linear = [], []
     for corners in mesh.nodes[mesh.cells[:, :4]]:
@@ -33,8 +34,9 @@ def split_energies(mesh, stress):
 
 
 def share_of_the_rest(ratio):
-    """e_3 / s_3 if errors fall as p^-b from e_1 to e_2 to e_3 with this ratio of falls;
-    three at most."""
+    """e_3 / s_3, at most three, if errors decrease as p^-b from e_1 to e_3 with this
+    ratio of successive decreases.
+    """
     smallest, largest = 0.1, 40.0
 
     def fall(b):
@@ -50,8 +52,9 @@ def share_of_the_rest(ratio):
 @pytest.mark.parametrize("bend", [0.01, 0.3, 1.0, 2.0, 5.0, 100.0, -3.75, -3.5])
 @pytest.mark.parametrize("stiffness", [E, 7.0])
 def test_remaining_error_follows_from_the_decay_of_the_indicated_error(bend, stiffness):
-    """u = z^2 / 2 + c z^3 / 3: a stress z + c z^2.  By what cases are compared is the
-    same for both energies."""
+    """u = z^2 / 2 + c z^3 / 3 gives a stress z + c z^2. Both energies have the same
+    scale.
+    """
     mesh = isoparametric(box_solid((1, 1, 3), (0.5, 0.6, 0.8)))
     field = np.zeros((len(mesh.nodes), 3, 1))
     z = mesh.nodes[:, 2]
@@ -73,8 +76,9 @@ SIZES = [(0.3, 0.4, 0.5), (0.3, 0.4, 0.01), (0.02, 0.4, 0.5), (30.0, 0.4, 50.0)]
 
 
 def heights(size):
-    """Of a face across x, y or z of a box of six tetrahedra: a right triangle's height
-    over its long side, or the depth of the box."""
+    """Heights of a face normal to x, y or z of a box of six tetrahedra: that of a right
+    triangle over its hypotenuse, or the depth of the box.
+    """
     found = []
     for axis in range(3):
         p, q = np.delete(size, axis)
@@ -85,8 +89,9 @@ def heights(size):
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("order", [2, 3])
 def test_traction_errors_of_a_constant_stress_equal_hand_calculation(rng, size, order):
-    """A face's energy is t^2 / (2 mu) times its area times its height over pi, for
-    every pair of fields; whichever faces are free."""
+    """The energy of a face is t^2 / (2 mu) times its area times its height over pi, for
+    every pair of fields and any choice of free faces.
+    """
     mesh = isoparametric(box_solid((1, 1, 1), np.array(size)), order)
     A = rng.normal(size=(3, 3, 2))
     fields = np.einsum("nx,ixk->nik", mesh.nodes, A)

@@ -1,4 +1,4 @@
-"""Sparse systems and the choice of the solver."""
+"""Sparse systems and the choice of solver."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Stress: superposition, closed forms of bars, the region without singular edges."""
+"""Stresses: superposition, closed forms for bars, the region without singular edges."""
 
 import numpy as np
 import pytest
@@ -33,16 +33,18 @@ def solved():
     ([0, 0, 1e3, 0, 0, 0], np.sqrt(3) * 1e3 * R / (2 * SECOND)),
 ])  # fmt: skip
 def test_stress_in_the_middle_of_a_bar_equals_textbook_values(solved, wrench, expected):
-    """Four radii from both ends the end effects have decayed (e^-4 a radius). The
-    tolerance of 0.3 % is the mesh's (averaged at nodes, elements of half the
-    radius)."""
+    """Four radii from both ends, the end effects have decayed (e^-4 per radius). The
+    tolerance of 0.3 % is the mesh error (averaged at nodes, elements of half the
+    radius).
+    """
     stress = stress_influence(solved, away=4 * R)
     assert stress.peak(wrench)[0] == pytest.approx(expected, rel=3e-3)
 
 
 def test_stress_of_a_bar_in_tension_is_axial_only(solved):
-    """Components, since the von Mises stress does not see a pressure:
-    zz = F / A, xx = yy = 0."""
+    """Components are compared, because the von Mises stress is insensitive to pressure:
+    zz = F / A, xx = yy = 0.
+    """
     stress = stress_influence(solved, away=4 * R).stresses([0, 0, 0, 0, 0, 1e3])
     np.testing.assert_allclose(stress[:, 2], 1e3 / AREA, rtol=3e-3)
     assert np.abs(stress[:, :2]).max() < 1e-3 * 1e3 / AREA
@@ -60,8 +62,9 @@ def test_stress_region_is_reported_and_excludes_the_clamped_edges(solved):
 
 
 def test_peak_stress_is_reported_with_that_of_the_beam(solved):
-    """A sideways force: at the section of the region nearest to the base M = F (L -
-    away); for the whole beam M = F L. The mesh's error is 2 %, as above."""
+    """Under a transverse force, M = F (L - away) at the section of the region nearest
+    to the base, and M = F L for the whole beam. The mesh error is 2 %, as above.
+    """
     load = [0, 0, 0, 1e3, 0, 0]
     peak = peak_stress(solved, load, section={"radius": R})
     assert peak.away == pytest.approx(R, rel=1e-6)

@@ -46,8 +46,9 @@ def bar(request):
     ([0, 0, 1e3, 0, 0, 0], np.sqrt(3) * 1e3 * R / (2 * SECOND)),
 ])  # fmt: skip
 def test_stress_of_a_bar_agrees_within_the_estimated_error(bar, wrench, expected):
-    """F / A, M R / I and T R / J at four radii from the ends,
-    where the end effect is 0.1 %."""
+    """F / A, M R / I and T R / J at four radii from the ends, where the end effect is
+    0.1 %.
+    """
     peak = peak_stress(bar, wrench, away=4 * R)
     assert abs(peak.von_mises - expected) <= peak.error + 1e-3 * expected
     assert peak.error < 0.25 * expected
@@ -57,7 +58,7 @@ def test_stress_of_a_bar_agrees_within_the_estimated_error(bar, wrench, expected
 
 
 def test_estimated_stress_error_of_a_uniform_strain_is_zero(rng):
-    """Displacements linear in place give one stress everywhere, up to rounding."""
+    """Displacements linear in position give a uniform stress to machine precision."""
 
     def everything(x):
         return np.full(len(x), True)
@@ -90,9 +91,11 @@ def test_peak_at_a_sharp_inner_edge_has_no_error_estimate():
 @pytest.mark.slow
 def test_peak_stress_of_a_stepped_shaft_agrees_within_the_estimated_error():
     """D 30, d 20, r 2 mm in tension, torsion and bending, 15 mm from the ends. The
-    expected values per N and N m come from another program: quadratic axisymmetric
-    elements, with the first harmonic in bending, on meshes of 0.1 and 0.05 mm in the
-    fillet that agree to 0.3 %. Peterson's charts have 5.94 (3 % below) in tension."""
+    expected values per N and N m were computed by another program with quadratic
+    axisymmetric elements, with the first harmonic in bending, on meshes of 0.1 and 0.05
+    mm in the fillet that agree to 0.3 %. Peterson's charts have 5.94 (3 % below) in
+    tension.
+    """
     points, triangles = shouldered_shaft(0.015, 0.010, 0.002, 48, 8)
     surface = check_surface(points, triangles, "shaft")
     ends = map(parse_interface, ("z=0", "z=0.12"))

@@ -1,4 +1,4 @@
-"""A link between two ends, against its whole stiffness matrix condensed at once."""
+"""Link with two moving ends, against the condensation of its full stiffness matrix."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,9 @@ from forcefit.stiffness.fem.two_ends import two_ends
 
 @pytest.mark.parametrize("interface", ["rigid", "distributing"])
 def test_stiffness_of_both_ends_equals_the_schur_complement(interface):
-    """Twelve motions of both ends at once, by dense elimination of all other nodes."""
+    """Twelve motions of both ends at once, by dense elimination of all
+    remaining nodes.
+    """
     options = FemOptions(0.5, interface, Budget(levels=1))
     solved = solve_bar({"width": 0.3, "height": 0.4}, Material(1.0, 0.3, 2.0), options)
     mesh, constants = solved.level.mesh, solved.level.material

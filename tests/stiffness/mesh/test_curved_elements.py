@@ -1,4 +1,4 @@
-"""Curved elements: they follow their shapes, and none is inverted."""
+"""Curved elements follow their shapes, and none is inverted."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,8 @@ SOLID_ANGLE = 4 * np.arcsin(HALF**2 / (1 + HALF**2))
 
 def shell(counts, inner, outer):
     """A piece of a spherical shell between four planes through its centre. Patch 0 is
-    hollow, a sphere seen from inside the part, patch 1 is round."""
+    the concave sphere, and patch 1 the convex one.
+    """
     unit, cells = box_cells(counts)
     s, t, u = unit.T
     way = np.column_stack([HALF * (2 * s - 1), HALF * (2 * t - 1), np.ones(len(s))])
@@ -56,14 +57,15 @@ def layers_of_bar(rings, layers, order):
 
 
 def side_errors(mesh):
-    """[-] distance of the side's nodes from the cylinder over its radius."""
+    """[-] distance of side nodes from the cylinder, relative to its radius."""
     nodes = mesh.nodes[np.unique(mesh.faces[mesh.patch == 2])]
     return np.abs(np.hypot(*nodes[:, :2].T) / 0.04 - 1)
 
 
 def test_nodes_of_curved_elements_lie_on_the_cylinder_to_fourth_order():
-    """The error of cubic elements falls with the fourth power of their size,
-    with or without layers."""
+    """The error of cubic elements decreases with the fourth power of their size, with
+    or without layers.
+    """
     errors = {rings: layers_of_bar(rings, 2 * rings, 3) for rings in (2, 4)}
     for k in range(2):
         coarse, fine = (side_errors(errors[rings][k]).max() for rings in (2, 4))
@@ -80,8 +82,9 @@ def volume(mesh):
 
 
 def test_volume_of_a_round_bar_converges_with_the_sixth_power():
-    """Edges and faces deviate to both sides of an arc, so that errors cancel. The error
-    of quadratic elements falls with the fourth power."""
+    """Edges and faces deviate to both sides of an arc, so errors cancel. The error of
+    quadratic elements decreases with the fourth power.
+    """
     exact = np.pi * 0.04**2 * 0.2
     for order, power, least in ((2, 4, 1e-5), (3, 6, 1e-7)):
         error = [
@@ -107,7 +110,7 @@ def shell_volume(inner, outer):
 
 
 def test_volume_of_a_sphere_converges_with_the_sixth_power():
-    """Concave and convex faces; nodes of the outline lie on both shapes."""
+    """Faces are concave and convex; outline nodes lie on both shapes."""
     error = []
     for n in (1, 2, 4):
         mesh = isoparametric(shell((n, n, n), 0.6, 1.0))
@@ -118,8 +121,9 @@ def test_volume_of_a_sphere_converges_with_the_sixth_power():
 
 @pytest.mark.parametrize(("number", "sign"), [(0, 1), (1, -1)])
 def test_geometry_error_equals_energy_density_times_missing_volume(number, sign):
-    """A constant strain: a hollow radius larger by 1e-4 takes volume from the shape, a
-    round one adds it; the difference of energies is the density's times that."""
+    """A constant strain: a concave radius larger by 1e-4 removes volume, a convex one
+    adds it. The energy difference is the energy density times this volume.
+    """
     solid = shell((3, 3, 2), 0.6, 1.0)
     mesh = isoparametric(solid)
     lam, mu = lame(60e9, 0.3)

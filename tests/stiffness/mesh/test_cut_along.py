@@ -1,4 +1,4 @@
-"""Interfaces whose outline has no sharp edge."""
+"""Interfaces whose outline is not a sharp edge."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ Z = np.array([0.0, 0, 1])
 
 
 def area_of(solid, patch):
-    """[m^2] of a patch's triangles."""
+    """[m^2] area of the triangles of a patch."""
     corners = solid.points[solid.faces[solid.patch == patch]]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     return np.linalg.norm(across, axis=1).sum() / 2
@@ -70,8 +70,9 @@ def test_interface_without_a_sharp_edge_ends_where_the_rounding_begins(tmp_path)
 def test_stiffness_of_a_rounded_block_is_symmetric_and_below_an_upper_bound(
     tmp_path,
 ):
-    """Couplings that its mirror planes forbid vanish; 119 142 N m/rad is an upper
-    bound of K_RZ by a conforming mesh of another program."""
+    """Couplings that its mirror planes forbid vanish; 119 142 N m/rad is an upper bound
+    on K_RZ from a conforming mesh of another program.
+    """
     options = FemOptions(0.02, cache=tmp_path)
     link = solve_link(BLOCK, *FLAT_ENDS, [Material(7e10, 0.3)], options=options).link
     K = link.stiffness

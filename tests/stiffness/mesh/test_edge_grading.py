@@ -1,4 +1,4 @@
-"""Layers along singular edges: found, conforming, of the same volume."""
+"""Layers along singular edges are located, conforming and volume-preserving."""
 
 import numpy as np
 import pytest
@@ -23,14 +23,14 @@ CLAMPED = [(0, 1), (0,), ()]  # patches: both ends, the base, none
 
 
 def corner_post(counts=(2, 2, 3)):
-    """An L: a post without the quarter beyond x = y = 0.1; one inner edge."""
+    """An L-shaped post, without the quarter beyond x = y = 0.1, with one inner edge."""
     return with_plane_sides(
         masked_solid(counts, SIZE, lambda c: (c[:, :2] < 0.1).any(axis=1))
     )
 
 
 def on_outline(x):
-    """Whether places x are on the L's outline, whatever their height."""
+    """Check whether points x are on the outline of the L, at any height."""
     near = np.abs(x[..., :2] - 0.1) < 1e-9
     inner = near & (x[..., 1::-1] > 0.1 - 1e-9)
     outer = (np.abs(x[..., :2]) < 1e-9) | (np.abs(x[..., :2] - 0.2) < 1e-9)
@@ -86,7 +86,7 @@ def check_layers(solid, held):
 def test_layers_of_any_union_of_boxes_are_conforming_and_preserve_the_volume(
     kept, held
 ):
-    """Also bodies that touch in an edge or a corner, holes and steps."""
+    """This includes bodies that touch in an edge or a corner, holes and steps."""
     counts = np.array([3, 2, 2])
 
     def keep(centers):

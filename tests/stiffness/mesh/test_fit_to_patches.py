@@ -1,4 +1,4 @@
-"""Meshes fitted to the patches of a surface, and refusals."""
+"""Meshes fitted to the patches of a surface, and rejected meshes."""
 
 import numpy as np
 import pytest
@@ -19,14 +19,14 @@ ENDS = parse_interface("z=0"), parse_interface("z=0.1")
 
 
 @pytest.mark.parametrize("stretch", [0.979, 1.021])
-def test_mesh_of_another_volume_is_refused(stretch):
+def test_mesh_of_another_volume_is_rejected(stretch):
     made = box_solid((2, 2, 2), (0.1, 0.1, 0.1 * stretch))
     with pytest.raises(MeshFailed, match="the mesh has 0.00.* the surface encloses"):
         fit_to_patches(made.points, made.cells, SURFACE, find_patches(SURFACE, *ENDS))
 
 
 @pytest.mark.parametrize(("other", "missing"), [(1, "base"), (0, "tip"), (2, "base")])
-def test_a_mesh_without_a_face_on_an_interface_is_refused(other, missing):
+def test_a_mesh_without_a_face_on_an_interface_is_rejected(other, missing):
     made = box_solid((2, 2, 2), (0.1, 0.1, 0.1))
     far = Plane(50 * Z, Z)  # out of every corner's reach
     patches = Patches(np.full(len(CUBE_TRIANGLES), other), (far, far, far))
@@ -34,7 +34,7 @@ def test_a_mesh_without_a_face_on_an_interface_is_refused(other, missing):
         fit_to_patches(made.points, made.cells, SURFACE, patches)
 
 
-def test_fit_turns_cells_of_wrong_orientation_and_drops_unused_points():
+def test_fit_reorients_inverted_cells_and_drops_unused_points():
     """The solid equals that of well-ordered cells; it lies far from the origin."""
     far = np.array([3.0, -2.0, 1.0])
     rng = np.random.default_rng(7)

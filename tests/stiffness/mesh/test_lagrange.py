@@ -59,7 +59,9 @@ def test_derivatives_of_shape_functions_equal_central_differences(rng, degree, c
 
 @pytest.mark.parametrize("order", [2, 3])
 def test_shared_node_has_the_same_position_in_every_element(order):
-    """In any order of the corners; a box has as many nodes as its finer grid."""
+    """This holds for any order of the corners; a box has as many nodes as its finer
+    grid.
+    """
     solid = box_solid((2, 3, 2), (0.1, 0.2, 0.3))
     mesh = isoparametric(solid, order)
     assert len(mesh.nodes) == prod(order * n + 1 for n in (2, 3, 2))

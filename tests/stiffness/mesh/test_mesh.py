@@ -1,4 +1,4 @@
-"""Meshes of tetrahedra: fitted to shapes, cached, refused."""
+"""Tetrahedral meshes: fitted to shapes, cached, or rejected."""
 
 import io
 import subprocess
@@ -20,7 +20,7 @@ FACES = parse_interface("z=0"), parse_interface("z=0.1")
 
 
 def kuhn_cube(n):
-    """A cube of side 0.1 m, no mesher needed."""
+    """A cube of side 0.1 m, without a mesher."""
     return box_solid((n, n, n), (0.1, 0.1, 0.1))
 
 
@@ -41,7 +41,7 @@ def test_meshed_bar_has_flat_ends_and_corners_on_its_cylinder(tmp_path):
 
 
 def npz(**arrays):
-    """A file of arrays, as the cache keeps them."""
+    """A file of arrays, as in the cache."""
     file = io.BytesIO()
     np.savez(file, **arrays)
     return file.getvalue()
@@ -98,7 +98,7 @@ def test_failed_mesher_is_reported_with_its_last_output(
 
 
 def test_mesher_is_stopped_at_its_time_limit(tmp_path):
-    """0.05 s is less than a Python process needs to start."""
+    """0.05 s is less than the start-up time of a Python process."""
     with pytest.raises(MeshFailed, match=r"no mesh within 0.05 s"):
         mesh_solid(bar(), *FACES, time_limit=0.05, cache=tmp_path)
     assert list(tmp_path.iterdir()) == []
@@ -109,7 +109,9 @@ def test_mesher_is_stopped_at_its_time_limit(tmp_path):
     not mesh_module._SAME_NUMBERS.exists(), reason="the C++ library is not GNU's"
 )
 def test_same_surface_has_the_same_mesh_in_every_cache(tmp_path):
-    """Two runs with different caches agree; another edge length changes the mesh."""
+    """Two runs with different caches agree; a different edge length changes
+    the mesh.
+    """
     one, again, other = (
         mesh_solid(bar(), *FACES, edge=edge, cache=tmp_path / str(number))
         for number, edge in enumerate((0.03, 0.03, 0.029))
@@ -119,7 +121,7 @@ def test_same_surface_has_the_same_mesh_in_every_cache(tmp_path):
     assert not np.array_equal(one.cells, other.cells)
 
 
-def test_mesh_with_a_missing_column_is_refused(tmp_path, monkeypatch):
+def test_mesh_with_a_missing_column_is_rejected(tmp_path, monkeypatch):
     """One of 64 columns of the cube is missing: a hole of 1.6 % of the volume."""
     cube = kuhn_cube(8)
     place = np.floor(cube.points[cube.cells].mean(axis=1) / 0.0125)
@@ -134,8 +136,9 @@ def test_mesh_with_a_missing_column_is_refused(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("name", ["distal_plain", "delta_forearm", "l_bracket"])
 def test_coarser_surface_has_fewer_triangles_and_the_same_volume(name):
-    """The coarse surface is near the part, has as many holes, and its volume to 1 %.
-    The bracket needs all of its triangles."""
+    """The coarse surface is close to the part, with as many holes and the same volume
+    within 1 %. The bracket requires all of its triangles.
+    """
     import pyvista as pv
 
     surface = read_surface(Path(__file__).parents[3] / "meshes" / f"{name}.stl")

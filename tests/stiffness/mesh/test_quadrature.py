@@ -27,6 +27,6 @@ def test_quadrature_rules_are_positive_and_integrate_monomials_exactly(degree, c
 
 
 @pytest.mark.parametrize("corners", CORNERS)
-def test_degree_without_a_quadrature_rule_is_refused(corners):
+def test_degree_without_a_quadrature_rule_is_rejected(corners):
     with pytest.raises(ValueError, match="degree is 7, expected one up to 6"):
         quadrature(7, corners)

@@ -1,4 +1,4 @@
-"""Refinement by bisection: boundary, patches, number of halvings."""
+"""Refinement by bisection: boundary, patches and number of halvings."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from tests.solids_for_tests import bar_solid, box_solid
 
 
 def crooked(rng):
-    """A box whose corners are all shifted, so that no two edges are as long."""
+    """A box with all corners shifted, so that no two edges have equal length."""
     solid = box_solid((2, 2, 2), (1.0, 1.0, 1.0))
     points = solid.points + 0.05 * rng.uniform(-1, 1, solid.points.shape)
     return Solid(points, solid.cells, solid.faces, solid.patch, (None,) * 3)
@@ -19,8 +19,9 @@ def crooked(rng):
 @pytest.mark.parametrize("solid", [crooked(np.random.default_rng(1)),
                                    bar_solid(2, 4, 0.02, 0.1)])  # fmt: skip
 def test_refined_faces_stay_on_the_boundary_of_their_patch_and_point_outward(solid):
-    """Each patch keeps the sum of its faces' vectors where its shape is unknown; a
-    bar's side stays on its circle, and no end shrinks."""
+    """The sum of face vectors is preserved on patches of unknown shape; the side of a
+    bar stays on its circle, and no end shrinks.
+    """
     asked = np.random.default_rng(2).integers(1, 4, len(solid.cells))
     finer = refine(solid, asked).solid
     assert finer.volumes().min() > 0
@@ -49,7 +50,7 @@ def test_refined_faces_stay_on_the_boundary_of_their_patch_and_point_outward(sol
 
 @pytest.mark.parametrize("halvings", [0, 1, 2, 4])
 def test_every_part_of_a_cell_is_bisected_as_often_as_requested(rng, halvings):
-    """At least as often; other cells are halved only where they must conform."""
+    """Requested cells are halved at least as often; other cells only for conformity."""
     solid = crooked(rng)
     asked = np.zeros(len(solid.cells), dtype=int)
     asked[7] = halvings

@@ -41,7 +41,9 @@ def layer(contrast):
                  (0.0187, 0.0113, 0.0241), marks=pytest.mark.slow),
 ])  # fmt: skip
 def test_mesh_is_cut_along_the_faces_of_a_box(region, size):
-    """The elements of the region fill its volume, and no other element changes."""
+    """The elements of the region fill its volume, and all other elements are
+    unchanged.
+    """
     regions = regions_of([
         Material(E, 0.3),
         parse_part("--part", f"{region}/young=1e9,poisson=0.3"),
@@ -54,7 +56,7 @@ def test_mesh_is_cut_along_the_faces_of_a_box(region, size):
 
 
 def test_material_edges_of_a_layer_go_around_the_block():
-    """Two squares with sides of 30 mm at the layer's faces."""
+    """The edges form two squares with sides of 30 mm at the layer's faces."""
     regions = regions_of([Material(E, 0.3), layer(10)])
     cut = cut_by_regions(block(), regions)
     start, end = cut.points[material_edges(cut, regions)].swapaxes(0, 1)

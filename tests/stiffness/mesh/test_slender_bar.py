@@ -1,4 +1,4 @@
-"""Slender and thin-walled bars, meshed without the mesher."""
+"""Slender and thin-walled bars, meshed by extrusion."""
 
 import numpy as np
 import pytest
@@ -47,8 +47,9 @@ def ends(length):
 def test_stiffness_of_a_rod_and_a_thin_tube_agrees_with_closed_forms(
     surface, length, J, A, tmp_path
 ):
-    """Torsion is exact between rigid ends. In tension the ends cannot contract: K is at
-    least E A / L, and at most one width over the length above it."""
+    """Torsion is exact between rigid ends. In tension, the ends cannot contract, so K
+    exceeds E A / L by at most the ratio of width to length.
+    """
     options = FemOptions(0.01, cache=tmp_path)
     link = solve_link(surface, *ends(length), [Material(E, NU)], options=options).link
     error = link.relative_error_estimate
@@ -60,7 +61,7 @@ def test_stiffness_of_a_rod_and_a_thin_tube_agrees_with_closed_forms(
 
 
 def test_slender_bar_mesh_follows_a_turned_and_moved_surface():
-    """Its volume, its middle, and its ends on the interfaces."""
+    """Checks the volume, the centre, and the ends on the interfaces."""
     turn = rotation_matrix(np.array([0.3, -0.7, 1.1]))
     shift = np.array([0.2, -0.1, 0.4])
     for made, area in ((box(0.002, 0.005, 0.4), 1e-5), (tube(0.01, 0.0097, 0.4), None)):
@@ -79,9 +80,8 @@ def test_slender_bar_mesh_follows_a_turned_and_moved_surface():
 
 
 def twisted_tube(outer, inner, length, facets=48, levels=4):
-    """A tube whose rings turn by half a facet from level to level, as in STEP files.
-
-    No edge of a triangle is parallel to the axis.
+    """A tube whose rings are rotated by half a facet from level to level, as in STEP
+    files. No triangle edge is parallel to the axis.
     """
     step = 2 * np.pi / facets
     rings = [(outer, k) for k in range(levels)]
@@ -109,8 +109,8 @@ def test_thin_tube_with_corners_between_its_ends_is_extruded():
     assert solid.volumes().sum() == pytest.approx(volume, rel=0.03)
 
 
-def test_slender_bar_mesh_is_not_made_for_other_parts():
-    """A stubby bar, a tapered bar, a tube that is too short, and a side interface."""
+def test_slender_bar_mesh_is_not_used_for_other_parts():
+    """The parts are a stubby bar, a tapered bar, a short tube, and a side interface."""
     stubby = check_surface(*cylinder(0.02, 0.1), "bar")
     assert slender_bar(stubby, *ends(0.1)) is None
     tapered = check_surface(*cylinder(1e-3, 1.0, 32, 0.8e-3), "taper")

@@ -1,4 +1,4 @@
-"""Bars meshed without the mesher: closed, filled, of the textbook's stiffness."""
+"""Extruded bars are closed and filled, and have the textbook stiffness."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ SECTIONS = [
 
 @pytest.mark.parametrize("section", SECTIONS, ids=lambda section: "-".join(section))
 def test_straight_bar_mesh_is_closed_and_has_exact_volume_and_ends(section):
-    """Exact except that chords replace circles."""
+    """Volume and ends are exact, except that chords replace circles."""
     solid = straight_bar(section)
     area = declared_section(section, 0.3).area
     assert (solid.volumes() > 0.0).all()
@@ -52,7 +52,7 @@ def test_no_element_of_a_round_bar_is_inverted(section):
     "section", [ROUND, {"radius": 0.3}, pytest.param(THIN, marks=pytest.mark.slow)]
 )
 def test_torsion_of_round_bars_and_tubes_equals_the_textbook_value(section):
-    """G J / L: round sections do not warp, so that held ends have no effect."""
+    """G J / L, because round sections do not warp and held ends have no effect."""
     options = FemOptions(0.01, budget=Budget(unknowns=60_000))
     link = solve_bar(section, Material(1.0, 0.3), options).link
     J = declared_section(section, 0.3).J
@@ -64,8 +64,9 @@ def test_torsion_of_round_bars_and_tubes_equals_the_textbook_value(section):
 
 
 def test_square_bar_bends_equally_about_both_axes_within_its_estimated_error():
-    """A mesh for a tenth of the accuracy:
-    K falls by no more than the estimated error."""
+    """On a mesh for a tenth of the accuracy, K decreases by no more than the estimated
+    error.
+    """
     coarse, fine = (
         solve_bar(
             {"width": 0.2, "height": 0.2}, Material(1.0, 0.3),

@@ -1,4 +1,4 @@
-"""Libraries of links: built, resumed, read, interpolated, exported."""
+"""Link libraries: building, resuming, reading, interpolation and export."""
 
 import csv
 import io
@@ -104,7 +104,7 @@ def test_estimated_error_between_grid_points_covers_the_true_error(spec, rng):
     ({"radios": 0.02}, 'unknown parameter "radios"; did you mean "radius"?'),
     ({"radius": None}, "radius: missing; expected a value"),
 ])  # fmt: skip
-def test_look_up_outside_the_grid_or_with_other_parameters_is_refused(
+def test_look_up_outside_the_grid_or_with_other_parameters_is_rejected(
     spec, change, message
 ):
     build_library(spec)
@@ -115,7 +115,7 @@ def test_look_up_outside_the_grid_or_with_other_parameters_is_refused(
     assert message in str(caught.value)
 
 
-def test_grid_with_a_missing_entry_is_refused(spec):
+def test_grid_with_a_missing_entry_is_rejected(spec):
     files = build_library(spec)
     files[0].unlink()
     wanted = {"length": 0.3, "radius": 0.02, "young": 6e10, "poisson": 0.3}
@@ -123,8 +123,8 @@ def test_grid_with_a_missing_entry_is_refused(spec):
         look_up(read_library(spec.folder), wanted)
 
 
-def test_entry_with_other_parameters_is_refused_by_name(spec):
-    """A key renamed by hand in one file, or entries of two libraries in one folder."""
+def test_entry_with_other_parameters_is_rejected_by_name(spec):
+    """One key was renamed by hand, or the folder contains entries of two libraries."""
     build_library(spec)
     *others, last = read_library(spec.folder)
     renamed = {"*" if k == "young" else k: v for k, v in last.parameters.items()}
@@ -135,7 +135,7 @@ def test_entry_with_other_parameters_is_refused_by_name(spec):
 
 
 def changed(change):
-    """The text of an entry of which something is otherwise."""
+    """Return the text of an entry with a change."""
 
     def text(whole):
         content = json.loads(whole)
@@ -159,7 +159,7 @@ FORCES_FIRST = ["FX", "FY", "FZ", "MX", "MY", "MZ"]
     (changed(lambda entry: entry["stiffness"][0].__setitem__(0, -1.0)),
      "not positive definite"),
 ])  # fmt: skip
-def test_wrong_entry_is_refused(spec, text, message):
+def test_wrong_entry_is_rejected(spec, text, message):
     (file, *_) = build_library(spec)
     file.write_text(text(file.read_text()))
     with pytest.raises(BadInput) as caught:
@@ -167,7 +167,7 @@ def test_wrong_entry_is_refused(spec, text, message):
     assert message in str(caught.value)
 
 
-def test_missing_entry_or_library_is_refused_by_name(spec, tmp_path):
+def test_missing_entry_or_library_is_rejected_by_name(spec, tmp_path):
     build_library(spec)
     with pytest.raises(BadInput, match='no entry "round-beam"'):
         read_entry(spec.folder, "round-beam")
@@ -188,7 +188,7 @@ def test_missing_entry_or_library_is_refused_by_name(spec, tmp_path):
     (('shape = "round"', 'shape = "tube"'), "inner_radius: missing"),
     (('method = "beam"', 'method = "beam"\nfoo = 1'), 'unknown key "foo"'),
 ])  # fmt: skip
-def test_wrong_build_file_is_refused(tmp_path, change, message):
+def test_wrong_build_file_is_rejected(tmp_path, change, message):
     path = tmp_path / "spec.toml"
     path.write_text(SPEC.replace(*change))
     with pytest.raises(BadInput) as caught:
@@ -266,7 +266,9 @@ BETWEEN = {
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_build_file_of_each_shape_is_distributed_with_its_entries(shape):
-    """The keys are those that a build would make; the folder has an entry for each."""
+    """The keys are those that a build would create, and the folder has an entry for
+    each.
+    """
     spec = read_spec(SHIPPED / f"{shape}.toml")
     assert (spec.shape, spec.method) == (shape, "fea")
     entries = read_library(SHIPPED / shape)
@@ -291,8 +293,9 @@ def test_interpolation_error_estimate_bounds_the_error_against_another_stiffness
 
 @pytest.mark.parametrize("shape", ["rectangle", "box"])
 def test_shipped_square_links_are_slightly_stiffer_than_their_beams(shape):
-    """Held ends add up to 0.3 b / L in bending. No entry is softer than Timoshenko's
-    beam but a box in torsion, whose corners Bredt's formula leaves out."""
+    """Held ends add up to 0.3 b / L in bending. No entry is softer than the Timoshenko
+    beam except a box in torsion, whose corners Bredt's formula neglects.
+    """
     K, _ = look_up(read_library(SHIPPED / shape), {"length": 0.37})
     lengths = read_spec(SHIPPED / f"{shape}.toml").grid
     lengths = {k: lengths[k][0] for k in SHAPES[shape]} | {"length": 0.37}

@@ -1,4 +1,4 @@
-"""Families of CAD parts: a table of files and sizes, and entries between them."""
+"""Families of CAD parts: a table of files and sizes, and interpolation."""
 
 import numpy as np
 import pytest
@@ -73,7 +73,7 @@ def test_estimated_error_between_family_sizes_covers_the_closed_form(parts, leng
     assert np.abs(scaled(error, truth)).max() < 0.02
 
 
-def test_estimated_error_covers_an_entry_that_is_left_out(parts):
+def test_estimated_error_covers_an_omitted_entry(parts):
     folder, _ = parts
     build_library(read_spec(folder / "spec.toml"))
     entries = read_library(folder / "links")
@@ -92,7 +92,7 @@ def test_estimated_error_covers_an_entry_that_is_left_out(parts):
     ("0.3,0.02", "-0.3,0.02", "line 3, length: found '-0.3', expected a length"),
     ("0.3,0.02", "0.2,0.02", '"rod-length0.2-radius0.02" twice'),
 ])  # fmt: skip
-def test_wrong_family_table_is_refused_in_one_line(parts, old, new, message):
+def test_wrong_family_table_is_rejected_in_one_line(parts, old, new, message):
     folder, _ = parts
     table = folder / "rods.csv"
     table.write_text(table.read_text().replace(old, new, 1))
@@ -101,7 +101,7 @@ def test_wrong_family_table_is_refused_in_one_line(parts, old, new, message):
     assert "\n" not in str(error.value)
 
 
-def test_interface_that_names_an_unknown_size_is_refused(parts):
+def test_interface_that_names_an_unknown_size_is_rejected(parts):
     folder, _ = parts
     (folder / "spec.toml").write_text(SPEC.replace("{length}", "{height}"))
     with pytest.raises(BadInput, match="line 2: tip"):

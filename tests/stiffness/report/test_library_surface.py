@@ -1,4 +1,4 @@
-"""Library entries of parts given by their surface."""
+"""Library entries for parts given by surfaces."""
 
 import csv
 import hashlib
@@ -48,7 +48,7 @@ density = 2700
 
 @pytest.fixture(scope="module")
 def cache(tmp_path_factory):
-    """Of meshes: each is made once."""
+    """Mesh cache, so that each mesh is created once."""
     return tmp_path_factory.mktemp("meshes")
 
 
@@ -67,7 +67,7 @@ def bar_stl(tmp_path, monkeypatch, cache):
 def test_surface_entry_has_the_digest_of_its_file_and_an_error_estimate(
     bar_stl, tmp_path
 ):
-    """Held ends make a bar of L / r = 7 stiffer than its beam, by less than 10 %."""
+    """Held ends make a bar of L / r = 7 stiffer than its beam by less than 10 %."""
     spec = tmp_path / "spec.toml"
     spec.write_text(LINKS)
     command = ["library", str(spec), "--json", "-"]
@@ -141,7 +141,7 @@ def test_surface_entry_is_rebuilt_only_if_its_input_changed(
     (("density = 2700", LINKS[LINKS.index("[[link]]") :]), 'found "bar" twice'),
     (("accuracy = 0.01", 'shape = "round"'), "grid"),
 ])  # fmt: skip
-def test_wrong_surface_table_of_a_build_file_is_refused(
+def test_wrong_surface_table_of_a_build_file_is_rejected(
     bar_stl, tmp_path, change, message
 ):
     path = tmp_path / "spec.toml"
@@ -151,7 +151,7 @@ def test_wrong_surface_table_of_a_build_file_is_refused(
     assert message in str(caught.value)
 
 
-def test_surface_without_its_interface_is_refused_and_nothing_is_written(
+def test_surface_without_its_interface_is_rejected_and_nothing_is_written(
     bar_stl, tmp_path
 ):
     spec = tmp_path / "spec.toml"
@@ -162,7 +162,7 @@ def test_surface_without_its_interface_is_refused_and_nothing_is_written(
 
 
 def test_step_file_becomes_a_library_entry(tmp_path, monkeypatch, cache):
-    """A brick by gmsh's own kernel, in millimetres as the file states."""
+    """A brick from gmsh's kernel, in millimetres as stated in the file."""
     gmsh = pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
     monkeypatch.setenv("FORCEFIT_CACHE", str(cache))
     gmsh.initialize(interruptible=False)

@@ -1,4 +1,4 @@
-"""Page of a link by finite elements."""
+"""HTML report on a link computed by finite elements."""
 
 from dataclasses import replace
 
@@ -29,8 +29,9 @@ def bar(**mesh):
 
 
 def test_page_of_a_bar_shows_its_stiffness_and_compliance():
-    """Stretching: E A / L; torsion with nu = 0.3: E / 2.6 J / L; both are alone in
-    their rows."""
+    """Stretching: E A / L; torsion with nu = 0.3: E / 2.6 J / L; both are the only
+    entries in their rows.
+    """
     text = link_page(bar(), Provenance())
     area, polar = np.pi * RADIUS**2, np.pi * RADIUS**4 / 2
     K, C = (

@@ -1,4 +1,4 @@
-"""Beams against finite elements over slenderness, and beams along curve files."""
+"""Beams against finite elements over slenderness, and beams from curve files."""
 
 import json
 from dataclasses import replace
@@ -21,7 +21,7 @@ MATERIAL = ["--young", "6e10", "--poisson", "0.3"]
 
 
 def made_up(ratio, c, d, error=0.0):
-    """A bar and the same one stiffer by 1 + c / ratio + d / ratio^2."""
+    """A bar, and the same bar stiffened by 1 + c / ratio + d / ratio^2."""
     length = 0.02 * ratio
     C = beam_compliance(length, round_section(0.02, 0.3), 6e10, 0.3)
     ends = {"tip": [length, 0, 0], "base": [0, 0, 0]}
@@ -34,7 +34,9 @@ def made_up(ratio, c, d, error=0.0):
 
 
 def diagonal_residual(sweep):
-    """Couplings, scaled by a diagonal that shear changes, are no plain series."""
+    """Couplings are scaled by a diagonal that depends on shear, so they are not a plain
+    series.
+    """
     return np.abs(np.diagonal(sweep.residual, axis1=1, axis2=2)).max()
 
 
@@ -47,8 +49,9 @@ def test_end_effect_fit_recovers_the_simulated_coefficients():
 
 
 def test_error_of_the_modulus_is_not_absorbed_by_the_fit_of_end_effects():
-    """A modulus 1 % too high is not an end effect,
-    since it does not fade with length."""
+    """A modulus 1 % too high is not an end effect, because it does not vanish with
+    length.
+    """
     comparisons = []
     for ratio in (5, 10, 20, 40):
         one = made_up(ratio, 0.2, 0.0)
@@ -80,7 +83,8 @@ ENDS = {
 @pytest.mark.slow
 def test_end_effect_of_a_round_bar_agrees_with_an_independent_solution():
     """Each mesh is stiffer than that solution, by no more than its stated error. The
-    same fit of the exact values has c = 0.212, 0.254, 0.102 and zero in torsion."""
+    same fit to the exact values gives c = 0.212, 0.254, 0.102, and zero in torsion.
+    """
     sweep = sweep_slenderness({"radius": 0.02}, 6e10, 0.3, list(ENDS), accuracy=0.004)
     for comparison, exact in zip(sweep.comparisons, ENDS.values(), strict=True):
         comparisons = np.diag(comparison.difference)
@@ -119,14 +123,14 @@ def test_axial_stiffness_at_zero_poissons_ratio_has_no_end_effect():
     ),
     (["--section", "width=1"], "--section: found width, expected one of"),
 ])  # fmt: skip
-def test_slenderness_refuses_wrong_options_before_meshing(run, options, message):
+def test_slenderness_rejects_wrong_options_before_meshing(run, options, message):
     command = ["stiffness", "compare", "--ratios", "5,10", *MATERIAL]
     status, _, err = run(*command, *options)
     assert status == 2
     assert message in err
 
 
-def test_comparison_of_a_beam_with_another_tip_is_refused():
+def test_comparison_of_a_beam_with_another_tip_is_rejected():
     C = beam_compliance(0.4, round_section(0.02, 0.3), 6e10, 0.3)
     one = LinkStiffness("beam", C, tip=[0.4, 0, 0], base=[0, 0, 0])
     other = LinkStiffness("fea", C, tip=[0.41, 0, 0], base=[0, 0, 0])
@@ -206,7 +210,7 @@ section = { width = 0.01, height = 0.02, wall = 0.001 }
     (("up = [0, 1, 0]", "tip_section = { radius = 0.1 }"),
      "found different lengths at both ends of a tapered piece"),
 ])  # fmt: skip
-def test_wrong_curve_file_is_refused_by_its_path(tmp_path, change, message):
+def test_wrong_curve_file_is_rejected_by_its_path(tmp_path, change, message):
     path = curve_file(tmp_path, L_BRACKET.replace(*change, 1))
     with pytest.raises(BadInput) as caught:
         read_curve(path, 0.3)
@@ -214,7 +218,7 @@ def test_wrong_curve_file_is_refused_by_its_path(tmp_path, change, message):
     assert str(caught.value).startswith(str(path))
 
 
-def test_compare_refuses_a_curve_file_together_with_a_section(run, tmp_path):
+def test_compare_rejects_a_curve_file_together_with_a_section(run, tmp_path):
     path = curve_file(tmp_path, L_BRACKET)
     command = ["stiffness", "compare", "x.stl", "--base", "z=0", "--tip", "x=0.15"]
     status, _, err = run(*command, *MATERIAL, "--curve", path, "--radius", "0.1")
@@ -232,7 +236,9 @@ def rectangle(width, height, up, stiffer=1.0, axis=(0, 0, 1)):
 
 @pytest.mark.parametrize("axis", [(0, 0, 1), (0.6, 0, 0.8)])
 def test_comparison_reports_a_section_rotated_by_90_degrees(axis):
-    """A 20 x 60 mm bar 2 % stiffer than its beam; I differs ninefold if turned."""
+    """A 20 x 60 mm bar is 2 % stiffer than its beam; I differs ninefold after
+    rotation.
+    """
     solid = rectangle(0.06, 0.02, [0, 1, 0], 1.02, axis)
     right = compare_link(rectangle(0.06, 0.02, [0, 1, 0], axis=axis), solid, 0.03)
     assert right.better_turn == (0, pytest.approx(0.02))
@@ -264,5 +270,5 @@ def test_comparison_names_the_corner_of_a_bent_beam_only():
     one = made_up(20, 0.2, 0.0)
     assert "corner" not in one.explanation
     bent = compare_link(one.beam, one.fea, 0.02, length=1.5 * one.length)
-    assert "corner is stiffer" in bent.explanation
+    assert "corner of a solid is stiffer" in bent.explanation
     assert bent.slenderness == pytest.approx(30)

@@ -1,4 +1,4 @@
-"""Shapes as surfaces and as beams: volumes of prisms, walls, tapers."""
+"""Shapes as surfaces and as beams: volumes of prisms, walls and tapers."""
 
 import math
 
@@ -73,7 +73,7 @@ def test_beam_of_a_shape_has_the_ends_and_area_of_the_shape(shape):
     ("box", {"length": L, "width": R, "height": S, "wall": 0.6 * S}, "leaves no hole"),
     ("box", {"length": L, "width": S, "height": R, "wall": 0.5 * S}, "leaves no hole"),
 ])  # fmt: skip
-def test_wrong_shape_is_refused(shape, lengths, words):
+def test_wrong_shape_is_rejected(shape, lengths, words):
     for call in (check_shape, shape_surface, lambda s, v: shape_beam(s, v, NU)):
         with pytest.raises(BadInput) as caught:
             call(shape, lengths)

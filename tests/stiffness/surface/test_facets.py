@@ -1,4 +1,4 @@
-"""Lifted facets: weights of corners, unit normals, fourth-order accuracy."""
+"""Lifted facets: corner weights, unit normals and fourth-order accuracy."""
 
 import numpy as np
 import pytest

@@ -63,7 +63,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("text", "message"), REFUSED)
-def test_wrong_interface_is_refused(text, message):
+def test_wrong_interface_is_rejected(text, message):
     with pytest.raises(BadInput) as caught:
         parse_interface(text, "--base")
     assert str(caught.value).startswith("--base: ")
@@ -81,7 +81,9 @@ def test_written_interface_is_read_as_the_same_interface(text, written):
 
 
 def test_interface_distance_is_measured_from_the_plane_or_the_cylinder(rng):
-    """Along the normal, or across the axis beyond the radius; inside and outside."""
+    """Distances are along the normal, or radial from the cylinder, inside and
+    outside.
+    """
     point, d = np.array([1.0, 2.0, 3.0]), np.array([0, 0.6, 0.8])
     u, v = np.array([1.0, 0, 0]), np.array([0, 0.8, -0.6])
     a, b = rng.normal(size=(2, 4, 5))
@@ -97,7 +99,7 @@ def test_interface_distance_is_measured_from_the_plane_or_the_cylinder(rng):
     assert parse_interface("bore=1,2,3/0,3,4/0.5").distance(point) == pytest.approx(0.5)
 
 
-def test_rigid_faces_that_share_an_edge_are_refused():
+def test_rigid_faces_that_share_an_edge_are_rejected():
     """The stiffness between two sides of a cube has no finite value."""
     surface = check_surface(CUBE, CUBE_TRIANGLES, "cube")
     one, other = parse_interface("y=0"), parse_interface("z=0.1")

@@ -7,7 +7,7 @@ from forcefit.stiffness.surface.intersections import crossing_triangles
 
 
 def crosses(one, other):
-    """Whether an edge of one triangle meets the inside of the other."""
+    """Check whether an edge of one triangle meets the inside of the other."""
     a, b, c = other
     for k in range(3):
         p, q = one[k], one[(k + 1) % 3]
@@ -61,8 +61,9 @@ def test_crossing_pairs_are_found_among_many_triangles():
 @pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
 @pytest.mark.parametrize("way", [1, -1])
 def test_touching_triangles_do_not_cross(unit, way):
-    """A needle's edge of length 2 ends in the plane of a triangle, or passes its side;
-    a billionth of a length further it crosses."""
+    """The edge of a needle of length 2 ends in the plane of a triangle or touches its
+    side; a billionth of a length further, it crosses.
+    """
     base = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])[::way]
 
     def crossing(at, low, high, third):

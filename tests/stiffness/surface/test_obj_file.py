@@ -1,4 +1,4 @@
-"""OBJ files as programs write them."""
+"""OBJ files as written by common programs."""
 
 import numpy as np
 import pytest
@@ -63,7 +63,7 @@ def test_a_concave_polygon_is_cut_into_triangles_inside_it(tmp_path):
     ("f 1 2 400000000", r"found point 400000000 in a face, expected points 1 to 8"),
     ("", "contains no triangles, or is not OBJ"),
 ])  # fmt: skip
-def test_wrong_obj_line_is_refused_with_its_number(tmp_path, line, message):
+def test_wrong_obj_line_is_rejected_with_its_number(tmp_path, line, message):
     path = tmp_path / "cube.obj"
     path.write_text(POINTS + line + "\n")
     with pytest.raises(BadInput, match=message):

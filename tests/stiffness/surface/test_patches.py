@@ -63,7 +63,7 @@ def test_fit_recovers_a_shape_from_points_on_it(fit, shape, rng):
 
 
 def test_slot_is_recognised_as_planes_and_half_cylinders():
-    """Its faces are tangent, without a sharp edge between them."""
+    """Its faces are tangent, without sharp edges between them."""
     angle = np.linspace(-np.pi / 2, np.pi / 2, 17)
     half = 0.02 * np.column_stack([np.cos(angle), np.sin(angle)])
     outline = np.concatenate([half + [0.03, 0], -half - [0.03, 0]])
@@ -75,8 +75,9 @@ def test_slot_is_recognised_as_planes_and_half_cylinders():
 
 @pytest.mark.slow
 def test_mesh_of_a_barrel_has_the_volume_of_the_smooth_shape(tmp_path):
-    """The radius is 20 + 6 sin mm, which is no cone, sphere or torus. Its facets lack
-    more than 0.6 % of the volume, the curved mesh less than 0.03 %."""
+    """The radius of 20 + 6 sin mm is not that of a cone, sphere or torus. The facets
+    lack more than 0.6 % of the volume, the curved mesh less than 0.03 %.
+    """
 
     def radius(share):
         return 0.02 + 0.006 * np.sin(np.pi * share)
@@ -91,6 +92,6 @@ def test_mesh_of_a_barrel_has_the_volume_of_the_smooth_shape(tmp_path):
     assert abs(volume / exact - 1) < 3e-4
 
 
-def test_same_interface_at_base_and_tip_is_refused():
+def test_same_interface_at_base_and_tip_is_rejected():
     with pytest.raises(BadInput, match="the same faces"):
         find_patches(bar(), parse_interface("z=0"), parse_interface("z=0"))

@@ -1,4 +1,4 @@
-"""Planes, cones, spheres and tori: distances and fits by hand."""
+"""Planes, cones, spheres and tori: distances and fits against hand calculation."""
 
 import numpy as np
 import pytest
@@ -66,8 +66,9 @@ def test_normal_of_a_fitted_plane_has_the_sign_of_its_facets(sign):
 
 @pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
 def test_projection_onto_two_round_shapes_ends_on_their_common_line(unit):
-    """To rounding, by Newton's method:
-    after the first step a tenth of the distance remains."""
+    """Newton's method converges to machine precision; after the first step, a tenth of
+    the distance remains.
+    """
     sphere = Sphere(unit * CENTER, 2.0 * unit)
     cylinder = Cone(unit * (CENTER + [0.3, 0.0, 0.0]), AXIS, 1.0 * unit)
     points = ring_points([1.3, 0.9], [1.6, -1.9])

@@ -14,13 +14,15 @@ ENDS = parse_interface("x=-0.1"), parse_interface("x=0.1")
 
 
 def filleted_plate(fillet=0.006, corner=0.025, steps=6):
-    """200 x 300 x 12 mm, a fillet around its foot, which meets the round corners."""
+    """A plate of 200 x 300 x 12 mm with a fillet around its foot that meets the rounded
+    corners.
+    """
     profile = fillet_profile(fillet, 0.012, steps)
     return rounded_block((0.1, 0.15), corner, profile, 2 * steps)
 
 
 def volume_of(fillet=0.006, corner=0.025):
-    """[m^3] of the plate: outline's area integrated over the height."""
+    """[m^3] volume of the plate: area of the outline integrated over the height."""
 
     def area(inset):
         a, b, r = 0.2 - 2 * inset, 0.3 - 2 * inset, corner - inset
@@ -116,7 +118,8 @@ def test_flat_side_between_fillets_remains_flat():
 def test_cylinders_next_to_a_hump_are_recognised_separately():
     """A bar with a hump r = 10 + 4 sin^2 mm over z = 30 .. 70 mm. The facets lack 0.44
     % of the integral of pi r^2. The smoothed surface lacks less than its stated
-    uncertainty, and the long cylinders are no part of the hump."""
+    uncertainty, and the long cylinders are not part of the hump.
+    """
     share = np.linspace(0, 1, 13)
     r = np.r_[0.01, 0.01 + 0.004 * np.sin(np.pi * share) ** 2, 0.01]
     surface = revolved(r, np.r_[0.0, 0.03 + 0.04 * share, 0.1], 40)

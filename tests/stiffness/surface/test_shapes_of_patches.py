@@ -19,7 +19,9 @@ FAR = np.array([[0.0, 0, 1], [0.6, 0, 1], [0, 0.8, 1]])  # off every interface
 
 
 def loose(*triangles, unit=1.0, shift=(0.0, 0.0, 0.0)):
-    """Triangles that share nothing, and one that makes the box sqrt 2 across."""
+    """Triangles without common points, and one that extends the bounding box
+    to sqrt 2.
+    """
     corners = np.array([*triangles, FAR]).reshape(-1, 3) + shift
     return Surface(unit * corners, np.arange(len(corners)).reshape(-1, 3), "loose")
 
@@ -33,7 +35,9 @@ def tilted(angle, size):
 @pytest.mark.parametrize("unit", [0.01, 1.0, 100.0])
 @pytest.mark.parametrize("kind", ["plane=0,0,0/0,0,1", "disc=0,0,0/0,0,1/{}"])
 def test_triangles_on_a_plane_have_all_corners_and_their_normal_on_it(unit, kind):
-    """Corners within 1e-5 of the diagonal on either side; normals within acos 0.9."""
+    """Corners lie within 1e-5 of the diagonal on either side, and normals within acos
+    0.9.
+    """
     near = 1e-5 * np.sqrt(2)
     flat = np.array(tilted(0.0, 0.1))
     surface = loose(
@@ -57,7 +61,9 @@ def around(radius, angle, tilt=0.0):
 
 @pytest.mark.parametrize("unit", [0.01, 1.0, 100.0])
 def test_triangles_on_a_bore_have_all_corners_on_it_and_face_across_its_axis(unit):
-    """Corners within 2e-3 of the radius; normals at least 60 degrees from the axis."""
+    """Corners lie within 2e-3 of the radius, and normals at least 60 degrees from the
+    axis.
+    """
     radius = 0.1
     on = around(radius, 0.5)
     out = on / radius
@@ -79,7 +85,9 @@ def spoke(low, high):
 
 @pytest.mark.parametrize("unit", [0.1, 1.0, 10.0])
 def test_disc_interface_consists_of_the_triangles_within_its_radius(unit):
-    """To 0.2 %; a triangle from 1 % inside to 1 % outside is cut, and refused."""
+    """The radius is met to 0.2 %; a triangle from 1 % inside to 1 % outside is cut and
+    therefore rejected.
+    """
     radius, shift = 0.2, np.array([0.3, -0.1, 0.2])
     center = ",".join(map(str, unit * shift))
     disc = parse_interface(f"disc={center}/0,0,1/{unit * radius}")
@@ -100,7 +108,7 @@ def test_disc_interface_consists_of_the_triangles_within_its_radius(unit):
             assert triangles_on(surface, disc, "tip").tolist() == [0, 1]
 
 
-def test_interface_off_the_part_is_refused_with_the_extent_of_the_part():
+def test_interface_off_the_part_is_rejected_with_the_extent_of_the_part():
     words = (
         "bar: no face of the surface lies on the tip interface {} [m]; the part spans "
     )
@@ -124,7 +132,9 @@ def patches_of(points, triangles, top):
 
 @pytest.mark.parametrize("unit", [0.02, 1.0, 100.0])
 def test_an_edge_of_more_than_35_degrees_separates_patches(unit):
-    """Ten sides meet at 36 degrees and are planes, eleven at 33 and are a cylinder."""
+    """Ten sides meet at 36 degrees and are planes; eleven meet at 33 degrees and form a
+    cylinder.
+    """
     for sides, kind, count in ((10, Plane, 10), (11, Cone, 1)):
         points, triangles = cylinder(0.02 * unit, 0.1 * unit, sides)
         surface, patches = patches_of(points, triangles, 0.1 * unit)

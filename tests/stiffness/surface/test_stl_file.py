@@ -1,4 +1,4 @@
-"""STL files as programs write them, and as they are damaged."""
+"""STL files as written by common programs, and damaged STL files."""
 
 import re
 
@@ -13,7 +13,7 @@ CORNERS = CUBE[CUBE_TRIANGLES]  # (12, 3, 3)
 
 
 def text_of(corners):
-    """An STL file of words, after the description of 3D Systems (1988)."""
+    """A text STL file according to the description of 3D Systems (1988)."""
     lines = ["solid cube"]
     for facet in corners:
         lines += [" facet normal 0 0 0", "  outer loop"]
@@ -63,13 +63,13 @@ BINARIES = {
 
 @pytest.mark.parametrize("case", TEXTS)
 def test_text_stl_file_is_read_without_rounding(tmp_path, case):
-    """In double precision, equal to the last bit."""
+    """In double precision, the numbers are equal to the last bit."""
     np.testing.assert_array_equal(read(tmp_path, TEXTS[case]), CORNERS)
 
 
 @pytest.mark.parametrize("case", BINARIES)
 def test_binary_stl_file_is_read(tmp_path, case):
-    """In single precision, as the format has."""
+    """In single precision, as in the format."""
     found = read(tmp_path, BINARIES[case])
     np.testing.assert_array_equal(found, CORNERS.astype("<f4"))
 
@@ -85,7 +85,7 @@ def test_binary_stl_file_is_read(tmp_path, case):
     (TEXT[: TEXT.rindex(b"\n", 0, TEXT.rindex(b"endloop")) - 4], "facet 12: the file"),
     (TEXT[: TEXT.rindex(b"vertex") + 6], "facet 12: the file is cut"),
 ])  # fmt: skip
-def test_damaged_stl_file_is_refused_with_the_number_of_the_facet(
+def test_damaged_stl_file_is_rejected_with_the_number_of_the_facet(
     tmp_path, content, message
 ):
     with pytest.raises(BadInput, match=re.escape(message).replace('"', "['\"]")) as no:
@@ -93,7 +93,7 @@ def test_damaged_stl_file_is_refused_with_the_number_of_the_facet(
     assert "cube.stl" in str(no.value)
 
 
-def test_any_damaged_stl_file_is_read_or_refused(tmp_path, rng):
+def test_any_damaged_stl_file_is_read_or_rejected(tmp_path, rng):
     """500 files with bytes changed, cut out or missing at the end."""
     for number in range(500):
         content = bytearray(TEXT if number % 2 else BINARY)

@@ -1,4 +1,4 @@
-"""Surfaces read, checked and repaired."""
+"""Reading, checking and repair of surfaces."""
 
 import struct
 
@@ -27,7 +27,7 @@ def write_stl(path, points, triangles):
 
 @pytest.mark.parametrize("kind", ["stl", "ply", "obj", "vtk", "vtp"])
 def test_every_file_format_has_the_same_surface(tmp_path, kind):
-    """STL and PLY have single precision: 1e-7 of the coordinates."""
+    """STL and PLY have single precision, 1e-7 of the coordinates."""
     pyvista = pytest.importorskip("pyvista")
     points, triangles = cylinder()
     path = tmp_path / f"bar.{kind}"
@@ -38,7 +38,7 @@ def test_every_file_format_has_the_same_surface(tmp_path, kind):
     assert len(surface.triangles) == len(triangles)
 
 
-def test_surface_unit_scales_the_part_and_a_wrong_unit_is_refused(tmp_path):
+def test_surface_unit_scales_the_part_and_a_wrong_unit_is_rejected(tmp_path):
     points, triangles = cylinder()
     path = write_stl(tmp_path / "bar.stl", 1000 * points, triangles)
     assert read_surface(path, "mm").volume == pytest.approx(bar().volume, rel=1e-6)
@@ -57,7 +57,7 @@ def test_surface_unit_scales_the_part_and_a_wrong_unit_is_refused(tmp_path):
     ("a.xyz", b"1 2 3", "unknown kind of surface file"),
     ("absent/a.stl", None, "cannot be read"),
 ])  # fmt: skip
-def test_wrong_surface_file_is_refused(tmp_path, name, content, message):
+def test_wrong_surface_file_is_rejected(tmp_path, name, content, message):
     path = tmp_path / name
     if content is not None:
         path.write_bytes(content)
@@ -89,7 +89,7 @@ def test_units_of_length_equal_those_of_scipy():
 
 
 def test_signed_volume_does_not_change_far_from_the_origin():
-    """Some 40 km away, products of coordinates have no digit left for 1 litre."""
+    """About 40 km away, products of coordinates have no digits left for 1 litre."""
     far = CUBE + np.array([1e4, -2e4, 3e4])
     for points, tolerance in ((CUBE, 1e-12), (far, 1e-8)):
         volume = signed_volume(points, CUBE_TRIANGLES)

@@ -1,4 +1,4 @@
-"""Refusals and repairs of surfaces."""
+"""Rejection and repair of surfaces."""
 
 import re
 
@@ -36,7 +36,7 @@ def test_surface_digest_depends_on_the_geometry_only():
     (19.99, "m", None), (20.01, "m", "mm"), (20.01, "mm", "m"),
     (1.001e-3, "mm", None), (0.999e-3, "mm", "m"), (0.999e-3, "m", "m"),
 ])  # fmt: skip
-def test_part_of_implausible_size_is_refused_with_a_likely_unit(size, unit, hint):
+def test_part_of_implausible_size_is_rejected_with_a_likely_unit(size, unit, hint):
     """Plausible sizes are from a millimetre to twenty metres."""
     points = CUBE * size / (0.1 * np.sqrt(3))
     if hint is None:
@@ -81,7 +81,7 @@ def test_triangle_of_two_corners_is_dropped_and_reported(pair):
 @pytest.mark.parametrize("turned", [1, 5, 7, 11])
 @pytest.mark.parametrize("hollow", [False, True])
 def test_reversed_triangles_are_repaired_and_reported(rng, turned, hollow):
-    """The smaller number of triangles is turned, then a shell that is inside out."""
+    """The smaller group of triangles is reversed, then a shell that is inside out."""
     mixed = CUBE_TRIANGLES.copy()
     some = rng.choice(12, turned, replace=False)
     mixed[some] = mixed[some][:, ::-1]
@@ -118,7 +118,7 @@ def test_overlapping_body_is_not_read_as_a_cavity():
         check_surface(points, triangles, "cubes")
 
 
-def test_second_body_is_refused_with_the_place_of_its_middle():
+def test_second_body_is_rejected_with_the_position_of_its_centre():
     far = CUBE + [0.3, 0.4, 0.5]
     points = np.concatenate([2 * CUBE, far])
     triangles = np.concatenate([CUBE_TRIANGLES, CUBE_TRIANGLES + 8])
@@ -170,14 +170,16 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("points", "triangles", "message"), REFUSED)
-def test_surface_that_bounds_no_solid_is_refused(points, triangles, message):
+def test_surface_that_bounds_no_solid_is_rejected(points, triangles, message):
     with pytest.raises(BadInput, match=f"part: .*{message}"):
         check_surface(points, triangles, "part")
 
 
-def test_place_where_a_surface_intersects_itself_is_reported():
-    """The cube's top drawn up to a spike, or down through its bottom: the middle of two
-    triangles that cross is named, one of the spike's and one of the bottom's."""
+def test_position_of_a_self_intersection_is_reported():
+    """The top of the cube is pulled up to a spike, or down through its bottom. The
+    message names the midpoint of two crossing triangles, one of the spike and one of
+    the bottom.
+    """
     sides = [t for t in CUBE_TRIANGLES if not (CUBE[t][:, 2] == 0.1).all()]
     bottom = [t for t in CUBE_TRIANGLES if (CUBE[t][:, 2] == 0.0).all()]
     ring = [1, 5, 7, 3, 1]

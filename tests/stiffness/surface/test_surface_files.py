@@ -1,4 +1,4 @@
-"""Surfaces from MSH and STEP, and readers in a process of their own."""
+"""Surfaces from MSH and STEP files, and readers in separate processes."""
 
 import json
 import subprocess
@@ -60,7 +60,9 @@ def test_vtk_file_of_tetrahedra_and_their_surface_is_read(tmp_path):
     ids=["triangles", "solid", "quads"],
 )  # fmt: skip
 def test_msh_file_of_a_cube_is_read(tmp_path, content, capfd):
-    """Written by hand after the format's description; 12 triangles around 1e-3 m^3."""
+    """The file is written by hand from the format description: 12 triangles around 1e-3
+    m^3.
+    """
     path = tmp_path / "cube.msh"
     path.write_text(content)
     surface = read_surface(path)
@@ -78,7 +80,7 @@ def test_msh_file_of_a_cube_is_read(tmp_path, content, capfd):
     (msh2([(1, 2)], 1), "contains neither triangles nor tetrahedra"),
     (msh2(TRIANGLES[:-1], 2), "the surface is open"),
 ])  # fmt: skip
-def test_wrong_msh_file_is_refused(tmp_path, content, message, capfd):
+def test_wrong_msh_file_is_rejected(tmp_path, content, message, capfd):
     path = tmp_path / "bad.msh"
     path.write_text(content)
     with pytest.raises(BadInput, match=message):
@@ -86,7 +88,7 @@ def test_wrong_msh_file_is_refused(tmp_path, content, message, capfd):
     assert capfd.readouterr().out == ""
 
 
-def test_step_file_without_gmsh_is_refused_with_the_package_to_install(
+def test_step_file_without_gmsh_is_rejected_with_the_package_to_install(
     tmp_path, monkeypatch
 ):
     monkeypatch.setitem(sys.modules, "gmsh", None)
@@ -114,7 +116,7 @@ def gmsh():
 def test_step_file_is_read_in_its_own_unit_and_its_cylinders_are_recognised(
     tmp_path, gmsh
 ):
-    """The file is in millimetres; 48 facets a circle lack 0.3 % of the volume."""
+    """The file is in millimetres; 48 facets per circle lack 0.3 % of the volume."""
     path = tmp_path / "tube.step"
     gmsh.write(str(path))
     gmsh.finalize()
@@ -143,7 +145,7 @@ gmsh.write(sys.argv[1])
 
 
 def test_one_of_several_solids_is_read_by_its_name(tmp_path, run):
-    """A cylinder of 20 x 100 mm and a box of 10 x 20 x 30 mm; facets lack 0.3 %."""
+    """A cylinder of 20 x 100 mm and a box of 10 x 20 x 30 mm; the facets lack 0.3 %."""
     pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
     path = tmp_path / "two.step"
     # in a process of its own: what was read before decides the unit that is written
@@ -179,8 +181,10 @@ gmsh.write(sys.argv[1])
 """
 
 
-def test_touching_solids_are_united_and_separate_ones_refused(tmp_path):
-    """Boxes of 20 x 30 x 40 mm, 10 x 10 x 50 mm on it, and 1 x 1 x 1 mm apart."""
+def test_touching_solids_are_united_and_separate_ones_rejected(tmp_path):
+    """Boxes of 20 x 30 x 40 mm, of 10 x 10 x 50 mm on top of it, and a separate one of
+    1 x 1 x 1 mm.
+    """
     pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
     path = tmp_path / "three.step"
     script = [sys.executable, "-c", TOUCHING, str(path)]
@@ -214,7 +218,7 @@ def test_files_written_by_gmsh_are_read(tmp_path, gmsh, version, binary, dimensi
     assert surface.volume == pytest.approx(exact, rel=2e-2)
 
 
-def test_a_broken_step_file_is_refused(tmp_path, gmsh):
+def test_a_broken_step_file_is_rejected(tmp_path, gmsh):
     path = tmp_path / "part.step"
     path.write_text("rubbish")
     with pytest.raises(
@@ -224,7 +228,7 @@ def test_a_broken_step_file_is_refused(tmp_path, gmsh):
 
 
 @pytest.mark.parametrize("kept", [0.3, 0.6, 0.9])
-def test_a_file_that_crashes_its_reader_is_refused(tmp_path, kept):
+def test_a_file_that_crashes_its_reader_is_rejected(tmp_path, kept):
     """VTK crashes on a truncated binary PLY file."""
     pyvista = pytest.importorskip("pyvista")
     path = tmp_path / "part.ply"
@@ -236,7 +240,7 @@ def test_a_file_that_crashes_its_reader_is_refused(tmp_path, kept):
 
 
 def test_reader_is_stopped_at_its_time_limit(tmp_path, monkeypatch):
-    """The time limit is that of the reader's process, which needs more than 1 ms."""
+    """The time limit applies to the reader's process, which takes more than 1 ms."""
     path = tmp_path / "part.vtk"
     path.write_text("# vtk DataFile Version 3.0\n")
     monkeypatch.setattr(surface_files, "_TIME_LIMIT", 0.001)
@@ -245,7 +249,7 @@ def test_reader_is_stopped_at_its_time_limit(tmp_path, monkeypatch):
 
 
 class Model:
-    """What gmsh's model says of an assembly: solids by tag, and their faces."""
+    """Mock of a gmsh model of an assembly, with solids by tag and their faces."""
 
     def __init__(self, **faces):
         self.faces = faces
@@ -272,7 +276,7 @@ def faces_of(model, path, solid):
     return list(sides(model, dict.fromkeys(chosen.values(), 0)))
 
 
-def test_faces_of_a_named_solid_are_selected_and_unknown_names_refused(tmp_path):
+def test_faces_of_a_named_solid_are_selected_and_unknown_names_rejected(tmp_path):
     path = tmp_path / "arm.step"
     assert faces_of(Model(arm=[1, 2]), path, "") == [1, 2]
     both = Model(arm=[1, 2], bolt=[3], bolt__2=[4, 5], _=[6])
