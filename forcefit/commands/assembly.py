@@ -83,7 +83,7 @@ def error(
     along: AlongOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Compute upper and lower bounds on the pose error, problem (27)."""
+    """Bound the pose error from above and below, problem (27)."""
     from forcefit.assembly.linear.reference.pose_error import ASSUMPTIONS
     from forcefit.assembly.model.largest import LARGEST_LENGTH
     from forcefit.assembly.report.pose_errors import pose_error_of, pose_error_text

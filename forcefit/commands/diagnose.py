@@ -56,7 +56,7 @@ def diagnose(
         typer.Option(help="Also write the robot with the identified effects."),
     ] = None,
 ) -> None:
-    """Identify effects missing from a model from measured deviations.
+    """Identify effects missing from a model from measured data.
 
     The verdict is explained, learned, none_needed, ambiguous, outside_library or
     not_enough_rows.  The errors before and after identification are evaluated on

@@ -47,7 +47,7 @@ def compare(
     page: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
-    """List the values that differ between two runs, largest change first."""
+    """List values that differ between two runs, largest first."""
     from forcefit.page.comparison import compare as compare_results
     from forcefit.page.comparison import comparison_page, comparison_text
 

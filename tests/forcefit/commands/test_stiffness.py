@@ -127,7 +127,7 @@ def test_wrong_option_is_refused_by_name_before_meshing(words, message):
                 "--part",
                 "z=0..1/young=1,poisson=0",
             ],
-            "--part: found together with a section",
+            "--part: found together with a cross section",
         ),
     ],
 )

@@ -144,15 +144,15 @@ def test_page_states_the_command_and_digests_of_its_input_files(tmp_path):
     assert rows["SHA-256 of robot.toml"] == (
         "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
     )
-    assert rows["SHA-256 of gone.toml"].startswith("cannot be read any more")
+    assert rows["SHA-256 of gone.toml"].startswith("can no longer be read")
     assert {"forcefit", "Python", "numpy", "clarabel"} <= set(rows)
 
 
 @pytest.mark.parametrize(("text", "message"), [
-    ("<!doctype html><p>", "x: found a page without results of forcefit"),
-    ("hello", "neither HTML nor JSON, expected a report of forcefit or the JSON"),
+    ("<!doctype html><p>", "x: found an HTML page without forcefit results"),
+    ("hello", "neither HTML nor JSON, expected a forcefit report or JSON"),
     ("[" * 100_000, "x: found text that is neither HTML nor JSON, expected"),
-    ("[1]", "x: found a JSON list or value, expected results"),
+    ("[1]", "x: found a JSON list or value, expected a JSON object"),
 ])  # fmt: skip
 def test_page_without_results_is_refused(text, message):
     with pytest.raises(BadInput, match=message):

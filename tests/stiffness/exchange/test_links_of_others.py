@@ -283,8 +283,8 @@ def test_options_that_do_not_fit_a_conversion_are_refused(run, words, message):
 
 
 @pytest.mark.parametrize(("to", "name", "message"), [
-    ("numpy", "rod.npz", '--output: found "rod.npz", expected the ending'),
-    ("nastran", "rod.npy", '--output: found "rod.npy", expected the ending'),
+    ("numpy", "rod.npz", '--output: found "rod.npz", expected a file extension'),
+    ("nastran", "rod.npy", '--output: found "rod.npy", expected a file extension'),
     ("nastra", "rod.pch", 'did you mean "nastran"?'),
     ("nastran", "rod.mtx", "found a file that is not a matrix for nastran"),
 ])  # fmt: skip
