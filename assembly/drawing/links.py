@@ -1,4 +1,4 @@
-"""Links of drawn bodies, converted to the axes of the frame at their tip and back."""
+"""Conversion of links between drawn bodies and the frames at their tips."""
 
 from dataclasses import replace
 
@@ -58,7 +58,7 @@ def link_at_tip(
     if isinstance(link, BeamLink | MeshLink):
         given = link.axis
         if given is None and length < _SAME_POINT:
-            raise BadInput(f"{place}: found no distance between its two joints")
+            raise BadInput(f"{place}: found coincident joints at both ends")
         along = np.array(given) * (-1 if reverse else 1) if given else span / length
         x, y, z = along.tolist()
         link = replace(link, axis=(x, y, z))

@@ -1,4 +1,4 @@
-"""Data that a loops file adds to a robot: loops, drives, ball joints, a home pose."""
+"""Addition of the loops, drives, joint types and home pose in a loops file."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -120,7 +120,7 @@ def _couplings_said(
     for coupling in couplings:
         line = (
             f"mimic: {coupling.text()} becomes an independent drive; command it "
-            "by this rule"
+            "according to this equation"
         )
         if coupling.leader is not None and coupling.leader not in driven:
             line += (

@@ -1,4 +1,4 @@
-"""Robots from files of other programs, with a home pose in which their loops close."""
+"""Import of robots from other programs, with a home pose in which the loops close."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -42,20 +42,21 @@ def robot_of_file(
     points: Sequence[str] | None = None,
     ask: bool = True,
 ) -> tuple[Conversion, RobotAndMechanism]:
-    """Return the robot of a file of another program.
+    """Read a robot from a file of another program.
 
     Args:
-        source: a URDF, MJCF or SDF file.
-        loops: YAML file with ``closed_loop``; None for the file next to a URDF.
-        overlay: TOML file with elasticity, clearances and errors of frames by name.
-        points: names of loops that close only in a point.
-        ask: whether another installed program also reads the file, for comparison.
+        source: URDF, MJCF or SDF file.
+        loops: YAML file with ``closed_loop``; by default, the file in the same folder
+            as a URDF.
+        overlay: TOML file with elasticity, clearances and errors, by frame name.
+        points: names of loops that are closed only at a point.
+        ask: whether the file is compared with the reading of another program.
 
     Returns:
-        The robot with the report of its conversion (without files), and its mechanism.
+        Robot with the report of its conversion (without files), and its mechanism.
 
     Raises:
-        BadInput: a file violates a rule, or a loop cannot close.
+        BadInput: a file violates a rule, or a loop cannot be closed.
     """
     if loops is None and source.suffix.lower() == ".urdf":
         loops = find_loops_file(source)
@@ -73,9 +74,7 @@ def robot_of_file(
             f"{source}: found {len(mechanism.joints)} joints, expected at most "
             f"{MOST_FRAMES}"
         )
-    comparison = Comparison(
-        "", source.name, "no other program was asked to read the file"
-    )
+    comparison = Comparison("", source.name, "the comparison was not requested")
     if ask or mechanism.unweighed:
         comparison = compare(mechanism, source)
     mechanism = _weighed(mechanism, comparison)
@@ -139,9 +138,9 @@ def _closed(
         reason = str(error).removeprefix(f"{source}: ")
         taken = (
             (
-                "every loop as 3d (a point without orientation): the file declares "
-                "all as 6d, which generators write by default, but as 6d they "
-                f"cannot close ({reason}); declare with --points which loops are 3d"
+                "all loops as 3d (closed at a point with free orientation): the file "
+                "declares all as 6d, which generators write by default, but then they "
+                f"cannot be closed ({reason}); use --points to declare the 3d loops"
             ),
         )
         return loose, home, held, taken
@@ -179,8 +178,8 @@ def _left_out(placed: RobotAndMechanism, named: str | None) -> tuple[str, ...]:
     if named is None:
         lines.append(
             f"no platform is named: {placed.robot.platform}, the end of the "
-            'longest chain, was taken; an overlay with platform = "NAME" '
-            "selects another"
+            "longest chain, is used; to select a different platform, use an overlay "
+            'with platform = "NAME"'
         )
     return tuple(lines)
 

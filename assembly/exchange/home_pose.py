@@ -17,13 +17,13 @@ from forcefit.inputs.errors import BadInput, quoted
 from forcefit.stiffness.screws import rotation_vector, skew, transform
 
 CLOSED = 1e-10  # [rad, m] largest mismatch of a loop that counts as closed
-_SCREWED_TIGHT = 1e-14  # scaled loop mismatch below which only rounding errors remain
-_STARTS = 20  # number of random starts, at increasing distance from the file's home
+_SCREWED_TIGHT = 1e-14  # scaled loop mismatch that corresponds to machine precision
+_STARTS = 20  # number of random starts, at increasing distance from the home pose
 _STARTS_ALONE = 12  # number of starts for a single loop, to find one that cannot close
-_STEPS = 200  # largest number of search steps from one start
-_LONGEST_STEP = 0.3  # [rad or lengths] largest search step
-# a search counts as stalled if ten steps reduce the sum of squares by less than this
-# factor
+_STEPS = 200  # maximum number of iterations per start
+_LONGEST_STEP = 0.3  # [rad or robot sizes] maximum step length
+# a search is considered stalled if ten steps reduce the sum of squares by less than
+# this factor
 _STALLED = 0.999
 
 
@@ -34,22 +34,22 @@ def loop_residual(mechanism: Mechanism, coordinates: NDArray) -> float:
 
 
 def close_loops(mechanism: Mechanism, file: str) -> tuple[NDArray, bool]:
-    """Return joint coordinates for which all loops close, near those of the file.
+    """Find joint coordinates close to those of the file for which all loops are closed.
 
-    The first search holds the drives.  If the loops do not close, the next search also
-    moves the drives.  Then searches follow from random starts, each farther away; the
-    random starts are the same at every call.
+    The first search holds the drives.  If it fails, the next search also moves the
+    drives, and is followed by searches from random starts at increasing distances.  The
+    random starts are the same on each call.
 
     Args:
-        mechanism: mechanism of n joints.
+        mechanism: mechanism with n joints.
         file: name of the file, for error messages.
 
     Returns:
-        (n,) [rad or m] coordinates, and whether the drives have the coordinates of the
-        file.
+        Coordinates (n,) [rad or m], and whether the drive coordinates of the file are
+        preserved.
 
     Raises:
-        BadInput: no search closes the loops; the message names the loop at fault and
+        BadInput: no search closes the loops; the message names the loop that fails and
             its mismatch.
     """
     coordinates, residual, held = nearest_closed(mechanism, 0)
@@ -67,28 +67,28 @@ def close_loops(mechanism: Mechanism, file: str) -> tuple[NDArray, bool]:
 
 
 def _check_alone(mechanism: Mechanism, file: str) -> None:
-    """Reject a loop that cannot close even without the other loops."""
+    """Raise BadInput for a loop that cannot be closed on its own."""
     (loop,) = mechanism.loops
     residual = nearest_closed(mechanism, _STARTS_ALONE)[1]
     if residual >= CLOSED:
         ends = f"({quoted(loop.first)}, {quoted(loop.second)})"
         raise BadInput(
-            f"{file}: {loop.name} {ends} cannot close even by itself: the smallest "
-            f"gap found is {residual:.3g} rad or m; expected more joints, or "
+            f"{file}: {loop.name} {ends} cannot be closed even on its own: the "
+            f"smallest gap found is {residual:.3g} rad or m; expected more joints, or "
             "type 3d (--points)"
         )
 
 
 def nearest_closed(mechanism: Mechanism, starts: int) -> tuple[NDArray, float, bool]:
-    """Return joint coordinates with the least loop mismatch, near those of the file.
+    """Find joint coordinates with minimum loop mismatch, close to those of the file.
 
     Args:
-        mechanism: mechanism of n joints.
+        mechanism: mechanism with n joints.
         starts: number of random starts, in addition to the coordinates of the file.
 
     Returns:
-        (n,) [rad or m] coordinates, their mismatch [rad, m], and whether the drives
-        have the coordinates of the file.
+        Coordinates (n,) [rad or m], their loop mismatch [rad, m], and whether the drive
+        coordinates of the file are preserved.
     """
     loops = _Loops(mechanism, _size(mechanism))
     coordinates, residual, held = mechanism.home, np.inf, True

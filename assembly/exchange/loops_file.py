@@ -1,16 +1,15 @@
-"""``robot.yaml``: loops and drives of a URDF, which URDF itself cannot represent.
+"""Loops files (``robot.yaml``): loops and drives, which URDF cannot represent.
 
 The format is that of the project example-parallel-robots. ``closed_loop`` lists pairs
 of joints or links that coincide; ``type`` is ``6d``, or ``3d`` if only the points
-coincide; ``name_mot`` lists the drives.  ``joint_name`` and ``joint_type`` declare a
-joint as SPHERICAL, as FIXED or as a UJOINT about two axes (_XY, _YX, ..). They are
-needed because CAD programs export such joints as one rotation.  The keys ``home``
-(coordinates by joint) and ``platform`` are additions of forcefit, which other readers
-ignore.
+coincide; ``name_mot`` lists the drives.  ``joint_name`` and ``joint_type`` declare
+joints as SPHERICAL, FIXED or as a UJOINT about two axes (_XY, _YX, ..), because CAD
+programs export such joints as a single rotation.  The keys ``home`` (coordinates by
+joint) and ``platform`` are extensions of forcefit, which other readers ignore.
 
-The generator of that project writes ``6d`` for every loop, and users correct the types
-by hand.  A file that contains only ``6d`` may therefore be uncorrected: its loops
-become points if they cannot close otherwise.
+The generator of that project writes ``6d`` for all loops, and users are expected to
+correct the types.  If a file contains only ``6d``, it may not have been corrected; its
+loops therefore become points if they cannot be closed otherwise.
 
 Sources:
     Batto, de Matteis, example-parallel-robots: ``loader_tools.py``, ``generateYAML``.

@@ -70,7 +70,7 @@ def orientation(node: Node, angles: Angles) -> NDArray:
         x, y, z, angle = node.numbers("axisangle", 4, "-, angle")
         axis = np.array([x, y, z])
         if not axis.any():
-            raise node.bad("axisangle", "found the axis 0 0 0, expected a direction")
+            raise node.bad("axisangle", "found the axis 0 0 0, expected a nonzero axis")
         return rotation_matrix(angle * angles.unit * axis / np.linalg.norm(axis))
     if node.has("euler"):
         given = node.numbers("euler", 3, "angle") * angles.unit

@@ -1,4 +1,4 @@
-"""Conversion of SDF joints to joints of one freedom; also for ``<gazebo>`` in a URDF.
+"""Conversion of SDF joints, also in ``<gazebo>`` elements of a URDF.
 
 Sources:
     sdformat.org, specification 1.12, ``<joint>``: an axis is in the model's frame until
@@ -52,7 +52,7 @@ def joint_ends(frames: Frames, named: Named) -> tuple[str, str]:
     if ends[0] == ends[1]:
         raise node.bad(
             "child", f"found {quoted(ends[1])}, which is also its parent; expected "
-            "another link"
+            "a different link"
         )  # fmt: skip
     return ends[0], ends[1]
 

@@ -1,4 +1,4 @@
-"""Freedoms and poses of URDF joints.
+"""Degrees of freedom and poses of URDF joints.
 
 Sources:
     ROS wiki, urdf/XML/joint: the default axis is x; rpy are rotations about fixed axes.
@@ -69,7 +69,7 @@ def pose_of(origin: Node) -> NDArray:
         return placed(shift, turn)
     x, y, z, w = origin.numbers("quat_xyzw", 4, "-")
     if not any((x, y, z, w)):
-        raise origin.bad("quat_xyzw", "found a quaternion of zero, expected a rotation")
+        raise origin.bad("quat_xyzw", "found a zero quaternion, expected a rotation")
     return placed(shift, from_quaternion([w, x, y, z]))
 
 

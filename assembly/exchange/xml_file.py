@@ -205,7 +205,7 @@ class Node:
         length = float(np.linalg.norm(vector))
         if length < 1e-9:
             raise self.bad(
-                key, f"found {describe(vector.tolist())}, expected a direction"
+                key, f"found {describe(vector.tolist())}, expected a nonzero vector"
             )
         # a vector whose length is 1 except for rounding is not changed
         return vector if abs(length - 1.0) < 1e-15 else vector / length
@@ -260,7 +260,7 @@ def _encoding(content: bytes) -> str:
         codecs.decode(b"", known)
     except LookupError:
         return "utf-8-sig"
-    # the declaration is readable as ASCII, hence the text is not UTF-16
+    # the declaration is readable as ASCII, so that the text is not UTF-16
     return "utf-8-sig" if known.startswith("utf") else known
 
 

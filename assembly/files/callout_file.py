@@ -293,7 +293,7 @@ def _diameter(table: Table, shape: str) -> tuple[float, ...]:
     except BadInput:
         fault = f"found {describe(value)}"
         raise table.bad(
-            "diameter", f'{fault}, expected the diameter of a round face, "40 mm"'
+            "diameter", f'{fault}, expected a diameter such as "40 mm"'
         ) from None
 
 

@@ -37,7 +37,7 @@ def predict(
     ],
     json: JsonOption = None,
 ) -> None:
-    """Predict the readings for the commands of a campaign or a table.
+    """Predict readings for the commands of a campaign or table.
 
     The prediction includes the geometric errors, effects and functions of the robot
     file.  If the file states uncertainties, an interval is written for each reading.

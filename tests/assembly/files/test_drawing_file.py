@@ -448,7 +448,7 @@ REFUSED = {
     "format": ("format = 2", "format = 3", "format: found 3, expected 1 | 2"),
     "format of frames": (
         "format = 2", "format = 1",
-        "format: found 1 in a file of bodies and joints, expected 2"),
+        "format: found 1 in a file with bodies and joints, expected 2"),
     "a frame": (
         "[[leg]]", '[[frame]]\nname = "tip"\n[[leg]]', 'unknown key "frame"'),
     "unknown body": (
@@ -474,7 +474,7 @@ REFUSED = {
         'leg "leg".joint "upper".axis2: missing; expected 3 finite numbers'),
     "no direction": (
         "axis = [-16, 0, 45]", "axis = [0, 0, 0]",
-        'leg "leg".joint "slide".axis: found only zeros, expected a direction: 3 '),
+        'leg "leg".joint "slide".axis: found a zero vector, expected a nonzero '),
     "a body without joints": (
         '[[leg]]', '[[body]]\nname = "lost"\n[[leg]]',
         'body "lost": found no joint that connects it with "base", expected one'),
@@ -486,7 +486,7 @@ REFUSED = {
         'joint: found "leg1.slide" twice, expected different names'),
     "base": (
         'name = "tube"', 'name = "base"',
-        'leg "leg".body "base".name: found "base", which is fixed; '),
+        'leg "leg".body "base".name: found "base", which is reserved; '),
     "a body with itself": (
         'between = ["tube", "rod"]', 'between = ["rod", "rod"]',
         'leg "leg".joint "slide".between: found "rod" twice, expected two bodies'),
@@ -542,7 +542,7 @@ REFUSED = {
         'leg "leg".joint "slide".clearance.guide.gap: found -1, expected 2 numbers >='),
     "a guide and a bore": (
         "drive_stiffness = 2e7", "clearance = { length = 0.1, guide = { gap = 1e-5 } }",
-        '.clearance.guide: found together with "length", expected one of them'),
+        '.clearance.guide: found together with "length", expected only one of them'),
     "three bearings": (
         "drive_stiffness = 2e7", "clearance = { bearings = [1, 2, 3] }",
         'leg "leg".joint "slide".clearance.bearings: found [1, 2, 3], expected two t'),

@@ -76,7 +76,7 @@ REFUSED = {
         'such as "gain" or "time_constant"'),
     "a compliance of a reading": (PUBLIC, 'where = "drive"',
         'where = "reading"\nkind = "compliance"',
-        '.kind: found "compliance" in the reading, expected "screw"'),
+        '.kind: found "compliance" for reading, expected "screw"'),
     "an unknown key": (PUBLIC, "session =", "sesion =",
         ': unknown key "sesion"; did you mean "session"?'),
     "a knee at no load": (PUBLIC, WAVES,

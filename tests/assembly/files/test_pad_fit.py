@@ -90,7 +90,7 @@ def test_file_of_frames_keeps_the_fit_of_a_pad(tmp_path, rng):
     ("old", "new", "message"),
     [
         ("FIT", 'fit = "25 H7/p6"', 'pad.fit: found "25 H7/p6", an interference fit'),
-        ("FIT", FIT + ', gap = "5 um"', 'pad.gap: found it together with "fit"'),
+        ("FIT", FIT + ', gap = "5 um"', 'pad.gap: found together with "fit"'),
         ("pad = { FIT", FIT + ', pad = { gap = "5 um"',
          'fit: found together with "pad", expected it in the pad'),
     ],

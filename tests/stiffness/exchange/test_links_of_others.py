@@ -271,7 +271,7 @@ def test_matrix_of_one_program_becomes_that_of_another_in_one_step(run, tmp_path
     ("words", "message"),
     [
         (["k.pch", "--to", "abaqus"], "found only one of --to and --output"),
-        (["k.json"], "--to: missing; expected the format of the file to write"),
+        (["k.json"], "--to: missing; expected the format of the output file"),
         (["k.json", "--tip", "2", "--to", "numpy", "-o", "k.npy"],
          "--tip: found together with the results k.json"),
     ],
