@@ -1,4 +1,4 @@
-"""ISO 286 fits against worked limits, and the distribution of the clearance."""
+"""Tests of ISO 286 fits: tabulated limits and the distribution of the clearance."""
 
 import numpy as np
 import pytest

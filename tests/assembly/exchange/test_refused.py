@@ -1,4 +1,4 @@
-"""Files of other programs that break a rule are each refused with one message."""
+"""Messages for invalid files of other programs."""
 
 import pytest
 

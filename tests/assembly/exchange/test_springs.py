@@ -1,4 +1,4 @@
-"""Springs of joints: the deflection of one spring under a load, by hand."""
+"""Import of joint springs, whose deflection under a load is known."""
 
 import json
 

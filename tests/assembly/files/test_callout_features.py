@@ -138,8 +138,8 @@ def errors_row(robot):
 
 
 def test_shift_of_a_datum_uses_the_hole_of_its_fit(tmp_path):
-    """The hole of B is drawn once: its clearance is 2 times the shift at least, and
-    6 um more, the least play of g6."""
+    """The hole of B is drawn once: its clearance is at least twice the shift plus
+    6 um, the minimum clearance for g6."""
     robot = read(tmp_path, BRACKET)
     sources = sources_of(robot)
     values = sources.draw(0, 20_000, 1)

@@ -1,4 +1,4 @@
-"""Tolerances, form and fits of robot files that are refused, each with one message."""
+"""Messages for invalid tolerances, form tolerances and fits in robot files."""
 
 import pytest
 
@@ -116,7 +116,7 @@ REFUSED = {
     "form": (ARM, [
         ('"0.006 mm"', '"0.006"', 'tolerance of "pin".cylindricity: found \'0.006\''),
         ('"0.006 mm"', '"0.006 mm (M)"', "found a width with (M), expected a width"),
-        ("cylindricity", "flatness", "found no gap that is affected by the flatness of its features"),
+        ("cylindricity", "flatness", "found no gap that is affected by the flatness"),
         ('{ fit = "12 H7/g6", length = "40 mm" }', '{ axial = "5 um" }',
          'joint "pin".clearance: found no gap that the cylindricity of its features '
          "could widen, expected a radial clearance, a fit or bearings"),

@@ -1,4 +1,4 @@
-"""``[[effect]]`` named function: the public format, and what is refused."""
+"""Reading and writing of the effect ``function``, and messages for invalid files."""
 
 import json
 from math import cos, sin

@@ -1,4 +1,4 @@
-"""Links of robot files that break a rule are each refused with one message."""
+"""Messages for invalid links in robot files."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Robot files that break a rule are each refused with one message."""
+"""Messages for invalid robot files."""
 
 import math
 import re

@@ -1,4 +1,4 @@
-"""Loads by component: the same wrench, and its effect by closed forms."""
+"""Loads given by component, compared with closed forms."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Placement of mesh links: rotations from mesh axes to frame axes."""
+"""Rotation of mesh links from mesh axes to frame axes."""
 
 from dataclasses import replace
 
@@ -126,7 +126,7 @@ def test_mesh_axis_below_a_moved_slide_is_read_and_written(ram, tmp_path):
         ({}, 'link: found a distance of 0 m from .*, or a mesh with "axis"'),
         ({"more": "translation = [0, 0, 0.1]", "position": 0.1},
          'home position of 0.1 m; expected a home position of 0'),
-        ({"axis": ", axis = [0, 0, 0]"}, "mesh.axis: found .*, expected a nonzero direction"),
+        ({"axis": ", axis = [0, 0, 0]"}, "mesh.axis: found .*, expected a nonzero"),
         ({"axis": ", axis = [0, 0, 1], up = [1, 0, 0]", "more": "up = [0, 0, 3]"},
          r'"tool".up: up = .* lies along the axis .*; expected a different direction'),
     ],

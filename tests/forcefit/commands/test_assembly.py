@@ -192,7 +192,7 @@ most = [5e-4, 5e-4, 5e-4, 5e-5, 5e-5, 5e-5]
      ("solve", "--quantities", "margin"),
      ("sweep", "--grid", "tx=0,ty=0,tz=0.45", "-o", "x.nc")],
 )  # fmt: skip
-def test_every_command_reports_that_first_order_decides_nothing_when_singular(
+def test_every_command_reports_that_first_order_is_inconclusive_when_singular(
     run, tmp_path, monkeypatch, words
 ):
     monkeypatch.chdir(tmp_path)

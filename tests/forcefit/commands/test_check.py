@@ -1,4 +1,4 @@
-"""``forcefit check``: all messages about a file, each that of its reader alone."""
+"""``forcefit check`` reports all messages that the reader of a file would raise."""
 
 import copy
 import itertools

@@ -1,4 +1,4 @@
-"""Commands: the results that they write, and their refusals."""
+"""Results of commands, and messages for invalid input."""
 
 import json
 import os

@@ -159,7 +159,7 @@ def test_fea_writes_the_keys_of_the_format(tmp_path):
 
 
 @pytest.mark.slow
-def test_fea_of_two_materials_in_series_adds_their_compliances():
+def test_compliances_of_two_materials_in_series_add_up_in_fea():
     """Without Poisson's effect plane sections stay plane, and compliances add up: h/EI
     for pure bending, h/GJ with G = E/2 for torsion, h/EA for tension. The accuracy
     is 1 %. The faces between the materials are those of elements, not the plane,

@@ -1,4 +1,4 @@
-"""``forcefit assembly sweep`` and ``plot``: files that they write, and refusals."""
+"""``forcefit assembly sweep`` and ``plot``: output files and invalid input."""
 
 import json
 import os
@@ -306,7 +306,7 @@ def test_damaged_sweep_file_is_reported_by_one_message(run, tmp_path, monkeypatc
     ("words", "said"),
     [(["--gravity", "z=-9.81"], 1), (["--load", "fx=1"], 1), ([], 0)],
 )  # fmt: skip
-def test_sweep_reports_that_frequencies_leave_load_and_gravity_out(
+def test_sweep_reports_that_frequencies_neglect_load_and_gravity(
     run, tmp_path, words, said
 ):
     grid = ["--grid", "tx=0,ty=0.13", "--assumption", "none", "--frequencies", "1"]

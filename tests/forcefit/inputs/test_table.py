@@ -1,4 +1,4 @@
-"""Strict reading of tables: found and expected value, in one short line."""
+"""Reading of tables, with short messages for invalid values."""
 
 import math
 
@@ -23,7 +23,7 @@ def table(**content):
 
 
 def message(function, *args, **kwargs):
-    """What a call complains of."""
+    """Return the message of the error raised by a call."""
     with pytest.raises(BadInput) as caught:
         function(*args, **kwargs)
     return str(caught.value)

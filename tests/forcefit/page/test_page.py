@@ -1,4 +1,4 @@
-"""Pages: their numbers equal the results, nothing is fetched, names stay names."""
+"""Tests of report pages: numbers, escaping and self-containedness."""
 
 import math
 import re
@@ -42,7 +42,7 @@ def written(*body, **changes):
     (0.25, "", "0.25"),
     (3.0, "m/s^2", "3 m/s^2"),
 ])  # fmt: skip
-def test_page_numbers_are_shown_in_drawing_units(value, unit, text):
+def test_page_shows_numbers_in_display_units(value, unit, text):
     (cell,) = parse(table(["a"], [[Value(value, unit)]])).tables[0][1]
     assert cell.text == text
     assert cell.value == pytest.approx(value, nan_ok=True)
@@ -65,7 +65,7 @@ def test_table_column_states_its_unit_once_and_keeps_every_digit():
     assert (first[1].text, first[1].value, first[1].si) == ("300", value, "0.3")
 
 
-def test_names_on_a_page_are_escaped_in_html_and_data():
+def test_names_on_a_page_are_escaped_in_html_and_json():
     trace = {"type": "scatter", "x": [0.0], "y": [1.0], "name": ODD}
     named = bars({ODD: 1.0}, Axis(ODD, "m"), ODD)
     drawn = chart([trace], Axis(ODD), Axis(ODD), ODD)
