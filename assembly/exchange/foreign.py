@@ -107,20 +107,20 @@ def robot_of_file(
 def _closed(
     mechanism: Mechanism, source: Path, beside: LoopsFile | None
 ) -> tuple[Mechanism, NDArray, bool, tuple[str, ...]]:
-    """Return the mechanism with a home pose in which its loops close.
+    """Find a home pose in which the loops of a mechanism are closed.
 
     Args:
-        mechanism: mechanism as it was read.
-        source: path of the mechanism's file.
-        beside: loops file whose types may be generated defaults: if the loops cannot
-            close otherwise, they become points.  None if the types are certain.
+        mechanism: mechanism as read from the file.
+        source: path of the file.
+        beside: loops file whose types may be generated defaults, so that loops become
+            points if they cannot be closed otherwise; None if the types are certain.
 
     Returns:
-        The mechanism, its home coordinates (n,) [rad or m], whether the drives have the
-        coordinates of the file, and descriptions of the assumptions.
+        Mechanism, its home coordinates (n,) [rad or m], whether the drive coordinates
+        of the file are preserved, and descriptions of the assumptions.
 
     Raises:
-        BadInput: the loops cannot close.
+        BadInput: the loops cannot be closed.
     """
     try:
         return mechanism, *close_loops(mechanism, str(source)), ()
@@ -147,7 +147,7 @@ def _closed(
 
 
 def _named_platform(overlay: Path | str) -> str | None:
-    """Return the platform that an overlay names; None if it names none."""
+    """Return the platform named in an overlay, or None."""
     given = read_toml(overlay)
     if not given.has("platform"):
         return None
@@ -158,7 +158,7 @@ def _laid_over(
     placed: RobotAndMechanism, source: Path, overlay: Path | str | None,
     named: str | None,
 ) -> Robot:  # fmt: skip
-    """Return the robot with its overlay, which may name a body as the platform."""
+    """Apply an overlay, which may name a body as the platform, to a robot."""
     content = robot_table(placed.robot)
     if overlay is None:
         return robot_of(Table(content, str(source), ""), source.stem)
@@ -185,7 +185,7 @@ def _left_out(placed: RobotAndMechanism, named: str | None) -> tuple[str, ...]:
 
 
 def _weighed(mechanism: Mechanism, comparison: Comparison) -> Mechanism:
-    """Return bodies with the mesh masses of another program, or report them missing."""
+    """Adopt the masses of meshes from another program, or report them as missing."""
     known = comparison.weights
     bodies = dict(mechanism.bodies)
     for name, (mass, centre, J) in known.items():

@@ -59,9 +59,9 @@ def close_loops(mechanism: Mechanism, file: str) -> tuple[NDArray, bool]:
         coordinates, residual, held = nearest_closed(mechanism, _STARTS)
     if residual >= CLOSED:
         raise BadInput(
-            f"{file}: its {len(mechanism.loops)} loops cannot close together: "
-            f"the smallest gap found is {residual:.3g} rad or m; expected loops "
-            "that close: check the lengths and the types 6d and 3d (--points)"
+            f"{file}: its {len(mechanism.loops)} loops cannot be closed together: "
+            f"the smallest gap found is {residual:.3g} rad or m; check the lengths "
+            "and the types 6d and 3d (--points)"
         )
     return coordinates, held
 
@@ -151,16 +151,16 @@ def _solve(loops: "_Loops", start: NDArray, hold: bool) -> NDArray:
 
 
 def _size(mechanism: Mechanism) -> float:
-    """Return the longest distance [m] between neighbouring joints; 1 if it is zero."""
+    """Return the largest distance between neighbouring joints [m], or 1 if zero."""
     lengths = [np.linalg.norm(joint.placement[:3, 3]) for joint in mechanism.joints]
     return float(max(lengths, default=0.0)) or 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class _Loops:
-    """The closure equations of loops, and the equations of coupled joints.
+    """Closure equations of the loops and equations of the coupled joints.
 
-    In these equations, every joint rotates about or translates along its own z axis.
+    All joints rotate about or translate along their own z axes.
     """
 
     mechanism: Mechanism
@@ -168,23 +168,23 @@ class _Loops:
 
     @cached_property
     def kinds(self) -> NDArray:
-        """(n,) kind of each joint: 0 fixed, 1 revolute or helical, 2 prismatic."""
+        """Type of each joint (n,): 0 fixed, 1 revolute or helical, 2 prismatic."""
         kinds = {"fixed": 0, "revolute": 1, "helical": 1, "prismatic": 2}
         return np.array([kinds[j.kind] for j in self.mechanism.joints], int)
 
     @cached_property
     def leads(self) -> NDArray:
-        """(n,) [m/rad] translation per angle of helical joints; 0 for others."""
+        """Translation per angle of helical joints (n,) [m/rad]; 0 for all others."""
         return np.array([j.lead for j in self.mechanism.joints], float)
 
     @property
     def moving(self) -> NDArray:
-        """(n,) bool, whether a joint can move."""
+        """Whether each joint can move (n,)."""
         return self.kinds > 0
 
     @cached_property
     def actuated(self) -> NDArray:
-        """(n,) bool, whether a joint is driven."""
+        """Whether each joint is driven (n,)."""
         return np.array([j.actuated for j in self.mechanism.joints], dtype=bool)
 
     @cached_property
@@ -213,7 +213,7 @@ class _Loops:
 
     @cached_property
     def carried(self) -> NDArray:
-        """(n + 1, n) bool, joints that move the bodies on each joint; last: root."""
+        """Mask (n + 1, n) of the joints that move each body; the root comes last."""
         parents = self.tree[0]
         marks = np.zeros((len(parents) + 1, len(parents)))
         for i, parent in enumerate(parents):
@@ -223,7 +223,7 @@ class _Loops:
 
     @cached_property
     def concerned(self) -> NDArray:
-        """(n,) bool, whether a joint's motion changes the mismatch of a loop."""
+        """Whether the motion of each joint affects the mismatch of a loop (n,)."""
         marks = np.zeros(len(self.kinds), dtype=bool)
         for (i, _), (j, _), _ in self.ends:
             marks |= self.carried[i] != self.carried[j]
@@ -237,7 +237,7 @@ class _Loops:
 
     @cached_property
     def coupled(self) -> list[tuple[int, int, Coupling]]:
-        """Indices of follower and leader (-1 without a leader), and their rule."""
+        """Indices of follower and leader (-1 without a leader), and their coupling."""
         row = {joint.name: k for k, joint in enumerate(self.mechanism.joints)}
         return [
             (row[one.follower], row.get(one.leader or "", -1), one)
@@ -245,7 +245,7 @@ class _Loops:
         ]
 
     def equations(self, q: NDArray) -> tuple[NDArray, NDArray]:
-        """Return the mismatch, with scaled translations, and its derivatives by q."""
+        """Return the mismatch with scaled translations, and its Jacobian."""
         parents, fixed, _ = self.tree
         before, after = place_frames(parents, self.kinds, fixed, q, self.leads)
         p = before[:, :3, 3]

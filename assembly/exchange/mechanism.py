@@ -133,18 +133,19 @@ class Mechanism:
 def parents_first(joints: Sequence[Joint], bodies: Mapping[str, Body], file: str) -> (
     tuple[str, tuple[Joint, ...]]
 ):  # fmt: skip
-    """Return the root of a tree of bodies, and the joints with parents first.
+    """Sort joints so that parents precede children, and find the root.
 
     Args:
         joints: joints in any order.
-        bodies: all bodies by name.
+        bodies: all bodies, by name.
         file: name of the file, for error messages.
 
     Returns:
-        Name of the root, and the sorted joints.
+        Name of the root, and sorted joints.
 
     Raises:
-        BadInput: a body is missing or has two parents; or there is no root, or several.
+        BadInput: a body is missing or has two parents, or there is not exactly one
+            root.
     """
     carried: dict[str, Joint] = {}
     below: dict[str, list[Joint]] = {name: [] for name in bodies}
@@ -244,10 +245,10 @@ def chain(
 
 
 def ball(turns: str = "xyz") -> list[tuple[str, str, NDArray]]:
-    """Return a ball joint as three rotations, singular only far from home."""
+    """Return a ball joint as three rotations, which are singular only far from home."""
     return [(f"r{axis}", "revolute", np.array(UNIT_VECTORS[axis])) for axis in turns]
 
 
 def slides() -> list[tuple[str, str, NDArray]]:
-    """Return a translation in space as three prismatic joints."""
+    """Return the parts of a spatial translation: three prismatic joints."""
     return [(f"t{axis}", "prismatic", np.array(UNIT_VECTORS[axis])) for axis in "xyz"]

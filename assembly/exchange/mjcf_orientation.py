@@ -1,4 +1,4 @@
-"""Orientations in MJCF, which have five forms, in degrees or radians."""
+"""Orientations in MJCF, which are given in five forms, in degrees or radians."""
 
 import math
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from forcefit.stiffness.screws import rotation_matrix
 
 @dataclass(frozen=True)
 class Angles:
-    """The angle conventions of a file.
+    """Angle conventions of a file.
 
     Attributes:
         unit: [rad] one unit of the file's angles.

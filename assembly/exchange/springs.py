@@ -1,4 +1,4 @@
-"""Joint springs: springs unloaded at home are converted, others are reported."""
+"""Joint springs: those unloaded at home are converted, all others are reported."""
 
 import numpy as np
 from numpy.typing import NDArray

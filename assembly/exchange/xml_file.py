@@ -1,4 +1,4 @@
-"""Reader of XML files; entities and external files are rejected."""
+"""XML reader, which rejects entities and external files."""
 
 import codecs
 import re
@@ -28,7 +28,7 @@ _ENDLESS = 1e3  # [rad or m] larger limits count as no limits
 
 @dataclass(frozen=True)
 class Node:
-    """An element of an XML file, with its position for messages.
+    """Element of an XML file, with its position for messages.
 
     Attributes:
         element: element of :mod:`xml.etree.ElementTree`.

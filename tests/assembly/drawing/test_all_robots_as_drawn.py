@@ -139,7 +139,7 @@ def test_data_that_a_drawing_cannot_represent_are_reported(run, tmp_path):
     # a closure of two frames of one body
     (["-o", "x.toml", "--format", "2"], '[[frame]]\nname = "spot"\nparent = "arm"\n'
      'translation = [0.1, 0, 0]\n[[closure]]\nframes = ["tip", "spot"]\n',
-     'closure[1] ("tip", "spot"): found that it connects two frames of one rigid body'),
+     'closure[1] ("tip", "spot"): found a connection between two frames of the same '),
     (["-o", "x.toml", "--format", "2"], '[[effect]]\nname = "function"\nwhere = "tip"\n'
      'kind = "geometric_error"\ncomponents = ["TX"]\nform = "constant"\n'
      "parameters = { a = 1e-4 }\n", "effect"),

@@ -70,7 +70,7 @@ def test_loop_of_the_default_type_is_closed_in_a_point(types, tmp_path):
     assert "loop1" in answer.text()
     assert answer.table()["taken"] == list(answer.taken)
     assert convert(path, tmp_path / "robot.toml", points=["goal"]).taken == ()
-    with pytest.raises(BadInput, match="loop1 .* cannot close"):
+    with pytest.raises(BadInput, match="loop1 .* cannot be closed"):
         convert(path, tmp_path / "robot.toml", points=())
 
 

@@ -118,8 +118,8 @@ REFUSED = {
         ('"0.006 mm"', '"0.006 mm (M)"', "found a width with (M), expected a width"),
         ("cylindricity", "flatness", "found no gap that is affected by the flatness"),
         ('{ fit = "12 H7/g6", length = "40 mm" }', '{ axial = "5 um" }',
-         'joint "pin".clearance: found no gap that the cylindricity of its features '
-         "could widen, expected a radial clearance, a fit or bearings"),
+         'joint "pin".clearance: found no gap that is affected by the cylindricity of '
+         "its features, expected a radial clearance, a fit or bearings"),
         ('{ fit = "12 H7/g6", length = "40 mm" }', '{ fit = "25 H7/p6" }',
          'clearance.fit: found "25 H7/p6", an interference fit'),
         ('cylindricity = "0.006 mm"', 'cylindricity = "0.006 mm"\ndatums = ["pin"]',

@@ -477,7 +477,7 @@ REFUSED = {
         'leg "leg".joint "slide".axis: found a zero vector, expected a nonzero '),
     "a body without joints": (
         '[[leg]]', '[[body]]\nname = "lost"\n[[leg]]',
-        'body "lost": found no joint that connects it with "base", expected one'),
+        'body "lost": found no chain of joints that connects it to "base", expected'),
     "two bodies of a name": (
         '[[leg]]', '[[body]]\nname = "platform"\n[[leg]]',
         'body: found "platform" twice, expected different names'),
@@ -571,8 +571,8 @@ REFUSED = {
         'expected exactly one of "beam" | "curve" | "stiffness" | "mesh" | "library"'),
     "the name of another joint's frame": (
         'name = "slide"', 'name = "lower.second"',
-        'joint "leg1.lower.second": found "leg1.lower.second" as the name of a frame, '
-        'which joint "leg1.lower" has too; expected another name'),
+        'joint "leg1.lower.second": found "leg1.lower.second" as the name of a frame '
+        'that joint "leg1.lower" also has; expected a different name'),
     "copies": (
         "count = 3", "count = 0",
         'leg "leg".repeat.count: found 0, expected a whole number >= 1'),
