@@ -44,7 +44,7 @@ def with_loops(
     mechanism, parts = _retyped(mechanism, loops.turns, parts)
     ends = {name: name for name in mechanism.bodies}
     children = {joint.name: joint.child for joint in mechanism.joints}
-    # a joint of several freedoms ends at the last of its one-freedom joints
+    # a joint with several degrees of freedom ends at the last of its joints
     ends |= {name: children[several[-1]] for name, several in parts.items()}
     # a link on a fixed joint may have the joint's name: both denote the same place
     count, closed = len(mechanism.loops), list(mechanism.loops)

@@ -259,7 +259,7 @@ def _massive(node: Node, place: _Place, reading: _Reading) -> Body:
 
 
 def _freedoms(node: Node, place: _Place, reading: _Reading) -> Iterator[Joint]:
-    """Yield the joints of a body with one freedom each, in the body's axes."""
+    """Yield the joints of a body, one per degree of freedom, in the body's axes."""
     number = 0
     for inner, at in _elements(node, place):
         if inner.tag not in {"joint", "freejoint"}:

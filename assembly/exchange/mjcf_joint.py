@@ -101,7 +101,7 @@ def at_key(key: Node, joint: Joint, values: NDArray) -> Joint:
 
     Args:
         key: keyframe element.
-        joint: joint of one freedom, or the first joint of a ball or free joint.
+        joint: joint with one degree of freedom, or the first of a ball or free joint.
         values: one number, a quaternion, or a position and a quaternion.
 
     Returns:

@@ -84,7 +84,7 @@ def _add_mass(body: Element, inertia: Any) -> None:
 
 
 def _add_joint(model: Any, body: Element, i: int) -> bool:
-    """Add a joint to its body; return whether it has one freedom."""
+    """Add a joint to its body; return whether it has one degree of freedom."""
     joint, name = model.joints[i], model.names[i]
     several = _SEVERAL.get(joint.shortname())
     if several == "free":

@@ -121,7 +121,7 @@ def _tree(
 def _of_axis(joint: Node, tag: str, part: Node) -> str:
     """Return a description of an axis's omitted properties; empty if there are none."""
     spring = part.child("spring_stiffness")
-    # forcefit does not read further axes of joints of several freedoms
+    # forcefit does not read further axes of joints with several degrees of freedom
     crossed = joint.optional("type") in {"universal", "revolute2"}
     single = joint.optional("type") not in {"ball", "screw"}
     taken = crossed or (tag == "axis" and single)

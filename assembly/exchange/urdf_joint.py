@@ -25,13 +25,13 @@ _ZERO = np.zeros(3)
 
 
 def joint_freedoms(node: Node) -> list[tuple[str, str, NDArray]]:
-    """Return name, kind and axis of each freedom of a joint, or of a fixed joint.
+    """Return name, kind and axis per degree of freedom of a joint, or of a fixed joint.
 
     Args:
         node: element of a joint; a prefix marks a joint of Drake, with Drake's axes.
 
     Returns:
-        The freedoms, in the order in which they move the child.
+        The degrees of freedom, in the order in which they move the child.
 
     Raises:
         BadInput: the type is unknown, or an axis has no direction.
