@@ -25,8 +25,8 @@ MEANINGS = {
     SOLVER_FAILED: "the search found no solution with a sufficient certificate",
     SIMULATION_FAILED: "the multibody simulation failed",
     INVALID_ROBOT: "the varied numbers are not those of a valid robot",
-    SINGULAR: "the posture is singular (more freedoms than nearby): the first-order "
-    "analysis is inconclusive",
+    SINGULAR: "the posture is singular (more degrees of freedom than nearby "
+    "postures): the first-order analysis is inconclusive",
     BEYOND_LIMITS: "a joint's coordinate is beyond its limits",
     BEYOND_SINGULARITY: "home and this posture are separated by a singularity",
     FREE_MOTION: "the platform has a free motion, without resistance",
