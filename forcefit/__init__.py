@@ -1,15 +1,15 @@
-"""forcefit: assembly of parallel manipulators by force, with independent checks.
+"""forcefit: forced assembly of parallel manipulators, with independent checks.
 
-``import forcefit as ff; ff.load_robot("irsbot2")`` loads a robot.  Each public name is
-imported when it is first used.  :mod:`forcefit.inputs` reads and checks files, and
-:mod:`forcefit.commands` contains the command line.
+To load a robot, call ``import forcefit as ff; ff.load_robot("irsbot2")``.  Public names
+are imported on first use.  :mod:`forcefit.inputs` reads and checks files, and
+:mod:`forcefit.commands` implements the command line.
 """
 
 import os.path
 import sys
 
-# A checkout without symbolic links, for example on Windows, has the packages one level
-# up
+# In a checkout without symbolic links, for example on Windows, the packages are in the
+# parent folder
 if not os.path.isdir(os.path.join(__path__[0], "assembly")):
     __path__.append(os.path.dirname(__path__[0]))
 from forcefit.old_packages import OldPackages
@@ -21,7 +21,7 @@ TYPE_CHECKING = False  # importing typing takes longer than the rest of this mod
 if TYPE_CHECKING:
     __version__: str
 
-# public names by the module that defines them: the complete public interface
+# the complete public interface: public names, grouped by the module that defines them
 _OWNERS = {
     "forcefit.inputs.errors": ("BadInput",),
     "forcefit.stiffness.beam.beam": ("beam_compliance",),
@@ -58,8 +58,8 @@ _OWNERS = {
     "forcefit.validation.inspection.inspection": ("inspect_campaign",),
     "forcefit.validation.study.run": ("run_study",),
 }  # fmt: skip
-# Old public names by the module that still defines them, each with the public name that
-# replaces it.  They work for one release.
+# Deprecated public names, grouped by the module that still defines them, each with its
+# replacement.  They are supported for one more release.
 _REPLACED = {
     "forcefit.stiffness.beam.sections": {
         "rectangular_section": "beam_compliance", "round_section": "beam_compliance",
@@ -83,8 +83,9 @@ _REPLACED = {
     "forcefit.validation.study.report": {"write_study": "run_study"},
     "forcefit.validation.study.study_file": {"read_study": "run_study"},
 }  # fmt: skip
-# Old public names that work for one release.  Each entry gives the new public name, and
-# the module and the name of the object if they are not those of the new name.
+# Deprecated public names, supported for one more release.  Each entry gives the new
+# public name, followed by the module and attribute if they differ from those of the new
+# name.
 _RENAMED: dict[str, tuple[str, ...]] = {
     "foretell": ("predict",), "load_deflection": ("deflection_curve",),
     "read_robot": ("load_robot",),
@@ -93,7 +94,7 @@ _RENAMED: dict[str, tuple[str, ...]] = {
     **{old: (new, owner, old)
        for owner, names in _REPLACED.items() for old, new in names.items()},
 }  # fmt: skip
-# public names of the last release that must now be imported from their module
+# names that were public in the last release and must now be imported from their modules
 _MOVED = {
     "forcefit.stiffness.beam.sections": ("Section",),
     "forcefit.stiffness.fem.fea": ("FemOptions",),
@@ -116,7 +117,7 @@ __all__ = [*sorted(_OWNER_OF), "__version__"]
 
 
 def __getattr__(name: str) -> object:
-    """Import a public name when it is first used; warn if the name is an old one."""
+    """Import a public name on first use; warn if the name is deprecated."""
     if name == "__version__":
         return _version()
     if name not in _OWNER_OF and name not in _RENAMED and name not in _MOVED_TO:
@@ -143,7 +144,7 @@ def __dir__() -> list[str]:
 
 
 def _version() -> str:
-    """Return the version of the package: the last tag, and the commits after it."""
+    """Return the package version: the last tag and the number of commits since then."""
     from importlib.metadata import PackageNotFoundError, version
 
     try:

@@ -1,4 +1,4 @@
-"""``python -m forcefit`` is the command ``forcefit``."""
+"""Run the command ``forcefit`` as ``python -m forcefit``."""
 
 from forcefit.commands.app import main
 

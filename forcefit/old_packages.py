@@ -1,9 +1,9 @@
-"""Old names of the packages, such as ``assembly`` for ``forcefit.assembly``.
+"""Import the packages by their old names, for example ``assembly``.
 
-Nothing is installed under the old names, because a user or another distribution may
-have modules of these names.  The old names work for one more release.  Importing one
-returns the present module and prints a warning, unless Python finds another module of
-that name first.
+Nothing is installed under the old names, because users and other distributions may
+have modules with these names.  The old names are supported for one more release:
+importing one returns the current module, here ``forcefit.assembly``, and emits a
+warning, unless Python first finds an unrelated module with that name.
 """
 
 import sys
@@ -17,7 +17,7 @@ _PACKAGES = ("stiffness", "assembly", "validation")
 
 
 class OldPackages:
-    """Finder and loader for Python's import system that maps an old name to a module.
+    """Import finder and loader that maps old package names to the current modules.
 
     ``import forcefit`` puts this finder at the start of ``sys.meta_path``.
     """
@@ -25,7 +25,7 @@ class OldPackages:
     def find_spec(
         self, name: str, path: object, target: object = None
     ) -> ModuleSpec | None:
-        """Return the specification of a module with an old name, or None."""
+        """Return the module specification for an old name, or None for other names."""
         package, dot, _ = name.partition(".")
         if package not in _PACKAGES:
             return None
@@ -38,29 +38,29 @@ class OldPackages:
         return ModuleSpec(name, self) if ours else None  # type: ignore[arg-type]
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
-        """Return the present module, which already has a specification."""
+        """Return the current module, which already has its own specification."""
         module = import_module(f"forcefit.{spec.name}")
         self._spec = module.__spec__
         return module
 
     def exec_module(self, module: ModuleType) -> None:
-        """Restore the specification of the module, which the import has replaced."""
+        """Restore the module's own specification, which the import has overwritten."""
         module.__spec__ = self._spec
 
 
 def use_present_name(package: str) -> None:
-    """Make the old name of a package refer to the present module, and warn.
+    """Alias the old name of a package to the current module, and warn.
 
-    A package calls this function when it is imported by its old name.  This is possible
-    only in a checkout, where the folders ``assembly``, ``stiffness`` and ``validation``
-    are on the import path.
+    Each package calls this function when it is imported under its old name.  This
+    happens only in a checkout, where the folders ``assembly``, ``stiffness`` and
+    ``validation`` are on the import path.
     """
     sys.modules[package] = import_module(f"forcefit.{package}")
     _warn(package)
 
 
 def _is_of_others(package: str) -> bool:
-    """Return whether the name refers to a module that does not belong to forcefit."""
+    """Return whether the name refers to a module outside forcefit."""
     found = PathFinder.find_spec(package)
     if found is None:
         return False

@@ -1,4 +1,4 @@
-"""Tolerances on a drawing: zones of small screws, fits and general tolerances.
+"""Drawing tolerances: zones of small screws, fits and general tolerances.
 
-Start with ``zone.py`` for the convex zones, ``fits.py`` for ISO 286.
+Start with ``zone.py`` for convex tolerance zones and with ``fits.py`` for ISO 286 fits.
 """

@@ -1,4 +1,4 @@
-"""The callouts of one feature on a drawing, and their common zone."""
+"""Tolerance callouts of a feature on a drawing, and the intersection of their zones."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -27,7 +27,7 @@ from forcefit.assembly.callouts.zones_of_features import (
 from forcefit.inputs.table import BadInput
 
 SHAPES = ("axis", "plane", "point")
-# components of a screw that a datum of each shape constrains, in the datum's axes
+# screw components constrained by a datum of each shape, in the axes of the datum
 HELD = {
     "axis": (0, 1, 3, 4),
     "plane": (0, 1, 5),
@@ -37,25 +37,26 @@ HELD = {
 }
 LOCATIONS = ("position", "coaxiality", "profile")
 ORIENTATIONS = ("perpendicularity", "parallelism", "angularity")
-_ALONG = 1e-3  # sine of the angle below which two directions count as parallel
-_SAME_LENGTH = 1e-6  # [m] allowed difference between a stated and the nominal length
+_ALONG = 1e-3  # largest sine of the angle between directions that count as parallel
+_SAME_LENGTH = 1e-6  # [m] allowed difference between a stated and a nominal length
 
 
 @dataclass(frozen=True)
 class Datum:
-    """A datum: a feature relative to which other features are measured.
+    """Datum, that is, a feature relative to which other features are measured.
 
     Attributes:
         frame: name of the frame.
         shape: one of :data:`HELD`. A guide is an axis that also constrains the rotation
             about itself; a body constrains all components.
-        axis: (3,) unit vector of the axis or normal, in the frame's axes.
-        at: (3,) [m] middle of the feature, in the frame's axes.
-        hole: size of a hole that is a datum at maximum material, such as ``"12 H7"``:
-            the larger the hole, the more the datum can shift.  Empty for other datums.
-        hole_of: as for :attr:`Callout.hole_of`.
-        extent: [m] length of a hole that is datum A at maximum material, so that the
-            datum can tilt too; 0 for other datums.
+        axis: unit vector along the axis or normal (3,), in the frame axes.
+        at: centre of the feature (3,) [m], in the frame axes.
+        hole: size of a hole used as a datum at maximum material, for example
+            ``"12 H7"``; the larger the hole, the more the datum can shift.  Empty for
+            all other datums.
+        hole_of: see :attr:`Callout.hole_of`.
+        extent: length of a hole that is datum A at maximum material [m], so that the
+            datum can also tilt; 0 for all other datums.
     """
 
     frame: str
@@ -69,34 +70,34 @@ class Datum:
 
 @dataclass(frozen=True, eq=False)
 class Callout:
-    """The callouts of one feature of a body, at a joint or a frame.
+    """Tolerance callouts of a feature at a joint or a frame.
 
     Attributes:
-        name: name of the feature, such as ``"leg1.bore on tube"``.
+        name: name of the feature, for example ``"leg1.bore on tube"``.
         feature: name of the frame.
-        after: whether the feature is on the body that the frame's joint moves; False
-            for the body before the joint.
+        after: whether the feature is on the body moved by the joint of the frame;
+            otherwise it is on the body before the joint.
         datums: datums A, B, C in this order, at least one.
         shape: one of :data:`SHAPES`.
-        axis: (3,) unit vector of the axis or the normal, in the frame's axes.
-        extent: [m] length of a bore; the two sizes of a face along its x and y; or the
-            diameter of a round face.
-        widths: [m] width of each zone, by the words of :data:`LOCATIONS` and
+        axis: unit vector along the axis or normal (3,), in the frame axes.
+        extent: length of a bore, side lengths of a face along its x and y axes, or
+            diameter of a round face [m].
+        widths: width of each zone [m], by the words in :data:`LOCATIONS` and
             :data:`ORIENTATIONS`.
-        hole: size of a hole whose position applies at maximum material, such as
-            ``"12 H7"``; empty if it applies at every size.
-        direction: (3,) unit vector across the axis along which the zones are measured,
-            in the frame's axes; None for all directions.  For a face: the direction of
-            its first size.
-        length: [m] distance from datum A and its tolerance to each side, or None.
-        general: general tolerance, such as ``"ISO 2768-mK"``, or empty.
+        hole: size of a hole whose position tolerance applies at maximum material, for
+            example ``"12 H7"``; empty if it applies regardless of size.
+        direction: unit vector normal to the axis (3,), along which the zones are
+            measured, in the frame axes; None for all directions.  For a face, the
+            direction of its first side.
+        length: distance from datum A and its symmetric tolerance [m], or None.
+        general: general tolerance, for example ``"ISO 2768-mK"``, or empty.
         distribution: see :meth:`forcefit.assembly.callouts.zone.Zone.draw`.
         cp: capability index of a normal distribution.
-        at: (3,) [m] middle of the feature, in the frame's axes.
-        envelope: whether the whole face is within the limits of its length (envelope
-            principle), instead of only its middle.
+        at: centre of the feature (3,) [m], in the frame axes.
+        envelope: whether the limits on the length apply to the whole face (envelope
+            principle) rather than only to its centre.
         hole_of: name of the fit or joint whose hole is at maximum material. All
-            features with this name have the same hole size.
+            features with the same name have the same hole size.
     """
 
     name: str
@@ -119,21 +120,21 @@ class Callout:
 
     @property
     def words(self) -> str:
-        """Names of the callouts, such as ``"position and perpendicularity"``."""
+        """Names of the callouts, for example ``"position and perpendicularity"``."""
         found = [*self.widths, *(["length"] if self.length else [])]
         found += ["general tolerance"] if self.general else []
         return " and ".join(found)
 
     @property
     def first_width(self) -> float:
-        """[m] width of the first zone, or the tolerance of the length to each side."""
+        """Width of the first zone, or symmetric tolerance of the length [m]."""
         if self.widths:
             return next(iter(self.widths.values()))
         return self.length[1] if self.length else 1.0
 
     @property
     def axes(self) -> NDArray:
-        """(3, 3) axes of the feature as columns, in the frame's axes; z is the axis."""
+        """Axes of the feature as columns (3, 3), in the frame axes; z is its axis."""
         if self.shape == "plane" and self.direction is not None:
             x, z = np.array(self.direction), np.array(self.axis)
             return np.column_stack([x, np.cross(z, x), z])
@@ -141,7 +142,7 @@ class Callout:
 
 
 def axes_along(axis: tuple[float, float, float]) -> NDArray:
-    """Return (3, 3) axes as columns, z along a unit vector (identity if it is z)."""
+    """Return axes as columns (3, 3) with z along a unit vector; identity if it is z."""
     z = np.array(axis)
     if np.array_equal(z, [0.0, 0.0, 1.0]):
         return np.eye(3)
@@ -152,19 +153,19 @@ def axes_along(axis: tuple[float, float, float]) -> NDArray:
 
 
 def zone_of(callout: Callout, offset: NDArray, datum_axis: NDArray | None) -> Zone:
-    """Return the zone of a feature's deviation relative to its datums.
+    """Return the zone for the deviation of a feature from its datums.
 
     Args:
         callout: callouts of the feature.
-        offset: (3,) [m] vector from datum A to the feature, in the feature's axes.
-        datum_axis: (3,) unit vector of the axis or normal of datum A, in the feature's
+        offset: vector from datum A to the feature (3,) [m], in the feature axes.
+        datum_axis: unit vector along the axis or normal of datum A (3,), in the feature
             axes; None if datum A is a point.
 
     Returns:
-        The zone that is within the zones of all callouts, in the feature's axes.
+        Intersection of the zones of all callouts, in the feature axes.
 
     Raises:
-        BadInput: a callout does not fit the nominal geometry.
+        BadInput: a callout contradicts the nominal geometry.
     """
     _check_coaxial(callout, offset, datum_axis)
     zones = [_zone(callout, kind, width) for kind, width in callout.widths.items()]
@@ -174,10 +175,12 @@ def zone_of(callout: Callout, offset: NDArray, datum_axis: NDArray | None) -> Zo
         nominal, tolerance = callout.length
         if abs(distance - nominal) > _SAME_LENGTH:
             found = f"found a length of {nominal * 1e3:g} mm"
-            raise BadInput(f"{found}, expected that at home, {distance * 1e3:g} mm")
+            raise BadInput(
+                f"{found}, expected the length at home, {distance * 1e3:g} mm"
+            )
         if distance < _SAME_LENGTH:
-            fault = "found a length to a datum at the same place"
-            raise BadInput(f"{fault}, expected a distance from datum A")
+            fault = "found a length to a coincident datum"
+            raise BadInput(f"{fault}, expected a nonzero distance from datum A")
         if callout.envelope:
             zones.append(_face_within(callout, 2 * tolerance))
         else:
@@ -190,12 +193,14 @@ def zone_of(callout: Callout, offset: NDArray, datum_axis: NDArray | None) -> Zo
 def _check_coaxial(
     callout: Callout, offset: NDArray, datum_axis: NDArray | None
 ) -> None:
-    """Reject coaxiality of axes that do not coincide at home."""
+    """Check that coaxiality is specified only for axes that coincide at home."""
     if "coaxiality" not in callout.widths:
         return
-    expected = "expected the same axis at home; position is for others"
+    expected = "expected coincident axes at home; use position for other axes"
     if datum_axis is not None and np.linalg.norm(datum_axis[:2]) > _ALONG:
-        raise BadInput(f"found coaxiality to an axis in another direction, {expected}")
+        raise BadInput(
+            f"found coaxiality to an axis in a different direction, {expected}"
+        )
     apart = float(np.linalg.norm(offset[:2]))
     if apart > _SAME_LENGTH:
         raise BadInput(
@@ -204,7 +209,7 @@ def _check_coaxial(
 
 
 def _zone(callout: Callout, kind: str, width: float) -> Zone:
-    """Return the zone of one callout with the given width [m]."""
+    """Return the zone of a callout with the given width [m]."""
     across = callout.direction
     direction = None if across is None else (np.array(across) @ callout.axes)[:2]
     location = kind in LOCATIONS
@@ -228,7 +233,7 @@ def _zone(callout: Callout, kind: str, width: float) -> Zone:
 
 
 def _face_within(callout: Callout, width: float) -> Zone:
-    """Return the zone of a face between two planes with the given distance [m]."""
+    """Return the zone of a face between two planes at the given distance [m]."""
     is_round = len(callout.extent) == 1
     return (round_plane_position if is_round else plane_position)(
         width, *callout.extent
@@ -236,7 +241,10 @@ def _face_within(callout: Callout, width: float) -> Zone:
 
 
 def _away(shape: str, offset: NDArray, datum_axis: NDArray | None) -> NDArray:
-    """Return the offset (3,) that a length limits: normal to an axis or a plane."""
+    """Return the part of the offset (3,) to which a length tolerance applies.
+
+    This is the part normal to a plane, or normal to parallel axes.
+    """
     if shape == "plane":
         return np.array([0.0, 0.0, offset[2]])
     if datum_axis is not None and np.linalg.norm(datum_axis[:2]) < _ALONG:
@@ -252,7 +260,7 @@ def _general(callout: Callout, away: NDArray, datum_axis: NDArray | None) -> lis
     square = datum_axis is not None and abs(datum_axis[2]) < _ALONG
     if geometry and square and callout.shape == "axis":
         if not callout.extent:
-            fault = f"found class {geometry} of a bore without its length"
+            fault = f"found class {geometry} for a bore without its length"
             raise BadInput(f'{fault}, expected "extent" too, or no class {geometry}')
         width = perpendicularity_tolerance(callout.extent[0], geometry)
         zones.append(axis_orientation(width, callout.extent[0]))
@@ -263,17 +271,17 @@ def check_orientation(
     callout: Callout, axis: NDArray, datum_axis: NDArray | None,
     same_shape: bool | None,
 ) -> None:  # fmt: skip
-    """Reject perpendicularity or parallelism that contradicts the nominal geometry.
+    """Check orientation callouts against the nominal geometry.
 
     Args:
         callout: callouts of the feature.
-        axis: (3,) unit vector of the feature's axis or normal.
-        datum_axis: (3,) unit vector of datum A in the same axes; None for a point.
-        same_shape: whether both features are axes, or both are planes; None if datum A
-            may be the face or the bore of a fixed joint.
+        axis: unit vector along the axis or normal of the feature (3,).
+        datum_axis: unit vector of datum A in the same axes (3,); None for a point.
+        same_shape: whether the feature and datum A are both axes or both planes; None
+            if datum A may be either the face or the bore of a fixed joint.
 
     Raises:
-        BadInput: the angle at home differs from the callout, or the datum is a point.
+        BadInput: the nominal angle contradicts the callout, or the datum is a point.
     """
     for kind in set(callout.widths) & set(ORIENTATIONS):
         if datum_axis is None:
@@ -292,14 +300,14 @@ def check_orientation(
         if not any(fits):
             angle = np.degrees(np.arccos(min(1.0, cosine)))
             raise BadInput(
-                f"found {kind} where axis or normal and that of datum A are at "
-                f"{angle:.4g} deg at home, expected {_expected(kind, same_shape)} deg; "
-                "angularity is for other angles"
+                f"found {kind} although the angle between the axis or normal and that "
+                f"of datum A is {angle:.4g} deg at home, expected "
+                f"{_expected(kind, same_shape)} deg; use angularity for other angles"
             )
 
 
 def _expected(kind: str, same_shape: bool | None) -> str:
-    """Return the angle [deg] between axes or normals for a kind of orientation."""
+    """Return the expected angle [deg] between the axes or normals for a callout."""
     if same_shape is None:
         return "0 or 90"
     return "0" if (kind == "parallelism") == same_shape else "90"

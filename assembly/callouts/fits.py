@@ -1,7 +1,7 @@
-"""Fits of ISO 286: limits of a hole and a shaft, and the clearance between them.
+"""ISO 286 fits: limits of a hole and a shaft, and the clearance between them.
 
 The tables contain the values of ISO 286-1:2010 for the letters d to p, without the
-finer steps of nominal size.  A step means "over a, up to b": 30 mm belongs to 18-30.
+intermediate size ranges.  A range means "over a, up to b": 30 mm belongs to 18-30.
 """
 
 import re
@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput, quoted
 
-STEPS = (3, 6, 10, 18, 30, 50, 80, 120, 180, 250, 315, 400, 500)  # [mm] upper ends
+STEPS = (3, 6, 10, 18, 30, 50, 80, 120, 180, 250, 315, 400, 500)  # [mm] upper limits
 GRADES = (5, 6, 7, 8, 9, 10, 11)
-# [um] tolerance by grade, one row per step of nominal size
+# [um] tolerance by grade, with one row per range of nominal sizes
 _WIDTHS = (
     (4, 6, 10, 14, 25, 40, 60),
     (5, 8, 12, 18, 30, 48, 75),
@@ -52,12 +52,12 @@ _FIT = re.compile(
 _SIZE = re.compile(rf"\s*(\d+\.?\d*)\s*(?:mm)?\s*{_ONE}\s*")
 _UM = 1e-6
 _EXPECTED = 'expected a fit such as "12 H7/g6"'
-# a share 2 Phi(-3 Cp) of normally distributed sizes is outside limits at 3 Cp sigma
+# a fraction 2 Phi(-3 Cp) of normally distributed sizes is outside limits at 3 Cp sigma
 _DEVIATIONS_IN_LIMIT = 3.0
 
 
 class Limits(NamedTuple):
-    """Limit deviations [m] of a hole or a shaft from the nominal size."""
+    """Limit deviations of a hole or a shaft from the nominal size [m]."""
 
     lower: float
     upper: float
@@ -65,14 +65,14 @@ class Limits(NamedTuple):
 
 @dataclass(frozen=True)
 class Fit:
-    """A hole and a shaft of the same nominal size.
+    """Fit between a hole and a shaft of the same nominal size.
 
     Attributes:
         text: text on the drawing.
-        size: [m] nominal diameter.
+        size: nominal diameter [m].
         hole: limit deviations of the hole.
         shaft: limit deviations of the shaft.
-        form: [m] additional radial clearance due to the form of the parts, >= 0.
+        form: additional radial clearance due to form deviations of the parts [m], >= 0.
     """
 
     text: str
@@ -83,7 +83,7 @@ class Fit:
 
     @property
     def diametral(self) -> tuple[float, float]:
-        """[m] least and largest hole minus shaft; negative for interference."""
+        """Minimum and maximum diametral clearance [m]; negative for interference."""
         return self.hole.lower - self.shaft.upper, self.hole.upper - self.shaft.lower
 
     @property
@@ -96,31 +96,33 @@ class Fit:
 
     @property
     def radial(self) -> tuple[float, float]:
-        """[m] least and largest radial clearance, >= 0.
+        """Minimum and maximum radial clearance [m], >= 0.
 
-        The radial clearance is half the diametral clearance, plus ``form``.
+        The radial clearance is half the diametral clearance plus ``form``.
         """
         least, most = self.diametral
         return max(0.0, least / 2) + self.form, max(0.0, most / 2) + self.form
 
     @property
     def mean_radial(self) -> float:
-        """[m] radial clearance of parts with mean sizes, 0 if they interfere."""
+        """Radial clearance of parts with mean sizes [m]."""
         return max(0.0, sum(self.diametral) / 4) + self.form
 
     def draw(
         self, uniform: NDArray, distribution: str = "uniform", cp: float = 1.0
     ) -> NDArray:
-        """Return random radial clearances; 0 where the parts interfere.
+        """Draw random radial clearances.
 
         Args:
-            uniform: (k, 2) numbers between 0 and 1, for the hole and the shaft.
-            distribution: distribution of each size within its limits: ``"uniform"``, or
-                ``"normal"``, centred and not truncated at the limits.
-            cp: capability index of the normal sizes, (upper - lower) / (6 sigma).
+            uniform: uniform random numbers (k, 2) between 0 and 1, for the hole and the
+                shaft.
+            distribution: distribution of the hole and shaft sizes: ``"uniform"`` within
+                the limits, or ``"normal"``, centred and not truncated at the limits.
+            cp: capability index of normally distributed sizes,
+                (upper - lower) / (6 sigma).
 
         Returns:
-            (k,) [m] radial clearances.
+            Radial clearances (k,) [m], equal to ``form`` where the parts interfere.
         """
         from scipy.special import ndtri
 
@@ -138,18 +140,18 @@ class Fit:
 
 @dataclass(frozen=True)
 class FittedEnd:
-    """One of two fitted places of a hole and a shaft, such as an end of a bore.
+    """One of two fitted locations between a hole and a shaft.
 
-    The two places are the ends of a bore or a guide, or two bearings. Their clearances
-    let the parts rotate relative to each other.
+    The two locations are the ends of a bore or guide, or two bearings. Their clearances
+    allow the parts to rotate relative to each other.
 
     Attributes:
-        length: [m] distance between the two places, > 0. The rotation is at most the
+        length: distance between both locations [m], > 0. The rotation is limited to the
             radial clearance divided by this distance.
-        parts: name of the hole and the shaft; places with the same parts have the same
+        parts: name of the hole and shaft; locations with the same parts have the same
             clearance.
-        bound: name of the clearance that follows from the fit: ``"tilt"`` for a bore,
-            ``"spin"`` for a guide, each of whose contacts rotates about one axis.
+        bound: clearance bound that follows from the fit: ``"tilt"`` for a bore, or
+            ``"spin"`` for a guide, in which each contact rotates about one axis.
     """
 
     length: float
@@ -157,30 +159,30 @@ class FittedEnd:
     bound: str = "tilt"
 
     def bounds(self, radial: float) -> dict[str, float]:
-        """Return the largest rotation [rad] by name for a radial clearance [m]."""
+        """Return the rotation bound [rad], by name, for a radial clearance [m]."""
         return {self.bound: radial / self.length}
 
 
 def parse_fit(text: str) -> Fit:
-    """Return the fit that a text specifies.
+    """Parse a fit.
 
     Args:
-        text: nominal size in mm, hole and shaft, such as ``"12 H7/g6"``; optionally
-            with the radial clearance due to the form of the parts, such as
+        text: nominal size in mm, hole and shaft, for example ``"12 H7/g6"``, optionally
+            followed by the radial clearance due to form deviations, for example
             ``"12 H7/g6 + 5 um"``.
 
     Returns:
-        The fit, of any kind.
+        Clearance, transition or interference fit.
 
     Raises:
-        BadInput: the text is not a fit, or the tables do not contain it.
+        BadInput: the text is not a fit, or the fit is not in the tables.
     """
     match = _FIT.fullmatch(text)
     if match is None:
         raise BadInput(f"found {quoted(text)}, {_EXPECTED}")
     size, hole, hole_grade, shaft, shaft_grade, form = match.groups()
     if not hole.isupper() or not shaft.islower():
-        fault = "capital letters are holes, small letters shafts"
+        fault = "capital letters denote holes, small letters denote shafts"
         raise BadInput(f"found {quoted(text)}, {_EXPECTED}: {fault}")
     return Fit(
         text.strip(), float(size) * 1e-3, limits_of(float(size), hole, int(hole_grade)),
@@ -189,10 +191,10 @@ def parse_fit(text: str) -> Fit:
 
 
 def clearance_fit(text: str) -> Fit:
-    """Return a fit whose parts have clearance, at least for some sizes.
+    """Return a clearance or transition fit parsed from a text.
 
     Raises:
-        BadInput: see :func:`parse_fit`; or the parts always interfere.
+        BadInput: the fit is an interference fit, or is invalid (see :func:`parse_fit`).
     """
     fit = parse_fit(text)
     if fit.kind == "interference":
@@ -200,49 +202,48 @@ def clearance_fit(text: str) -> Fit:
         raise BadInput(
             f"found {quoted(text)}, an interference fit ({least:.0f} to {most:.0f} "
             "um), "
-            'expected a clearance or transition fit; write type = "fixed" without '
-            "clearance for a press fit"
+            "expected a clearance or transition fit; for a press fit, write type = "
+            '"fixed" without clearance'
         )
     return fit
 
 
 def parse_hole(text: str) -> tuple[float, Limits]:
-    """Return the nominal size [m] and deviations of a hole, such as ``"12 H7"``.
+    """Return the nominal size [m] and deviations of a hole such as ``"12 H7"``.
 
     Raises:
-        BadInput: the text is not a size, or is a shaft; or the tables do not contain
-            the hole.
+        BadInput: the text is not a size, denotes a shaft, or is not in the tables.
     """
     match = _SIZE.fullmatch(text)
     if match is None:
         raise BadInput(f'found {quoted(text)}, expected a size such as "12 H7"')
     if match[2].islower():
-        expected = 'expected a hole, whose letter is a capital, such as "12 H7"'
+        expected = 'expected a hole with a capital letter, such as "12 H7"'
         raise BadInput(f"found {quoted(text)}, a shaft; {expected}")
     return float(match[1]) * 1e-3, limits_of(float(match[1]), match[2], int(match[3]))
 
 
 def limits_of(size: float, letter: str, grade: int) -> Limits:
-    """Return the deviations of a hole (capital letter) or a shaft (small letter).
+    """Return the limit deviations of a hole (capital letter) or shaft (small letter).
 
     Args:
-        size: [mm] nominal size, above 0 and up to 500.
+        size: nominal size [mm], above 0 and up to 500.
         letter: d e f g h js k m n p for a shaft, or D to P for a hole.
-        grade: 5 to 11. For K, M and N only 6 to 8, for P only 6 and 7.
+        grade: 5 to 11, except for K, M and N (6 to 8) and P (6 and 7).
 
     Returns:
-        The deviations.
+        Limit deviations [m].
 
     Raises:
-        BadInput: the tables do not contain the entry.
+        BadInput: the tables do not contain this tolerance class.
     """
     name = f"{letter}{grade}"
     small = letter.lower()
     if small not in LETTERS or letter not in (small, small.upper()):
         known = " ".join(LETTERS)
         raise BadInput(
-            f"found {quoted(name)}, expected one of the letters {known}, or the same "
-            "as capitals for a hole (ISO 286)"
+            f"found {quoted(name)}, expected one of the letters {known}, or the "
+            "corresponding capital for a hole (ISO 286)"
         )
     if grade not in GRADES:
         raise BadInput(f"found {quoted(name)}, expected a grade from 5 to 11 (ISO 286)")
@@ -278,7 +279,7 @@ def _shaft(step: int, letter: str, grade: int) -> tuple[float, float]:
 def _hole(step: int, letter: str, grade: int) -> tuple[float, float]:
     """Return the lower and upper deviation [um] of a hole."""
     # D to H mirror the shafts.  For K, M, N and P over 3 mm, ES = -ei + Delta with
-    # Delta = IT(n) - IT(n-1), except M6 of 250-315.
+    # Delta = IT(n) - IT(n-1), except for M6 in the range 250-315.
     width = _width(step, grade)
     if letter == "js":
         return -width / 2, width / 2
@@ -289,8 +290,8 @@ def _hole(step: int, letter: str, grade: int) -> tuple[float, float]:
     if not finest <= grade <= coarsest:
         name = f"{letter.upper()}{grade}"
         raise BadInput(
-            f"found {quoted(name)}, expected {letter.upper()} of a grade from "
-            f"{finest} to {coarsest}: the table has no other grades"
+            f"found {quoted(name)}, expected {letter.upper()} with a grade from "
+            f"{finest} to {coarsest}, because the table has no other grades"
         )
     delta = width - _width(step, grade - 1) if step else 0.0
     upper = -deviation + delta

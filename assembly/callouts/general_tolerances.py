@@ -1,8 +1,8 @@
-"""General tolerances of ISO 2768: lengths and perpendicularity by class.
+"""ISO 2768 general tolerances for lengths and perpendicularity.
 
-Part 1 limits linear dimensions.  Of part 2, only perpendicularity is available. Part 2
-is withdrawn, and its successor ISO 22081 contains no tables.  Neither part limits a
-position or a coaxiality.
+Part 1 of the standard limits linear dimensions.  From part 2, only perpendicularity is
+implemented; this part has been withdrawn, and its successor ISO 22081 contains no
+tables.  Neither part limits position or coaxiality.
 """
 
 import re
@@ -12,38 +12,38 @@ import numpy as np
 
 from forcefit.inputs.table import BadInput, quoted
 
-# [mm] largest length of each table column; the first column begins above 0.5
+# [mm] upper limit of each column in the table; the first column starts at 0.5
 LENGTHS = (3, 6, 30, 120, 400, 1000, 2000, 4000)
-# [mm] tolerance to each side (+-); NaN where the standard has no value
+# [mm] symmetric tolerance (+-); NaN where the standard has no value
 LINEAR = {
     "f": (0.05, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5, np.nan),
     "m": (0.1, 0.1, 0.2, 0.3, 0.5, 0.8, 1.2, 2.0),
     "c": (0.2, 0.3, 0.5, 0.8, 1.2, 2.0, 3.0, 4.0),
     "v": (np.nan, 0.5, 1.0, 1.5, 2.5, 4.0, 6.0, 8.0),
 }
-_SIDES = (100, 300, 1000, 3000)  # [mm] largest length of the shorter side
-# [mm] width of the zone; class L up to 100 mm has no value, as it was not confirmed
+_SIDES = (100, 300, 1000, 3000)  # [mm] upper limit for the length of the shorter side
+# [mm] zone width; NaN for class L up to 100 mm, whose value has not been confirmed
 PERPENDICULARITY = {
     "H": (0.2, 0.3, 0.4, 0.5),
     "K": (0.4, 0.6, 0.8, 1.0),
     "L": (np.nan, 1.0, 1.5, 2.0),
 }
-_SHORTEST = 0.5  # [mm] part 1 has no values for shorter lengths
+_SHORTEST = 0.5  # [mm] smallest length for which part 1 has values
 _TEXT = re.compile(r"\s*ISO\s*2768\s*-\s*([fmcv])([HKL])?\s*")
 
 
 class GeneralTolerance(NamedTuple):
-    """ISO 2768 tolerance classes for lengths and for geometry; empty if not given."""
+    """ISO 2768 tolerance classes for lengths and geometry; empty if not specified."""
 
     linear: str
     geometry: str
 
 
 def parse_general(text: str) -> GeneralTolerance:
-    """Return the classes that a text such as ``"ISO 2768-mK"`` specifies.
+    """Return the tolerance classes given by a text such as ``"ISO 2768-mK"``.
 
     Raises:
-        BadInput: the text does not specify classes.
+        BadInput: the text does not specify valid classes.
     """
     match = _TEXT.fullmatch(text)
     if match is None:
@@ -55,10 +55,10 @@ def parse_general(text: str) -> GeneralTolerance:
 
 
 def linear_tolerance(length: float, kind: str) -> float:
-    """Return the tolerance [m] to each side of a length [m] in a class.
+    """Return the symmetric tolerance [m] of a length [m] in a tolerance class.
 
     Raises:
-        BadInput: the table contains no value.
+        BadInput: the table has no value for this length.
     """
     mm = length * 1e3
     if mm < _SHORTEST or mm > LENGTHS[-1]:
@@ -68,10 +68,10 @@ def linear_tolerance(length: float, kind: str) -> float:
 
 
 def perpendicularity_tolerance(side: float, kind: str) -> float:
-    """Return the width [m] of the zone for a shorter side [m] in class H, K or L.
+    """Return the zone width [m] for the length of the shorter side [m] and a class.
 
     Raises:
-        BadInput: the table contains no value.
+        BadInput: the table has no value for this length.
     """
     mm = side * 1e3
     if not 0 < mm <= _SIDES[-1]:
@@ -83,10 +83,10 @@ def perpendicularity_tolerance(side: float, kind: str) -> float:
 def _entry(
     row: tuple[float, ...], steps: tuple[int, ...], mm: float, name: str
 ) -> float:
-    """Return the tolerance [m] of the smallest size step that contains a size."""
-    # a rounding error of a length in metres must not select the next step
+    """Return the tolerance [m] for a size [mm] from a row of the table."""
+    # a rounding error in the conversion from metres must not select the next column
     value = row[int(np.searchsorted(steps, mm * (1 - 1e-12)))]
     if np.isnan(value):
         fault = f"found {mm:g} mm in {name}, for which the table has no value"
-        raise BadInput(f"{fault}, expected another class or a stated tolerance")
+        raise BadInput(f"{fault}, expected a different class or a stated tolerance")
     return value * 1e-3

@@ -1,30 +1,33 @@
-"""Support function of a convex zone, with a certified upper bound."""
+"""Support function of a convex tolerance zone, with a certified upper bound."""
 
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-_GAP = 3e-8  # relative gap of a certified support function
-_LEAST_MU = 1e-9  # for a smaller barrier parameter, Newton steps are rounding errors
-_STEPS = 50  # largest number of Newton steps for one barrier parameter
+_GAP = 3e-8  # relative duality gap of a certified support function
+_LEAST_MU = (
+    1e-9  # for smaller barrier parameters, rounding errors dominate Newton steps
+)
+_STEPS = 50  # maximum number of Newton steps per barrier parameter
 
 
 def largest_product(
     w: NDArray, bounds: Sequence[NDArray], cones: Sequence[NDArray] = ()
 ) -> tuple[NDArray, float]:
-    """Maximise w.x subject to |bound @ x| <= 1 by an interior-point method.
+    """Maximise w.x subject to |bound @ x| <= 1 with an interior-point method.
 
     Args:
-        w: (m,) coefficients.
-        bounds: matrices (k, m), which together bound every direction.
-        cones: matrices (k, m) with the rows s and S of a double cone
-            |s.x| + |S x| <= 1.
+        w: coefficients (m,).
+        bounds: matrices (k, m), which together bound all directions.
+        cones: matrices (k, m) whose first row s and remaining rows S define a double
+            cone |s.x| + |S x| <= 1.
 
     Returns:
-        (m,) x in the set, and a certified upper bound of the maximum. The bound is the
-        sum of the norms of multipliers with sum bound^T multiplier = w.  For a cone,
-        the norm is the larger one of the first entry and of the norm of the others.
+        Feasible x (m,), and a certified upper bound on the maximum. The upper bound is
+        the sum of the norms of multipliers that satisfy sum bound^T multiplier = w.
+        For a cone, this norm is the maximum of the absolute value of the first entry
+        and the norm of the remaining entries.
     """
     x, value, _ = product_by_bounds(w, bounds, cones)
     return x, value
@@ -33,22 +36,23 @@ def largest_product(
 def product_by_bounds(
     w: NDArray, bounds: Sequence[NDArray], cones: Sequence[NDArray] = ()
 ) -> tuple[NDArray, float, NDArray]:
-    """Return the result of :func:`largest_product`, and the parts of its bound.
+    """Return the result of :func:`largest_product` and the contributions to its bound.
 
     Args:
-        w: (m,) coefficients.
-        bounds: as for :func:`largest_product`.
-        cones: as for :func:`largest_product`.
+        w: coefficients (m,).
+        bounds: see :func:`largest_product`.
+        cones: see :func:`largest_product`.
 
     Returns:
-        x, the upper bound, and the part of the upper bound due to each of ``bounds``
-        and ``cones``.  This part is the norm of the multiplier, which is the derivative
-        of the upper bound with respect to the logarithm of their size.
+        x, the upper bound, and the contribution of each of ``bounds`` and ``cones`` to
+        the upper bound.  A contribution is the norm of the multiplier, which is also
+        the derivative of the upper bound with respect to the logarithm of the size of
+        the bound or cone.
     """
     length = float(np.linalg.norm(w))
     if length == 0.0:
         return np.zeros_like(w), 0.0, np.zeros(len(bounds) + len(cones))
-    # all other values are divided by the value that is attained along w itself
+    # the problem is scaled by the value attained along w
     reached = 1.0 / max(_largest_gauge(w, bounds, cones), 1e-300)
     unit = length * length * reached
     w = w / unit
@@ -59,10 +63,10 @@ def product_by_bounds(
     of_bounds = [float(part.sum()) for part in np.split(start, ends)]
     while best > (1 + _GAP) * max(float(w @ x), 0.0) and mu > _LEAST_MU:
         centre = _centre(w, bounds, cones, x, mu)
-        if centre is None:  # rounding errors: keep the bound that is certified so far
+        if centre is None:  # due to rounding errors; the best bound so far is returned
             break
         x, multipliers = centre
-        # the smallest change of the multipliers that balances w exactly
+        # smallest change of the multipliers that satisfies the condition exactly
         change = np.linalg.lstsq(rows.T, w - rows.T @ multipliers, rcond=None)[0]
         parts = np.split(multipliers + change, ends)
         count = len(bounds)
@@ -80,7 +84,7 @@ def product_by_bounds(
 def _largest_gauge(
     x: NDArray, bounds: Sequence[NDArray], cones: Sequence[NDArray]
 ) -> float:
-    """Return the factor by which the convex set must be enlarged to contain x."""
+    """Return the gauge of x, the factor by which the set must be scaled to reach x."""
     sizes = [float(np.linalg.norm(b @ x)) for b in bounds]
     sizes += [abs(c[0] @ x) + float(np.linalg.norm(c[1:] @ x)) for c in cones]
     return max(sizes)
@@ -128,7 +132,7 @@ def _centre(
 
 
 def _halves(cones: Sequence[NDArray], x: NDArray) -> Iterator[tuple[NDArray, float]]:
-    """Yield rows and slack of both halves |S x| <= 1 -+ s.x of each double cone."""
+    """Yield rows and slack for both halves |S x| <= 1 -+ s.x of each double cone."""
     for cone in cones:
         for sign in (1.0, -1.0):
             signed = np.vstack([sign * cone[:1], cone[1:]])

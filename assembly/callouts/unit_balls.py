@@ -1,4 +1,4 @@
-"""Random points in products of unit balls, computed from uniform random numbers."""
+"""Random points in products of unit balls, transformed from uniform random numbers."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,17 +10,17 @@ def in_balls(
     uniform: NDArray, dimensions: tuple[int, ...], distribution: str = "uniform",
     s: float = 0.0,
 ) -> NDArray:  # fmt: skip
-    """Return points in a product of unit balls from uniform numbers.
+    """Transform uniform random numbers to points in a product of unit balls.
 
     Args:
-        uniform: (k, m or more) independent uniform numbers between 0 and 1.
-        dimensions: dimension of each ball, with the sum m.
-        distribution: ``"uniform"``, ``"truncated"``, or ``"normal"``, whose points may
-            be outside the balls.
-        s: standard deviation of each coordinate for the normal distributions.
+        uniform: independent uniform random numbers (k, at least m) between 0 and 1.
+        dimensions: dimension of each ball; their sum is m.
+        distribution: ``"uniform"``, ``"truncated"`` or ``"normal"``; normally
+            distributed points may lie outside the balls.
+        s: standard deviation of each coordinate for ``"normal"`` and ``"truncated"``.
 
     Returns:
-        (k, m) points.
+        Points (k, m).
     """
     ends = np.cumsum(dimensions)
     parts = np.split(uniform[:, : ends[-1]], ends[:-1], axis=1)
@@ -28,7 +28,7 @@ def in_balls(
 
 
 def _in_ball(uniform: NDArray, distribution: str, s: float) -> NDArray:
-    """Return points (k, d) of a d-dimensional unit ball from uniform numbers (k, d)."""
+    """Transform uniform random numbers (k, d) to points (k, d) in a unit ball."""
     from scipy.special import gammainc, gammaincinv
 
     d = uniform.shape[1]
@@ -50,7 +50,7 @@ def _in_ball(uniform: NDArray, distribution: str, s: float) -> NDArray:
 
 
 def ball_variance(d: int, distribution: str, s: float) -> float:
-    """Return the variance of each coordinate in a unit ball of dimension d."""
+    """Return the variance of each coordinate of random points in a unit d-ball."""
     if distribution == "uniform":
         return 1.0 / (d + 2)
     if distribution == "normal":

@@ -1,4 +1,4 @@
-"""Parsing of tolerance texts: zone widths, lengths with tolerances, modifiers."""
+"""Parsing of tolerances: zone widths, lengths with tolerances, and modifiers."""
 
 import re
 
@@ -15,16 +15,16 @@ _LENGTH = re.compile(
 
 
 def parse_width(value: object) -> tuple[float, bool]:
-    """Return the width of a zone, and whether it applies at maximum material.
+    """Parse the width of a zone with an optional maximum material modifier.
 
     Args:
-        value: a number in m, or a text such as ``"0.05 mm"`` or ``"0.05 mm (M)"``.
+        value: number in m, or text such as ``"0.05 mm"`` or ``"0.05 mm (M)"``.
 
     Returns:
-        The width [m] > 0, and whether the text ends with ``(M)``.
+        Positive width [m], and whether the modifier ``(M)`` is present.
 
     Raises:
-        BadInput: the value is not a width.
+        BadInput: the value is not a valid width.
     """
     expected = 'expected a width > 0 such as "0.05 mm"'
     width, at_most = -1.0, False
@@ -38,17 +38,17 @@ def parse_width(value: object) -> tuple[float, bool]:
 
 
 def parse_length(value: object) -> tuple[float, float]:
-    """Return a length and its tolerance to each side, both in m.
+    """Parse a length with its symmetric tolerance.
 
     Args:
-        value: a text such as ``"452 +- 0.1 mm"`` or ``"20 +- 0.1 mm (E)"``.
+        value: text such as ``"452 +- 0.1 mm"`` or ``"20 +- 0.1 mm (E)"``.
 
     Returns:
-        The length [m], and its tolerance [m] > 0.
+        Length [m] and positive tolerance [m].
 
     Raises:
-        BadInput: the text is not a length with a tolerance, or the tolerance is 0 or
-            not below the length.
+        BadInput: the text is not a length with a tolerance, or the tolerance is 0 or is
+            not smaller than the length.
     """
     expected = 'expected a length such as "452 +- 0.1 mm"'
     match = _LENGTH.fullmatch(value) if isinstance(value, str) else None
@@ -63,11 +63,11 @@ def parse_length(value: object) -> tuple[float, float]:
 
 
 def within_envelope(value: object) -> bool:
-    """Return whether a length is marked with ``(E)``, the envelope principle."""
+    """Return whether a length has the modifier ``(E)`` for the envelope principle."""
     match = _LENGTH.fullmatch(value) if isinstance(value, str) else None
     return match is not None and bool(match[7])
 
 
 def _value(digits: str, power: str | None) -> float:
-    """Return a number from its digits and its power of ten."""
+    """Compose a number from its digits and its exponent."""
     return float(f"{digits}e{power or 0}")

@@ -1,12 +1,12 @@
-"""Convex zones of small screws: support function, random draws, covariance.
+"""Convex tolerance zones of small screws: support function, random draws, covariance.
 
-A zone is a set of screws d [RX RY RZ TX TY TZ] of a feature, in the feature's axes. It
-contains all d with ``|bound @ d| <= 1`` for each bound. Components to which no bound
-refers are zero.  A bound with one row is an interval, with two rows a disc, with three
-rows a ball.  Linearly independent bounds can reach their limits simultaneously, so
-their set is d = columns u, |u_k| <= 1.  Linearly dependent bounds exclude a part of
-this set. Double cones ``|s @ d| + |S @ d| <= 1``, the zones of round faces, also
-exclude a part.
+A zone is a set of screws d [RX RY RZ TX TY TZ] of a feature, in the feature axes. It
+contains all d with ``|bound @ d| <= 1`` for each bound; components to which no bound
+applies are zero.  A bound with one row is an interval, with two rows a disc, and with
+three rows a ball.  Linearly independent bounds can be active simultaneously, so that
+they define the set d = columns u with |u_k| <= 1.  Linearly dependent bounds cut off
+part of this set, as do the double cones ``|s @ d| + |S @ d| <= 1`` that describe round
+faces.
 
 Sources:
     Mujezinovic, Davidson, Shah (2004), A new mathematical model for geometric
@@ -26,24 +26,24 @@ from forcefit.assembly.callouts.largest_product import largest_product
 from forcefit.assembly.callouts.unit_balls import VOLUMES, ball_variance, in_balls
 
 DISTRIBUTIONS = ("uniform", "normal", "truncated")
-_SAMPLE = 1 << 17  # number of draws for the covariance of a zone without closed form
-_RANK = 1e-9  # least accepted singular value of independent bounds, over the largest
-_MOST_ATTEMPTS = 10_000  # largest number of draws for one part inside the zone
+_SAMPLE = 1 << 17  # number of draws for the covariance of zones without a closed form
+_RANK = 1e-9  # smallest relative singular value of linearly independent bounds
+_MOST_ATTEMPTS = 10_000  # maximum number of attempts to draw a part inside the zone
 Numbers = Callable[[int], NDArray]  # attempt -> (k, words) uniform numbers
 
 
 @dataclass(frozen=True, eq=False)
 class Zone:
-    """A convex zone of small screws, as defined at the beginning of this module.
+    """Convex tolerance zone of small screws, as defined at the top of this module.
 
     Attributes:
-        bounds: matrices (k, 6), k = 1, 2, 3: rows on the screw [1/rad, 1/m].
-        bonus: largest relative growth of the zone with the size of the feature (maximum
+        bounds: matrices (k, 6) with k = 1, 2, 3, applied to the screw [1/rad, 1/m].
+        bonus: maximum relative growth of the zone with the size of the feature (maximum
             material condition); 0 for no growth.
-        cones: matrices (3, 6): the row s along the axis of a double cone, and the two
-            rows S across it.  The bounds must limit the same components.
-        from_zero: whether the zone grows with a size from a point to the bounds, as for
-            the shift of a datum at maximum material.
+        cones: matrices (3, 6) with the row s along the axis of a double cone and the
+            two rows S across it.  The bounds must limit the same components.
+        from_zero: whether the zone grows with the size of a hole from a single point to
+            the bounds, as for the shift of a datum at maximum material.
     """
 
     bounds: tuple[NDArray, ...]
@@ -53,7 +53,7 @@ class Zone:
 
     @cached_property
     def _split(self) -> tuple[list[int], list[int]]:
-        """Indices of the linearly independent bounds, and of the other bounds."""
+        """Indices of the linearly independent bounds and of the remaining bounds."""
         kept: list[int] = []
         cutting: list[int] = []
         for i, bound in enumerate(self.bounds):
@@ -70,24 +70,24 @@ class Zone:
 
     @cached_property
     def columns(self) -> NDArray:
-        """(6, m) [rad, m] map from the coordinates u to the screw."""
+        """Map (6, m) [rad, m] from the coordinates u to the screw."""
         rows = np.vstack([self.bounds[i] for i in self._split[0]])
         scale = _scale(rows)
         return np.asarray(np.linalg.pinv(rows / scale) / scale[:, None])
 
     @cached_property
     def cuts(self) -> tuple[NDArray, ...]:
-        """Matrices (k, m): the linearly dependent bounds, as conditions on u."""
+        """Linearly dependent bounds, as matrices (k, m) applied to u."""
         return tuple(self.bounds[i] @ self.columns for i in self._split[1])
 
     @cached_property
     def cones_on_u(self) -> tuple[NDArray, ...]:
-        """Matrices (3, m): the double cones as conditions on the coordinates u."""
+        """Double cones, as matrices (3, m) applied to u."""
         return tuple(cone @ self.columns for cone in self.cones)
 
     @property
     def is_cut(self) -> bool:
-        """Whether further bounds or cones restrict the product of unit balls."""
+        """Whether dependent bounds or cones restrict the product of unit balls."""
         return bool(self.cuts or self.cones)
 
     @property
@@ -97,15 +97,15 @@ class Zone:
 
     @property
     def words(self) -> int:
-        """Uniform random numbers per draw: one per coordinate, one for hole size."""
+        """Number of uniform random numbers per draw; a growing zone needs one more."""
         return sum(self.dimensions) + self.grows
 
     def growth(self, size: NDArray) -> NDArray:
-        """Return the zone's scale factors for sizes from 0 (least) to 1 (largest)."""
+        """Return scale factors of the zone for relative hole sizes from 0 to 1."""
         return size if self.from_zero else 1.0 + self.bonus * size
 
     def inside(self, u: NDArray, grown: NDArray | float = 1.0) -> NDArray:
-        """Return (k,) bool, True for coordinates (k, m) inside the scaled zone."""
+        """Return whether coordinates u (k, m) are inside the scaled zone."""
         limits = [(part, grown) for part in self._balls(u)]
         limits += [(u @ cut.T, 1.0) for cut in self.cuts]
         marks = [np.linalg.norm(x, axis=-1) <= g * (1 + 1e-12) for x, g in limits]
@@ -113,37 +113,37 @@ class Zone:
         return np.asarray(np.all(marks, axis=0))
 
     def _cone_gauges(self, u: NDArray) -> list[NDArray]:
-        """Return the gauge (k,) of each double cone, which is 1 on its surface."""
+        """Return the gauge of each double cone (k,), which equals 1 on its surface."""
         return [
             abs(u @ c[0]) + np.linalg.norm(u @ c[1:].T, axis=-1)
             for c in self.cones_on_u
         ]
 
     def _balls(self, u: NDArray) -> list[NDArray]:
-        """Return the coordinates u, split into one array per ball."""
+        """Split the coordinates u into one array per ball."""
         ends = np.cumsum(self.dimensions)
         return np.split(u, ends[:-1], axis=-1)
 
     @cached_property
     def bounds_on_u(self) -> tuple[NDArray, ...]:
-        """Matrices (k, m): the zone at its largest is |bound @ u| <= 1 for all."""
+        """Bounds as matrices (k, m) applied to u, for the maximum size of the zone."""
         rows = np.split(np.eye(sum(self.dimensions)), np.cumsum(self.dimensions)[:-1])
         return (*(row / (1.0 + self.bonus) for row in rows), *self.cuts)
 
     def support(self, direction: NDArray) -> float:
-        """Return the largest ``direction @ d`` over the screws of the zone.
+        """Return the maximum of ``direction @ d`` over the screws d in the zone.
 
         Args:
-            direction: (6,) coefficients.
+            direction: coefficients (6,).
 
         Returns:
-            The largest value. For independent bounds it has a closed form; otherwise it
-            is a certified upper bound, larger by about 3e-8 relative.
+            Maximum, in closed form for independent bounds. Otherwise a certified upper
+            bound, which exceeds the maximum by a relative amount of about 3e-8.
         """
         return self.farthest_u(np.asarray(direction, dtype=float) @ self.columns)[1]
 
     def farthest(self, direction: NDArray) -> NDArray:
-        """Return the screw (6,) [rad, m] of the zone farthest in a direction (6,)."""
+        """Return the screw d (6,) [rad, m] in the zone that maximises direction @ d."""
         w = np.asarray(direction, dtype=float) @ self.columns
         return np.asarray(self.columns @ self.farthest_u(w)[0])
 
@@ -160,22 +160,22 @@ class Zone:
     def draw(
         self, numbers: Numbers, distribution: str = "uniform", cp: float = 1.0
     ) -> NDArray:
-        """Return coordinates u of random parts.
+        """Draw the coordinates u of random parts.
 
         Args:
-            numbers: function from the number of the attempt, 0, 1, .., to independent
-                uniform numbers (k, :attr:`words`).  A part outside the zone is drawn
-                again; the size of its feature is kept from attempt 0.
+            numbers: function that returns independent uniform random numbers
+                (k, :attr:`words`) for attempt 0, 1, ...  Parts outside the zone are
+                drawn again, but the sizes of their features stay those of attempt 0.
             distribution: ``"uniform"`` in the zone; ``"normal"``, see
-                :meth:`deviation`; or ``"truncated"``, the normal distribution without
-                parts outside the zone.
+                :meth:`deviation`; or ``"truncated"``, the normal distribution
+                restricted to the zone.
             cp: capability index of the normal distributions.
 
         Returns:
-            (k, m) coordinates.
+            Coordinates (k, m).
 
         Raises:
-            RuntimeError: no draw of a part was within the zone, whose volume is almost
+            RuntimeError: no draw was inside the zone, because its volume is almost
                 zero.
         """
         s = 0.0 if distribution == "uniform" else self.deviation(cp)
@@ -195,7 +195,7 @@ class Zone:
     def _attempt(
         self, uniform: NDArray, distribution: str, s: float, grown: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """Return coordinates of one attempt, and whether they are in the zone."""
+        """Return the coordinates drawn in one attempt, and which are accepted."""
         u = self._in_balls(uniform, distribution, s) * grown[:, None]
         if distribution == "normal":
             return u, np.ones(len(u), dtype=bool)
@@ -205,14 +205,14 @@ class Zone:
         return u, self.inside(u, grown)
 
     def _in_balls(self, uniform: NDArray, distribution: str, s: float) -> NDArray:
-        """Return coordinates (k, m) in the unit balls, before parts are rejected."""
+        """Draw coordinates (k, m) in the unit balls, without rejection."""
         return in_balls(uniform, self.dimensions, distribution, s)
 
     @cached_property
     def _tightest(self) -> tuple[tuple[int, ...], NDArray]:
-        """Set of independent bounds with the least volume, used for drawing.
+        """Set of independent bounds with the minimum volume, used for drawing.
 
-        The set is described by the dimensions of its balls, and the matrix from
+        The set is given by the dimensions of its balls and the matrix that maps the
         coordinates in the balls to u.
         """
         bounds = [bound @ self.columns for bound in self.bounds]
@@ -233,14 +233,14 @@ class Zone:
     def deviation(self, cp: float = 1.0) -> float:
         """Return the standard deviation of each u for a normal distribution.
 
-        The probability outside the zone is as in one dimension, 2 Phi(-3 cp).
+        As in one dimension, the probability of a part outside the zone is 2 Phi(-3 cp).
 
         Args:
             cp: capability index > 0.
 
         Returns:
-            [-] standard deviation relative to the radii of the balls. It is exact for
-            independent bounds, otherwise a quantile of fixed draws (1 % accurate).
+            Standard deviation relative to the radii of the balls [-]. It is exact for
+            independent bounds, and otherwise a quantile of fixed draws (1 % accuracy).
         """
         from scipy.optimize import brentq
         from scipy.special import gammainc, ndtr
@@ -268,8 +268,8 @@ class Zone:
             cp: capability index of the normal distributions.
 
         Returns:
-            (6, 6) [rad^2 .. m^2] covariance, in closed form for independent bounds,
-            otherwise from 131 072 fixed draws (1 % accurate).
+            Covariance (6, 6) [rad^2 .. m^2], in closed form for independent bounds, and
+            otherwise from 131 072 fixed draws (1 % accuracy).
         """
         return np.asarray(
             self.columns @ self.variance_of_u(distribution, cp) @ self.columns.T
@@ -297,11 +297,11 @@ def intersection(zones: Sequence[Zone]) -> Zone:
 
 
 def _scale(rows: NDArray) -> NDArray:
-    """Return the largest entries (6,) [1/rad, 1/m], which scale rad and m equally."""
+    """Return scales (6,) [1/rad, 1/m]: the largest rotation and translation entries."""
     sizes = [np.abs(rows[:, part]).max() for part in (slice(0, 3), slice(3, 6))]
     return np.repeat([size if size > 0 else 1.0 for size in sizes], 3)
 
 
 def _sample(words: int, attempt: int = 0) -> NDArray:
-    """Return uniform random numbers of a fixed seed, equal at each call."""
+    """Return uniform random numbers from a fixed seed, identical on each call."""
     return np.random.default_rng([words, attempt]).random((_SAMPLE, words))

@@ -1,6 +1,6 @@
-"""Robots as drawn: bodies and joints, given by points and axes in the home pose.
+"""Drawings: robots given by bodies and joints, with points and axes in the home pose.
 
-Start with ``drawing.py``, which defines the data.  ``frames.py`` converts a drawing to
-a robot of frames and closures; ``drawing_of_robot.py`` converts a robot to a drawing.
-Drawing files are read in ``assembly/files/drawing_file.py``.
+Start with ``drawing.py``, which defines the data model.  ``frames.py`` converts a
+drawing to a robot with frames and closures, and ``drawing_of_robot.py`` converts a
+robot to a drawing.  Drawing files are read in ``assembly/files/drawing_file.py``.
 """

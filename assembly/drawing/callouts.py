@@ -1,4 +1,4 @@
-"""Callouts of drawn bodies, transferred to the frames of their joints."""
+"""Transfer of the callouts of drawn bodies to the frames of their joints."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -15,7 +15,7 @@ from forcefit.assembly.model.placed_frames import PlacedFrame, own_motion
 from forcefit.inputs.table import BadInput, quoted
 
 _ROUNDING = 1e-12
-# datum shape by joint type; the datum of any other joint type is an axis
+# datum shape by joint type; for all remaining joint types, the datum is an axis
 _DATUM_SHAPES = {
     "planar": "plane",
     "spherical": "point",
@@ -28,7 +28,7 @@ Vector = tuple[float, float, float]
 def frame_callouts(
     drawing: Drawing, steps: Sequence[Step], placed: Sequence[PlacedFrame]
 ) -> tuple[Callout, ...]:
-    """Return the callouts of a drawing, with frames in place of joints.
+    """Return the callouts of a drawing, with joints replaced by frames.
 
     Args:
         drawing: bodies and joints.
@@ -47,7 +47,7 @@ def frame_callouts(
 def frame_fits(
     steps: Sequence[Step],
 ) -> tuple[dict[str, str], dict[str, FittedEnd]]:
-    """Return the fit and the fitted end of each frame of the joints of a tree."""
+    """Return the fits and fitted ends of all joint frames in a tree."""
     found = {
         part.name: part.numbers
         for step in steps if isinstance(step.edge.item, DrawnJoint)
@@ -61,7 +61,7 @@ def _of_frames(
     drawn: DrawnCallout, passed: Mapping[str, Step],
     poses: Mapping[str, tuple[NDArray, NDArray]],
 ) -> Callout:  # fmt: skip
-    """Return a drawn callout, transferred to the frame on the callout's body."""
+    """Transfer a drawn callout to the frame on the body of the callout."""
     callout = drawn.callout
     step = passed[callout.feature]
     frame, after, joint = _side(step, drawn.body)
@@ -97,7 +97,7 @@ def _of_frames(
 
 
 def _hole_of(step: Step, drawn: DrawnCallout) -> str:
-    """Return the name of the fit of a joint's hole; without a fit, of the joint."""
+    """Return the name of the fit of a hole, or the name of the joint without a fit."""
     joint = step.edge.item
     assert isinstance(joint, DrawnJoint)
     fitted = [p for p in parts_of(joint, step.reverse) if p.numbers.fit]
@@ -123,7 +123,7 @@ def _side(step: Step, body: str) -> tuple[str, bool, DrawnJoint]:
 
 
 def _axis(joint: DrawnJoint, body: str) -> NDArray:
-    """Return the axis (3,) of a joint, as fixed to a body, in base axes at home."""
+    """Return the joint axis that is fixed to a body (3,), in base axes at home."""
     second = joint.kind == "universal" and body == joint.second
     return joint.axis2 if second else joint.axis
 

@@ -1,9 +1,10 @@
-"""Clearances of joints from the sizes of their contacts, as frames with bounds.
+"""Joint clearances that follow from the dimensions of contacts.
 
-Each frame rotates about its own axes or translates along them by a small amount.
-Frames in series add their motions.  Two chains of such frames between the same two
-bodies, joined by a closure, allow those small screws that both chains allow.  The sets
-in this table are represented exactly:
+Contacts are represented by frames with clearance bounds.  Each frame allows small
+rotations about its axes or small translations along them, and the motions of frames in
+series add up.  Two chains of such frames between the same two bodies, connected by a
+closure, allow the small screws that are possible in both chains.  The following sets
+are represented exactly:
 
 ======  ==================  ============================================================
 chains  contacts            small screws that the contacts allow, in the joint's axes
@@ -50,16 +51,16 @@ from forcefit.stiffness.screws import transform
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """A frame of a joint that provides only clearance.
+    """Frame of a joint that provides only clearance.
 
     Attributes:
-        suffix: suffix of the frame's name.
-        pose: (4, 4) pose in the joint's axes.
-        clearance: bounds of the clearance.
-        fit: ISO 286 fit from whose mean clearance the bounds follow, or empty.
-        end: fitted end through which the bounds follow from the fit; its parts are
-            those of a bearing, or empty if the joint has one hole and one shaft.
-        chain: 0 for frames in series with the joint's own, 1 for frames in parallel.
+        suffix: suffix of the frame name.
+        pose: pose in the joint axes (4, 4).
+        clearance: clearance bounds.
+        fit: ISO 286 fit whose mean clearance determines the bounds, or empty.
+        end: fitted end that relates the bounds to the fit; its parts are those of a
+            bearing, or empty if the joint has one hole and one shaft.
+        chain: 0 for frames in series with the joint frame, 1 for frames in parallel.
     """
 
     suffix: str
@@ -74,16 +75,16 @@ def bearings(
     first: tuple[float, float], second: tuple[float, float],
     names: tuple[str, str] = BEARING,
 ) -> tuple[Contact, ...]:  # fmt: skip
-    """Return the contacts of a shaft along z in two bearings or in a bore's two ends.
+    """Return the contacts of a shaft along z in two bearings or two ends of a bore.
 
     Args:
-        first: [m] height z and radial gap of the lower bearing or bore end. The radial
+        first: height z and radial gap of the lower bearing or bore end [m]. The radial
             gap is half the diametral clearance.
-        second: [m] height z and radial gap of the upper bearing or bore end.
-        names: names of the two contacts.
+        second: height z and radial gap of the upper bearing or bore end [m].
+        names: names of both contacts.
 
     Returns:
-        Two contacts, whose sum is exactly the set of small screws of the shaft.
+        Two contacts, which in series allow exactly the small screws of the shaft.
     """
     (z1, c1), (z2, c2) = first, second
     # a rotation about one place moves the shaft only at the other place
@@ -98,13 +99,13 @@ def fitted(
     contacts: tuple[Contact, ...], fits: tuple[str, str], parts: tuple[str, str],
     length: float,
 ) -> tuple[Contact, ...]:  # fmt: skip
-    """Return the contacts of :func:`bearings` with fits at the two places.
+    """Return the contacts of :func:`bearings` with fits.
 
     Args:
         contacts: two contacts, computed for the mean radial clearances of the fits.
-        fits: fits of the first and the second place; empty if the gap is given.
-        parts: names of the parts at the two places.
-        length: [m] distance between the two places.
+        fits: fits at the first and second contact; empty if the gap is given.
+        parts: names of the parts at both contacts.
+        length: distance between both contacts [m].
     """
     # a rotation about one place moves the shaft only at the other place
     return tuple(
@@ -123,17 +124,17 @@ def guide(
     """Return the contacts of a block in a guide along z, centred at the origin.
 
     Args:
-        gaps: [m] c_x and c_y, from the centred block to one side along x and y.
-        length: [m] length L of the guide, > 0.
-        width: [m] width w along x, > 0.
-        height: [m] height t along y, > 0.
-        largest: [m] largest gaps if they vary, for example by a fit; by default `gaps`.
+        gaps: gaps c_x and c_y between the centred block and one side along x and y [m].
+        length: length L of the guide [m], > 0.
+        width: width w along x [m], > 0.
+        height: height t along y [m], > 0.
+        largest: maximum gaps if they vary, for example in a fit [m]; `gaps` by default.
 
     Returns:
-        Two chains, which roll about two opposite edges of the block.
+        Contacts in two chains, which roll about opposite edges of the block.
     """
     edge = np.array([width / 2, height / 2, 0.0])
-    # the gaps limit the roll of the block to half of the bound that the chains have
+    # the gaps limit the roll of the block to half of the bound set here
     c_x, c_y = largest or gaps
     most = 2 * min(2 * c_y / width, 2 * c_x / height)
     rolls = Clearance(spin=most), Clearance(spin=np.inf, axial=np.inf)
@@ -160,12 +161,12 @@ def _tilts(
 def fitted_guide(
     contacts: tuple[Contact, ...], fits: tuple[str, str], length: float
 ) -> tuple[Contact, ...]:
-    """Return the contacts of :func:`guide` with the fits along x and y.
+    """Return the contacts of :func:`guide` with fits along x and y.
 
     Args:
         contacts: contacts of a guide, computed for the mean gaps of the fits.
         fits: fits along x and y.
-        length: [m] length of the guide.
+        length: length of the guide [m].
     """
     turns = {"yaw": (fits[0], "x"), "pitch": (fits[1], "y")}
     found = []
@@ -180,18 +181,18 @@ def fitted_guide(
 
 
 def pad(gap: float, length: float, width: float, fit: str = "") -> tuple[Contact, ...]:
-    """Return the contacts of a rectangular pad between two planes, normal to z.
+    """Return the contacts of a rectangular pad between two planes normal to z.
 
     Args:
-        gap: [m] gap g from the centred pad to one plane; with a fit, its mean.
-        length: [m] length 2A along x, > 0.
-        width: [m] width 2B along y, > 0.
-        fit: fit of the distance of the planes and the thickness of the pad, or empty.
+        gap: gap g between the centred pad and one plane [m], or its mean for a fit.
+        length: length 2A along x [m], > 0.
+        width: width 2B along y [m], > 0.
+        fit: fit between the distance of the planes and the pad thickness, or empty.
 
     Returns:
-        Two chains: rotations that move three corners, and the fourth corner.  With a
-        fit, a rotation moves the fourth corner too, because the fit then determines
-        rotations only.
+        Contacts in two chains: the first one moves three corners by rotations, the
+        second one moves the fourth corner.  With a fit, the fourth corner is moved by a
+        rotation as well, because the fit then determines only rotations.
     """
     A, B = length / 2, width / 2
     corners = np.array([[A, B, 0.0], [-A, B, 0.0], [-A, -B, 0.0], [A, -B, 0.0]])
@@ -215,5 +216,5 @@ def pad(gap: float, length: float, width: float, fit: str = "") -> tuple[Contact
 
 
 def _along_z(z: float) -> NDArray:
-    """Return the (4, 4) frame at a height z, parallel to the joint's axes."""
+    """Return the frame at height z (4, 4), parallel to the joint axes."""
     return transform([0.0, 0.0, z], np.eye(3))

@@ -1,7 +1,7 @@
-"""Bodies and joints of a robot, by points and axes in base axes at home.
+"""Data model of a drawing: bodies and joints, given in base axes at home.
 
-All names are unique within the robot: the body ``tube`` in the copy ``leg1`` of a leg
-is named ``leg1.tube``.
+All names are unique within the robot.  For example, the body ``tube`` in the copy
+``leg1`` of a leg is named ``leg1.tube``.
 """
 
 from dataclasses import dataclass, field, replace
@@ -32,18 +32,18 @@ NEAR_X = 0.985  # cosine of 10 deg; nearer to the base's x, the base's y is used
 
 @dataclass(frozen=True, eq=False)
 class JointNumbers:
-    """Error, clearance and stiffness of one bearing, in the joint's axes.
+    """Error, clearance and stiffness of a joint or bearing, in the joint axes.
 
     Attributes:
-        clearance: bounds of the clearance, or None.
-        stiffness: (6, 6) [N m/rad .. N/m] K_B, with ``inf`` on the diagonal for rigid
+        clearance: clearance bounds, or None.
+        stiffness: K_B (6, 6) [N m/rad .. N/m], with ``inf`` on the diagonal for rigid
             components and 0 for free motions; or None.
-        error: (6,) [rad, m] geometric error delta l.
-        tolerance: (6,) [rad, m] standard deviations of the error, or None.
+        error: geometric error delta l (6,) [rad, m].
+        tolerance: standard deviations of the error (6,) [rad, m], or None.
         fit: ISO 286 fit whose mean radial clearance is in ``clearance``, or empty.
-        fitted_end: how the tilt follows from the fit; None if the fit determines
+        fitted_end: data that relate the tilt to the fit; None if the fit determines
             ``radial``.
-        contacts: further clearance, given by the sizes of the contacts.
+        contacts: additional clearance, given by the dimensions of contacts.
         locked_at: pose at which a fixed joint is bolted, with its clearance before
             bolting; or None.
     """
@@ -60,26 +60,26 @@ class JointNumbers:
 
 @dataclass(frozen=True, eq=False)
 class DrawnJoint:
-    """A joint between two bodies.
+    """Joint between two bodies; all vectors are in base axes at home.
 
     Attributes:
         name: name of the joint.
-        kind: a key of :data:`FREE_ROWS`.
+        kind: key of :data:`FREE_ROWS`.
         first: name of the first body, or ``"base"``.
-        second: name of the second body, which moves along +axis relative to the first
-            when the coordinate increases.
-        at: (3,) [m] point of the joint, base axes at home.
-        axis: (3,) unit vector of the axis; for a universal joint the axis fixed to the
-            first body, for a planar joint the normal.
-        across: (3,) unit vector of the x axis, perpendicular to ``axis``.
-        axis2: (3,) unit vector of the axis of a universal joint that is fixed to the
-            second body; equal to ``across`` for other types.
+        second: name of the second body, which moves in the positive direction of
+            ``axis`` relative to the first body when the coordinate increases.
+        at: position of the joint (3,) [m].
+        axis: unit vector along the axis (3,): for a universal joint, the axis fixed to
+            the first body; for a planar joint, the normal.
+        across: unit vector along the x axis (3,), perpendicular to ``axis``.
+        axis2: unit vector along the axis of a universal joint that is fixed to the
+            second body (3,); equal to ``across`` for all remaining types.
         actuated: whether a drive holds the joint.
-        position: [rad or m] coordinate at home.
-        limits: [rad or m] smallest and largest coordinate, or None.
-        pitch: [m] translation per turn of a helical joint; 0 for other types.
-        numbers: error, clearance and stiffness: one entry for the joint, or one for
-            each bearing of a universal joint.
+        position: coordinate at home [rad or m].
+        limits: minimum and maximum coordinate [rad or m], or None.
+        pitch: translation per turn of a helical joint [m]; 0 for all remaining types.
+        numbers: error, clearance and stiffness: one entry per bearing for a universal
+            joint, otherwise one entry.
     """
 
     name: str
@@ -99,19 +99,18 @@ class DrawnJoint:
 
 @dataclass(frozen=True, eq=False)
 class DrawnBody:
-    """A body of a robot.
+    """Body of a robot; all vectors are in base axes at home.
 
     Attributes:
         name: name of the body.
-        mass: [kg] mass in addition to the mass of its link.
-        centre: (3,) [m] centre of that mass, base axes at home.
-        inertia: (3, 3) [kg m^2] inertia about this centre, base axes at home.
-        axes: (3, 3) base axes, rotated with the copy of the leg, as columns.
-        link: elasticity between two of the body's joints, with directions in base axes
-            at home; a stiffness matrix is in the axes of the joint ``ends[1]``, at its
-            point.
-        ends: names of the joints at the two ends of the link; the second is None for
-            the platform's point.
+        mass: mass in addition to the mass of the link [kg].
+        centre: centre of this additional mass (3,) [m].
+        inertia: moments of inertia about this centre (3, 3) [kg m^2].
+        axes: base axes rotated with the copy of the leg, as columns (3, 3).
+        link: elastic link between two joints of the body; a stiffness matrix refers to
+            the position and axes of the joint ``ends[1]``.
+        ends: names of the joints at both ends of the link; the second one is None for
+            the reference point of the platform.
     """
 
     name: str
@@ -125,12 +124,13 @@ class DrawnBody:
 
 @dataclass(frozen=True, eq=False)
 class DrawnCallout:
-    """The callouts of a joint's feature on one of its two bodies.
+    """Tolerance callouts of a joint feature on one of its two bodies.
 
     Attributes:
         body: name of the body, or ``"base"``.
-        callout: the callout, with names of joints in place of frames.
-        direction: (3,) direction of the zones, base axes at home; None for all.
+        callout: callouts in which frame names are replaced by joint names.
+        direction: direction in which the zones are measured (3,), in base axes at home;
+            None for all directions.
     """
 
     body: str
@@ -140,18 +140,17 @@ class DrawnCallout:
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """A robot that consists of bodies and joints.
+    """Robot that consists of bodies and joints.
 
     Attributes:
         name: name of the robot.
         platform: name of the body whose pose error is reported.
-        platform_at: (3,) [m] point of the platform whose error is reported, base axes
-            at home.
-        bodies: bodies in the order of the file.
-        joints: joints in the order of the file.
-        description: description in one line.
-        remarks: defaults of the robot's file that are easily overlooked.
-        callouts: tolerances of features.
+        platform_at: reference point of the platform (3,) [m], in base axes at home.
+        bodies: bodies in file order.
+        joints: joints in file order.
+        description: one-line description.
+        remarks: default values in the file that are easily overlooked.
+        callouts: tolerance callouts of features.
     """
 
     name: str
@@ -165,7 +164,7 @@ class Drawing:
 
 
 def unit(vector: NDArray) -> NDArray:
-    """Return the vector divided by its length."""
+    """Normalise a vector to length 1."""
     return vector / np.linalg.norm(vector)
 
 
@@ -173,12 +172,12 @@ def perpendicular(axis: NDArray, near: NDArray | None = None) -> NDArray:
     """Return a unit vector perpendicular to an axis.
 
     Args:
-        axis: (3,) unit vector.
-        near: (3,) direction that is projected onto the plane perpendicular to the axis;
-            None for the base's x, or the base's y if the axis is within 10 deg of x.
+        axis: unit vector (3,).
+        near: direction that is projected onto the plane normal to the axis (3,); None
+            for the base x axis, or the y axis if the axis is within 10 deg of x.
 
     Returns:
-        (3,) unit vector.
+        Unit vector (3,).
     """
     if near is None:
         near = np.eye(3)[1 if abs(axis[0]) > NEAR_X else 0]
@@ -186,7 +185,7 @@ def perpendicular(axis: NDArray, near: NDArray | None = None) -> NDArray:
 
 
 def turned_joint(joint: DrawnJoint, T: NDArray) -> DrawnJoint:
-    """Return the joint moved by a (4, 4) transform; its numbers do not change."""
+    """Apply a transform (4, 4) to a joint."""
     R = T[:3, :3]
     return replace(
         joint, at=R @ joint.at + T[:3, 3], axis=R @ joint.axis,
@@ -195,7 +194,7 @@ def turned_joint(joint: DrawnJoint, T: NDArray) -> DrawnJoint:
 
 
 def turned_body(body: DrawnBody, T: NDArray) -> DrawnBody:
-    """Return the body moved by a (4, 4) transform, with its mass and its link."""
+    """Apply a transform (4, 4) to a body, including its mass and its link."""
     R = T[:3, :3]
     return replace(
         body, centre=R @ body.centre + T[:3, 3], inertia=R @ body.inertia @ R.T,
@@ -204,14 +203,14 @@ def turned_body(body: DrawnBody, T: NDArray) -> DrawnBody:
 
 
 def turned_link(link: Link | None, R: NDArray) -> Link | None:
-    """Return the link with its directions expressed in rotated axes.
+    """Express the directions of a link in rotated axes.
 
     Args:
-        link: any link; a matrix and a stiffness library contain no directions.
-        R: rotation from the present axes to the new axes.
+        link: link; stiffness matrices and library entries contain no directions.
+        R: rotation matrix from the current axes to the new axes.
 
     Returns:
-        The link in the new axes.
+        Link in the new axes.
     """
     if isinstance(link, BeamLink):
         return replace(link, axis=_turned(link.axis, R), up=_turned(link.up, R))
@@ -222,7 +221,7 @@ def turned_link(link: Link | None, R: NDArray) -> Link | None:
 
 
 def _turned(vector: Direction, R: NDArray) -> Direction:
-    """Return a direction expressed in other axes, or None if no direction is given."""
+    """Express a direction in rotated axes; None stays None."""
     if vector is None:
         return None
     x, y, z = (R @ np.array(vector)).tolist()

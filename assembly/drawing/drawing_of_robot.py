@@ -1,4 +1,4 @@
-"""Conversion of a robot of frames and closures to a drawing of bodies and joints.
+"""Conversion of a robot with frames and closures to a drawing with bodies and joints.
 
 Start with :func:`drawing_of_robot`.  ``frames.py`` contains the inverse conversion.
 """
@@ -32,8 +32,8 @@ from forcefit.inputs.table import BadInput, quoted
 from forcefit.results.display import rounded
 from forcefit.stiffness.screws import rotation_vector, transform
 
-_SAME = 1e-12  # [lengths, rad] points and axes that differ by less are equal
-# fields of a frame that a drawing can represent
+_SAME = 1e-12  # [robot sizes, rad] tolerance for coincident points and axes
+# frame fields that a drawing can represent
 _HELD = {
     "name", "parent", "translation", "rotation", "joint", "actuated", "position",
     "limits", "geometric_error", "tolerance", "clearance", "joint_stiffness", "link",
@@ -44,14 +44,14 @@ _HELD = {
 
 @dataclass(frozen=True, eq=False)
 class DrawnRobot:
-    """A robot as a drawing, with a list of properties that a drawing cannot represent.
+    """Drawing of a robot, with a list of properties that it cannot represent.
 
     Attributes:
         drawing: bodies and joints of the robot.
-        frames: for each joint, the name that its frame gets in the robot of the
-            drawing. Ball, cylindrical and planar joints are not listed, because their
+        frames: name of the frame of each joint after the drawing is converted back to a
+            robot. Ball, cylindrical and planar joints are not listed, because their
             axes change.
-        left_out: descriptions of properties of the robot that the drawing omits.
+        left_out: descriptions of properties that the drawing omits.
     """
 
     drawing: Drawing
@@ -60,13 +60,13 @@ class DrawnRobot:
 
 
 def drawing_of_robot(robot: Robot) -> DrawnRobot:
-    """Return a robot as bodies and joints by points and axes of its home pose.
+    """Convert a robot to a drawing in its home pose.
 
     Args:
-        robot: any robot.
+        robot: robot with frames and closures.
 
     Returns:
-        The drawing, and descriptions of what it omits.
+        Drawing, and descriptions of omitted properties.
 
     Raises:
         BadInput: a drawing cannot represent the robot.
@@ -76,7 +76,7 @@ def drawing_of_robot(robot: Robot) -> DrawnRobot:
     end = rigid.after[robot.index(robot.platform)]
     if end == 0:
         raise BadInput(
-            f"{robot.name}: found a platform fixed to the base, expected one that moves"
+            f"{robot.name}: found a platform fixed to the base, expected a moving one"
         )
     # a robot with effects keeps one joint per frame: effects refer to frames by name
     sheet = _Sheet(posture, rigid, found_joints(posture, rigid, not robot.has_effects))
@@ -119,7 +119,7 @@ class _Sheet:
     same: dict[int, int] = field(default_factory=dict)
 
     def name_of(self, k: int) -> str:
-        """Return the name of a body from its number."""
+        """Return the name of a body, given its number."""
         k = self.same.get(k, k)
         return self.bodies[k].name if k else BASE
 

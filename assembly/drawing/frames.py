@@ -1,8 +1,8 @@
-"""Conversion of a drawing to a robot of frames and closures.
+"""Conversion of a drawing to a robot with frames and closures.
 
-A joint becomes one frame with its name, or one frame for each of its freedoms
-(``joint.first``).  A body becomes a fixed frame with its name in three cases: it has a
-mass or a link, it is the platform, or a loop closes at it.
+A joint becomes one frame with the same name, or one frame per degree of freedom
+(``joint.first``).  A body becomes a fixed frame with the same name if it has a mass or
+a link, if it is the platform, or if a loop is closed at it.
 """
 
 from collections.abc import Mapping
@@ -55,13 +55,13 @@ class _Plan:
 
 
 def robot_of_drawing(drawing: Drawing) -> Robot:
-    """Return the robot of a drawing; its closures are closed at home.
+    """Convert a drawing to a robot, whose loops are closed at home.
 
     Args:
         drawing: bodies and joints.
 
     Returns:
-        The robot; its remarks list the joints after which the loops close.
+        Robot, whose remarks list the joints after which the loops are closed.
 
     Raises:
         BadInput: no joint connects a body to the base, the two ends of a link coincide,
@@ -134,8 +134,8 @@ def _part_names(drawing: Drawing) -> set[str]:
             if part.name in owners:
                 raise BadInput(
                     f"joint {quoted(joint.name)}: found {quoted(part.name)} as the "
-                    f"name of a frame, which joint {quoted(owners[part.name])} has "
-                    "too; expected another name"
+                    f"name of a frame that joint {quoted(owners[part.name])} also "
+                    "has; expected a different name"
                 )
             owners[part.name] = joint.name
     return set(owners)

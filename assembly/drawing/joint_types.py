@@ -1,8 +1,8 @@
-"""Recognition of joints with several freedoms in a robot whose frames have one each.
+"""Recognition of joints with several degrees of freedom in a robot with frames.
 
-Consecutive passive frames at one point, without anything on the bodies between them,
-form a universal, spherical, cylindrical or planar joint. This requires that one joint
-can have the same clearance and springs at every posture.
+Consecutive passive frames at the same point, without mass or links on the bodies
+between them, form a universal, spherical, cylindrical or planar joint, provided that a
+single joint can have the same clearance and springs in all postures.
 """
 
 from collections import Counter
@@ -27,7 +27,7 @@ from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from forcefit.inputs.table import BadInput, quoted
 
 _SAME = 1e-12  # [lengths, sine] points and directions that differ by less are equal
-_PARALLEL = 1e-2  # sine of the angle below which axes form no universal joint
+_PARALLEL = 1e-2  # smallest sine of the angle between the axes of a universal joint
 _TURNS = ("revolute", "revolute")
 # suffixes in the names of the frames of a drawn joint (``parts.py``)
 _PARTS = {"first", "second", "third", "turn", "slide", "slide_x", "slide_y"}
@@ -57,10 +57,11 @@ def found_joints(
     Args:
         posture: the robot at home.
         bodies: rigid bodies of the robot.
-        several: whether frames may be combined to joints of several freedoms.
+        several: whether frames may be combined into joints with several degrees of
+            freedom.
 
     Returns:
-        The joints; each frame that is a joint belongs to one of them.
+        Joints, such that each frame that is a joint belongs to exactly one of them.
     """
     robot = posture.robot
     following = _following(posture, bodies) if several else {}
@@ -136,8 +137,8 @@ def _numbers(frame: Frame) -> JointNumbers:
         if {"rx", "ry", "rz"} & set(bolt.pose):
             raise BadInput(
                 f"frame {quoted(frame.name)}.locked_at: found a rotation of the "
-                "platform, but the platform has other axes in a drawing; expected only "
-                "a translation, or joint coordinates"
+                "platform, whose axes are different in a drawing; expected only a "
+                "translation, or joint coordinates"
             )
         bolt, error = replace(bolt, screw=np.zeros(6)), error - bolt.screw
     return JointNumbers(
@@ -146,7 +147,7 @@ def _numbers(frame: Frame) -> JointNumbers:
 
 
 def _several(posture: Posture, rows: list[int]) -> tuple[DrawnJoint, list[int]] | None:
-    """Return the joint of two or three frames; None if the type is not known."""
+    """Return the joint formed by two or three frames, or None if there is none."""
     frames = [posture.robot.frames[i] for i in rows]
     kinds = tuple(frame.joint for frame in frames)
     axes = [posture.transforms[i][:3, :3] for i in rows]

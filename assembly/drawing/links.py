@@ -1,4 +1,4 @@
-"""Links of drawn bodies, converted to the axes of the frame at their tip and back."""
+"""Conversion of links between drawn bodies and the frames at their tips."""
 
 from dataclasses import replace
 
@@ -28,19 +28,19 @@ _PARALLEL = 1e-6  # sine of the angle below which an axis defines no lateral dir
 def link_at_tip(
     body: DrawnBody, base: NDArray, tip: NDArray, reverse: bool = False
 ) -> Link | None:
-    """Return the link of a drawn body in the form that the frame at its tip uses.
+    """Convert the link of a drawn body to the frame at its tip.
 
     Args:
         body: body with a link.
-        base: (4, 4) pose at home of the end nearer to the robot's base.
-        tip: (4, 4) pose at home of the other end, in whose axes the link is expressed.
-        reverse: whether ``tip`` is the end at which the body's link begins.
+        base: home pose of the end closer to the robot base (4, 4).
+        tip: home pose of the opposite end (4, 4), in whose axes the link is expressed.
+        reverse: whether ``tip`` is the end at which the link of the body starts.
 
     Returns:
-        The link with directions in the tip's axes; beams have a length and an axis.
+        Link with directions in tip axes; beams have a length and an axis.
 
     Raises:
-        BadInput: the two ends coincide, or a link from a library is reversed.
+        BadInput: both ends coincide, or a library link is reversed.
     """
     link, R = body.link, tip[:3, :3]
     place = f"body {quoted(body.name)}.link"
@@ -58,7 +58,7 @@ def link_at_tip(
     if isinstance(link, BeamLink | MeshLink):
         given = link.axis
         if given is None and length < _SAME_POINT:
-            raise BadInput(f"{place}: found no distance between its two joints")
+            raise BadInput(f"{place}: found coincident joints at both ends")
         along = np.array(given) * (-1 if reverse else 1) if given else span / length
         x, y, z = along.tolist()
         link = replace(link, axis=(x, y, z))
@@ -103,16 +103,16 @@ def beam_start(frame: Frame, T: NDArray) -> NDArray | None:
 
 
 def drawn_link(frame: Frame, T: NDArray, to: NDArray, spanned: bool) -> Link:
-    """Return the link of a frame in the form that a drawn body uses.
+    """Convert the link of a frame to a drawn body.
 
     Args:
         frame: frame with a link.
-        T: (4, 4) home pose of the frame in base axes.
-        to: (4, 4) home pose of the joint at the link's end, at the frame's origin.
+        T: home pose of the frame in base axes (4, 4).
+        to: home pose of the joint at the end of the link (4, 4), at the frame origin.
         spanned: whether a beam connects its two joints.
 
     Returns:
-        The link with directions in base axes; a stiffness matrix is in the joint's
+        Link with directions in base axes; a stiffness matrix is expressed in joint
         axes.
     """
     link, R = frame.link, T[:3, :3]

@@ -1,4 +1,4 @@
-"""The frames of a joint: one frame per freedom, all at the joint's point."""
+"""Frames of a drawn joint: one frame per degree of freedom, all at the same point."""
 
 from dataclasses import dataclass, replace
 
@@ -16,15 +16,15 @@ _FLIP_SCREW = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One frame of a joint.
+    """Frame of a joint.
 
     Attributes:
         name: name of the frame.
         kind: ``"fixed"``, ``"revolute"`` or ``"prismatic"``, about or along its z axis.
-        pose: (4, 4) home pose before the joint's motion, in base axes.
-        position: [rad or m] coordinate at home.
+        pose: home pose before the joint motion (4, 4), in base axes.
+        position: coordinate at home [rad or m].
         numbers: error, clearance and stiffness of this frame.
-        contact: whether the frame is a contact instead of the joint's own frame.
+        contact: whether the frame is a contact rather than the frame of the joint.
     """
 
     name: str
@@ -37,7 +37,7 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Parallel:
-    """A second chain of frames between the same two bodies.
+    """Second chain of frames between the same two bodies.
 
     Attributes:
         start: name of the joint's frame after which the chain begins.
@@ -56,10 +56,11 @@ def parts_of(joint: DrawnJoint, reverse: bool = False) -> list[Part]:
     Args:
         joint: joint of any type.
         reverse: whether the frames lead from the second body to the first. Axes and
-            signs are then such that coordinates, errors and springs are the same.
+            signs are then chosen such that coordinates, errors and springs are
+            preserved.
 
     Returns:
-        At least one frame; each error, bound and spring is on one of them.
+        At least one frame; each error, bound and spring belongs to one of them.
     """
     every = _all_parts(joint)
     parts = _passed([part for part, chain in every if chain == 0], reverse)
@@ -188,8 +189,8 @@ def _shares(joint: DrawnJoint) -> list[JointNumbers]:
     if joint.kind == "spherical":
         return [own, JointNumbers(), JointNumbers()]
     if joint.kind == "planar":
-        # the error moves the plane and precedes the sliding; the rotation has the
-        # contact
+        # the error moves the plane and precedes the sliding motion; the contact belongs
+        # to the rotation
         placed = JointNumbers(error=_from_axes(own.error), tolerance=_size(own))
         contact = replace(own, error=np.zeros(6), tolerance=None)
         return [placed, JointNumbers(), contact]

@@ -1,7 +1,7 @@
-"""The rigid bodies of a robot of frames and closures.
+"""Rigid bodies of a robot with frames and closures.
 
 Frames without relative motion form one body.  Two bodies are connected by a joint, by a
-fixed frame with an error, a clearance or a spring, or by a link.
+fixed frame with an error, clearance or spring, or by a link.
 """
 
 from dataclasses import dataclass
@@ -38,13 +38,13 @@ def connects(frame: Frame) -> bool:
 
 
 def rigid_bodies(robot: Robot) -> RigidBodies:
-    """Return the rigid bodies of a robot; the frames of a closure share one body.
+    """Find the rigid bodies of a robot; both frames of a closure belong to one body.
 
     Args:
-        robot: any robot.
+        robot: robot with frames and closures.
 
     Returns:
-        The bodies.
+        Rigid bodies.
 
     Raises:
         BadInput: a closure, joint or link connects a rigid body with itself.
@@ -86,6 +86,6 @@ def rigid_bodies(robot: Robot) -> RigidBodies:
 def _same(place: str) -> str:
     """Return the message for a connection between two frames of one body."""
     return (
-        f"{place}: found that it connects two frames of one rigid body, expected two "
-        "bodies: a file of bodies and joints (format 2) cannot hold it"
+        f"{place}: found a connection between two frames of the same rigid body, which "
+        "a file with bodies and joints (format 2) cannot represent"
     )

@@ -1,9 +1,8 @@
-"""The spanning tree of a drawing, and the edges that close its loops.
+"""Spanning tree of a drawing, and the edges that close its loops.
 
-The nodes are rigid bodies.  An elastic body has two nodes, one at each end of its link:
-``(name, False)`` at the end at which the link begins, which contains only the joint
-there, and ``(name, True)``, which contains everything else.  The edges are joints and
-links.
+The nodes are rigid bodies, and the edges are joints and links.  An elastic body has one
+node at each end of its link: ``(name, False)`` at the start, which contains only the
+joint at this end, and ``(name, True)``, which contains all remaining parts.
 """
 
 import heapq
@@ -20,7 +19,7 @@ ROOT: Node = (BASE, True)
 
 @dataclass(frozen=True, eq=False)
 class Edge:
-    """An edge of the graph: a joint, or the link of an elastic body.
+    """Edge of the graph: a joint, or the link of an elastic body.
 
     Attributes:
         item: the joint or the body.
@@ -35,7 +34,7 @@ class Edge:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """An edge as the spanning tree traverses it.
+    """Edge in the direction in which the spanning tree traverses it.
 
     Attributes:
         edge: the edge.
@@ -59,17 +58,16 @@ class Step:
 
 
 def steps_of(drawing: Drawing) -> list[Step]:
-    """Return every edge of a drawing, in the order in which frames are created.
+    """Return all edges of a drawing, in the order in which frames are created.
 
-    Edges are traversed from their first to their second body if some path from the base
-    does so; the tree uses the shortest of such paths.
+    Edges are traversed from their first to their second body whenever a path from the
+    base allows it, and the tree uses the shortest of these paths.
 
     Args:
-        drawing: any drawing.
+        drawing: bodies and joints.
 
     Returns:
-        The edges branch by branch; edges that close a loop follow the branch of their
-        first body.
+        Edges by branch; edges that close a loop follow the branch of their first body.
 
     Raises:
         BadInput: no joint connects a body to the base.
@@ -83,8 +81,8 @@ def steps_of(drawing: Drawing) -> list[Step]:
     for body in drawing.bodies:
         if (body.name, True) not in entered:
             raise BadInput(
-                f"body {quoted(body.name)}: found no joint that connects it with "
-                f'"{BASE}", expected one'
+                f"body {quoted(body.name)}: found no chain of joints that connects it "
+                f'to "{BASE}", expected at least one'
             )
     order: list[Step] = []
     waiting = [ROOT]

@@ -1,5 +1,5 @@
-"""Import and export of robots from and to other programs: URDF, MJCF, SDF.
+"""Import and export of robots in the formats of other programs: URDF, MJCF and SDF.
 
-Start with ``robot_files.py`` and ``convert.py``; ``mechanism.py`` defines the
-representation that all formats share.
+Start with ``robot_files.py`` and ``convert.py``.  ``mechanism.py`` defines the common
+representation of all formats.
 """

@@ -1,9 +1,9 @@
-"""Conversion of a mechanism to a robot of frames, and back.
+"""Conversion between mechanisms and robots with frames.
 
-A moving joint becomes a frame with the joint's name; a body on a fixed joint becomes a
-frame with the body's name.  A body on a moving joint gets its own frame if it has a
-mass, ends a chain, or is an end of a loop, because such a body may have other axes than
-the joint.
+A moving joint becomes a frame with the name of the joint, and a body on a fixed joint
+becomes a frame with the name of the body.  A body on a moving joint has its own frame
+if it has a mass, is the last body in a chain, or is the end of a loop, because its axes
+may then differ from those of the joint.
 """
 
 from collections.abc import Mapping
@@ -40,13 +40,13 @@ Places = Mapping[str, tuple[str, NDArray]]
 
 @dataclass(frozen=True, eq=False)
 class RobotAndMechanism:
-    """A robot together with the mechanism that it was converted from or to.
+    """Robot together with the corresponding mechanism.
 
     Attributes:
-        robot: the robot of frames.
-        mechanism: the mechanism of bodies.
-        places: for each body, its frame (``"base"`` for the root) and the pose (4, 4)
-            of the body in this frame after the frame's motion.
+        robot: robot with frames.
+        mechanism: mechanism with bodies.
+        places: for each body, its frame (``"base"`` for the root), and the pose of the
+            body in this frame after the frame's motion (4, 4).
     """
 
     robot: Robot
@@ -55,15 +55,15 @@ class RobotAndMechanism:
 
 
 def points_as_joints(mechanism: Mechanism, home: NDArray) -> Mechanism:
-    """Return a mechanism with a ball joint in each loop that closes in a point only.
+    """Insert a ball joint into each loop that is closed only at a point.
 
     Args:
-        mechanism: mechanism of n joints.
-        home: (n,) [rad or m] coordinates for which its loops close.
+        mechanism: mechanism with n joints.
+        home: coordinates for which the loops are closed (n,) [rad or m].
 
     Returns:
-        The mechanism at home. The ball joints have zero coordinates, and every loop
-        constrains all six directions.
+        Mechanism at home, in which the ball joints have zero coordinates and each loop
+        constrains all six degrees of freedom.
     """
     poses = body_poses(mechanism, home)
     bodies = dict(mechanism.bodies)
@@ -91,13 +91,13 @@ def points_as_joints(mechanism: Mechanism, home: NDArray) -> Mechanism:
 
 
 def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
-    """Return the robot of a mechanism.
+    """Convert a mechanism to a robot.
 
     Args:
-        mechanism: mechanism at home, with loops that constrain all six directions.
+        mechanism: mechanism at home, whose loops constrain all six degrees of freedom.
 
     Returns:
-        The robot, with the mechanism and the places of its bodies.
+        Robot, together with the mechanism and the places of its bodies.
 
     Raises:
         BadInput: no body can be the platform.
@@ -155,7 +155,7 @@ def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
 
 
 def _without_base(mechanism: Mechanism) -> Mechanism:
-    """Return the mechanism with a joint renamed if its name is that of the base."""
+    """Rename a joint that has the reserved name of the base."""
     names = {joint.name for joint in mechanism.joints}
     if BASE not in names:
         return mechanism
@@ -171,13 +171,14 @@ def _without_base(mechanism: Mechanism) -> Mechanism:
 
 
 def guess_platform(mechanism: Mechanism) -> str:
-    """Return the body at the end of the longest chain that does not only close a loop.
+    """Return the body at the end of the longest chain, apart from loop closures.
 
     Args:
-        mechanism: any mechanism.
+        mechanism: mechanism with at least one joint.
 
     Returns:
-        The name of a body that carries no other body; the first of equally long chains.
+        Name of a body that carries no other body; the first one among chains of equal
+        length.
 
     Raises:
         BadInput: the mechanism has no joint.
@@ -199,7 +200,7 @@ def guess_platform(mechanism: Mechanism) -> str:
 
 
 def _closes(joint: Joint, mechanism: Mechanism) -> bool:
-    """Return whether a joint belongs to a joint of several freedoms in a loop."""
+    """Return whether a joint is part of a multi-degree-of-freedom joint in a loop."""
     return any(
         loop.first == f"{loop.name}.tip"
         and (joint.name == loop.name or joint.name.startswith(f"{loop.name}."))
@@ -227,15 +228,15 @@ def _with_ends(mechanism: Mechanism) -> Mechanism:
 
 
 def mechanism_of_robot(robot: Robot, home: NDArray) -> RobotAndMechanism:
-    """Return the mechanism of a robot: rigid bodies, without clearance and errors.
+    """Convert a robot to a mechanism of rigid bodies, without clearance and errors.
 
     Args:
-        robot: robot of n frames.
-        home: (n,) [rad or m] coordinates at home.
+        robot: robot with n frames.
+        home: coordinates at home (n,) [rad or m].
 
     Returns:
-        The mechanism.  The body of a fixed frame has the frame's name; the name of a
-        moving body has the suffix ``.link``.
+        Mechanism.  The body of a fixed frame has the name of the frame; the names of
+        moving bodies have the suffix ``.link``.
     """
     names = {f.name for f in robot.frames}
     root = _unlike(BASE, names)

@@ -10,15 +10,16 @@ from forcefit.assembly.exchange.mechanism import Joint, motion
 def balls_at_rest(joints: tuple[Joint, ...]) -> tuple[Joint, ...]:
     """Return joints in which passive ball joints have zero coordinates at home.
 
-    A ball joint consists of three rotations, which lose a freedom if the second angle
-    is 90 degrees. The rotation at home is therefore included in the joint's placement.
+    A ball joint consists of three rotations, which lose a degree of freedom if the
+    second angle is 90 degrees. The rotation at home is therefore included in the
+    placement of the joint.
 
     Args:
         joints: joints at home.
 
     Returns:
-        The joints in the same pose.  Only the coordinates of ball joints change that
-        were converted to three consecutive rotations.
+        Joints in the same pose.  Only the coordinates of ball joints that were
+        converted to three consecutive rotations are changed.
     """
     at_rest = list(joints)
     for i in range(len(joints) - 2):

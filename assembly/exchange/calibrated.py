@@ -1,4 +1,4 @@
-"""A robot whose known geometric errors are part of its nominal geometry."""
+"""Calibrated robots, whose known geometric errors are part of the nominal geometry."""
 
 from dataclasses import replace
 
@@ -16,14 +16,14 @@ CONSTANT = ("encoder_offset", "link_length")
 
 
 def with_calibration(home: Posture) -> Robot:
-    """Return a robot whose nominal geometry includes the calibrated errors.
+    """Move the known errors of a robot to its nominal geometry.
 
     Args:
-        home: home pose of the robot of a file, with its geometric errors and effects.
+        home: home posture of a robot with geometric errors and effects.
 
     Returns:
-        The robot with geometric errors and constant effects included in its frames.
-        They are removed from its errors and effects.
+        Robot whose frames include the geometric errors and constant effects, which are
+        removed from its errors and effects.
 
     Raises:
         BadInput: an effect violates one of its rules.

@@ -1,7 +1,7 @@
-"""Comparison of a robot file as read by forcefit with the same file read by MuJoCo.
+"""Comparison of a file as read by forcefit and by MuJoCo.
 
 MuJoCo is optional.  If it is installed, it reads URDF and MJCF files in a separate
-process, so that no file can crash or block this process.
+process, so that invalid files can neither crash nor block this process.
 """
 
 import importlib.util
@@ -27,19 +27,19 @@ _WORKER = "from forcefit.assembly.exchange.mujoco_reading import main; main()"
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Comparison of a file's content as read by another program and by forcefit.
+    """Comparison of a file as read by another program and by forcefit.
 
     Attributes:
         reader: name and version of the other program.
-        file: the file that both programs read.
-        why_not: reason why the file could not be compared; otherwise empty.
-        bodies: number of bodies compared.
-        masses: number of bodies whose mass and moments of inertia were compared.
-        loops: number of loops compared.
-        difference: largest difference, [rad, m] or relative mass; lengths are divided
-            by the robot's size if the size exceeds 1 m.
-        where: description of where the largest difference occurs.
-        weights: mass properties of bodies whose mass only the other program can read.
+        file: file read by both programs.
+        why_not: reason why no comparison was possible; otherwise empty.
+        bodies: number of compared bodies.
+        masses: number of bodies with compared mass and moments of inertia.
+        loops: number of compared loops.
+        difference: largest difference [rad, m], or relative difference of masses;
+            lengths are divided by the size of the robot if it exceeds 1 m.
+        where: location of the largest difference.
+        weights: mass properties of bodies that only the other program can read.
     """
 
     reader: str
@@ -71,8 +71,8 @@ class Comparison:
         if not self.agrees:
             return (
                 f"{self.reader} reads {self.file} differently: {self.where} "
-                f"differs by {self.difference:.2g}; check which of the two "
-                "programs reads the file correctly"
+                f"differs by {self.difference:.2g}; check which program "
+                "reads the file correctly"
             )
         return (
             f"{self.reader} reads {self.file} alike: largest difference "
@@ -84,11 +84,11 @@ def compare(mechanism: Mechanism, path: Path) -> Comparison:
     """Compare a mechanism with its file as read by another program.
 
     Args:
-        mechanism: mechanism as it was read or written.
+        mechanism: mechanism that was read from or written to the file.
         path: path of the file.
 
     Returns:
-        The comparison, or the reason why none was made.
+        Comparison, or the reason why none was possible.
     """
     name = path.name
     if path.suffix.lower() not in {".urdf", ".xml"}:

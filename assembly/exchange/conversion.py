@@ -16,15 +16,15 @@ class Conversion:
 
     Attributes:
         robot: robot that was written or read.
-        files: files that were written.
-        open_before: [rad, m] mismatch of the loops at the home pose of the file.
-        open_after: [rad, m] mismatch of the loops at the computed home pose.
-        drives_held: whether the drives have the coordinates of the file.
-        difference: largest difference of any body's pose after reading back, in 100
-            random postures.
-        comparisons: comparisons of the files as read by another program.
-        left_out: descriptions of parts that the new file cannot represent.
-        taken: descriptions of assumptions where the files are incomplete.
+        files: output files.
+        open_before: mismatch of the loops in the home pose of the file [rad, m].
+        open_after: mismatch of the loops in the computed home pose [rad, m].
+        drives_held: whether the drive coordinates of the file are preserved.
+        difference: largest difference between body poses in 100 random postures after
+            reading back the output file.
+        comparisons: comparisons with the files as read by another program.
+        left_out: descriptions of parts that the output file cannot represent.
+        taken: descriptions of assumptions made because the files are incomplete.
     """
 
     robot: Robot
@@ -39,7 +39,7 @@ class Conversion:
 
     @property
     def agrees(self) -> bool:
-        """Whether all other programs read the same robot as forcefit."""
+        """Whether all programs read the same robot."""
         return all(comparison.agrees for comparison in self.comparisons)
 
     def table(self) -> dict[str, Any]:

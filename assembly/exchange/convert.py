@@ -1,4 +1,4 @@
-"""``forcefit convert``: import and export of robots, verified by reading back.
+"""Conversion of robot files for ``forcefit convert``, verified by reading them back.
 
 ============  ==========================================================  ==========
 kind          read                                                        written
@@ -70,30 +70,30 @@ def convert(
     close: Closing | None = None,
     version: int = 1,
 ) -> Conversion:
-    """Convert a robot between a robot file and the files of other programs.
+    """Convert a robot between robot files and the formats of other programs.
 
     Args:
-        source: a ``.urdf``, ``.xml`` (MJCF), ``.sdf`` or ``.toml`` file, or the name of
-            a built-in robot.
-        target: a ``.toml``, ``.urdf`` or ``.xml`` file.
-        loops: YAML file with ``closed_loop``; None for the file next to the source.
-        overlay: TOML file with elasticity, clearances and errors of frames by name.
-        points: names of loops that close only in a point, in addition to loops of type
-            3d; an empty list to use the types unchanged.  None to use the types unless
-            every loop is declared 6d and the loops cannot close: then all loops become
-            points, and the result reports this.
+        source: ``.urdf``, ``.xml`` (MJCF), ``.sdf`` or ``.toml`` file, or the name of a
+            built-in robot.
+        target: ``.toml``, ``.urdf`` or ``.xml`` file.
+        loops: YAML file with ``closed_loop``; by default, a file in the same folder as
+            the source.
+        overlay: TOML file with elasticity, clearances and errors, by frame name.
+        points: names of loops that are closed only at a point, in addition to loops of
+            type 3d; an empty list to use the declared types.  By default, the declared
+            types are used, unless all loops are declared as 6d and cannot be closed; in
+            this case, all loops become points, which the result reports.
         close: for a robot file or built-in robot, the result of
-            :func:`forcefit.assembly.kinematics.closing.closing_of`; None for no
-            closing.
-        version: format of a robot file that is written: 1 for frames and closures, 2
-            for bodies and joints.
+            :func:`forcefit.assembly.kinematics.closing.closing_of`, or None.
+        version: version of the robot file format: 1 for frames and closures, 2 for
+            bodies and joints.
 
     Returns:
-        The files written, and their difference from the source.
+        Output files, and their difference from the source.
 
     Raises:
-        BadInput: a file violates a rule, a loop cannot close, or the written robot
-            differs from the source; no file is then written.
+        BadInput: a file violates a rule, a loop cannot be closed, or the output differs
+            from the source; in these cases, no file is written.
     """
     source, target = Path(source), Path(target)
     check_target(target)
@@ -125,14 +125,14 @@ def convert(
 
 
 def check_target(target: Path) -> None:
-    """Raise an error before the conversion if the target file cannot be written.
+    """Check before the conversion that the output file can be written.
 
     Args:
-        target: path of the file; next to a URDF, a YAML file is also written.
+        target: path of the file; for a URDF, a YAML file is written as well.
 
     Raises:
-        BadInput: the suffix is not supported; or the file, or the YAML file, exists and
-            belongs to another program, or cannot be written.
+        BadInput: the file extension is not supported, or one of the files cannot be
+            written or already exists and was written by another program.
     """
     ending = target.suffix.lower()
     if ending not in _KINDS:
@@ -144,18 +144,18 @@ def check_target(target: Path) -> None:
 
 
 def write_converted(robot: Robot, target: Path, version: int = 1) -> Conversion:
-    """Write a robot to a robot file, a URDF or an MJCF file, and read it back.
+    """Write a robot to a robot file, URDF or MJCF file, and read it back.
 
     Args:
-        robot: any robot.
-        target: a ``.toml``, ``.urdf`` or ``.xml`` file.
-        version: format of a robot file, see :func:`convert`.
+        robot: robot to write.
+        target: ``.toml``, ``.urdf`` or ``.xml`` file.
+        version: version of the robot file format; see :func:`convert`.
 
     Returns:
-        The files written, and their difference from the robot.
+        Output files, and their difference from the robot.
 
     Raises:
-        BadInput: the file cannot be written, or would describe another robot.
+        BadInput: the file cannot be written, or would describe a different robot.
     """
     mismatch = home_posture(robot).mismatch
     conversion = Conversion(
@@ -207,7 +207,7 @@ def _written(
                 raise BadInput(f"{comparison.text()}; nothing is written")
     if not difference <= FAITHFUL:
         raise BadInput(
-            f"{target}: the written file describes another robot: its bodies "
+            f"{target}: the output would describe a different robot: body poses "
             f"differ by {difference:.2g} rad or m, expected at most "
             f"{FAITHFUL:g}; nothing is written"
         )
@@ -220,7 +220,7 @@ def _written(
 
 
 def _built_in(conversion: Conversion) -> tuple[Conversion, RobotAndMechanism]:
-    """Return a robot's rigid mechanism with its calibration and with closed loops."""
+    """Return the rigid mechanism of a calibrated robot with closed loops."""
     threads = [quoted(f.name) for f in conversion.robot.frames if f.pitch]
     if threads:
         raise BadInput(

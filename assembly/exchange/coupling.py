@@ -1,4 +1,4 @@
-"""Couplings: joints whose coordinate is a polynomial of another joint's."""
+"""Couplings between joints: one coordinate is a polynomial in another coordinate."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,14 +8,14 @@ from forcefit.inputs.errors import BadInput, quoted
 
 @dataclass(frozen=True)
 class Coupling:
-    """A joint that follows another: q = rest + sum of c_k (q_leader - leader_rest)^k.
+    """Coupled joint: q = rest + sum of c_k (q_leader - leader_rest)^k.
 
     Attributes:
-        follower: name of the joint that follows.
-        leader: name of the joint that is followed; None if the follower is fixed.
-        coefficients: coefficients c_0, c_1, ..
-        rest: [rad or m] rest coordinate of the follower.
-        leader_rest: [rad or m] rest coordinate of the leader.
+        follower: name of the coupled joint.
+        leader: name of the joint that it follows; None if the follower is fixed.
+        coefficients: coefficients c_0, c_1, ...
+        rest: rest coordinate of the follower [rad or m].
+        leader_rest: rest coordinate of the leader [rad or m].
     """
 
     follower: str
@@ -48,7 +48,7 @@ class Coupling:
 
 
 def leaders_first(couplings: Sequence[Coupling], file: str) -> tuple[Coupling, ...]:
-    """Return the couplings in an order in which a leader's own coupling comes first.
+    """Sort couplings so that the coupling of a leader precedes those of its followers.
 
     Args:
         couplings: couplings in any order.

@@ -1,4 +1,4 @@
-"""Data that a loops file adds to a robot: loops, drives, ball joints, a home pose."""
+"""Addition of the loops, drives, joint types and home pose in a loops file."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -44,7 +44,7 @@ def with_loops(
     mechanism, parts = _retyped(mechanism, loops.turns, parts)
     ends = {name: name for name in mechanism.bodies}
     children = {joint.name: joint.child for joint in mechanism.joints}
-    # a joint of several freedoms ends at the last of its one-freedom joints
+    # a joint with several degrees of freedom ends at the last of its joints
     ends |= {name: children[several[-1]] for name, several in parts.items()}
     # a link on a fixed joint may have the joint's name: both denote the same place
     count, closed = len(mechanism.loops), list(mechanism.loops)
@@ -120,7 +120,7 @@ def _couplings_said(
     for coupling in couplings:
         line = (
             f"mimic: {coupling.text()} becomes an independent drive; command it "
-            "by this rule"
+            "according to this equation"
         )
         if coupling.leader is not None and coupling.leader not in driven:
             line += (

@@ -1,4 +1,4 @@
-"""Comparison of a written robot with the original robot in random postures."""
+"""Comparison of a converted robot with the original in random postures."""
 
 from collections.abc import Mapping, Sequence
 
@@ -18,20 +18,20 @@ _POSTURES = 100
 
 
 def largest_difference(placed: RobotAndMechanism) -> float:
-    """Return the largest difference of the bodies' poses in random postures.
+    """Return the largest difference between body poses in random postures.
 
-    All joints of both trees are moved by up to 1 rad or m from home; loops need not
-    close.
+    All joints of both trees are moved by up to 1 rad or 1 m from home, without closing
+    the loops.
 
     Args:
         placed: robot and mechanism, one of which was read back from a file.
 
     Returns:
-        Largest difference of any entry of a body's transform; lengths are divided by
-        the largest distance from the base if that is above 1 m.
+        Largest difference between entries of the body transforms; lengths are divided
+        by the largest distance from the base if it exceeds 1 m.
 
     Raises:
-        BadInput: one of the two lacks a joint of the other.
+        BadInput: a joint exists in only one of the two.
     """
     robot, mechanism = placed.robot, placed.mechanism
     moving = [joint.name for joint in mechanism.joints if joint.kind != "fixed"]
@@ -39,8 +39,8 @@ def largest_difference(placed: RobotAndMechanism) -> float:
     lost = sorted(set(rows) ^ set(moving))
     if lost:
         raise BadInput(
-            f"{robot.name}: found joint {lost[0]} only before or only after the "
-            "conversion, expected it in both"
+            f"{robot.name}: found joint {lost[0]} either only before or only after "
+            "the conversion, expected it in both robots"
         )
     random, worst = np.random.default_rng(0), 0.0
     kinds = np.array([KINDS[f.joint] for f in robot.frames])

@@ -1,4 +1,4 @@
-"""Robots from files of other programs, with a home pose in which their loops close."""
+"""Import of robots from other programs, with a home pose in which the loops close."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -42,20 +42,21 @@ def robot_of_file(
     points: Sequence[str] | None = None,
     ask: bool = True,
 ) -> tuple[Conversion, RobotAndMechanism]:
-    """Return the robot of a file of another program.
+    """Read a robot from a file of another program.
 
     Args:
-        source: a URDF, MJCF or SDF file.
-        loops: YAML file with ``closed_loop``; None for the file next to a URDF.
-        overlay: TOML file with elasticity, clearances and errors of frames by name.
-        points: names of loops that close only in a point.
-        ask: whether another installed program also reads the file, for comparison.
+        source: URDF, MJCF or SDF file.
+        loops: YAML file with ``closed_loop``; by default, the file in the same folder
+            as a URDF.
+        overlay: TOML file with elasticity, clearances and errors, by frame name.
+        points: names of loops that are closed only at a point.
+        ask: whether the file is compared with the reading of another program.
 
     Returns:
-        The robot with the report of its conversion (without files), and its mechanism.
+        Robot with the report of its conversion (without files), and its mechanism.
 
     Raises:
-        BadInput: a file violates a rule, or a loop cannot close.
+        BadInput: a file violates a rule, or a loop cannot be closed.
     """
     if loops is None and source.suffix.lower() == ".urdf":
         loops = find_loops_file(source)
@@ -73,9 +74,7 @@ def robot_of_file(
             f"{source}: found {len(mechanism.joints)} joints, expected at most "
             f"{MOST_FRAMES}"
         )
-    comparison = Comparison(
-        "", source.name, "no other program was asked to read the file"
-    )
+    comparison = Comparison("", source.name, "the comparison was not requested")
     if ask or mechanism.unweighed:
         comparison = compare(mechanism, source)
     mechanism = _weighed(mechanism, comparison)
@@ -108,20 +107,20 @@ def robot_of_file(
 def _closed(
     mechanism: Mechanism, source: Path, beside: LoopsFile | None
 ) -> tuple[Mechanism, NDArray, bool, tuple[str, ...]]:
-    """Return the mechanism with a home pose in which its loops close.
+    """Find a home pose in which the loops of a mechanism are closed.
 
     Args:
-        mechanism: mechanism as it was read.
-        source: path of the mechanism's file.
-        beside: loops file whose types may be generated defaults: if the loops cannot
-            close otherwise, they become points.  None if the types are certain.
+        mechanism: mechanism as read from the file.
+        source: path of the file.
+        beside: loops file whose types may be generated defaults, so that loops become
+            points if they cannot be closed otherwise; None if the types are certain.
 
     Returns:
-        The mechanism, its home coordinates (n,) [rad or m], whether the drives have the
-        coordinates of the file, and descriptions of the assumptions.
+        Mechanism, its home coordinates (n,) [rad or m], whether the drive coordinates
+        of the file are preserved, and descriptions of the assumptions.
 
     Raises:
-        BadInput: the loops cannot close.
+        BadInput: the loops cannot be closed.
     """
     try:
         return mechanism, *close_loops(mechanism, str(source)), ()
@@ -139,16 +138,16 @@ def _closed(
         reason = str(error).removeprefix(f"{source}: ")
         taken = (
             (
-                "every loop as 3d (a point without orientation): the file declares "
-                "all as 6d, which generators write by default, but as 6d they "
-                f"cannot close ({reason}); declare with --points which loops are 3d"
+                "all loops as 3d (closed at a point with free orientation): the file "
+                "declares all as 6d, which generators write by default, but then they "
+                f"cannot be closed ({reason}); use --points to declare the 3d loops"
             ),
         )
         return loose, home, held, taken
 
 
 def _named_platform(overlay: Path | str) -> str | None:
-    """Return the platform that an overlay names; None if it names none."""
+    """Return the platform named in an overlay, or None."""
     given = read_toml(overlay)
     if not given.has("platform"):
         return None
@@ -159,7 +158,7 @@ def _laid_over(
     placed: RobotAndMechanism, source: Path, overlay: Path | str | None,
     named: str | None,
 ) -> Robot:  # fmt: skip
-    """Return the robot with its overlay, which may name a body as the platform."""
+    """Apply an overlay, which may name a body as the platform, to a robot."""
     content = robot_table(placed.robot)
     if overlay is None:
         return robot_of(Table(content, str(source), ""), source.stem)
@@ -179,14 +178,14 @@ def _left_out(placed: RobotAndMechanism, named: str | None) -> tuple[str, ...]:
     if named is None:
         lines.append(
             f"no platform is named: {placed.robot.platform}, the end of the "
-            'longest chain, was taken; an overlay with platform = "NAME" '
-            "selects another"
+            "longest chain, is used; to select a different platform, use an overlay "
+            'with platform = "NAME"'
         )
     return tuple(lines)
 
 
 def _weighed(mechanism: Mechanism, comparison: Comparison) -> Mechanism:
-    """Return bodies with the mesh masses of another program, or report them missing."""
+    """Adopt the masses of meshes from another program, or report them as missing."""
     known = comparison.weights
     bodies = dict(mechanism.bodies)
     for name, (mass, centre, J) in known.items():

@@ -17,13 +17,13 @@ from forcefit.inputs.errors import BadInput, quoted
 from forcefit.stiffness.screws import rotation_vector, skew, transform
 
 CLOSED = 1e-10  # [rad, m] largest mismatch of a loop that counts as closed
-_SCREWED_TIGHT = 1e-14  # scaled loop mismatch below which only rounding errors remain
-_STARTS = 20  # number of random starts, at increasing distance from the file's home
+_SCREWED_TIGHT = 1e-14  # scaled loop mismatch that corresponds to machine precision
+_STARTS = 20  # number of random starts, at increasing distance from the home pose
 _STARTS_ALONE = 12  # number of starts for a single loop, to find one that cannot close
-_STEPS = 200  # largest number of search steps from one start
-_LONGEST_STEP = 0.3  # [rad or lengths] largest search step
-# a search counts as stalled if ten steps reduce the sum of squares by less than this
-# factor
+_STEPS = 200  # maximum number of iterations per start
+_LONGEST_STEP = 0.3  # [rad or robot sizes] maximum step length
+# a search is considered stalled if ten steps reduce the sum of squares by less than
+# this factor
 _STALLED = 0.999
 
 
@@ -34,22 +34,22 @@ def loop_residual(mechanism: Mechanism, coordinates: NDArray) -> float:
 
 
 def close_loops(mechanism: Mechanism, file: str) -> tuple[NDArray, bool]:
-    """Return joint coordinates for which all loops close, near those of the file.
+    """Find joint coordinates close to those of the file for which all loops are closed.
 
-    The first search holds the drives.  If the loops do not close, the next search also
-    moves the drives.  Then searches follow from random starts, each farther away; the
-    random starts are the same at every call.
+    The first search holds the drives.  If it fails, the next search also moves the
+    drives, and is followed by searches from random starts at increasing distances.  The
+    random starts are the same on each call.
 
     Args:
-        mechanism: mechanism of n joints.
+        mechanism: mechanism with n joints.
         file: name of the file, for error messages.
 
     Returns:
-        (n,) [rad or m] coordinates, and whether the drives have the coordinates of the
-        file.
+        Coordinates (n,) [rad or m], and whether the drive coordinates of the file are
+        preserved.
 
     Raises:
-        BadInput: no search closes the loops; the message names the loop at fault and
+        BadInput: no search closes the loops; the message names the loop that fails and
             its mismatch.
     """
     coordinates, residual, held = nearest_closed(mechanism, 0)
@@ -59,36 +59,36 @@ def close_loops(mechanism: Mechanism, file: str) -> tuple[NDArray, bool]:
         coordinates, residual, held = nearest_closed(mechanism, _STARTS)
     if residual >= CLOSED:
         raise BadInput(
-            f"{file}: its {len(mechanism.loops)} loops cannot close together: "
-            f"the smallest gap found is {residual:.3g} rad or m; expected loops "
-            "that close: check the lengths and the types 6d and 3d (--points)"
+            f"{file}: its {len(mechanism.loops)} loops cannot be closed together: "
+            f"the smallest gap found is {residual:.3g} rad or m; check the lengths "
+            "and the types 6d and 3d (--points)"
         )
     return coordinates, held
 
 
 def _check_alone(mechanism: Mechanism, file: str) -> None:
-    """Reject a loop that cannot close even without the other loops."""
+    """Raise BadInput for a loop that cannot be closed on its own."""
     (loop,) = mechanism.loops
     residual = nearest_closed(mechanism, _STARTS_ALONE)[1]
     if residual >= CLOSED:
         ends = f"({quoted(loop.first)}, {quoted(loop.second)})"
         raise BadInput(
-            f"{file}: {loop.name} {ends} cannot close even by itself: the smallest "
-            f"gap found is {residual:.3g} rad or m; expected more joints, or "
+            f"{file}: {loop.name} {ends} cannot be closed even on its own: the "
+            f"smallest gap found is {residual:.3g} rad or m; expected more joints, or "
             "type 3d (--points)"
         )
 
 
 def nearest_closed(mechanism: Mechanism, starts: int) -> tuple[NDArray, float, bool]:
-    """Return joint coordinates with the least loop mismatch, near those of the file.
+    """Find joint coordinates with minimum loop mismatch, close to those of the file.
 
     Args:
-        mechanism: mechanism of n joints.
+        mechanism: mechanism with n joints.
         starts: number of random starts, in addition to the coordinates of the file.
 
     Returns:
-        (n,) [rad or m] coordinates, their mismatch [rad, m], and whether the drives
-        have the coordinates of the file.
+        Coordinates (n,) [rad or m], their loop mismatch [rad, m], and whether the drive
+        coordinates of the file are preserved.
     """
     loops = _Loops(mechanism, _size(mechanism))
     coordinates, residual, held = mechanism.home, np.inf, True
@@ -151,16 +151,16 @@ def _solve(loops: "_Loops", start: NDArray, hold: bool) -> NDArray:
 
 
 def _size(mechanism: Mechanism) -> float:
-    """Return the longest distance [m] between neighbouring joints; 1 if it is zero."""
+    """Return the largest distance between neighbouring joints [m], or 1 if zero."""
     lengths = [np.linalg.norm(joint.placement[:3, 3]) for joint in mechanism.joints]
     return float(max(lengths, default=0.0)) or 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class _Loops:
-    """The closure equations of loops, and the equations of coupled joints.
+    """Closure equations of the loops and equations of the coupled joints.
 
-    In these equations, every joint rotates about or translates along its own z axis.
+    All joints rotate about or translate along their own z axes.
     """
 
     mechanism: Mechanism
@@ -168,23 +168,23 @@ class _Loops:
 
     @cached_property
     def kinds(self) -> NDArray:
-        """(n,) kind of each joint: 0 fixed, 1 revolute or helical, 2 prismatic."""
+        """Type of each joint (n,): 0 fixed, 1 revolute or helical, 2 prismatic."""
         kinds = {"fixed": 0, "revolute": 1, "helical": 1, "prismatic": 2}
         return np.array([kinds[j.kind] for j in self.mechanism.joints], int)
 
     @cached_property
     def leads(self) -> NDArray:
-        """(n,) [m/rad] translation per angle of helical joints; 0 for others."""
+        """Translation per angle of helical joints (n,) [m/rad]; 0 for all others."""
         return np.array([j.lead for j in self.mechanism.joints], float)
 
     @property
     def moving(self) -> NDArray:
-        """(n,) bool, whether a joint can move."""
+        """Whether each joint can move (n,)."""
         return self.kinds > 0
 
     @cached_property
     def actuated(self) -> NDArray:
-        """(n,) bool, whether a joint is driven."""
+        """Whether each joint is driven (n,)."""
         return np.array([j.actuated for j in self.mechanism.joints], dtype=bool)
 
     @cached_property
@@ -213,7 +213,7 @@ class _Loops:
 
     @cached_property
     def carried(self) -> NDArray:
-        """(n + 1, n) bool, joints that move the bodies on each joint; last: root."""
+        """Mask (n + 1, n) of the joints that move each body; the root comes last."""
         parents = self.tree[0]
         marks = np.zeros((len(parents) + 1, len(parents)))
         for i, parent in enumerate(parents):
@@ -223,7 +223,7 @@ class _Loops:
 
     @cached_property
     def concerned(self) -> NDArray:
-        """(n,) bool, whether a joint's motion changes the mismatch of a loop."""
+        """Whether the motion of each joint affects the mismatch of a loop (n,)."""
         marks = np.zeros(len(self.kinds), dtype=bool)
         for (i, _), (j, _), _ in self.ends:
             marks |= self.carried[i] != self.carried[j]
@@ -237,7 +237,7 @@ class _Loops:
 
     @cached_property
     def coupled(self) -> list[tuple[int, int, Coupling]]:
-        """Indices of follower and leader (-1 without a leader), and their rule."""
+        """Indices of follower and leader (-1 without a leader), and their coupling."""
         row = {joint.name: k for k, joint in enumerate(self.mechanism.joints)}
         return [
             (row[one.follower], row.get(one.leader or "", -1), one)
@@ -245,7 +245,7 @@ class _Loops:
         ]
 
     def equations(self, q: NDArray) -> tuple[NDArray, NDArray]:
-        """Return the mismatch, with scaled translations, and its derivatives by q."""
+        """Return the mismatch with scaled translations, and its Jacobian."""
         parents, fixed, _ = self.tree
         before, after = place_frames(parents, self.kinds, fixed, q, self.leads)
         p = before[:, :3, 3]

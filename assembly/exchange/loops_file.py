@@ -1,16 +1,15 @@
-"""``robot.yaml``: loops and drives of a URDF, which URDF itself cannot represent.
+"""Loops files (``robot.yaml``): loops and drives, which URDF cannot represent.
 
 The format is that of the project example-parallel-robots. ``closed_loop`` lists pairs
 of joints or links that coincide; ``type`` is ``6d``, or ``3d`` if only the points
-coincide; ``name_mot`` lists the drives.  ``joint_name`` and ``joint_type`` declare a
-joint as SPHERICAL, as FIXED or as a UJOINT about two axes (_XY, _YX, ..). They are
-needed because CAD programs export such joints as one rotation.  The keys ``home``
-(coordinates by joint) and ``platform`` are additions of forcefit, which other readers
-ignore.
+coincide; ``name_mot`` lists the drives.  ``joint_name`` and ``joint_type`` declare
+joints as SPHERICAL, FIXED or as a UJOINT about two axes (_XY, _YX, ..), because CAD
+programs export such joints as a single rotation.  The keys ``home`` (coordinates by
+joint) and ``platform`` are extensions of forcefit, which other readers ignore.
 
-The generator of that project writes ``6d`` for every loop, and users correct the types
-by hand.  A file that contains only ``6d`` may therefore be uncorrected: its loops
-become points if they cannot close otherwise.
+The generator of that project writes ``6d`` for all loops, and users are expected to
+correct the types.  If a file contains only ``6d``, it may not have been corrected; its
+loops therefore become points if they cannot be closed otherwise.
 
 Sources:
     Batto, de Matteis, example-parallel-robots: ``loader_tools.py``, ``generateYAML``.
@@ -35,17 +34,17 @@ TURNS = {"FIXED": "", "SPHERICAL": "xyz"} | {
 
 @dataclass(frozen=True)
 class LoopsFile:
-    """The content of a loops file.
+    """Content of a loops file.
 
     Attributes:
         file: name of the file, for messages.
         pairs: names of joints or links that coincide.
-        points: for each pair, whether only the points coincide.
+        points: whether only the points coincide, for each pair.
         drives: names of the driven joints; None if the file does not list them.
-        turns: actual axes of a joint, such as ``"xyz"``, by joint.
-        home: [rad or m] coordinates at home by joint.
+        turns: actual rotation axes by joint, for example ``"xyz"``.
+        home: coordinates at home [rad or m], by joint.
         platform: name of a link, or None.
-        passed_over: keys that are unknown and ignored.
+        passed_over: unknown keys, which are ignored.
     """
 
     file: str = ""
@@ -59,12 +58,12 @@ class LoopsFile:
 
     @property
     def as_generated(self) -> bool:
-        """Whether no loop is declared as a point, as in a generated file."""
+        """Whether all loops are declared as 6d, as in a generated file."""
         return bool(self.pairs) and not any(self.points)
 
 
 def find_loops_file(robot: Path) -> Path | None:
-    """Return the path of a loops file: the robot's name + ``.yaml``, or robot.yaml."""
+    """Return the path of the loops file in the folder of a robot, or None."""
     for path in (robot.with_suffix(".yaml"), robot.parent / "robot.yaml"):
         if path.is_file():
             return path
@@ -110,14 +109,14 @@ def read_loops(path: Path | str) -> LoopsFile:
 
 
 def with_points(loops: LoopsFile, names: Sequence[str]) -> LoopsFile:
-    """Return the loops file with the named loops declared as points (type 3d).
+    """Declare the named loops as points (type 3d).
 
     Args:
-        loops: loops of a file.
-        names: ``loop1`` for the first loop, or the name of either end; ``all`` for all.
+        loops: content of a loops file.
+        names: ``loop1`` for the first loop, the name of either end, or ``all``.
 
     Returns:
-        The loops with the new types.
+        Loops with the new types.
 
     Raises:
         BadInput: a name does not belong to any loop.
@@ -138,7 +137,7 @@ def with_points(loops: LoopsFile, names: Sequence[str]) -> LoopsFile:
 
 
 def loops_text(loops: LoopsFile) -> str:
-    """Return the text of a loops file, with all digits of every number."""
+    """Return the text of a loops file, with numbers at full precision."""
     rows = [f"[{_word(a)}, {_word(b)}]" for a, b in loops.pairs]
     kinds = ["3d" if point else "6d" for point in loops.points]
     lines = [
@@ -156,7 +155,7 @@ def loops_text(loops: LoopsFile) -> str:
 
 
 def _reason(error: Exception) -> str:
-    """Return the place and the cause of a YAML error in one line."""
+    """Return the place and cause of a YAML error on one line."""
     mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", "")
     if mark is None or not problem:
         return one_line(str(error), 200)

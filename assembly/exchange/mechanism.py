@@ -1,8 +1,9 @@
-"""Common representation of URDF, MJCF and SDF: bodies, joints of one freedom, loops.
+"""Common representation of URDF, MJCF and SDF: bodies, joints and loops.
 
 A joint carries a child body, whose pose in the parent body is ``placement @ motion @
-after``; the motion is about or along ``axis``.  A joint of several freedoms is a chain
-of such joints with massless bodies between them.  Units are metres, radians, kilograms.
+after``; the motion is about or along ``axis``.  Each joint has one degree of freedom; a
+joint with several of them is a chain of such joints with massless bodies in between.
+Units are metres, radians and kilograms.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,13 +23,14 @@ HERE.setflags(write=False)
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A rigid body.
+    """Rigid body.
 
     Attributes:
         name: name, unique among bodies.
-        mass: [kg] mass.
-        centre: (3,) [m] centre of mass, in the body's axes.
-        inertia: (3, 3) [kg m^2] inertia about the centre of mass, in the body's axes.
+        mass: mass [kg].
+        centre: centre of mass (3,) [m], in body axes.
+        inertia: moments of inertia about the centre of mass (3, 3) [kg m^2], in body
+            axes.
     """
 
     name: str
@@ -39,7 +41,7 @@ class Body:
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """A joint between a body and its parent; see the module's docstring.
+    """Joint between a body and its parent, as described at the top of this module.
 
     Attributes:
         name: name, unique among joints.
@@ -74,7 +76,7 @@ class Joint:
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """A loop: two places on two bodies that coincide.
+    """Loop closure: two places on different bodies that coincide.
 
     Attributes:
         name: name of the loop.
@@ -95,7 +97,7 @@ class Loop:
 
 @dataclass(frozen=True, eq=False)
 class Mechanism:
-    """A robot as a tree of bodies and loops.
+    """Robot as a tree of bodies with loop closures.
 
     Attributes:
         name: name of the robot.
@@ -131,18 +133,19 @@ class Mechanism:
 def parents_first(joints: Sequence[Joint], bodies: Mapping[str, Body], file: str) -> (
     tuple[str, tuple[Joint, ...]]
 ):  # fmt: skip
-    """Return the root of a tree of bodies, and the joints with parents first.
+    """Sort joints so that parents precede children, and find the root.
 
     Args:
         joints: joints in any order.
-        bodies: all bodies by name.
+        bodies: all bodies, by name.
         file: name of the file, for error messages.
 
     Returns:
-        Name of the root, and the sorted joints.
+        Name of the root, and sorted joints.
 
     Raises:
-        BadInput: a body is missing or has two parents; or there is no root, or several.
+        BadInput: a body is missing or has two parents, or there is not exactly one
+            root.
     """
     carried: dict[str, Joint] = {}
     below: dict[str, list[Joint]] = {name: [] for name in bodies}
@@ -214,7 +217,7 @@ def chain(
     name: str, parent: str, child: str, placement: NDArray, after: NDArray,
     freedoms: Sequence[tuple[str, str, NDArray]],
 ) -> tuple[list[Joint], list[Body]]:  # fmt: skip
-    """Return a joint of several freedoms as joints of one, with massless bodies.
+    """Split a joint with several degrees of freedom into a chain of joints.
 
     Args:
         name: name of the joint, to which the name of each part is appended.
@@ -242,10 +245,10 @@ def chain(
 
 
 def ball(turns: str = "xyz") -> list[tuple[str, str, NDArray]]:
-    """Return a ball joint as three rotations, singular only far from home."""
+    """Return a ball joint as three rotations, which are singular only far from home."""
     return [(f"r{axis}", "revolute", np.array(UNIT_VECTORS[axis])) for axis in turns]
 
 
 def slides() -> list[tuple[str, str, NDArray]]:
-    """Return a translation in space as three prismatic joints."""
+    """Return the parts of a spatial translation: three prismatic joints."""
     return [(f"t{axis}", "prismatic", np.array(UNIT_VECTORS[axis])) for axis in "xyz"]

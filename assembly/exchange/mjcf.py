@@ -1,4 +1,4 @@
-"""Import of MJCF: MuJoCo's bodies and joints, and equality constraints as loops.
+"""Import of MJCF: bodies, joints, and equality constraints, which become loops.
 
 Sources:
     MuJoCo documentation, XML reference: angles are in degrees unless the compiler
@@ -43,7 +43,7 @@ _REFUSED = ("composite", "flexcomp", "flex")
 _SECTIONS = ("compiler", "option", "size", "statistic", "visual", "asset", "default",
              "custom", "keyframe", "contact", "sensor", "worldbody", "equality",
              "tendon", "actuator")  # fmt: skip
-# attributes of a joint that forcefit reads
+# joint attributes that forcefit reads
 _READ = ("name", "type", "pos", "axis", "ref", "class")
 _SPRING = ("stiffness", "springref")
 _RANGE = ("range", "limited")
@@ -78,14 +78,14 @@ class _Reading:
 
 
 def read_mjcf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
-    """Return the mechanism of an MJCF file.
+    """Read an MJCF file.
 
     Args:
-        path: path of the file; files that it includes or attaches are also read.
-        loops: loops file with further loops and drives, or None.
+        path: path of the file; included and attached files are read as well.
+        loops: loops file with additional loops and drives, or None.
 
     Returns:
-        The mechanism, at the keyframe ``home`` if the file contains one.
+        Mechanism, at the keyframe ``home`` if the file contains one.
 
     Raises:
         BadInput: the file violates a rule of the format, or an element is unknown.
@@ -259,7 +259,7 @@ def _massive(node: Node, place: _Place, reading: _Reading) -> Body:
 
 
 def _freedoms(node: Node, place: _Place, reading: _Reading) -> Iterator[Joint]:
-    """Yield the joints of a body with one freedom each, in the body's axes."""
+    """Yield the joints of a body, one per degree of freedom, in the body's axes."""
     number = 0
     for inner, at in _elements(node, place):
         if inner.tag not in {"joint", "freejoint"}:

@@ -1,8 +1,8 @@
 """Expansion of MJCF: included files, replicated bodies, attached models.
 
-MuJoCo could expand files (``MjSpec``), but MuJoCo is optional, and forcefit compares
-its own reading with MuJoCo's.  Moreover, MuJoCo's error messages do not name the
-included file, and its XML has six digits (MuJoCo 3.17).
+Files are not expanded by MuJoCo (``MjSpec``), because MuJoCo is optional and is used to
+verify the import.  Moreover, its error messages do not name the included file, and its
+XML output has only six digits (MuJoCo 3.17).
 
 Sources:
     MuJoCo documentation, XML reference: ``include`` inserts the elements of a file.
@@ -36,14 +36,14 @@ UNIT, SEQUENCE = "attached.unit", "attached.sequence"
 
 
 def expanded(root: Node, depth: int = 0) -> Node:
-    """Return an MJCF file in which every body is written out.
+    """Expand an MJCF file so that all bodies are written out.
 
     Args:
-        root: root element of the file, which is changed in place.
+        root: root element of the file, which is modified in place.
         depth: number of files that include this file, directly or indirectly.
 
     Returns:
-        The root element.
+        Root element.
 
     Raises:
         BadInput: a file is missing or not MJCF, files are nested too deeply, there are

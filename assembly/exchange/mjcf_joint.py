@@ -1,4 +1,4 @@
-"""Conversion of MJCF joints to joints of one freedom, and their keyframe values."""
+"""Conversion of MJCF joints and keyframes to joints with one degree of freedom."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ def several_freedoms(given: Node, name: str, kind: str, offset: NDArray) -> list
         offset: (4, 4) pose of the element's frame in the body.
 
     Returns:
-        Joints of one freedom in order, whose bodies are not set yet.
+        Joints with one degree of freedom, in order, whose bodies are not set yet.
 
     Raises:
         BadInput: a number is invalid.
@@ -101,7 +101,7 @@ def at_key(key: Node, joint: Joint, values: NDArray) -> Joint:
 
     Args:
         key: keyframe element.
-        joint: joint of one freedom, or the first joint of a ball or free joint.
+        joint: joint with one degree of freedom, or the first of a ball or free joint.
         values: one number, a quaternion, or a position and a quaternion.
 
     Returns:
@@ -114,7 +114,7 @@ def at_key(key: Node, joint: Joint, values: NDArray) -> Joint:
         return replace(joint, position=float(values[0]))
     quaternion = values[-4:]
     if not quaternion.any():
-        raise key.bad("qpos", f"found a quaternion of zero for {quoted(joint.name)}")
+        raise key.bad("qpos", f"found a zero quaternion for {quoted(joint.name)}")
     turn = placed(
         values[:-4] if len(values) == 7 else _ZERO, from_quaternion(quaternion)
     )

@@ -1,4 +1,4 @@
-"""Masses and moments of inertia of MJCF bodies, either written or from shapes.
+"""Masses and moments of inertia of MJCF bodies, given explicitly or by shapes.
 
 Sources:
     MuJoCo documentation, XML reference, compiler (``inertiafromgeom``,
@@ -26,15 +26,15 @@ from forcefit.assembly.model.inertia import (
 )
 
 _SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
-# [kg, kg m^2] smaller lower bounds are ignored: files set them only so that MuJoCo
-# accepts massless bodies
+# [kg, kg m^2] smaller lower bounds are ignored, because files specify them only so that
+# MuJoCo accepts massless bodies
 _REGULAR, _REGULAR_INERTIA = 1e-6, 1e-9
 _KINDS = (*_SIZES, "plane", "hfield", "mesh", "sdf")
 
 
 @dataclass(frozen=True, eq=False)
 class MassRules:
-    """The rules of a file's compiler element for masses.
+    """Rules for masses in the compiler element of a file.
 
     Attributes:
         from_shapes: ``true``, ``false``, or ``auto`` to use shapes only if no mass is

@@ -1,4 +1,4 @@
-"""Orientations in MJCF, which have five forms, in degrees or radians."""
+"""Orientations in MJCF, which are given in five forms, in degrees or radians."""
 
 import math
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from forcefit.stiffness.screws import rotation_matrix
 
 @dataclass(frozen=True)
 class Angles:
-    """The angle conventions of a file.
+    """Angle conventions of a file.
 
     Attributes:
         unit: [rad] one unit of the file's angles.
@@ -70,7 +70,7 @@ def orientation(node: Node, angles: Angles) -> NDArray:
         x, y, z, angle = node.numbers("axisangle", 4, "-, angle")
         axis = np.array([x, y, z])
         if not axis.any():
-            raise node.bad("axisangle", "found the axis 0 0 0, expected a direction")
+            raise node.bad("axisangle", "found the axis 0 0 0, expected a nonzero axis")
         return rotation_matrix(angle * angles.unit * axis / np.linalg.norm(axis))
     if node.has("euler"):
         given = node.numbers("euler", 3, "angle") * angles.unit

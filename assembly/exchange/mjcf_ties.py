@@ -39,7 +39,7 @@ class Ties:
         defaults: default attributes of ``equality``.
         sites: body of each site and pose (4, 4) in it, by name.
         rests: [rad or m] coordinate of each joint in the initial configuration.
-        parts: joints of one freedom by the name of the joint in the file.
+        parts: joints with one degree of freedom by the name of the joint in the file.
         extra: kinds and names of parts that are not converted; extended while reading.
     """
 
@@ -131,7 +131,7 @@ class Ties:
             rule is inverted.
 
         Raises:
-            BadInput: a joint does not exist, or has several freedoms.
+            BadInput: a joint does not exist, or has several degrees of freedom.
         """
         for node in self.equalities:
             if node.tag != "joint":

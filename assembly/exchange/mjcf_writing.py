@@ -1,4 +1,4 @@
-"""Export of MJCF: nested bodies, loops as weld constraints, home as a keyframe."""
+"""Export of MJCF, with loops as weld constraints and the home pose as a keyframe."""
 
 from xml.sax.saxutils import quoteattr
 

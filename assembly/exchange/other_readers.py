@@ -1,4 +1,4 @@
-"""Readers of robot files that other Python packages install by entry points.
+"""Readers for robot files that other Python packages provide through entry points.
 
 A package assigns a function to the suffix of its files::
 
@@ -19,18 +19,18 @@ GROUP = "forcefit.readers"
 
 
 def has_reader(path: Path) -> bool:
-    """Return whether a package has installed a reader for the suffix of a file."""
+    """Return whether an installed package provides a reader for a file extension."""
     return _ending(path) in installed_names(GROUP)
 
 
 def read_by_other(path: Path) -> Robot:
-    """Return the robot of a file, read by an installed package.
+    """Read a robot with the reader of an installed package.
 
     Args:
-        path: file with a suffix for which a reader exists, see :func:`has_reader`.
+        path: file with an extension for which a reader exists; see :func:`has_reader`.
 
     Returns:
-        The robot.
+        Robot.
 
     Raises:
         BadInput: several packages read this suffix; or the reader cannot be imported,

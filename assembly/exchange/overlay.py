@@ -1,7 +1,7 @@
-"""Overlay: a TOML file that adds elasticity, clearances and tolerances to a robot.
+"""Overlays: TOML files that add elasticity, clearances and tolerances to a robot.
 
-An overlay is separate from the robot's own file. A CAD program can therefore write the
-robot's file again without loss of measured data.
+Because an overlay is separate from the robot file, a CAD program can regenerate the
+robot file without losing measured data.
 """
 
 from collections.abc import Mapping

@@ -1,8 +1,8 @@
 """Import of a Pinocchio model in memory: ``pinocchio.Model``.
 
 The model is converted to MJCF text, which is then read like a file.  The model is a
-tree; Pinocchio stores loops in separate objects, which are not read.  Every joint of
-one freedom is assumed to be a drive, as for a URDF that names no drives.
+tree; Pinocchio stores loops in separate objects, which are not read.  Each joint with
+one degree of freedom is assumed to be driven, as for a URDF without specified drives.
 
 Sources:
     Pinocchio documentation, Model and JointModel: motion subspaces begin with the
@@ -84,7 +84,7 @@ def _add_mass(body: Element, inertia: Any) -> None:
 
 
 def _add_joint(model: Any, body: Element, i: int) -> bool:
-    """Add a joint to its body; return whether it has one freedom."""
+    """Add a joint to its body; return whether it has one degree of freedom."""
     joint, name = model.joints[i], model.names[i]
     several = _SEVERAL.get(joint.shortname())
     if several == "free":

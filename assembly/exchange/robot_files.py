@@ -34,28 +34,28 @@ def load_robot(
     *,
     links: bool = True,
 ) -> Robot:
-    """Return a built-in robot by name, or the robot of a file or of a model.
+    """Load a robot by name, from a file or from a model in memory.
 
     Args:
-        name: name such as ``"irsbot2"``; or the path of a robot file, or of a URDF
-            (with its loops file next to it), MJCF or SDF file; or a ``mujoco.MjModel``
-            or ``mujoco.MjSpec``, of which bodies, joints, equalities between them,
-            actuators and the keyframe ``home`` are read; or a ``pinocchio.Model``, a
-            tree in which all joints of one freedom are drives.
-        close: function that closes the loops of a robot file, as
-            :mod:`forcefit.assembly.kinematics.closing` does; None for no closing.
-        links: whether links given by a mesh or a library are solved or read now, as
-            solvers require.  Otherwise the robot can only be placed, written and
-            converted, and its assembly zone can be computed.  Links are always solved
-            for a robot with joints that are bolted at a pose.
+        name: name of a built-in robot, for example ``"irsbot2"``; path of a robot file,
+            MJCF file, SDF file or URDF (with its loops file in the same folder);
+            ``mujoco.MjModel`` or ``mujoco.MjSpec``, whose bodies, joints, equalities,
+            actuators and keyframe ``home`` are read; or ``pinocchio.Model``, whose
+            joints with one degree of freedom are all assumed to be driven.
+        close: function that closes the loops of a robot file, as in
+            :mod:`forcefit.assembly.kinematics.closing`, or None.
+        links: whether to solve link meshes and read link libraries, as solvers require.
+            Otherwise the robot can only be placed, written and converted, and its zone
+            margin can be computed.  Links are always solved for a robot with joints
+            that are bolted at a pose.
 
     Returns:
-        The robot. For a file of another program, its remarks list assumptions and
+        Robot. If it was imported from another program, its remarks list assumptions and
         omissions.
 
     Raises:
-        BadInput: the name is neither a built-in robot nor a file nor a model; the robot
-            violates a rule; or a mesh or library that it names is not usable.
+        BadInput: the name is neither a built-in robot, a file nor a model; the robot
+            violates a rule; or one of its meshes or libraries is unusable.
     """
     declared = isinstance(name, str | Path)
     robot = _load_declared(name, close) if declared else _robot_of_model(name, close)
@@ -139,13 +139,13 @@ def _robot_of_model(model: object, close: Closing | None) -> Robot:
 
 
 def write_robot(robot: Robot, path: str | Path) -> None:
-    """Write a robot to a file whose format is given by the suffix.
+    """Write a robot to a file whose format is given by the file extension.
 
     Args:
-        robot: robot to be written.
+        robot: robot to write.
         path: ``.toml`` for a robot file, which contains the complete robot; ``.urdf``
-            (with a YAML file next to it) or ``.xml`` (MJCF) for its rigid bodies and
-            joints; see ``forcefit convert``, which reports what these omit.
+            (with a YAML file in the same folder) or ``.xml`` (MJCF) for rigid bodies
+            and joints only.  ``forcefit convert`` reports what these formats omit.
 
     Raises:
         BadInput: the suffix is not supported, a file of another program exists at this

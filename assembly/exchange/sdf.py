@@ -1,4 +1,4 @@
-"""Import of SDF: links, and joints that may close loops.
+"""Import of SDF, in which joints may close loops.
 
 Sources:
     sdformat.org, specification 1.12; see also the modules ``sdf_*.py``.
@@ -44,15 +44,15 @@ _HELD_OF_AXIS = ("xyz", "use_parent_model_frame", "mimic")
 
 
 def read_sdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
-    """Return the mechanism of an SDF file with one model, possibly with nested models.
+    """Read an SDF file with one model, which may contain nested models.
 
     Args:
         path: path of the file.
-        loops: loops file with drives and further loops, or None.
+        loops: loops file with drives and additional loops, or None.
 
     Returns:
-        The mechanism: a tree from the world, or from the first link at its pose; joints
-        that the tree does not need become loops.
+        Mechanism whose tree starts at the world, or at the first link in its pose;
+        joints outside the tree become loops.
 
     Raises:
         BadInput: the file violates a rule of the format, or a joint type is unknown.
@@ -121,7 +121,7 @@ def _tree(
 def _of_axis(joint: Node, tag: str, part: Node) -> str:
     """Return a description of an axis's omitted properties; empty if there are none."""
     spring = part.child("spring_stiffness")
-    # forcefit does not read further axes of joints of several freedoms
+    # forcefit does not read further axes of joints with several degrees of freedom
     crossed = joint.optional("type") in {"universal", "revolute2"}
     single = joint.optional("type") not in {"ball", "screw"}
     taken = crossed or (tag == "axis" and single)

@@ -314,7 +314,7 @@ def own_pose(node: Node) -> NDArray:
     if kind == "quat_xyzw":
         *shift, x, y, z, w = node.numbers("", 7, "m, -")
         if not any((x, y, z, w)):
-            raise node.bad("", "found a quaternion of zero, expected a rotation")
+            raise node.bad("", "found a zero quaternion, expected a rotation")
         return placed(np.array(shift), from_quaternion([w, x, y, z]))
     values = node.numbers("", 6, "m, angle")
     degrees = node.optional("degrees") in {"true", "1"}

@@ -1,4 +1,4 @@
-"""Conversion of SDF joints to joints of one freedom; also for ``<gazebo>`` in a URDF.
+"""Conversion of SDF joints, also in ``<gazebo>`` elements of a URDF.
 
 Sources:
     sdformat.org, specification 1.12, ``<joint>``: an axis is in the model's frame until
@@ -52,7 +52,7 @@ def joint_ends(frames: Frames, named: Named) -> tuple[str, str]:
     if ends[0] == ends[1]:
         raise node.bad(
             "child", f"found {quoted(ends[1])}, which is also its parent; expected "
-            "another link"
+            "a different link"
         )  # fmt: skip
     return ends[0], ends[1]
 
@@ -61,7 +61,9 @@ def joint_parts(
     frames: Frames, name: str, named: Named, ends: tuple[str, str], carried: str,
     backwards: bool = False,
 ) -> tuple[list[Joint], list[Body]]:  # fmt: skip
-    """Return the joints of one freedom that form a joint, reversed if backwards.
+    """Return the elementary joints of a joint, one per degree of freedom.
+
+    They are reversed if the joint is defined backwards.
 
     Args:
         frames: frames of the model.
@@ -133,7 +135,7 @@ def _lead(node: Node) -> float:
 
 
 def _of_axis(joint: Joint, node: Node, tag: str) -> Joint:
-    """Return the joint of one freedom with the range and the spring of its axis."""
+    """Return the joint with the range and the spring of its axis."""
     axis = node.child(tag)
     if axis is None:
         return joint
@@ -181,7 +183,7 @@ def joint_couplings(
         frames: frames of the model.
         name: name of the joint.
         named: element of the joint.
-        parts: names of the joints of one freedom by the name of the whole joint.
+        parts: names of the elementary joints by the name of the whole joint.
 
     Returns:
         A coupling for each axis that follows another axis.
@@ -211,7 +213,7 @@ def joint_couplings(
 
 
 def _part(mimic: Node, parts: list[str], tag: str) -> str:
-    """Return the joint of one freedom that belongs to an axis of a joint."""
+    """Return the elementary joint that belongs to an axis of a joint."""
     if len(parts) == 1 and tag == "axis":
         return parts[0]
     ends = {"axis": ".first", "axis2": ".second"}.get(tag, "?")

@@ -1,4 +1,4 @@
-"""Masses and moments of inertia of SDF links: written, default, or from shapes.
+"""Masses and moments of inertia of SDF links: explicit, default or from shapes.
 
 Sources:
     sdformat.org, specification 1.12, ``<inertial>``: a link without this element, or

@@ -1,4 +1,4 @@
-"""Volumes, areas and moments of inertia of simple shapes, to compute masses."""
+"""Volumes, areas and moments of inertia of simple shapes."""
 
 import math
 from collections.abc import Sequence

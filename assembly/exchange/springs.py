@@ -1,4 +1,4 @@
-"""Joint springs: springs unloaded at home are converted, others are reported."""
+"""Joint springs: those unloaded at home are converted, all others are reported."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +45,7 @@ def other_springs(mechanism: Mechanism) -> tuple[str, ...]:
         if not joint.actuated and not _at_rest(joint)
     ]
     what = "springs preloaded at home, not converted, though they may carry load"
-    return counted("springs beside drives", driven) + counted(what, loaded)
+    return counted("springs parallel to drives", driven) + counted(what, loaded)
 
 
 def _is_spring(joint: Joint) -> bool:

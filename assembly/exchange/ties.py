@@ -1,4 +1,4 @@
-"""Detection of unknown elements that may connect bodies."""
+"""Detection of unknown XML elements that may connect bodies."""
 
 from collections.abc import Container, Mapping
 

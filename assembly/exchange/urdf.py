@@ -1,4 +1,4 @@
-"""Import of URDF: links, joints, and the loops from a separate file.
+"""Import of URDF, with loops and drives from a separate file.
 
 Sources:
     ROS wiki, urdf/XML/joint and urdf/XML/link: a child link has the frame of its joint
@@ -36,15 +36,15 @@ _HELD = {"origin", "parent", "child", "axis", "mimic"}
 
 
 def read_urdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
-    """Return the mechanism of a URDF.
+    """Read a URDF.
 
     Args:
         path: path of the file.
         loops: loops file of the robot; None for an open chain.
 
     Returns:
-        The mechanism.  Its drives are those of the loops file; if it lists none, the
-        joints with a transmission; without these and without loops, all joints.
+        Mechanism.  Its drives are those listed in the loops file; by default, the
+        joints with a transmission; and without any transmission or loop, all joints.
 
     Raises:
         BadInput: the file violates a rule of the format, or a joint type is unknown.

@@ -1,4 +1,4 @@
-"""Freedoms and poses of URDF joints.
+"""Degrees of freedom and poses of URDF joints.
 
 Sources:
     ROS wiki, urdf/XML/joint: the default axis is x; rpy are rotations about fixed axes.
@@ -25,13 +25,13 @@ _ZERO = np.zeros(3)
 
 
 def joint_freedoms(node: Node) -> list[tuple[str, str, NDArray]]:
-    """Return name, kind and axis of each freedom of a joint, or of a fixed joint.
+    """Return name, kind and axis per degree of freedom of a joint, or of a fixed joint.
 
     Args:
         node: element of a joint; a prefix marks a joint of Drake, with Drake's axes.
 
     Returns:
-        The freedoms, in the order in which they move the child.
+        The degrees of freedom, in the order in which they move the child.
 
     Raises:
         BadInput: the type is unknown, or an axis has no direction.
@@ -69,7 +69,7 @@ def pose_of(origin: Node) -> NDArray:
         return placed(shift, turn)
     x, y, z, w = origin.numbers("quat_xyzw", 4, "-")
     if not any((x, y, z, w)):
-        raise origin.bad("quat_xyzw", "found a quaternion of zero, expected a rotation")
+        raise origin.bad("quat_xyzw", "found a zero quaternion, expected a rotation")
     return placed(shift, from_quaternion([w, x, y, z]))
 
 

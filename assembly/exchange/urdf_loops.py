@@ -39,7 +39,7 @@ def with_closing_joints(
     Args:
         mechanism: mechanism of the file's links and joints.
         root: root element of the file.
-        parts: names of the joints of one freedom by the name of the whole joint; the
+        parts: names of the elementary joints by the name of the whole joint; the
             parts of closing joints are added.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Export of a URDF and its loops file; numbers are written with all digits."""
+"""Export of a URDF and its loops file, with numbers at full precision."""
 
 from xml.sax.saxutils import quoteattr
 

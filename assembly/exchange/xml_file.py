@@ -1,4 +1,4 @@
-"""Reader of XML files; entities and external files are rejected."""
+"""XML reader, which rejects entities and external files."""
 
 import codecs
 import re
@@ -28,7 +28,7 @@ _ENDLESS = 1e3  # [rad or m] larger limits count as no limits
 
 @dataclass(frozen=True)
 class Node:
-    """An element of an XML file, with its position for messages.
+    """Element of an XML file, with its position for messages.
 
     Attributes:
         element: element of :mod:`xml.etree.ElementTree`.
@@ -205,7 +205,7 @@ class Node:
         length = float(np.linalg.norm(vector))
         if length < 1e-9:
             raise self.bad(
-                key, f"found {describe(vector.tolist())}, expected a direction"
+                key, f"found {describe(vector.tolist())}, expected a nonzero vector"
             )
         # a vector whose length is 1 except for rounding is not changed
         return vector if abs(length - 1.0) < 1e-15 else vector / length

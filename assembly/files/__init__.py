@@ -1,4 +1,4 @@
-"""Reading and writing of robot files; links, joints and effects have their own modules.
+"""Reading and writing of robot files, including links, joints and effects.
 
 Start with ``robot_file.py``; ``docs/robot_files.md`` describes the format.
 """

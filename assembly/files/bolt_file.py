@@ -1,4 +1,4 @@
-"""Reader of the key ``locked_at``: the pose at which a fixed joint is bolted."""
+"""Reading of ``locked_at``, the pose at which a fixed joint is bolted."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -19,19 +19,19 @@ _EXPECTED = (
 def read_locked_at(
     table: Table, fixed: bool, clearance: Clearance | None
 ) -> tuple[Clearance | None, LockedAt | None]:
-    """Return the clearance of a joint in use, and the pose at which it is bolted.
+    """Return the operating clearance of a joint, and the pose at which it is bolted.
 
     Args:
         table: table of the joint.
-        fixed: whether the joint is a fixed joint.
-        clearance: clearance given in the table.
+        fixed: whether the joint is fixed.
+        clearance: clearance specified in the table.
 
     Returns:
-        If ``locked_at`` is absent, the clearance and None.  Otherwise None, because a
-        bolted joint has no clearance, and the pose with the former clearance.
+        Without ``locked_at``, the clearance and None.  Otherwise None, because a bolted
+        joint has no clearance, and the pose together with the clearance before bolting.
 
     Raises:
-        BadInput: the joint is not fixed, it has no clearance, or the pose is invalid.
+        BadInput: the joint is not fixed or has no clearance, or the pose is invalid.
     """
     key = "locked_at"
     if not table.has(key):
@@ -55,7 +55,7 @@ def read_locked_at(
 
 
 def _numbers(table: Table, key: str, names: tuple[str, ...] | None) -> dict[str, float]:
-    """Return the coordinates of a table by name; empty if the key is absent."""
+    """Return the coordinates in an inner table by name; empty if it is absent."""
     if not table.has(key):
         return {}
     inner = table.table(key)
@@ -69,14 +69,14 @@ def _numbers(table: Table, key: str, names: tuple[str, ...] | None) -> dict[str,
 
 
 def bolt_without_units(table: Table, kinds: Mapping[str, str]) -> None:
-    """Replace texts such as ``"30 deg"`` in ``locked_at`` by numbers in m or rad.
+    """Convert texts such as ``"30 deg"`` in ``locked_at`` to numbers in m or rad.
 
     Args:
-        table: table of a drawn joint; its content is changed.
-        kinds: type of every joint by its name.
+        table: table of a drawn joint, which is modified in place.
+        kinds: type of each joint, by name.
 
     Raises:
-        BadInput: a text is not a number with a unit of its coordinate.
+        BadInput: a text is not a number with a unit that suits its coordinate.
     """
     if not isinstance(table.content.get("locked_at"), dict):
         return
@@ -90,7 +90,7 @@ def bolt_without_units(table: Table, kinds: Mapping[str, str]) -> None:
 
 
 def _slides(kinds: Mapping[str, str], name: str) -> bool:
-    """Return whether the coordinate of a joint is a length."""
+    """Return whether a joint coordinate is a length."""
     return kinds.get(name) == "prismatic"
 
 
@@ -101,7 +101,7 @@ def bolt_table(bolt: LockedAt) -> Any:
         bolt: pose at which the joint is bolted, and its clearance before bolting.
 
     Returns:
-        Plain values of the file format.
+        Plain values in the file format.
     """
     given = {"pose": bolt.pose, "joints": bolt.joints}
     table: dict[str, Any] = {k: dict(v) for k, v in given.items() if v}

@@ -1,7 +1,7 @@
-"""Tolerances of features in robot files: ``[[tolerance]]``.
+"""Reading of ``[[tolerance]]`` tables, the feature tolerances in robot files.
 
-In a file of frames, a feature is a frame.  In a file of bodies, a feature is a joint of
-the body.  See ``docs/drawing_tolerances.md``.
+Features are frames in a file with frames, and joints of a body in a file with bodies.
+See ``docs/drawing_tolerances.md``.
 """
 
 from collections.abc import Iterator, Mapping
@@ -42,7 +42,7 @@ from forcefit.inputs.table import BadInput, Table, describe, nearest, quoted
 
 _ZONES = (*LOCATIONS, *ORIENTATIONS, "length", "general")
 _LARGEST_CP = 5.0
-# largest cosine of the angle of two directions that count as perpendicular
+# largest cosine of the angle between directions that count as perpendicular
 _ACROSS = 1e-3
 _NOT_ACROSS = "found a direction that is not perpendicular to the axis, expected 90 deg"
 # number of lengths in "extent", by shape of the feature
@@ -51,7 +51,7 @@ _EXTENTS = {
     "axis": 'the length of the bore, such as "20 mm"',
     "plane": 'two sizes of the face, such as ["40 mm", "30 mm"], or "diameter"',
 }
-# tolerance keys that a feature of each shape cannot have
+# tolerance keys that are not allowed for features of each shape
 _EXCLUDED = {
     "axis": ("profile",),
     "plane": ("coaxiality",),
@@ -60,14 +60,14 @@ _EXCLUDED = {
 
 
 def read_frame_callouts(root: Table, frames: list[str]) -> tuple[Callout, ...]:
-    """Return the callouts of a file of frames.
+    """Read the callouts in a file with frames.
 
     Args:
         root: root table of the file.
         frames: names of the frames.
 
     Returns:
-        Callouts in the order of the file, not checked against the geometry.
+        Callouts in file order, which have not been checked against the geometry.
 
     Raises:
         BadInput: the file violates a rule of the format.
@@ -79,7 +79,7 @@ def read_frame_callouts(root: Table, frames: list[str]) -> tuple[Callout, ...]:
         check_frame(table, "feature", feature, frames)
         for word in FORMS:
             if table.has(word):
-                fault = "found one in a file of frames, expected half its width added"
+                fault = "found in a file with frames, expected half its width added"
                 raise table.bad(word, f"{fault} to the clearance of the frame")
         datums = frame_datums(table, frames)
         shape = table.choice("shape", SHAPES, "axis")
@@ -99,12 +99,12 @@ def read_drawn_callouts(
     """Yield the callouts of the bodies in a copy of a leg, and those of the base.
 
     Args:
-        copied: copy of a leg, or the bodies that belong to no leg.
-        bodies: bodies of the whole robot.
-        joints: joints of the whole robot.
+        copied: copy of a leg, or the bodies outside legs.
+        bodies: all bodies of the robot.
+        joints: all joints of the robot.
 
     Yields:
-        Callouts whose features and datums are joints; directions are in base axes in
+        Callouts whose features and datums are joints; directions are in base axes at
         the home pose.
 
     Raises:
@@ -124,7 +124,7 @@ def read_drawn_callouts(
 def _drawn(
     table: Table, copied: Copy, body: str, joints: list[DrawnJoint]
 ) -> DrawnCallout | None:
-    """Return the callouts of a body's feature; None if it has only a form tolerance."""
+    """Return the callouts of a body feature, or None if it has only form tolerances."""
     here = {j.name: j for j in joints if body in (j.first, j.second)}
     short = body.removeprefix(copied.prefix)
 
@@ -143,7 +143,7 @@ def _drawn(
     form = read_form(table, shape)
     if form and not any(table.has(word) for word in _ZONES):
         for key in [k for k in table.content if k not in ("feature", "name", *FORMS)]:
-            fault = "found this key at a feature that has only a form tolerance"
+            fault = "found this key for a feature with only a form tolerance"
             raise table.bad(key, f"{fault}, expected none")
         return None
     datums = joint_datums(table, feature.name, find)
@@ -161,7 +161,7 @@ def _drawn(
 def _check_direction(
     table: Table, direction: Vector, feature: DrawnJoint, body: str
 ) -> None:
-    """Raise BadInput if a direction is not perpendicular to the axis of a bore."""
+    """Check that a direction is perpendicular to the axis of a bore."""
     if feature.kind == "planar":
         fault = "found a direction for a face; its sides are along the joint's x and y"
         raise table.bad("direction", f"{fault}; expected none")
@@ -175,7 +175,7 @@ def _callout(
     table: Table, name: str, feature: str, datums: tuple[Datum, ...], shape: str,
     after: bool, axis: Vector | None,
 ) -> Callout:  # fmt: skip
-    """Return a callout from the keys that occur in both file formats."""
+    """Read the keys of a callout that are common to both file formats."""
     if len({replace(d, hole="", hole_of="", extent=0.0) for d in datums}) < len(datums):
         names = [datum.frame for datum in datums]
         raise table.bad("datums", f"found {names}, expected each datum once")
@@ -188,13 +188,13 @@ def _callout(
         raise table.bad("direction", f"found a direction for {fault}, expected none")
     distribution = table.choice("distribution", DISTRIBUTIONS, "uniform")
     if table.has("cp") and distribution == "uniform":
-        expected = 'expected distribution = "normal" or "truncated" with it'
-        raise table.bad("cp", f"found a cp for a uniform distribution, {expected}")
+        expected = 'expected distribution = "normal" or "truncated"'
+        raise table.bad("cp", f"found cp with a uniform distribution, {expected}")
     length = general = None
     if table.has("length"):
         length = parsed_value(table, "length", parse_length)
     if envelope and shape != "plane":
-        fault = "found (E) at a feature that is not a face"
+        fault = "found (E) for a feature that is not a face"
         raise table.bad("length", f"{fault}, expected none")
     if envelope and not extent:
         raise table.bad("extent", f"missing; expected {_EXTENTS[shape]}")
@@ -212,7 +212,7 @@ def _callout(
 
 
 def _widths(table: Table, shape: str) -> tuple[dict[str, float], str]:
-    """Return the zone widths, and the hole with maximum material condition."""
+    """Return the zone widths and the size of the hole at maximum material."""
     widths: dict[str, float] = {}
     used = False
     hole = table.text("hole", "") if table.has("hole") else ""
@@ -223,7 +223,7 @@ def _widths(table: Table, shape: str) -> tuple[dict[str, float], str]:
             continue
         if word in _EXCLUDED[shape]:
             article = "an" if shape == "axis" else "a"
-            fault = f"found this zone at a feature that is {article} {shape}"
+            fault = f"found this zone for a feature that is {article} {shape}"
             raise table.bad(word, f"{fault}, expected none")
         widths[word], at_most = parsed_value(table, word, parse_width)
         if at_most and (word != "position" or shape != "axis" or not hole):
@@ -238,7 +238,7 @@ def _widths(table: Table, shape: str) -> tuple[dict[str, float], str]:
 
 
 def _check_widths(table: Table, widths: dict[str, float]) -> None:
-    """Raise BadInput if an orientation zone is not smaller than the location zone."""
+    """Check that orientation zones are smaller than the location zone."""
     located = [widths[w] for w in LOCATIONS if w in widths]
     for word in ORIENTATIONS:
         if word in widths and located and not widths[word] < min(located):
@@ -248,7 +248,7 @@ def _check_widths(table: Table, widths: dict[str, float]) -> None:
 
 
 def _check_form(table: Table, form: float, widths: Mapping[str, float]) -> None:
-    """Raise BadInput if the form zone is not the smallest zone of the feature."""
+    """Check that the form zone is the smallest zone of the feature."""
     least = min(widths.values(), default=1.0)
     if form and not form < least:
         word = next(word for word in FORMS if table.has(word))
@@ -282,23 +282,23 @@ def _diameter(table: Table, shape: str) -> tuple[float, ...]:
     """Return the diameter [m] of a round face."""
     if shape != "plane":
         article = "an" if shape == "axis" else "a"
-        fault = f"found it at a feature that is {article} {shape}, expected none"
+        fault = f"found for a feature that is {article} {shape}, expected none"
         raise table.bad("diameter", f"{fault}; only a face has a diameter")
     if table.has("extent"):
-        fault = 'found it together with "extent", the sizes of a rectangular face'
-        raise table.bad("diameter", f"{fault}; expected one of them")
+        fault = 'found together with "extent", the side lengths of a rectangular face'
+        raise table.bad("diameter", f"{fault}; expected only one of them")
     value = table.content["diameter"]
     try:
         return (parse_width(value)[0],)
     except BadInput:
         fault = f"found {describe(value)}"
         raise table.bad(
-            "diameter", f'{fault}, expected that of a round face, such as "40 mm"'
+            "diameter", f'{fault}, expected a diameter such as "40 mm"'
         ) from None
 
 
 def _across(table: Table, axis: Vector | None) -> Vector | None:
-    """Return the unit vector of the zones' direction, perpendicular to a known axis."""
+    """Return the direction in which the zones are measured, or None."""
     direction = read_direction(table, "direction")
     if direction is not None and axis is not None:
         if abs(float(np.dot(direction, axis))) > _ACROSS:

@@ -1,4 +1,4 @@
-"""Callouts of features as tables ``[[tolerance]]`` of a file of frames."""
+"""Writing of callouts as ``[[tolerance]]`` tables in files with frames."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ from forcefit.assembly.files.datum_file import ORIGIN, Z_AXIS
 
 
 def callout_table(callout: Callout) -> dict[str, Any]:
-    """Return the content of a ``[[tolerance]]`` table without default values."""
+    """Return the content of a ``[[tolerance]]`` table, omitting default values."""
     table: dict[str, Any] = {"feature": callout.feature}
     if callout.name != callout.feature:
         table["name"] = callout.name
@@ -47,7 +47,7 @@ def callout_table(callout: Callout) -> dict[str, Any]:
 
 
 def _datum_table(datum: Datum) -> str | dict[str, Any]:
-    """Return the value that describes a datum in a robot file."""
+    """Return a datum in the format of robot files."""
     if datum == Datum(datum.frame):
         return datum.frame
     table: dict[str, Any] = {

@@ -1,4 +1,4 @@
-"""Datums of ``[[tolerance]]`` tables in robot files, and readers of other keys."""
+"""Reading of datums, points and directions in ``[[tolerance]]`` tables."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -16,15 +16,15 @@ Parsed = TypeVar("Parsed")
 Vector = tuple[float, float, float]
 Z_AXIS = (0.0, 0.0, 1.0)
 ORIGIN = (0.0, 0.0, 0.0)
-# types of joints whose feature on a body is a single hole
+# joint types whose feature on a body is a single hole
 _HOLES = ("revolute", "cylindrical")
 
 
 def frame_datums(table: Table, frames: list[str]) -> tuple[Datum, ...]:
-    """Return the datums of a feature in a file of frames.
+    """Return the datums of a feature in a file with frames.
 
     Raises:
-        BadInput: a rule of the format is broken.
+        BadInput: the table violates a rule of the format.
     """
     datums = tuple(_datum(table, value, frames) for value in _datum_list(table))
     for number, datum in enumerate(datums):
@@ -38,20 +38,20 @@ def frame_datums(table: Table, frames: list[str]) -> tuple[Datum, ...]:
 def joint_datums(
     table: Table, feature: str, find: Callable[[str, str], DrawnJoint]
 ) -> list[Datum]:
-    """Return the datums of a feature in a file of bodies and joints.
+    """Return the datums of a feature in a file with bodies and joints.
 
     Args:
-        table: table of the feature's tolerances.
-        feature: name of its joint in the whole robot.
+        table: table with the tolerances of the feature.
+        feature: full name of the joint that is the feature.
         find: function that returns the joint for a name in the file; its second
             argument is the key that contains the name.
 
     Returns:
-        The datums, named by their joints.  The text ``"B (M)"`` means datum B with the
-        maximum material condition.
+        Datums, identified by their joints.  The text ``"B (M)"`` denotes datum B at
+        maximum material.
 
     Raises:
-        BadInput: a rule of the format is broken.
+        BadInput: the table violates a rule of the format.
     """
     datums = []
     hole, extent = table.text("datum_hole", ""), 0.0
@@ -69,7 +69,7 @@ def joint_datums(
         joint = find(name, "datums")
         if joint.name == feature:
             fault = f"found {quoted(value)}, which is the feature itself"
-            raise table.bad("datums", f"{fault}, expected another joint of the body")
+            raise table.bad("datums", f"{fault}, expected a different joint")
         if at_most:
             _check_shifting(table, value, joint.kind, hole)
             if number == 0 and not extent:
@@ -88,13 +88,13 @@ def joint_datums(
         fault = f"found a hole size, and {len(shifting)} datums with (M)"
         raise table.bad("datum_hole", f'{fault}; expected one, such as "B (M)"')
     if extent and not datums[0].hole:
-        fault = "found it without (M) at datum A"
+        fault = "found without (M) at datum A"
         raise table.bad("datum_extent", f"{fault}; expected none")
     return datums
 
 
 def _check_shifting(table: Table, value: str, kind: str, hole: str) -> None:
-    """Raise BadInput for (M) at a datum that is not a hole with a size."""
+    """Check that a datum with (M) is a hole with a given size."""
     if kind not in _HOLES:
         fault = f"found {quoted(value)}, a {kind} joint"
         expected = f"expected (M) at a {' or '.join(_HOLES)} joint"
@@ -107,7 +107,7 @@ def _check_shifting(table: Table, value: str, kind: str, hole: str) -> None:
 
 
 def _datum_list(table: Table) -> list:
-    """Return the datums as written in the file: one to three."""
+    """Return the list of one to three datums in the file."""
     value = table.require("datums", "names of features, A first")
     if not isinstance(value, list) or not 1 <= len(value) <= 3:
         fault = f"found {describe(value)}, expected a list of one to three names"
@@ -116,7 +116,7 @@ def _datum_list(table: Table) -> list:
 
 
 def _datum(table: Table, value: Any, frames: list[str]) -> Datum:
-    """Return a datum, written as the name of a frame or as a table."""
+    """Read a datum, which is given by a frame name or by a table."""
     if isinstance(value, dict):
         inner = Table(value, table.file, f"{table.place}.datums")
         name = inner.text("frame", expected="the name of a frame")
@@ -144,7 +144,7 @@ def _extent(table: Table, key: str) -> float:
 
 
 def _hole_of_datum(table: Table, name: str, shape: str) -> tuple[str, str]:
-    """Return the size of a datum hole with (M), and the name of the hole."""
+    """Return the size and the name of a datum hole at maximum material."""
     if not table.has("hole"):
         return "", ""
     if shape != "axis":
@@ -155,14 +155,14 @@ def _hole_of_datum(table: Table, name: str, shape: str) -> tuple[str, str]:
 
 
 def check_frame(table: Table, key: str, name: str, frames: list[str]) -> None:
-    """Raise BadInput if a name is not the name of a frame."""
+    """Check that a name is the name of a frame."""
     if name not in frames:
         fault = f"found {quoted(name)}, expected the name of a frame"
         raise table.bad(key, fault + nearest(name, frames))
 
 
 def read_point(table: Table) -> Vector:
-    """Return the middle [m] of a feature in the axes of its frame."""
+    """Return the centre of a feature [m], in the axes of its frame."""
     default = np.zeros(3)
     x, y, z = table.array("at", (3,), "m", default, largest=LARGEST_LENGTH).tolist()
     return x, y, z
@@ -175,15 +175,13 @@ def read_direction(table: Table, key: str) -> Vector | None:
     vector = table.array(key, (3,), "direction", largest=LARGEST_LENGTH)
     size = float(np.linalg.norm(vector))
     if size < 1e-12:
-        raise table.bad(
-            key, "found only zeros, expected a direction: 3 numbers, not all 0"
-        )
+        raise table.bad(key, "found a zero vector, expected a nonzero direction vector")
     x, y, z = (vector / size).tolist()
     return x, y, z
 
 
 def parsed_value(table: Table, key: str, parse: Callable[[Any], Parsed]) -> Parsed:
-    """Return the value of a key, converted by a function that rejects wrong values."""
+    """Parse the value of a key with a function that rejects invalid values."""
     try:
         return parse(table.content[key])
     except BadInput as error:

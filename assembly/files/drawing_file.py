@@ -1,4 +1,4 @@
-"""Reading of robot files of ``format = 2``: bodies and joints in the home pose.
+"""Reading of robot files with ``format = 2``: bodies and joints in the home pose.
 
 The keys are described in ``docs/drawn_robots.md``.
 """
@@ -32,7 +32,7 @@ from forcefit.assembly.model.robot import BASE
 from forcefit.inputs.table import Table, describe, nearest, quoted
 from forcefit.stiffness.screws import rotation_matrix, transform
 
-MOST_COPIES = 200  # largest number of copies of a leg
+MOST_COPIES = 200  # maximum number of copies of a leg
 
 
 def is_drawing(root: Table) -> bool:
@@ -43,24 +43,24 @@ def is_drawing(root: Table) -> bool:
 
 
 def read_drawing(root: Table, name: str, description: str) -> Drawing:
-    """Return the bodies and joints of a robot file.
+    """Read the bodies and joints of a robot file.
 
     Args:
-        root: root table of the file; keys of other parts of the file are left to the
-            caller.
+        root: root table of the file; keys that do not describe bodies and joints are
+            read by the caller.
         name: name of the robot.
         description: description of the robot.
 
     Returns:
-        The drawing with all copies of the legs; names are those in the whole robot.
+        Drawing with all copies of the legs and full names.
 
     Raises:
         BadInput: the file violates a rule of the format.
     """
-    # a copy, because texts with units are replaced by numbers
+    # copied, because texts with units are replaced by numbers
     root.content = copy.deepcopy(root.content)
     if root.get("format", 2) == 1:
-        raise root.bad("format", "found 1 in a file of bodies and joints, expected 2")
+        raise root.bad("format", "found 1 in a file with bodies and joints, expected 2")
     platform = root.text("platform", expected="the name of a body")
     without_units(root, "platform_at", "length")
     at = root.array("platform_at", (3,), "m", largest=LARGEST_LENGTH)
@@ -109,7 +109,7 @@ def _check_lists(table: Table, valid: tuple[str, ...]) -> None:
 
 
 def _copies(root: Table) -> Iterator[Copy]:
-    """Yield the copies of the legs, and the bodies outside legs, in file order."""
+    """Yield all copies of the legs, and the bodies outside legs, in file order."""
     order = [key for key in root.content if key in {"leg", "body", "joint"}]
     own = Copy(root, "", np.eye(4))
     legs = root.tables("leg")
@@ -131,7 +131,7 @@ def _copies(root: Table) -> Iterator[Copy]:
 
 
 def _repeated(leg: Table, name: str) -> Iterator[Copy]:
-    """Yield the copies of one leg; the first copy is the leg as written."""
+    """Yield the copies of a leg, the first of which is the leg as written."""
     if not leg.has("repeat"):
         yield Copy(leg, f"{name}.", np.eye(4))
         return
@@ -143,7 +143,7 @@ def _repeated(leg: Table, name: str) -> Iterator[Copy]:
     size = float(np.linalg.norm(about))
     if size < 1e-12:
         raise table.bad(
-            "about", "found only zeros, expected a direction: 3 numbers, not all 0"
+            "about", "found a zero vector, expected a nonzero direction vector"
         )
     without_units(table, "at", "length")
     at = table.array("at", (3,), "m", np.zeros(3), largest=LARGEST_LENGTH)
@@ -157,7 +157,7 @@ def _joints(
     copied: Copy, names: list[str], forms: dict[str, tuple[str, float]],
     kinds: dict[str, str],
 ) -> Iterator[DrawnJoint]:  # fmt: skip
-    """Yield the joints of a copy, between bodies of the copy or of the whole robot."""
+    """Yield the joints of a copy, which may also connect to bodies outside the copy."""
 
     def find(name: str) -> str | None:
         inner = copied.prefix + name
@@ -179,7 +179,7 @@ def _joints(
 def _between(
     table: Table, find: Callable[[str], str | None], names: list[str]
 ) -> list[str]:
-    """Return the full names of the two bodies of a joint."""
+    """Return the full names of the bodies connected by a joint."""
     value = table.require("between", 'two names of bodies, or "base"')
     proper = isinstance(value, list) and all(isinstance(v, str) for v in value)
     if not proper or len(value) != 2:
@@ -202,7 +202,7 @@ def _between(
 
 
 def _form_remarks(forms: dict[str, tuple[str, float]]) -> tuple[str, ...]:
-    """Return a remark on the clearances that form tolerances increase."""
+    """Return a remark on clearances that are increased by form tolerances."""
     texts = [
         f"{quoted(joint)} by {added * 1e6:.4g} um ({word})"
         for joint, (word, added) in forms.items()
@@ -211,7 +211,7 @@ def _form_remarks(forms: dict[str, tuple[str, float]]) -> tuple[str, ...]:
 
 
 def _check_distinct(root: Table, kind: str, names: list[str]) -> None:
-    """Raise BadInput if two tables have the same name."""
+    """Check that all names are different."""
     seen: set[str] = set()
     for name in names:
         if name in seen:

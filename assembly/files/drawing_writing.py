@@ -1,4 +1,4 @@
-"""Writing of robots as files of ``format = 2``: bodies and joints at home.
+"""Writing of robot files with ``format = 2``: bodies and joints in the home pose.
 
 Start with :func:`drawing_text`.
 """
@@ -24,29 +24,29 @@ from forcefit.assembly.model.inertia import six_moments
 from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput
 
-# relative to the vector: smaller components of points and directions are written as 0
+# components smaller than this fraction of a point or direction are written as 0
 _ROUNDING = 1e-15
-_AT_ZERO = 1e-12  # [rad or m] smaller joint coordinates count as 0 and are not written
+_AT_ZERO = 1e-12  # [rad or m] smaller joint coordinates count as 0 and are omitted
 
 
 def drawing_text(robot: Robot, drawing: Drawing, folder: Path) -> str:
-    """Return the text of a file of bodies and joints.
+    """Return the text of a robot file with bodies and joints.
 
     Args:
         robot: robot whose effects, reference point and diagnosis are also written.
         drawing: drawing of the robot.
-        folder: folder of the file to be written; paths are written relative to it.
+        folder: folder of the output file, to which paths are made relative.
 
     Returns:
-        The text.
+        Text of the file.
 
     Raises:
         BadInput: the robot has tolerance callouts or fits.
     """
     if robot.callouts or robot.fits:
         raise BadInput(
-            f"{robot.name}: found [[tolerance]] or a fit, which are not written as "
-            "bodies and joints; expected none, or --format 1"
+            f"{robot.name}: found [[tolerance]] or a fit, which cannot be written to a "
+            "file with bodies and joints; use --format 1 instead"
         )
     table = root_table(robot, folder)
     diagnosis = table.pop("diagnosis", {})
@@ -58,7 +58,7 @@ def drawing_text(robot: Robot, drawing: Drawing, folder: Path) -> str:
 
 
 def _point(values: NDArray) -> list[float]:
-    """Return the numbers of a point, with rounding errors replaced by 0."""
+    """Return the coordinates of a point, with rounding errors replaced by 0."""
     least = _ROUNDING * max(1.0, float(np.abs(values).max()))
     return [float(v) if abs(v) > least else 0.0 for v in values]
 
@@ -75,7 +75,7 @@ def _body_table(body: DrawnBody, folder: Path) -> dict[str, Any]:
     if body.link is not None and body.ends is not None:
         link = link_table(body.link, folder)
         beam = link["link"].get("beam", {})
-        # this theory is the default and is not written
+        # the default theory is omitted
         if beam.get("theory") == "timoshenko":
             del beam["theory"]
         for key in ("axis", "up"):
@@ -111,7 +111,7 @@ def _joint_table(joint: DrawnJoint) -> dict[str, Any]:
 
 
 def _drive_stiffness(joint: DrawnJoint) -> float | None:
-    """Return the stiffness of a drive if it is the only spring of its joint."""
+    """Return the stiffness of a drive if it is the only spring in its joint."""
     K = joint.numbers[0].stiffness
     if K is None or not joint.actuated:
         return None
@@ -122,13 +122,13 @@ def _drive_stiffness(joint: DrawnJoint) -> float | None:
 
 
 def _none(key: str) -> Any:
-    """Return the value that means no clearance, no stiffness or no error in a file."""
+    """Return the value of a key that denotes no clearance, stiffness or error."""
     free = [np.inf, np.inf, 0.0, np.inf, np.inf, np.inf]
     return {"clearance": {}, "joint_stiffness": free}.get(key, [0.0] * 6)
 
 
 def _numbers_table(own: JointNumbers) -> dict[str, Any]:
-    """Return the keys for error, clearance and stiffness of a joint or a bearing."""
+    """Return the keys for the error, clearance and stiffness of a joint or bearing."""
     table = joint_table(own.clearance, own.locked_at, own.stiffness)
     if own.error.any():
         table["geometric_error"] = own.error.tolist()

@@ -1,4 +1,4 @@
-"""Bodies in robot files of ``format = 2``, and the joints at their links' ends."""
+"""Reading of bodies in robot files with ``format = 2``."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -17,17 +17,17 @@ from forcefit.assembly.model.robot import BASE
 from forcefit.inputs.table import Table, nearest, quoted
 from forcefit.stiffness.screws import transform
 
-LONGEST_NAME = 200  # largest number of characters of a name
+LONGEST_NAME = 200  # [characters] maximum length of a name
 
 
 @dataclass(frozen=True, eq=False)
 class Copy:
-    """A copy of a leg, or the bodies and joints that belong to no leg.
+    """Copy of a leg, or the bodies and joints outside legs.
 
     Attributes:
-        table: table in which the bodies and joints are written.
-        prefix: prefix of their names, such as ``"leg1."``.
-        T: (4, 4) transform from the leg as written in the table to the copy.
+        table: table that contains the bodies and joints.
+        prefix: prefix of their names, for example ``"leg1."``.
+        T: transform from the leg as written in the table to the copy (4, 4).
     """
 
     table: Table
@@ -36,13 +36,13 @@ class Copy:
 
 
 def read_bodies(copied: Copy) -> Iterator[DrawnBody]:
-    """Yield the bodies of a copy, without the joints at the ends of their links."""
+    """Yield the bodies of a copy; the joints at the ends of links are not set yet."""
     for table in copied.table.tables("body"):
         name = table.text("name", longest=LONGEST_NAME)
         table.place = place_of(copied.table, "body", name)
         if name == BASE:
             raise table.bad(
-                "name", f'found "{BASE}", which is fixed; expected another name'
+                "name", f'found "{BASE}", which is reserved; expected a different name'
             )
         without_units(table, "centre", "length")
         link = read_drawn_link(table)
@@ -60,33 +60,33 @@ def read_bodies(copied: Copy) -> Iterator[DrawnBody]:
                 raise table.bad(
                     key, 'found a joint, but no "link"; expected both or neither'
                 )
-        table.tables("tolerance")  # marked as used here; read when all joints are known
+        table.tables("tolerance")  # marked as read; parsed when all joints are known
         table.finish()
         yield turned_body(body, copied.T)
 
 
 def place_of(owner: Table, kind: str, name: str) -> str:
-    """Return the text with which messages on a body or a joint begin."""
+    """Return the place of a body or joint, with which messages begin."""
     return f"{owner.place + '.' if owner.place else ''}{kind} {quoted(name)}"
 
 
 def with_ends(
     body: DrawnBody, copied: Copy, joints: list[DrawnJoint], point: NDArray | None
 ) -> DrawnBody:
-    """Return the body with the joints at the ends of its link.
+    """Set the joints at the ends of a body's link.
 
     Args:
         body: body as read from the file.
         copied: copy of a leg to which the body belongs.
-        joints: joints of the whole robot.
-        point: (3,) [m] the platform's point if the body is the platform.
+        joints: all joints of the robot.
+        point: reference point of the platform (3,) [m], if the body is the platform.
 
     Returns:
-        The body; a beam along a curve is replaced by its stiffness matrix and its mass.
+        Body with these joints; a curved beam is replaced by its stiffness matrix and
+        mass.
 
     Raises:
-        BadInput: a joint does not exist, or the curve does not lead from the first
-            joint to the second.
+        BadInput: a joint does not exist, or the curve does not connect both joints.
     """
     table = next(
         t for t in copied.table.tables("body")
@@ -120,14 +120,14 @@ def with_ends(
 def _ends(
     table: Table, prefix: str, here: list[str], platform: bool
 ) -> tuple[str, str | None]:
-    """Return the full names of the joints at the two ends of a link."""
+    """Return the full names of the joints at both ends of a link."""
     given = [_end(table, key, prefix, here) for key in ("from", "to")]
     left = [name for name in here if name not in given]
     first = given[0] or (left.pop(0) if left else None)
     second = given[1] or (left[0] if left else None)
     if first is None or (second is None and not platform):
         fault = f"found {len(here)} joint of the body" if here else "found no joint"
-        raise table.bad("link", f"{fault}, expected two, between which the link is")
+        raise table.bad("link", f"{fault}, expected two joints at the ends of the link")
     if first == second:
         raise table.bad(
             "to", f"found {quoted(first)} at both ends, expected two joints"
@@ -136,7 +136,7 @@ def _ends(
 
 
 def _end(table: Table, key: str, prefix: str, here: list[str]) -> str | None:
-    """Return the full name of the joint at one end of a link; None if not given."""
+    """Return the full name of the joint at one end of a link, if it is specified."""
     if not table.has(key):
         return None
     name = table.text(key, expected="the name of a joint")
@@ -151,7 +151,7 @@ def _end(table: Table, key: str, prefix: str, here: list[str]) -> str | None:
 def link_remarks(
     bodies: list[DrawnBody], joints: list[DrawnJoint], copies: list[Copy]
 ) -> tuple[str, ...]:
-    """Return a remark on links whose ends are assumed, without `from` and `to`."""
+    """Return a remark on links whose ends are assumed, because none are specified."""
     stated = {
         copied.prefix + table.content["name"]
         for copied in copies
@@ -168,7 +168,7 @@ def link_remarks(
 
 
 def mass_remarks(copies: list[Copy]) -> tuple[str, ...]:
-    """Return a remark on masses whose centre is not stated."""
+    """Return a remark on masses whose centre is not specified."""
     names = [
         quoted(copied.prefix + table.content["name"])
         for copied in copies

@@ -1,4 +1,4 @@
-"""Clearance of a joint in a robot file of ``format = 2``, as bounds or as contacts."""
+"""Reading of joint clearances in robot files with ``format = 2``."""
 
 from forcefit.assembly.callouts.fits import Fit
 from forcefit.assembly.drawing.contacts import (
@@ -18,21 +18,21 @@ from forcefit.assembly.model.largest import LARGEST_LENGTH
 from forcefit.assembly.model.robot import Clearance
 from forcefit.inputs.table import Table, describe, quoted
 
-# [m] smallest length of a contact; a shorter one would allow unlimited tilt
+# [m] smallest length of a contact; shorter contacts would allow unlimited tilt
 _LEAST_LENGTH = 1e-9
 _ANGLES = ("tilt", "spin")
 _Clearance = tuple[Clearance | None, tuple[Contact, ...]]
 
 
 def read_drawn_clearance(table: Table, kind: str) -> _Clearance:
-    """Return the clearance of a joint or of a bearing from its ``clearance`` table.
+    """Read the ``clearance`` table of a joint or bearing.
 
     Args:
         table: table of the joint.
         kind: type of the joint; ``"revolute"`` for a bearing of a universal joint.
 
     Returns:
-        The bounds of the joint's own frame, None if there are none; and its contacts.
+        Bounds at the frame of the joint, or None, and the contacts of the joint.
 
     Raises:
         BadInput: the table violates a rule of the format.
@@ -47,7 +47,7 @@ def read_drawn_clearance(table: Table, kind: str) -> _Clearance:
     contacts = [key for key in _CONTACTS if inner.has(key)]
     if len(contacts) > 1:
         fault = f"found together with {quoted(contacts[0])}"
-        raise inner.bad(contacts[1], f"{fault}, expected one of them")
+        raise inner.bad(contacts[1], f"{fault}, expected only one of them")
     if contacts not in ([], ["length"]) and inner.has("fit"):
         where = "each bearing" if contacts == ["bearings"] else f"the {contacts[0]}"
         fault = f"found together with {quoted(contacts[0])}, expected it in {where}"
@@ -61,7 +61,7 @@ def read_drawn_clearance(table: Table, kind: str) -> _Clearance:
 
 
 def _in_bore(table: Table, kind: str, bounds: Clearance) -> _Clearance:
-    """Return the remaining bounds of the joint, and the contacts in its bore."""
+    """Return the remaining bounds of a joint and the contacts in its bore."""
     _refuse_with(table, "length", ("tilt", "ball"))
     _refuse_without_shaft(table, "length", kind)
     half = _length(table, "length") / 2
@@ -71,7 +71,7 @@ def _in_bore(table: Table, kind: str, bounds: Clearance) -> _Clearance:
 
 
 def _in_bearings(table: Table, kind: str, bounds: Clearance) -> _Clearance:
-    """Return the remaining bounds of a joint, and the contacts in its two bearings."""
+    """Return the remaining bounds of a joint and the contacts in its two bearings."""
     _refuse_with(table, "bearings", ("radial", "tilt", "ball"))
     _refuse_without_shaft(table, "bearings", kind)
     value = table.get("bearings")
@@ -83,13 +83,13 @@ def _in_bearings(table: Table, kind: str, bounds: Clearance) -> _Clearance:
     (z1, gap1, fit1, part1), (z2, gap2, fit2, part2) = first, second
     if z2 - z1 <= _LEAST_LENGTH:
         fault = f"found both bearings at z = {z1:g} m"
-        raise table.bad("bearings", f"{fault}, expected a distance between them")
+        raise table.bad("bearings", f"{fault}, expected different positions")
     contacts = bearings((z1, gap1), (z2, gap2))
     return _of_shaft(bounds), fitted(contacts, (fit1, fit2), (part1, part2), z2 - z1)
 
 
 def _bearing(table: Table, number: int, content: dict) -> tuple[float, float, str, str]:
-    """Return position and radial gap [m] of a bearing, its fit, and its parts' name."""
+    """Return the position [m], radial gap [m], fit and part name of a bearing."""
     inner = Table(dict(content), table.file, f"{table.place}.bearings[{number}]")
     for key in ("z", "radial"):
         without_units(inner, key, "length")
@@ -100,30 +100,30 @@ def _bearing(table: Table, number: int, content: dict) -> tuple[float, float, st
 
 
 def _gap(table: Table, key: str = "radial") -> tuple[float, str]:
-    """Return the gap [m] of a key, or the mean gap of a fit; and the fit, or ``""``."""
+    """Return the gap [m], which is given directly or by a fit, and the fit if any."""
     fit = fit_of(table)
     if fit is not None:
         if table.has(key):
-            raise table.bad(key, 'found it together with "fit", expected one of them')
+            raise table.bad(key, 'found together with "fit", expected only one of them')
         return fit.mean_radial, fit.text
     return table.number(key, "m", least=0.0, largest=LARGEST_LENGTH), ""
 
 
 def _of_shaft(bounds: Clearance) -> Clearance | None:
-    """Return the bounds ``axial`` and ``spin``; None if neither is given."""
+    """Return the bounds ``axial`` and ``spin``, or None if neither is given."""
     kept = Clearance(axial=bounds.axial, spin=bounds.spin)
     return None if kept == Clearance() else kept
 
 
 def _refuse_without_shaft(table: Table, key: str, kind: str) -> None:
-    """Raise BadInput if a joint without a shaft has a bore or bearings."""
+    """Check that bores and bearings are specified only for joints with a shaft."""
     if not {0, 1, 3, 4}.isdisjoint(FREE_ROWS[kind]):
         fault = f"found the clearance of a shaft on a {kind} joint"
         raise table.bad(key, f"{fault}, which has no shaft; expected none")
 
 
 def _in_guide(table: Table, kind: str, bounds: Clearance) -> _Clearance:
-    """Return the bound along the axis, and the contacts of a guide."""
+    """Return the bound along the axis and the contacts of a guide."""
     _refuse_type(table, "guide", kind, "prismatic")
     _refuse_with(table, "guide", ("radial", "tilt", "spin", "ball"))
     inner = _sizes(table, "guide", ("gap", "length", "width", "height"))
@@ -140,7 +140,7 @@ def _in_guide(table: Table, kind: str, bounds: Clearance) -> _Clearance:
 
 
 def _guide_gaps(inner: Table) -> tuple[float, float]:
-    """Return the gaps c_x and c_y [m] of a guide along x and along y."""
+    """Return the gaps c_x and c_y of a guide along x and y [m]."""
     if not isinstance(inner.content.get("gap"), list):
         gap = inner.number("gap", "m", least=0.0, largest=LARGEST_LENGTH)
         return gap, gap
@@ -151,10 +151,10 @@ def _guide_gaps(inner: Table) -> tuple[float, float]:
 
 
 def _guide_fits(inner: Table) -> tuple[Fit, Fit] | None:
-    """Return the fits of a guide along x and y; None if its gaps are given instead."""
+    """Return the fits of a guide along x and y, or None if gaps are given instead."""
     value = inner.content.get("fit")
     if value is not None and inner.has("gap"):
-        raise inner.bad("gap", 'found it together with "fit", expected one of them')
+        raise inner.bad("gap", 'found together with "fit", expected only one of them')
     if not isinstance(value, list):
         fit = fit_of(inner)
         return None if fit is None else (fit, fit)
@@ -169,7 +169,7 @@ def _guide_fits(inner: Table) -> tuple[Fit, Fit] | None:
 
 
 def _on_pad(table: Table, kind: str, bounds: Clearance) -> _Clearance:
-    """Return the contacts of a pad; its first result, the bounds, is None."""
+    """Return the remaining bounds and the contacts of a pad."""
     _refuse_type(table, "pad", kind, "planar")
     _refuse_with(table, "pad", ("axial", "tilt", "ball"))
     inner = _sizes(table, "pad", ("gap", "length", "width"))
@@ -185,22 +185,22 @@ _CONTACTS = {
 
 
 def _refuse_type(table: Table, key: str, kind: str, of_kind: str) -> None:
-    """Raise BadInput if the joint is not of the type that has these contacts."""
+    """Check that the joint type supports these contacts."""
     if kind != of_kind:
         fault = f"found on a {kind} joint, expected none"
         raise table.bad(key, f"{fault}; only a {of_kind} joint has a {key}")
 
 
 def _refuse_with(table: Table, key: str, others: tuple[str, ...]) -> None:
-    """Raise BadInput if contacts and bounds limit the same motions."""
+    """Check that contacts and bounds do not limit the same motions."""
     for other in others:
         if table.has(other):
-            fault = f"found together with {quoted(key)}, which bounds that motion"
-            raise table.bad(other, f"{fault}; expected one of them")
+            fault = f"found together with {quoted(key)}, which bounds the same motion"
+            raise table.bad(other, f"{fault}; expected only one of them")
 
 
 def _sizes(table: Table, key: str, keys: tuple[str, ...]) -> Table:
-    """Return a table of lengths, with texts such as ``"2 mm"`` replaced by numbers."""
+    """Return a table of lengths, with texts such as ``"2 mm"`` converted to numbers."""
     given = table.table(key)
     inner = Table(dict(given.content), given.file, given.place)
     for name in keys:
@@ -214,7 +214,7 @@ def _length(table: Table, key: str) -> float:
 
 
 def _refuse_free(table: Table, bounds: Clearance | None, kind: str) -> None:
-    """Raise BadInput for bounds of free motions in a joint with several of these."""
+    """Check that free motions are not bounded in a joint with several of them."""
     free = set(FREE_ROWS[kind])
     for key, rows in zip(BOUNDS, CONES, strict=True):
         given = bounds is not None and getattr(bounds, key) is not None

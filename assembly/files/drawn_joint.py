@@ -1,4 +1,4 @@
-"""A joint of a robot file of ``format = 2``: type, axes, drive, error and clearance."""
+"""Reading of joints in robot files with ``format = 2``."""
 
 from typing import Any
 
@@ -23,22 +23,22 @@ from forcefit.assembly.model.largest import LARGEST, LARGEST_LENGTH
 from forcefit.inputs.table import Table
 
 ONE_FREEDOM = ("revolute", "prismatic", "helical")
-_PARALLEL = 1e-3  # sine of the angle below which two axes count as parallel
+_PARALLEL = 1e-3  # largest sine of the angle between axes that count as parallel
 _KEYS = ("clearance", "joint_stiffness", "geometric_error", "tolerance")
 _ROWS = ("RX", "RY", "RZ", "TX", "TY", "TZ")
 
 
 def read_drawn_joint(table: Table, name: str, first: str, second: str) -> DrawnJoint:
-    """Return one joint of a file.
+    """Read a joint from its table.
 
     Args:
         table: table of the joint.
-        name: name of the joint in the whole robot.
-        first: name of its first body.
-        second: name of its second body.
+        name: full name of the joint.
+        first: name of the first body.
+        second: name of the second body.
 
     Returns:
-        The joint as written, before its leg is copied.
+        Joint as written, without the transform to the copy of its leg.
 
     Raises:
         BadInput: the table violates a rule of the format.
@@ -73,7 +73,7 @@ def read_drawn_joint(table: Table, name: str, first: str, second: str) -> DrawnJ
 
 
 def _axes(table: Table, kind: str) -> tuple[NDArray, NDArray, NDArray]:
-    """Return unit vectors along the z axis, a perpendicular x axis and ``axis2``."""
+    """Return unit vectors along ``axis``, a perpendicular x axis, and ``axis2``."""
     needs = kind not in {"fixed", "spherical"}
     axis = _direction(table, "axis", needs)
     axis = np.array([0.0, 0.0, 1.0]) if axis is None else axis
@@ -83,27 +83,25 @@ def _axes(table: Table, kind: str) -> tuple[NDArray, NDArray, NDArray]:
         return axis, across, across
     if np.linalg.norm(np.cross(axis, axis2)) < _PARALLEL:
         raise table.bad(
-            "axis2", 'found a direction parallel to "axis", expected one across it'
+            "axis2", 'found a direction parallel to "axis", expected a different one'
         )
     return axis, perpendicular(axis, axis2), axis2
 
 
 def _direction(table: Table, key: str, needed: bool) -> NDArray | None:
-    """Return a (3,) unit vector; None if absent and not needed."""
+    """Return a unit vector (3,), or None if it is absent and not required."""
     if not needed and not table.has(key):
         return None
     without_units(table, key, "length")
     vector = table.array(key, (3,), "direction", largest=LARGEST_LENGTH)
     size = float(np.linalg.norm(vector))
     if size < 1e-12:
-        raise table.bad(
-            key, "found only zeros, expected a direction: 3 numbers, not all 0"
-        )
+        raise table.bad(key, "found a zero vector, expected a nonzero direction vector")
     return np.asarray(vector / size)
 
 
 def _limits(table: Table, unit: str) -> tuple[float, float] | None:
-    """Return the least and largest commanded coordinate; None if not given."""
+    """Return the minimum and maximum commanded coordinate, or None."""
     if not table.has("limits"):
         return None
     least, most = table.array("limits", (2,), unit, largest=LARGEST_LENGTH)
@@ -114,7 +112,7 @@ def _limits(table: Table, unit: str) -> tuple[float, float] | None:
 
 
 def _numbers(table: Table, kind: str, actuated: bool) -> tuple[JointNumbers, ...]:
-    """Return error, clearance and stiffness; of a universal joint, for each bearing."""
+    """Read error, clearance and stiffness, for each bearing of a universal joint."""
     if kind != "universal":
         return (_one(table, kind, actuated),)
     for key in ("clearance", "geometric_error", "tolerance"):
@@ -128,25 +126,25 @@ def _numbers(table: Table, kind: str, actuated: bool) -> tuple[JointNumbers, ...
 
 
 def _refuse_count(table: Table, key: str) -> None:
-    """Raise BadInput if a list does not contain one value for each of two bearings."""
+    """Check that a list contains one value for each of the two bearings."""
     value = table.content.get(key)
     parts = dict if key == "clearance" else list
     if not isinstance(value, list) or not all(isinstance(v, parts) for v in value):
         return
     if len(value) != 2:
         fault = f"found a list of {len(value)}, expected one value for both bearings"
-        raise table.bad(key, f"{fault}, or two, [first, second]")
+        raise table.bad(key, f"{fault}, or two values, [first, second]")
 
 
 def _bearing(table: Table, key: str, which: int) -> Any:
-    """Return the value of one bearing, from ``[first, second]`` or a common value."""
+    """Return the value for one bearing, from ``[first, second]`` or a common value."""
     value = table.content[key]
     pair = isinstance(value, list) and len(value) == 2
     return value[which] if pair else value
 
 
 def _one(table: Table, kind: str, actuated: bool) -> JointNumbers:
-    """Return error, clearance and stiffness of one joint or bearing."""
+    """Read the error, clearance and stiffness of a joint or bearing."""
     for key in ("geometric_error", "tolerance"):
         without_units(table, key, SCREW)
     zero = np.zeros(6)
@@ -165,7 +163,7 @@ def _one(table: Table, kind: str, actuated: bool) -> JointNumbers:
 
 
 def _tolerance(table: Table) -> NDArray | None:
-    """Return (6,) standard deviations of the geometric error; None if not given."""
+    """Return the standard deviations of the geometric error (6,), or None."""
     if not table.has("tolerance"):
         return None
     sigma = table.array("tolerance", (6,), "rad, m", largest=LARGEST_LENGTH)
@@ -176,7 +174,7 @@ def _tolerance(table: Table) -> NDArray | None:
 
 
 def _stiffness(table: Table, kind: str, actuated: bool) -> NDArray | None:
-    """Return (6, 6) K_B including the drive, 0 along free motions; None if rigid."""
+    """Return K_B (6, 6) including the drive, 0 along free motions; None if rigid."""
     free = FREE_ROWS[kind]
     if len(free) > 1:
         return _several_free(table, kind)
@@ -189,14 +187,14 @@ def _stiffness(table: Table, kind: str, actuated: bool) -> NDArray | None:
     )
     K = np.diag(np.full(6, np.inf)) if K is None else K
     if np.isfinite(K[own, own]):
-        fault = f"found {K[own, own]:g} as number {own + 1} of joint_stiffness too"
-        raise table.bad("drive_stiffness", f"{fault}, expected inf there")
+        fault = f"found also {K[own, own]:g} as number {own + 1} of joint_stiffness"
+        raise table.bad("drive_stiffness", f"{fault}, expected inf in that entry")
     K[own, own] = drive
     return K
 
 
 def _several_free(table: Table, kind: str) -> NDArray | None:
-    """Return (6, 6) K_B of a joint with several free motions, 0 along each of them."""
+    """Return K_B (6, 6) of a joint with several free motions, 0 along each of them."""
     if not table.has("joint_stiffness"):
         return None
     free = list(FREE_ROWS[kind])
@@ -207,7 +205,7 @@ def _several_free(table: Table, kind: str) -> NDArray | None:
             if any(entry != 0 for entry in entries):
                 name = f"number {row + 1} ({_ROWS[row]})"
                 fault = f"found a stiffness as {name}, along a free motion"
-                raise table.bad("joint_stiffness", f"{fault}; expected 0 there")
+                raise table.bad("joint_stiffness", f"{fault}; expected 0")
             if isinstance(value[row], list):
                 value[row][row] = np.inf
             else:
@@ -220,7 +218,7 @@ def _several_free(table: Table, kind: str) -> NDArray | None:
 
 
 def copy_rows(value: Any) -> Any:
-    """Return a list whose inner lists are copies; return any other value unchanged."""
+    """Copy a list and its inner lists; return other values unchanged."""
     if not isinstance(value, list):
         return value
     return [list(row) if isinstance(row, list) else row for row in value]

@@ -1,4 +1,4 @@
-"""Links of bodies in files of ``format = 2``: lengths with units, and curved beams."""
+"""Reading of links in robot files with ``format = 2``, including curved beams."""
 
 from dataclasses import dataclass
 from typing import Any, NoReturn
@@ -19,32 +19,32 @@ _LENGTHS = ("radius", "inner_radius", "width", "height", "length", "wall", "web"
             "flange")  # fmt: skip
 _CURVE = ("curve", "young", "poisson", "density", "theory")
 _KINDS = ("beam", "curve", "stiffness", "mesh", "library", "model")
-# [-] accepted distance of a curve's end from the joint, relative to the distance of
-# both joints
+# [-] accepted distance of the end of a curve from the joint, relative to the distance
+# between both joints
 _GAP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Table of a link that can be read only when the points of the joints are known.
+    """Link that can be read only when the positions of the joints are known.
 
     Attributes:
-        table: table of a beam along a curve, or of a link model of another
-            distribution.  Its keys are checked when the points of the joints are known.
+        table: unchecked table of a curved beam, or of a link model from another
+            distribution.
     """
 
     table: Table
 
 
 def read_drawn_link(body: Table) -> Link | Curve | None:
-    """Return the link of a body.
+    """Read the link of a body.
 
     Args:
-        body: table of the body; texts with units in it are replaced by numbers.
+        body: table of the body, in which texts with units are replaced by numbers.
 
     Returns:
-        The link, with directions in base axes in the home pose; a curve; or None for a
-        rigid body.
+        Link with directions in base axes at the home pose, a curve, or None for a rigid
+        body.
 
     Raises:
         BadInput: the table violates a rule of the format.
@@ -67,17 +67,17 @@ def read_drawn_link(body: Table) -> Link | Curve | None:
 
 
 def _refuse_no_kind(link: Table) -> NoReturn:
-    """Raise BadInput for a link of unknown kind; suggest a name for a misspelt key."""
+    """Raise BadInput for an unknown type of link, and suggest a name if possible."""
     unknown = [key for key in link.content if key not in (*_CURVE, "pieces", "up")]
     if unknown:
         hint = nearest(unknown[0], _KINDS)
         raise link.bad("", f"unknown key {quoted(unknown[0])}{hint}")
     names = " | ".join(map(quoted, _KINDS))
-    raise link.bad("", f"found no kind of link, expected exactly one of {names}")
+    raise link.bad("", f"found no type of link, expected exactly one of {names}")
 
 
 def _plain_lengths(content: dict[str, Any], body: Table, place: str) -> None:
-    """Replace texts with units in a section by numbers."""
+    """Replace texts with units in a cross section by numbers."""
     inner = Table(content, body.file, f"{body.place}.{place}")
     for key in _LENGTHS:
         without_units(inner, key, "length")
@@ -86,20 +86,20 @@ def _plain_lengths(content: dict[str, Any], body: Table, place: str) -> None:
 def curve_link(
     curve: Curve, start: NDArray, tip: NDArray
 ) -> tuple[MatrixLink, float, NDArray, NDArray]:
-    """Return stiffness and mass of a curved beam or of a link model.
+    """Compute the stiffness and mass of a curved beam or of a link model.
 
     Args:
         curve: link as read from the file.
-        start: (3,) [m] point of the joint at which the link begins, axes of the file.
-        tip: (4, 4) point and axes of the joint at its end, axes of the file.
+        start: position of the joint at the start of the link (3,) [m], in file axes.
+        tip: pose of the joint at the end of the link (4, 4), in file axes.
 
     Returns:
-        The stiffness at the tip, in the axes of the tip; the mass [kg]; its centre (3,)
-        [m]; and its moments of inertia (3, 3) [kg m^2] about this centre.  The mass is
-        0 without a density.
+        Stiffness at the tip, in the axes of the tip; mass [kg]; centre of mass (3,)
+        [m]; and moments of inertia about this centre (3, 3) [kg m^2].  Without a
+        density, the mass is 0.
 
     Raises:
-        BadInput: a piece or a material constant is invalid, or the curve does not end
+        BadInput: a segment or a material constant is invalid, or the curve does not end
             at the joint.
     """
     table = curve.table
@@ -111,7 +111,7 @@ def curve_link(
     theory = table.choice("theory", ("timoshenko", "euler"), "timoshenko")
     tables = table.tables("curve")
     if not tables:
-        raise table.bad("curve", f"found {describe([])}, expected at least one piece")
+        raise table.bad("curve", f"found {describe([])}, expected at least one segment")
     for part in tables:
         without_units(part, "end", "length")
         without_units(part, "center", "length")

@@ -1,4 +1,4 @@
-"""``[[effect]]`` of a robot file: known effects of the machine."""
+"""Reading and writing of ``[[effect]]`` tables, the known effects of a robot."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -17,14 +17,14 @@ from forcefit.inputs.table import BadInput, Table, nearest, quoted
 
 
 def with_effects(robot: Robot, tables: Sequence[Table]) -> Robot:
-    """Return a robot with the effects of its file.
+    """Add the effects in a robot file to the robot.
 
     Args:
-        robot: robot of the same file, without effects.
-        tables: every ``[[effect]]`` table.
+        robot: robot read from the same file, without effects.
+        tables: all ``[[effect]]`` tables.
 
     Returns:
-        The robot with effects.
+        Robot with effects.
 
     Raises:
         BadInput: an effect or parameter is unknown, an effect is given twice or at a
@@ -61,7 +61,7 @@ def with_effects(robot: Robot, tables: Sequence[Table]) -> Robot:
 
 
 def _parameters(table: Table, robot: Robot, effect: str) -> Values:
-    """Return the parameters of one effect of the library."""
+    """Read the parameters of an effect from the library."""
     allowed = parameter_names(robot, effect)
     inner = table.table("parameters") if table.has("parameters") else None
     table.finish()
@@ -88,10 +88,10 @@ def _parameters(table: Table, robot: Robot, effect: str) -> Values:
 
 
 def effect_tables(robot: Robot) -> list[dict[str, Any]]:
-    """Return the tables of a robot's effects for a robot file.
+    """Return the effects of a robot as tables for a robot file.
 
     Args:
-        robot: any robot.
+        robot: robot with effects.
 
     Returns:
         One table per effect, from which :func:`with_effects` reads the same effects.
@@ -112,10 +112,10 @@ def effect_tables(robot: Robot) -> list[dict[str, Any]]:
 
 
 def parameter_names(robot: Robot, effect: str) -> tuple[str, ...]:
-    """Return the public names of all parameters that an effect can have on a robot.
+    """Return the public names of all possible parameters of an effect.
 
     Args:
-        robot: any robot.
+        robot: robot to which the effect is applied.
         effect: name of an effect in the library.
 
     Returns:

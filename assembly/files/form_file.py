@@ -1,8 +1,8 @@
-"""Flatness and cylindricity of the features of joints, which increase the clearance.
+"""Flatness and cylindricity tolerances, which increase joint clearances.
 
-A form deviation neither rotates nor shifts a feature, so it has no screw.  If a face is
-flat within t, or a bore is cylindrical within t, the gap to the mating part can be up
-to t/2 larger.
+A form deviation neither rotates nor shifts a feature and therefore has no screw.  If a
+face is flat within t, or a bore is cylindrical within t, the gap to the mating part can
+increase by up to t/2.
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,17 +23,18 @@ _WITH_GAP = {
 
 
 def read_form(table: Table, shape: str) -> float:
-    """Return the width of the form zone of a feature; 0 without a form tolerance.
+    """Return the width of the form zone of a feature.
 
     Args:
-        table: table of the feature's tolerances.
+        table: table with the tolerances of the feature.
         shape: shape of the feature: ``"axis"``, ``"plane"`` or ``"point"``.
 
     Returns:
-        [m] width of the zone.
+        Width of the zone [m]; 0 without a form tolerance.
 
     Raises:
-        BadInput: the value is not a width, or the feature's shape has no such form.
+        BadInput: the value is not a width, or the form tolerance does not apply to a
+            feature of this shape.
     """
     width = 0.0
     for word, of_shape in FORMS.items():
@@ -41,7 +42,7 @@ def read_form(table: Table, shape: str) -> float:
             continue
         if shape != of_shape:
             article = "an" if shape == "axis" else "a"
-            fault = f"found this form at a feature that is {article} {shape}"
+            fault = f"found this tolerance for a feature that is {article} {shape}"
             raise table.bad(word, f"{fault}, expected none")
         width, at_most = parsed_value(table, word, parse_width)
         if at_most:
@@ -52,18 +53,17 @@ def read_form(table: Table, shape: str) -> float:
 
 
 def forms_of_joints(copies: Sequence[Copy]) -> dict[str, tuple[str, float]]:
-    """Return the form tolerances of joints, by the names of the joints.
+    """Return the form tolerances of joints, by joint name.
 
     Args:
-        copies: copies of the legs, and the bodies that belong to no leg.
+        copies: copies of the legs, and the bodies outside legs.
 
     Returns:
         For each joint, ``"flatness"`` or ``"cylindricity"``, and the increase of the
-        joint's clearance [m].  The increase is half of the sum of both features' zone
-        widths.
+        joint clearance [m], which is half the sum of the zone widths of both features.
 
     Raises:
-        BadInput: the text of a width cannot be read.
+        BadInput: the text of a width is invalid.
     """
     tables = [(c, t) for c in copies for t in c.table.tables("joint")]
     names = {c.prefix + str(t.content.get("name")) for c, t in tables}
@@ -79,7 +79,7 @@ def forms_of_joints(copies: Sequence[Copy]) -> dict[str, tuple[str, float]]:
 
 
 def _with_form(copies: Sequence[Copy]) -> Iterator[tuple[Copy, Table, str]]:
-    """Yield the tolerance tables with a form tolerance, and the key of the form."""
+    """Yield the tolerance tables that contain a form tolerance, with its key."""
     for copied in copies:
         owners = copied.table.tables("body")
         if not copied.prefix:
@@ -90,20 +90,20 @@ def _with_form(copies: Sequence[Copy]) -> Iterator[tuple[Copy, Table, str]]:
 
 
 def widen_clearance(joint: Table, word: str, added: float) -> None:
-    """Increase the gap of a joint by the effect of form tolerances.
+    """Increase the gap of a joint due to form tolerances.
 
     Args:
         joint: table of the joint, whose content is replaced.
         word: ``"flatness"`` or ``"cylindricity"``.
-        added: [m] increase of the gap.
+        added: increase of the gap [m].
 
     Raises:
-        BadInput: the joint has no gap between features with such a form.
+        BadInput: the joint has no gap to which this form tolerance applies.
     """
     given = joint.content.get("clearance")
     wider = _widened(joint, given, word, added) if isinstance(given, dict) else None
     if wider is None:
-        fault = f"found no gap that the {word} of its features could widen"
+        fault = f"found no gap that is affected by the {word} of its features"
         raise joint.bad("clearance", f"{fault}, expected {_WITH_GAP[word]}")
     joint.content = joint.content | {"clearance": wider}
 
@@ -111,7 +111,7 @@ def widen_clearance(joint: Table, word: str, added: float) -> None:
 def _widened(
     joint: Table, given: dict[str, Any], word: str, added: float
 ) -> dict[str, Any] | None:
-    """Return the clearance with a larger gap; None without a gap."""
+    """Return the clearance with an increased gap, or None if there is no gap."""
     if word == "flatness":
         pad = given.get("pad")
         if not isinstance(pad, dict):
@@ -137,7 +137,7 @@ def _widened(
 def _added(
     joint: Table, given: dict[str, Any], key: str, added: float
 ) -> dict[str, Any]:
-    """Return a table with a larger length [m]; its reader rejects other values."""
+    """Increase a length [m] in a table; invalid values are rejected later."""
     inner = Table(dict(given), joint.file, f"{joint.place}.clearance")
     without_units(inner, key, "length")
     value = inner.content.get(key)
@@ -147,7 +147,7 @@ def _added(
 
 
 def _looser(fit: Any, added: float) -> Any:
-    """Return the fit with more clearance; its reader rejects other texts later."""
+    """Increase the clearance of a fit; invalid texts are rejected later."""
     try:
         clearance_fit(fit)
     except (BadInput, TypeError):

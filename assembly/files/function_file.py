@@ -1,4 +1,4 @@
-"""Reading and writing of an ``[[effect]]`` named ``function`` in a robot file."""
+"""Reading and writing of the general effect ``function`` in robot files."""
 
 import math
 from collections.abc import Mapping
@@ -36,14 +36,14 @@ _KINDS_OF_VARIABLES = (
 
 
 def read_function(table: Table, robot: Robot) -> Function:
-    """Return one general effect.
+    """Read a general effect.
 
     Args:
-        table: an ``[[effect]]`` table whose name is ``function``.
-        robot: robot of the same file.
+        table: ``[[effect]]`` table with the name ``function``.
+        robot: robot in the same file.
 
     Returns:
-        The function, completely checked.
+        Validated function.
 
     Raises:
         BadInput: a place, component, variable, form or parameter is unknown or missing,
@@ -61,7 +61,7 @@ def read_function(table: Table, robot: Robot) -> Function:
         where = robot.joints[where].main
     kind = table.choice("kind", KINDS, "screw")
     if kind == "compliance" and where in {"reading", "load"}:
-        raise table.bad("kind", f'found "compliance" in the {where}, expected "screw"')
+        raise table.bad("kind", f'found "compliance" for {where}, expected "screw"')
     components = _words(table, "components", 6)
     for name in components:
         valid = components_of(where, robot)
@@ -92,7 +92,7 @@ def read_function(table: Table, robot: Robot) -> Function:
 
 
 def _words(table: Table, key: str, most: int) -> tuple[str, ...]:
-    """Return one or more different names from a key of the table."""
+    """Return a list of distinct names from a key of the table."""
     value = table.require(key, f"1 to {most} names")
     if isinstance(value, list) and all(isinstance(v, str) for v in value):
         if 1 <= len(value) <= most and len(set(value)) == len(value):
@@ -103,7 +103,7 @@ def _words(table: Table, key: str, most: int) -> tuple[str, ...]:
 def _numbers(
     table: Table, key: str, least: float = -math.inf
 ) -> Mapping[str, float]:  # fmt: skip
-    """Return the numbers of a table by name; empty if the key is absent."""
+    """Return the numbers in an inner table by name; empty if it is absent."""
     if not table.has(key):
         return {}
     inner = table.table(key)
@@ -111,7 +111,7 @@ def _numbers(
 
 
 def _of_main(variable: str, robot: Robot) -> str:
-    """Return a variable in which a joint of several frames is replaced by its frame."""
+    """Replace a joint with several frames in a variable by its main frame."""
     kind, _, rest = variable.partition(".")
     name, _, axis = rest.rpartition(".")
     if kind == "wrench" and name in robot.joints:
@@ -120,7 +120,7 @@ def _of_main(variable: str, robot: Robot) -> str:
 
 
 def _check_variable(table: Table, name: str, robot: Robot) -> None:
-    """Raise BadInput for a variable that is not recorded in measurements."""
+    """Check that a variable is one that measurements record."""
     kind, _, rest = name.partition(".")
     frames = [frame.name for frame in robot.frames]
     if kind == "q":
@@ -143,7 +143,7 @@ def _check_variable(table: Table, name: str, robot: Robot) -> None:
 
 
 def _check_parameters(table: Table, function: Function, robot: Robot) -> None:
-    """Raise BadInput for unknown and for missing parameters of a form."""
+    """Check for unknown and missing parameters of a form."""
     for name in function.std:
         if name not in function.parameters:
             hint = nearest(name, function.parameters)
@@ -197,12 +197,12 @@ def _check_parameters(table: Table, function: Function, robot: Robot) -> None:
 
 
 def _check_knots(table: Table, function: Function, component: str) -> None:
-    """Check that a spline has a value at each knot, and that knots are distinct."""
+    """Check that a spline has one value per knot, and that its knots are distinct."""
     names = columns_of(function, component)
     indices = np.array([column_indices(name) for name in names])
     wanted = math.prod(indices.max(axis=0).tolist()) if names else 2
     if len(names) != wanted or len(names) < 2:
-        message = f"found {len(names)} values, expected one for each knot, at least two"
+        message = f"found {len(names)} values, expected one per knot, at least two"
         raise table.bad("parameters", message)
     own = parameters_of(function, component)
     for end in ("", ".1", ".2"):
@@ -215,7 +215,7 @@ def _check_knots(table: Table, function: Function, component: str) -> None:
 
 
 def _check_formula(table: Table, function: Function, robot: Robot) -> None:
-    """Check that a formula has known names and consistent units."""
+    """Check that a formula has only known names and consistent units."""
     aliases = variable_names(function.variables)
     try:
         tree = parse_formula(function.formula)
@@ -241,7 +241,7 @@ def _check_formula(table: Table, function: Function, robot: Robot) -> None:
 
 
 def _example(form: Any) -> str:
-    """Return an example of the names of a form's parameters."""
+    """Return examples of the parameter names of a form."""
     word = form.words[0]
     name = word if form.indices is None else f"1.{word}" if word else "1"
     shapes = [quoted(shape) for shape in form.shapes]
@@ -249,7 +249,7 @@ def _example(form: Any) -> str:
 
 
 def function_table(function: Function) -> dict[str, Any]:
-    """Return the table of a function for a robot file.
+    """Return a function as a table for a robot file.
 
     Args:
         function: function of a robot.

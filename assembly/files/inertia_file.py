@@ -1,4 +1,4 @@
-"""Moments of inertia in robot files: six entries of the matrix."""
+"""Reading of moments of inertia in robot files."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,17 +10,18 @@ _LARGEST = 1e40  # [kg m^2] upper limit, numerically equal to the limit of masse
 
 
 def read_inertia(table: Table) -> NDArray:
-    """Return the moments of inertia of a frame or a body; zero if absent.
+    """Return the moments of inertia of a frame or a body.
 
     Args:
-        table: table with or without ``inertia``: Ixx, Iyy, Izz, Ixy, Ixz, Iyz, where
-            the last three are the entries of the matrix.
+        table: table with an optional key ``inertia``, which contains the matrix entries
+            Ixx, Iyy, Izz, Ixy, Ixz, Iyz.
 
     Returns:
-        (3, 3) [kg m^2] matrix.
+        Moments of inertia (3, 3) [kg m^2]; zero if the key is absent.
 
     Raises:
-        BadInput: the value is not six numbers, or no body has these moments of inertia.
+        BadInput: the value does not contain six numbers, or the moments of inertia are
+            not physically possible.
     """
     if not table.has("inertia"):
         return np.zeros((3, 3))

@@ -1,4 +1,4 @@
-"""Clearance and stiffness of a joint, read from a robot file."""
+"""Reading and writing of joint clearance and stiffness in robot files."""
 
 import math
 from dataclasses import replace
@@ -15,9 +15,9 @@ from forcefit.assembly.model.robot import LOCKED, NO_SPIN, Clearance, LockedAt
 from forcefit.inputs.number_arrays import find_fault, number_array
 from forcefit.inputs.table import BadInput, Table
 
-# [rad, m] smallest positive bound; the square of a smaller number would be 0
+# [rad, m] smallest positive bound; the squares of smaller numbers could underflow
 _LEAST_CLEARANCE = 1e-30
-# [m] smallest length of a fit; a shorter one would allow unlimited tilt
+# [m] smallest length of a fit; shorter fits would allow unlimited tilt
 _LEAST_LENGTH = 1e-9
 LEAST_PITCH = 1e-9  # [m] smallest accepted pitch of a screw
 LARGEST_PITCH = 1.0  # [m] largest accepted pitch of a screw
@@ -25,14 +25,14 @@ _CLEARANCE = {"radial": "m", "axial": "m", "tilt": "rad", "spin": "rad", "ball":
 
 
 def read_pitch(table: Table, joint: str) -> float:
-    """Return the ``pitch`` of a helical joint; 0 for other joints.
+    """Return the ``pitch`` of a helical joint, or 0 for all other joint types.
 
     Args:
         table: table of a frame or a drawn joint.
         joint: type of the joint.
 
     Returns:
-        [m] translation per turn of 360 degrees, positive for a right-hand thread.
+        Translation per turn [m], positive for a right-handed thread.
 
     Raises:
         BadInput: the pitch is missing, 0 or above 1 m, or the joint is not helical.
@@ -44,20 +44,20 @@ def read_pitch(table: Table, joint: str) -> float:
         return 0.0
     pitch = table.number("pitch", "m per turn", largest=LARGEST_PITCH)
     if abs(pitch) < LEAST_PITCH:
-        expected = f"expected at least {LEAST_PITCH:g} m, or at most minus that"
+        expected = f"expected a magnitude of at least {LEAST_PITCH:g} m"
         raise table.bad("pitch", f"found {pitch:g}, {expected}")
     return pitch
 
 
 def read_clearance(table: Table, joint: str) -> Clearance | None:
-    """Return the bounds of the ``clearance`` table; None if the table is absent.
+    """Read the ``clearance`` table of a frame.
 
     Args:
-        table: table of a ``[[frame]]``.
+        table: ``[[frame]]`` table.
         joint: type of the joint.
 
     Returns:
-        The given bounds.
+        Clearance bounds, or None if the table is absent.
 
     Raises:
         BadInput: a key is unknown, or :func:`read_bounds` rejects a bound.
@@ -68,7 +68,7 @@ def read_clearance(table: Table, joint: str) -> Clearance | None:
     end = _fitted_end(inner)
     bounds = read_bounds(inner, joint)
     if end is not None:
-        # here the fit determines the bound of the rotation, not of the radial clearance
+        # this fit determines the rotation bound instead of the radial clearance
         rotation = end.bounds(bounds.radial or 0.0)
         bounds = replace(bounds, radial=None, **rotation)
     inner.finish()
@@ -76,19 +76,19 @@ def read_clearance(table: Table, joint: str) -> Clearance | None:
 
 
 def read_bounds(table: Table, joint: str) -> Clearance:
-    """Return the bounds of a ``clearance`` table, which can also contain other keys.
+    """Read the bounds in a ``clearance`` table, ignoring all other keys.
 
     Args:
-        table: the table.
+        table: ``clearance`` table.
         joint: type of the joint.
 
     Returns:
-        The given bounds.
+        Clearance bounds.
 
     Raises:
-        BadInput: a bound is not a number >= 0; it is ``inf`` and the joint is not
-            fixed; it is so small that its square is 0; or ``ball`` is given together
-            with another bound of the same motion.
+        BadInput: a bound is not a number >= 0, is ``inf`` although the joint is not
+            fixed, or is so small that its square underflows; or ``ball`` is given
+            together with a different bound on the same motion.
     """
     bounds = {
         key: _bound(table, key, unit, joint)
@@ -114,21 +114,21 @@ def read_bounds(table: Table, joint: str) -> Clearance:
 
 
 def _bound(table: Table, key: str, unit: str, joint: str) -> float:
-    """Return one bound; ``inf`` is accepted only for fixed joints."""
+    """Read a bound; ``inf`` is allowed only for fixed joints."""
     if joint == "fixed" and table.content[key] == math.inf:
         return float(table.get(key))
     return table.number(key, unit, least=0.0, largest=LARGEST_LENGTH)
 
 
 def read_fit(table: Table) -> str:
-    """Return the ISO 286 fit of the ``clearance`` table; empty if it has none."""
+    """Return the ISO 286 fit in the ``clearance`` table, or an empty string."""
     content = table.content.get("clearance")
     fit = content.get("fit") if isinstance(content, dict) else None
     return fit.strip() if isinstance(fit, str) else ""
 
 
 def read_fitted_end(table: Table) -> FittedEnd | None:
-    """Return the data of a fit that determines a tilt; None for ``radial``."""
+    """Return the data of a fit that determines a rotation bound, or None."""
     content = table.content.get("clearance")
     if not isinstance(content, dict) or "length" not in content:
         return None
@@ -136,31 +136,33 @@ def read_fitted_end(table: Table) -> FittedEnd | None:
 
 
 def _fitted_end(inner: Table) -> FittedEnd | None:
-    """Return ``length``, ``parts`` and ``bound`` of a clearance table with a fit."""
+    """Read ``length``, ``parts`` and ``bound`` of a clearance table with a fit."""
     if not inner.has("length"):
         return None
     for key, fault in (("fit", "missing"), ("parts", "missing")):
         if not inner.has(key):
-            raise inner.bad(key, f'{fault}; expected one with "length"')
+            raise inner.bad(key, f'{fault}; expected together with "length"')
     bound = inner.choice("bound", ("tilt", "spin"), "tilt")
     if inner.has(bound):
         fault = 'found together with "length", which determines the tilt'
-        raise inner.bad(bound, f"{fault}; expected one of them")
+        raise inner.bad(bound, f"{fault}; expected only one of them")
     length = inner.number("length", "m", above=_LEAST_LENGTH, largest=LARGEST_LENGTH)
     return FittedEnd(length, inner.text("parts"), bound)
 
 
 def fit_of(inner: Table) -> Fit | None:
-    """Return the fit of a clearance or of a bearing; None if it has none.
+    """Return the fit of a clearance or bearing, or None if there is none.
 
     Raises:
         BadInput: the text is not a fit, the fit is an interference fit, or ``radial``
-            is also given.
+            is given as well.
     """
     if not inner.has("fit"):
         return None
     if inner.has("radial"):
-        raise inner.bad("radial", 'found together with "fit", expected one of them')
+        raise inner.bad(
+            "radial", 'found together with "fit", expected only one of them'
+        )
     text = inner.text("fit", expected='a fit such as "12 H7/g6"')
     try:
         return clearance_fit(text)
@@ -169,20 +171,21 @@ def fit_of(inner: Table) -> Fit | None:
 
 
 def read_joint_stiffness(table: Table, free: int | None = None) -> NDArray | None:
-    """Return K_B as a full matrix with infinities only on its diagonal.
+    """Read K_B as a full matrix with infinite entries only on its diagonal.
 
     Args:
-        table: table of a ``[[frame]]``.
-        free: index of the direction along which a passive joint moves; zeros in its row
-            and column leave the motion free.  None if the joint is not passive.
+        table: ``[[frame]]`` table.
+        free: index of the direction in which a passive joint moves, whose row and
+            column may be zero to leave the motion free; None if the joint is not
+            passive.
 
     Returns:
-        (6, 6) [N m/rad .. N/m] symmetric positive definite matrix, except for a row and
-        column of zeros along a free motion; None if absent.
+        Symmetric positive definite matrix (6, 6) [N m/rad .. N/m], except for zeros in
+        the row and column of a free motion; None if the key is absent.
 
     Raises:
-        BadInput: the value has another shape, is not a stiffness, or contains ``inf``
-            along the free motion.
+        BadInput: the value has an invalid shape, is not a stiffness, or contains
+            ``inf`` along the free motion.
     """
     key = "joint_stiffness"
     if not table.has(key):
@@ -230,18 +233,18 @@ def _has_rows(value: list) -> bool:
 
 
 def definite(table: Table, key: str, K: NDArray) -> NDArray:
-    """Return a stiffness matrix after a check that it is positive definite.
+    """Check that a stiffness matrix is positive definite, and symmetrise it.
 
     Args:
-        table: the table that was read.
+        table: table with the matrix.
         key: key of the matrix in the table.
-        K: (n, n) [N m/rad .. N/m] finite matrix or submatrix of a stiffness.
+        K: finite stiffness matrix or submatrix (n, n) [N m/rad .. N/m].
 
     Returns:
-        (n, n) the same matrix, exactly symmetric.
+        The matrix (n, n), made exactly symmetric.
 
     Raises:
-        BadInput: the matrix is not positive definite; the message names an entry.
+        BadInput: the matrix is not positive definite; the message states why.
     """
     if not K.size:
         return K
@@ -258,7 +261,7 @@ def definite(table: Table, key: str, K: NDArray) -> NDArray:
         expected = f"expected between {1 / LARGEST:g} and {LARGEST:g}"
         fault = f"found {diagonal[i]:g} as term [{i + 1}, {i + 1}]"
         raise table.bad(key, f"{fault}, {expected}")
-    # scale to a unit diagonal, so that rad and m have equal weights
+    # scaled to a unit diagonal, so that rad and m have equal weights
     size = np.sqrt(diagonal)
     unit = np.clip(K, -1e150, 1e150) / np.outer(size, size)
     asymmetry = np.abs(unit - unit.T)
@@ -282,15 +285,15 @@ def definite(table: Table, key: str, K: NDArray) -> NDArray:
 def joint_table(
     clearance: Clearance | None, bolt: LockedAt | None, stiffness: NDArray | None
 ) -> dict[str, Any]:
-    """Return the clearance, bolt and springs of a joint as keys of a robot file.
+    """Return the clearance, bolting pose and stiffness of a joint for a robot file.
 
     Args:
-        clearance: clearance in use, or None.
+        clearance: operating clearance, or None.
         bolt: pose at which the joint is bolted, with its clearance before bolting.
-        stiffness: (6, 6) K_B; a diagonal matrix is written as a list of six numbers.
+        stiffness: K_B (6, 6); a diagonal matrix is written as a list of six numbers.
 
     Returns:
-        Keys and plain values; absent data are omitted.
+        Keys and plain values, omitting absent data.
     """
     table: dict[str, Any] = {}
     clearance = clearance if bolt is None else bolt.clearance

@@ -1,4 +1,4 @@
-"""Reading and writing of ``link`` in a robot file: the elasticity of a body."""
+"""Reading and writing of elastic links in robot files."""
 
 from pathlib import Path
 from typing import Any
@@ -20,9 +20,9 @@ from forcefit.inputs.table import Table, describe, quoted
 from forcefit.inputs.writing import path_from
 from forcefit.stiffness.surface.surface import UNITS
 
-_SMALLEST_LENGTH = 1e-12  # [m] smallest accepted length of a part
-# largest number of pieces of a beam; for a bend of 90 degrees, 8 pieces already have a
-# relative error of 1e-4
+_SMALLEST_LENGTH = 1e-12  # [m] smallest accepted length
+# maximum number of springs in series for a beam; 8 springs are sufficient for a
+# relative error of 1e-4 at a bending angle of 90 degrees
 _MOST_PIECES = 100
 _ONE_SECTION = (
     '"radius" [, "inner_radius"] or "width", "height" or '
@@ -30,7 +30,7 @@ _ONE_SECTION = (
 )
 _KINDS = ("beam", "stiffness", "mesh", "library", "model")
 _MATERIAL = ("young", "poisson", "density")
-# for each kind of section its keys, with their units
+# keys of each type of cross section, with their units
 _SECTIONS: dict[str, dict[str, str]] = {
     "round": {"radius": "m", "inner_radius": "m"},
     "rectangular": {"width": "m", "height": "m"},
@@ -42,15 +42,15 @@ _SECTIONS: dict[str, dict[str, str]] = {
 
 
 def read_link(frame: Table, span: NDArray) -> Link | None:
-    """Return the link of a ``[[frame]]`` table, which has exactly one kind.
+    """Read the link of a ``[[frame]]`` table.
 
     Args:
-        frame: the frame's table; its keys ``link`` and ``up`` are read.
-        span: (3,) [m] vector from the parent's origin to the frame's, in the frame's
-            axes.  It is required for link models of other distributions.
+        frame: table of the frame, whose keys ``link`` and ``up`` are read.
+        span: vector from the parent origin to the frame origin (3,) [m], in the frame
+            axes, which is required for link models from other distributions.
 
     Returns:
-        The link; None if the body is rigid.
+        Link, or None if the body is rigid.
 
     Raises:
         BadInput: the table violates a rule of the format.
@@ -60,9 +60,9 @@ def read_link(frame: Table, span: NDArray) -> Link | None:
     link = frame.table("link")
     kinds = [kind for kind in _KINDS if link.has(kind)]
     if not kinds and not set(link.content) <= {*_MATERIAL, "up", "pieces"}:
-        link.finish()  # reports a misspelt kind with a suggestion
+        link.finish()  # reports a misspelt key with a suggestion
     if len(kinds) != 1:
-        given = " and ".join(map(quoted, kinds)) or "no kind of link"
+        given = " and ".join(map(quoted, kinds)) or "no type of link"
         names = " | ".join(map(quoted, _KINDS))
         raise link.bad("", f"found {given}, expected exactly one of {names}")
     result: Link
@@ -82,7 +82,7 @@ def read_link(frame: Table, span: NDArray) -> Link | None:
 
 
 def _beam_link(link: Table) -> BeamLink:
-    """Return the beam link of ``beam = { ... }`` with its material."""
+    """Read ``beam = { ... }`` and the material."""
     beam = link.table("beam")
     theory = beam.choice("theory", ("timoshenko", "euler"), "timoshenko")
     length = _size(beam, "length", "m") if beam.has("length") else None
@@ -100,7 +100,7 @@ def _beam_link(link: Table) -> BeamLink:
 
 
 def _pieces(link: Table) -> int:
-    """Return the number of pieces of a beam (springs in series), by default 1."""
+    """Return the number of springs in series for a beam, 1 by default."""
     count = link.number("pieces", "-", 1.0, least=1.0, below=_MOST_PIECES + 1.0)
     if count != round(count):
         raise link.bad("pieces", f"found {count:g}, expected a whole number")
@@ -108,7 +108,7 @@ def _pieces(link: Table) -> int:
 
 
 def _section(beam: Table) -> dict[str, float]:
-    """Return the dimensions of a beam's section; there are three kinds of section."""
+    """Return the dimensions of the cross section of a beam."""
     keys_of_kind = {
         kind: [key for key in keys if beam.has(key)] for kind, keys in _SECTIONS.items()
     }
@@ -132,7 +132,7 @@ def _section(beam: Table) -> dict[str, float]:
 
 
 def _mesh_link(link: Table, frame: Table) -> MeshLink:
-    """Return the link of ``mesh = { surface, base, tip, ... }`` with its material."""
+    """Read ``mesh = { surface, base, tip, ... }`` and the material."""
     from forcefit.stiffness.fem.part_text import read_parts
 
     mesh = link.table("mesh")
@@ -164,7 +164,7 @@ def _mesh_link(link: Table, frame: Table) -> MeshLink:
 
 
 def _interface(mesh: Table, key: str) -> Any:
-    """Return an interface between mesh and joint as written, after a syntax check."""
+    """Return an interface of a mesh as written, after a syntax check."""
     from forcefit.stiffness.surface.interface import parse_interface
 
     value = mesh.require(key, 'an interface such as "z=0.452"')
@@ -189,7 +189,7 @@ def _check_interface_table(table: Table) -> None:
 
 
 def _library_link(link: Table) -> LibraryLink:
-    """Return the entry of ``library = "path/to/library#key"``."""
+    """Read ``library = "path/to/library#key"``."""
     value = link.text("library")
     path, _, key = value.rpartition("#")
     if not (path and key):
@@ -208,7 +208,7 @@ def _material(link: Table) -> dict[str, Any]:
 
 
 def _size(table: Table, key: str, unit: str) -> float:
-    """Return a positive number within limits that exclude overflow of its powers."""
+    """Return a positive number within limits that prevent overflow of its powers."""
     length = unit == "m"
     largest = LARGEST_LENGTH if length else LARGEST
     smallest = _SMALLEST_LENGTH if length else 1 / LARGEST
@@ -225,28 +225,31 @@ def _direction(table: Table, key: str) -> tuple[float, float, float] | None:
         return None
     vector = table.array(key, (3,), "direction", largest=LARGEST_LENGTH)
     if np.linalg.norm(vector) < _SMALLEST_LENGTH:
-        raise table.bad(key, f"found {describe(vector.tolist())}, expected a direction")
+        raise table.bad(
+            key,
+            f"found {describe(vector.tolist())}, expected a nonzero direction vector",
+        )
     x, y, z = vector.tolist()
     return x, y, z
 
 
 def _path(table: Table, key: str, path: str) -> Path:
-    """Return a path that is written relative to the folder of the robot file."""
+    """Resolve a path relative to the folder of the robot file."""
     if path.strip() in {"", ".", ".."}:
         raise table.bad(key, f"found {describe(path)}, expected the path of a file")
     return Path(table.file).parent / path
 
 
 def link_table(link: Link, folder: Path | None = None) -> dict[str, Any]:
-    """Return the keys of a frame's table that describe its link.
+    """Return the keys of a ``[[frame]]`` table that describe a link.
 
     Args:
         link: link of a robot.
-        folder: folder of the file to be written, to which paths are made relative; None
-            to leave paths unchanged.
+        folder: folder of the output file, to which paths are made relative; None to
+            leave paths unchanged.
 
     Returns:
-        The ``link`` table, and the frame's ``up`` for a mesh with this direction.
+        The ``link`` table, and ``up`` of the frame for a mesh with this direction.
     """
     if isinstance(link, MatrixLink):
         return {"link": {"stiffness": link.stiffness.tolist()}}
@@ -273,7 +276,7 @@ def link_table(link: Link, folder: Path | None = None) -> dict[str, Any]:
 
 
 def _from(folder: Path | None, path: Path) -> str:
-    """Return the text of a path relative to the folder of the new file."""
+    """Return a path relative to the folder of the output file."""
     if folder is None or path.is_absolute():
         return str(path)
     return path_from(folder.resolve(), path.resolve())

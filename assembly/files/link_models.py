@@ -1,14 +1,14 @@
-"""Link models that other distributions install, by entry points.
+"""Link models that other distributions provide through entry points.
 
-A distribution names a function for a kind of link::
+A distribution declares a function for a type of link::
 
     [project.entry-points."forcefit.link_models"]
     cone = "their_package:cone"
 
-``cone(span, values)`` returns K_E, (6, 6) [N m/rad .. N/m], at the end of the link in
-the axes of its frame. ``span`` is the vector (3,) [m] from the start of the link to its
-end, in these axes. ``values`` contains the numbers and texts that the robot file states
-for the link.  A ``BadInput`` that the function raises is the message for the user.
+``cone(span, values)`` returns K_E (6, 6) [N m/rad .. N/m] at the end of the link, in
+the frame axes. ``span`` is the vector from the start of the link to its end (3,) [m],
+in the same axes, and ``values`` contains the numbers and texts specified in the robot
+file.  The function may raise ``BadInput``, whose message is shown to the user.
 """
 
 from typing import Any
@@ -25,26 +25,24 @@ GROUP = "forcefit.link_models"
 
 
 def model_link(link: Table, span: NDArray) -> MatrixLink:
-    """Return the link of ``model = { name, ... }``.
+    """Read ``model = { name, ... }`` and compute the link stiffness.
 
     Args:
-        link: the link's table.
-        span: (3,) [m] from the start of the link to its end, in the frame's axes.
+        link: table of the link.
+        span: vector from the start of the link to its end (3,) [m], in the frame axes.
 
     Returns:
-        The link, with the stiffness that the model computes.
+        Link with the stiffness computed by the model.
 
     Raises:
-        BadInput: no installed distribution has this model, it cannot be imported, or
-            its result is not a stiffness matrix.
+        BadInput: no installed distribution provides this model, it cannot be imported,
+            or its result is not a stiffness matrix.
     """
     inner = link.table("model")
     name, names = inner.text("name"), installed_names(GROUP)
     if name not in names:
         hint = nearest(name, names) or "; none is installed"
-        fault = (
-            f"found {quoted(name)}, expected a link model of an installed package{hint}"
-        )
+        fault = f"found {quoted(name)}, expected an installed link model{hint}"
         raise inner.bad("name", fault)
     values = {key: value for key, value in inner.content.items() if key != "name"}
     try:
@@ -56,7 +54,7 @@ def model_link(link: Table, span: NDArray) -> MatrixLink:
 
 
 def _computed(compute: Any, words: str, span: NDArray, values: dict) -> NDArray:
-    """Return the (6, 6) stiffness that a link model computes, after a check."""
+    """Compute and check the stiffness (6, 6) of a link model."""
     found = naming_owner(compute, words)(span, values)
     try:
         K = np.asarray(found, dtype=float)

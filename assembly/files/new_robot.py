@@ -1,6 +1,6 @@
-"""Texts of new robot files of ``format = 2``, with comments, for ``forcefit new``.
+"""Templates for robot files with ``format = 2``, used by ``forcefit new``.
 
-The letters in the name of a kind are the joints of a leg, beginning at the base:
+The letters in the name of a template denote the joints of a leg, starting at the base:
 revolute, prismatic, universal, spherical.  The first R or P is driven.
 """
 
@@ -12,20 +12,19 @@ import numpy as np
 from forcefit.inputs.errors import BadInput, nearest, quoted
 
 MOST_LEGS = 12
-Vector = tuple[int, int, int]  # point [mm], or direction of any length
+Vector = tuple[int, int, int]  # point [mm], or direction of arbitrary length
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of robot.
+    """Template for a type of robot.
 
     Attributes:
         about: short description.
-        legs: usual number of legs.
-        step: step between the possible numbers of legs; every number is a multiple of
-            it.
-        platform: [mm] the platform's point.
-        body: function from the number of legs to the text of the legs.
+        legs: default number of legs.
+        step: the number of legs must be a multiple of this number.
+        platform: reference point of the platform [mm].
+        body: function that returns the text of the legs for a given number of legs.
     """
 
     about: str
@@ -40,15 +39,14 @@ def new_robot(name: str, kind: str, legs: int | None = None) -> str:
 
     Args:
         name: name of the robot.
-        kind: a key of :data:`KINDS`.
-        legs: number of legs; None for the usual number.
+        kind: key of :data:`KINDS`.
+        legs: number of legs; None for the default number.
 
     Returns:
-        Text of a file of bodies and joints with comments, which can be solved without
-        changes.
+        Text of a commented file with bodies and joints, which can be solved as it is.
 
     Raises:
-        BadInput: the kind is unknown, or it does not exist with this number of legs.
+        BadInput: the type is unknown, or does not support this number of legs.
     """
     if kind not in KINDS:
         raise BadInput(f"--kind: found {quoted(kind)}{nearest(kind, KINDS)}")
@@ -104,13 +102,13 @@ def _lengths(point: Vector) -> str:
 
 
 def _direction(vector: Vector) -> str:
-    """Return the text of a direction of small whole numbers."""
+    """Return the text of a direction, reduced to small integers."""
     x, y, z = (int(v) for v in np.array(vector) // np.gcd.reduce(vector))
     return f"[{x}, {y}, {z}]"
 
 
 def _leg(name: str, count: int, comment: str = "") -> str:
-    """Return the text that begins a leg and defines its copies."""
+    """Return the text at the start of a leg, which defines its copies."""
     comment = comment or f"{name}1, {name}2, ...: copies about the vertical"
     return (
         f'[[leg]]\nname = "{name}"                     # {comment}\n'
@@ -119,7 +117,7 @@ def _leg(name: str, count: int, comment: str = "") -> str:
 
 
 def _bodies(*names: str, **radii: str) -> str:
-    """Return the text of a leg's bodies; bodies with a radius are elastic."""
+    """Return the text of the bodies in a leg; bodies with a radius are elastic."""
     text = ""
     for name in names:
         text += f'[[leg.body]]\nname = "{name}"\n'
@@ -131,7 +129,7 @@ def _bodies(*names: str, **radii: str) -> str:
 
 
 def _joint(name: str, kind: str, between: str, at: Vector, *lines: str) -> str:
-    """Return the text of a leg's joint; ``between`` contains two names."""
+    """Return the text of a joint in a leg; ``between`` contains two names."""
     first, second = between.split()
     more = "".join(f"{line}\n" for line in lines)
     return (
@@ -141,7 +139,7 @@ def _joint(name: str, kind: str, between: str, at: Vector, *lines: str) -> str:
 
 
 def _axis(vector: Vector, key: str = "axis", comment: str = "") -> str:
-    """Return the line of a robot file that states a direction."""
+    """Return a line that specifies a direction."""
     line = f"{key} = {_direction(vector)}"
     return f"{line:<33}# {comment}" if comment else line
 
@@ -159,7 +157,7 @@ def _cross(a: Vector, b: Vector) -> Vector:
 
 def _pairs(foot: Callable[[int], Vector], end: Callable[[int], Vector], legs: int,
            leg: Callable[[Vector, Vector], str]) -> str:  # fmt: skip
-    """Return the text of legs in pairs, which are mirror images of each other."""
+    """Return the text of pairs of legs that are mirror images of each other."""
     text = ""
     for name, side in (("left", 1), ("right", -1)):
         text += _leg(name, legs // 2) + leg(foot(side), end(side))
@@ -167,7 +165,7 @@ def _pairs(foot: Callable[[int], Vector], end: Callable[[int], Vector], legs: in
 
 
 def _ups(legs: int) -> str:
-    """Return the legs of a Gough platform, whose six drives fix six freedoms."""
+    """Return the legs of a Gough platform."""
 
     def leg(a: Vector, b: Vector) -> str:
         along = _minus(b, a)
@@ -188,7 +186,7 @@ def _ups(legs: int) -> str:
 
 
 def _rus(legs: int) -> str:
-    """Return legs with cranks, and with rods to the platform."""
+    """Return legs with cranks, which are connected to the platform by rods."""
 
     def leg(a: Vector, b: Vector) -> str:
         elbow = a[0] + 120, a[1], a[2]
@@ -210,7 +208,7 @@ def _rus(legs: int) -> str:
 
 
 def _upu(legs: int) -> str:
-    """Return the legs of Tsai's 3-UPU, whose parallel axes make it translate."""
+    """Return the legs of Tsai's translational 3-UPU, which has parallel axes."""
     a, b, y = (240, 0, 0), (80, 0, 450), (0, 1, 0)
     along = _minus(b, a)
     inner = _cross(along, y)
@@ -242,7 +240,7 @@ def _prs(legs: int) -> str:
 
 
 def _rrr(legs: int) -> str:
-    """Return the legs of a robot whose platform moves in the plane of x and y."""
+    """Return the legs of a planar robot, which moves in the x-y plane."""
     z = _axis((0, 0, 1))
     return (
         _leg("leg", legs)

@@ -1,4 +1,4 @@
-"""Reading and writing of robot files (``docs/robot_files.md``), with all checks."""
+"""Reading, validation and writing of robot files (``docs/robot_files.md``)."""
 
 import math
 from collections.abc import Callable
@@ -58,63 +58,63 @@ from forcefit.inputs.writing import (
 from forcefit.stiffness.screws import rotation_matrix, rotation_vector
 
 Closing = Callable[[Robot], Robot]
-_LONGEST_NAME = 200  # largest number of characters of a name
-# largest number of frames; the closures of more frames would require minutes
+_LONGEST_NAME = 200  # [characters] maximum length of a name
+# maximum number of frames; with more frames, closing the loops would take minutes
 MOST_FRAMES = 2000
 
 
 def read_robot(path: Path | str, close: Closing | None = None) -> Robot:
-    """Return the robot of a robot file.
+    """Read a robot file.
 
     Args:
-        path: a ``.toml`` file in the public format.
-        close: function that makes the closures of the declared robot hold; None to
-            leave them unchanged.
+        path: ``.toml`` file in the public format.
+        close: function that closes the loops of the declared robot; None if they are
+            already closed.
 
     Returns:
-        The robot; its nominal closures hold in its home pose.  Meshes and libraries of
-        its links are not read: see
+        Robot whose nominal loops are closed in the home pose.  Link meshes and
+        libraries are not read; see
         :func:`forcefit.assembly.files.solved_links.solve_links`.
 
     Raises:
-        BadInput: the file violates a rule of the format, or a closure does not hold.
+        BadInput: the file violates a rule of the format, or a loop is not closed.
     """
     return robot_of(read_toml(Path(path)), Path(path).stem, close)
 
 
 def robot_of(root: Table, name: str, close: Closing | None = None) -> Robot:
-    """Return the robot of a robot file's root table.
+    """Return the robot described by the root table of a robot file.
 
     Args:
-        root: the table; paths in it are relative to the folder of ``root.file``.
-        name: name of the robot if the table has none.
+        root: root table, in which paths are relative to the folder of ``root.file``.
+        name: name of the robot, if the table does not specify one.
         close: see :func:`read_robot`.
 
     Returns:
-        The robot; its nominal closures hold in its home pose.
+        Robot whose nominal loops are closed in the home pose.
 
     Raises:
-        BadInput: the table violates a rule of the format, or a closure does not hold.
+        BadInput: the table violates a rule of the format, or a loop is not closed.
     """
     robot = declared_robot(root, name)
     try:
         robot = robot if close is None else close(robot)
         home = home_posture(robot)
-        place_callouts(home)  # only checks that the callouts fit the geometry
+        place_callouts(home)  # checks the callouts against the nominal geometry
         return with_spans(robot, home.coordinates)
     except BadInput as error:
         raise BadInput(f"{root.file}: {error}") from None
 
 
 def declared_robot(root: Table, name: str) -> Robot:
-    """Return the robot of a root table as written, without a check of its closures.
+    """Return the robot as written in a root table, without closing its loops.
 
     Args:
         root: root table of a robot file.
-        name: name of the robot if the table has none.
+        name: name of the robot, if the table does not specify one.
 
     Returns:
-        The robot; lengths of its beams can still be unknown.
+        Robot whose beam lengths may still be unknown.
 
     Raises:
         BadInput: the table violates a rule of the format.
@@ -139,7 +139,7 @@ def declared_robot(root: Table, name: str) -> Robot:
 
 
 def _drawn(root: Table, name: str, description: str) -> Robot:
-    """Return the robot of a file of bodies and joints."""
+    """Return the robot described by a file with bodies and joints."""
     drawing = read_drawing(root, name, description)
     root.finish()
     try:
@@ -147,16 +147,16 @@ def _drawn(root: Table, name: str, description: str) -> Robot:
     except BadInput as error:
         raise BadInput(f"{root.file}: {error}") from None
     if len(robot.frames) > MOST_FRAMES:
-        fault = f"found joints and bodies that make {len(robot.frames)} frames"
+        fault = f"found joints and bodies with {len(robot.frames)} frames in total"
         raise root.bad("", f"{fault}, expected at most {MOST_FRAMES}")
     return robot
 
 
 def _framed(root: Table, name: str, description: str) -> Robot:
-    """Return the robot of a file of frames and closures."""
+    """Return the robot described by a file with frames and closures."""
     platform = root.text("platform", expected="the name of a frame")
     tables = root.tables("frame"), root.tables("closure")
-    root.tables("tolerance")  # marked as used here; read when all frames are known
+    root.tables("tolerance")  # marked as read; parsed when all frames are known
     root.finish()
     if not 0 < len(tables[0]) <= MOST_FRAMES:
         fault = f"found {len(tables[0])}" if tables[0] else "missing"
@@ -183,7 +183,7 @@ def _framed(root: Table, name: str, description: str) -> Robot:
 
 
 def _learned_range(root: Table) -> dict[str, tuple[float, float]]:
-    """Return the range of each variable in the identification data; may be empty."""
+    """Return the range of each variable in the identification data."""
     ranges: dict[str, tuple[float, float]] = {}
     if not root.has("learned_range"):
         return ranges
@@ -199,7 +199,7 @@ def _learned_range(root: Table) -> dict[str, tuple[float, float]]:
 
 
 def _reference_point(root: Table) -> tuple[float, float, float] | None:
-    """Return the point at which the robot was identified; None if not given."""
+    """Return the point at which the robot was identified, or None."""
     if not root.has("reference_point"):
         return None
     x, y, z = root.array("reference_point", (3,), "m", largest=LARGEST_LENGTH).tolist()
@@ -207,8 +207,8 @@ def _reference_point(root: Table) -> tuple[float, float, float] | None:
 
 
 def _diagnosis(root: Table) -> dict[str, Any]:
-    """Return the diagnosis recorded in the file, with an absolute path."""
-    # texts, numbers and lists of the diagnosis are stored unchanged
+    """Return the diagnosis recorded in the file, with an absolute covariance path."""
+    # texts, numbers and lists are preserved unchanged
     content: dict[str, Any] = {}
     if root.has("diagnosis"):
         table = root.table("diagnosis")
@@ -228,7 +228,7 @@ def _diagnosis(root: Table) -> dict[str, Any]:
 
 
 def _is_record(value: object) -> bool:
-    """Return whether a value is a text, finite number, bool or list of these."""
+    """Return whether a value is a string, finite number, boolean or list of these."""
     if isinstance(value, list):
         return all(_is_record(one) for one in value)
     if isinstance(value, float):
@@ -238,8 +238,8 @@ def _is_record(value: object) -> bool:
 
 def _remarks(tables: list[Table]) -> tuple[str, ...]:
     """Return a remark on frames with ``dh`` but without ``alpha``."""
-    # other missing parameters are often meant to be zero, but a forgotten alpha changes
-    # the robot
+    # other missing parameters are usually meant to be zero, but a forgotten alpha
+    # changes the robot
     dh = {table.content["name"]: table.content.get("dh") for table in tables}
     without_alpha = [
         quoted(name) for name, given in dh.items() if given and "alpha" not in given
@@ -250,7 +250,10 @@ def _remarks(tables: list[Table]) -> tuple[str, ...]:
 
 
 def _fitted_ends(tables: list[Table]) -> dict[str, FittedEnd]:
-    """Return by frame the fits that determine a tilt; equal parts need equal fits."""
+    """Return the fits that determine a rotation bound, by frame.
+
+    Fits of the same parts must be equal.
+    """
     ends: dict[str, FittedEnd] = {}
     fits: dict[str, str] = {}
     for table in tables:
@@ -267,7 +270,7 @@ def _fitted_ends(tables: list[Table]) -> dict[str, FittedEnd]:
 
 
 def _fit_remarks(robot: Robot) -> tuple[str, ...]:
-    """Return a remark that the mean clearance of every fit is used."""
+    """Return a remark on the mean clearances that are used for fits."""
     texts = []
     for name, text in fits_by_parts(robot).items():
         fit = parse_fit(text)
@@ -279,7 +282,7 @@ def _fit_remarks(robot: Robot) -> tuple[str, ...]:
 
 
 def _frame(table: Table) -> Frame:
-    """Return the frame of one ``[[frame]]`` table."""
+    """Read a ``[[frame]]`` table."""
     name = table.text("name", longest=_LONGEST_NAME)
     table.place = f"frame {quoted(name)}"
     joint = table.choice("joint", JOINTS, "fixed")
@@ -327,13 +330,13 @@ def _frame(table: Table) -> Frame:
 
 
 def _numbers(table: Table, key: str, count: int, unit: str) -> NDArray:
-    """Return the lengths or angles of a key; zeros if the key is absent."""
+    """Return an array of lengths or angles; zeros if the key is absent."""
     zero = np.zeros(count)
     return table.array(key, (count,), unit, zero, largest=LARGEST_LENGTH)
 
 
 def _drive_force(table: Table, passive: bool) -> float:
-    """Return the force of a drive on a passive joint; 0 if it is not given."""
+    """Return the drive force on a passive joint, 0 by default."""
     if table.has("drive_force") and not passive:
         fault = f"found a force on a joint that is not passive; {FORCE_CONTROL}"
         raise table.bad("drive_force", fault)
@@ -341,7 +344,7 @@ def _drive_force(table: Table, passive: bool) -> float:
 
 
 def _limits(table: Table) -> tuple[float, float] | None:
-    """Return the least and largest commanded coordinate; None if not given."""
+    """Return the minimum and maximum commanded coordinate, or None."""
     if not table.has("limits"):
         return None
     least, most = table.array("limits", (2,), "rad or m", largest=LARGEST_LENGTH)
@@ -352,7 +355,7 @@ def _limits(table: Table) -> tuple[float, float] | None:
 
 
 def _tolerance(table: Table) -> NDArray | None:
-    """Return the standard deviations of the geometric error; None if not given."""
+    """Return the standard deviations of the geometric error, or None."""
     if not table.has("tolerance"):
         return None
     sigma = table.array("tolerance", (6,), "rad, m", largest=LARGEST_LENGTH)
@@ -363,7 +366,7 @@ def _tolerance(table: Table) -> NDArray | None:
 
 
 def _placement(table: Table) -> tuple[NDArray, NDArray]:
-    """Return translation and rotation vector, from their keys or from ``dh``."""
+    """Return the translation and rotation vector, given directly or by ``dh``."""
     given = [key for key in ("translation", "rotation") if table.has(key)]
     if not table.has("dh"):
         return (
@@ -389,7 +392,7 @@ def _placement(table: Table) -> tuple[NDArray, NDArray]:
 
 
 def _closure(table: Table, names: list[str]) -> tuple[str, str]:
-    """Return the two frames of one ``[[closure]]`` table."""
+    """Read a ``[[closure]]`` table."""
     value = table.require("frames", "two frame names")
     table.finish()
     proper = isinstance(value, list) and all(isinstance(v, str) for v in value)
@@ -402,9 +405,11 @@ def _closure(table: Table, names: list[str]) -> tuple[str, str]:
 
 
 def _check_known(table: Table, key: str, name: str, names: list[str]) -> None:
-    """Raise BadInput if a name is not the name of a frame."""
+    """Check that a name is the name of a frame."""
     if name == BASE:
-        message = 'found "base"; expected a frame (add a fixed one whose parent is it)'
+        message = (
+            'found "base"; expected a frame (add a fixed frame with parent "base")'
+        )
         raise table.bad(key, message)
     if name not in names:
         hint = nearest(name, names)
@@ -413,7 +418,7 @@ def _check_known(table: Table, key: str, name: str, names: list[str]) -> None:
 
 
 def _check_meeting_frames(robot: Robot) -> None:
-    """Check that a frame at which chains meet has a rigid joint."""
+    """Check that frames at which chains meet have rigid joints."""
     meeting = {"platform": [robot.platform]}
     for number, pair in enumerate(robot.closures, 1):
         meeting[f"closure[{number}].frames"] = list(pair)
@@ -434,13 +439,13 @@ def write_robot(robot: Robot, path: Path | str) -> None:
     """Write a robot file from which :func:`read_robot` reads the same robot.
 
     Args:
-        robot: the robot.
-        path: path of the new file; relative paths of meshes and libraries are written
-            relative to its folder.
+        robot: robot to write.
+        path: path of the output file, to whose folder relative paths of meshes and
+            libraries refer.
 
     Raises:
         BadInput: the file cannot be written, or a file exists that was not written by
-            this function and can contain comments.
+            this function and may contain comments.
     """
     check_writable(path, ROBOT)
     table = robot_table(robot, Path(path).parent)
@@ -457,8 +462,8 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
     """Return the content of a robot file.
 
     Args:
-        robot: any robot.
-        folder: folder of the file to be written, to which paths are made relative.
+        robot: robot to write.
+        folder: folder of the output file, to which paths are made relative.
 
     Returns:
         Plain values, from which :func:`robot_of` reads the same robot.
@@ -478,7 +483,7 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
 
 
 def _write_fit(clearance: dict[str, Any], robot: Robot, name: str) -> None:
-    """Replace the mean clearance of a frame's fit by the fit."""
+    """Replace the mean clearance at a frame by the fit that defines it."""
     end = robot.fitted_ends.get(name)
     del clearance["radial" if end is None else end.bound]
     clearance["fit"] = robot.fits[name]
@@ -488,11 +493,11 @@ def _write_fit(clearance: dict[str, Any], robot: Robot, name: str) -> None:
 
 
 def root_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
-    """Return the content of a robot file without its frames and closures.
+    """Return the content of a robot file except for its frames and closures.
 
     Args:
-        robot: any robot.
-        folder: folder of the file to be written, to which paths are made relative.
+        robot: robot to write.
+        folder: folder of the output file, to which paths are made relative.
 
     Returns:
         Plain values.
@@ -514,14 +519,14 @@ def root_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
 
 
 def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
-    """Return the content of ``[[frame]]`` without default values.
+    """Return the content of a ``[[frame]]`` table, omitting default values.
 
     Args:
         frame: frame of a robot.
-        folder: folder of the file to be written, to which paths are made relative.
+        folder: folder of the output file, to which paths are made relative.
 
     Returns:
-        Keys and plain values of the file format.
+        Keys and plain values in the file format.
     """
     table: dict[str, Any] = {"name": frame.name, "parent": frame.parent}
     table["translation"] = frame.translation.tolist()

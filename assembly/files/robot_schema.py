@@ -1,4 +1,4 @@
-"""JSON schema of a robot file for text editors: the keys that the reader accepts."""
+"""JSON schema of robot files, for completion and validation in text editors."""
 
 from forcefit.assembly.callouts.callout import HELD, LOCATIONS, ORIENTATIONS, SHAPES
 from forcefit.assembly.callouts.zone import DISTRIBUTIONS
@@ -170,7 +170,7 @@ _CONTACTS = record(
         width=number("width along y", "m"),
     ),
 )  # fmt: skip
-# in a universal joint, each of the two bearings can have its own value
+# each of the two bearings in a universal joint can have its own value
 _OF_JOINT = record(**{
     f"{key}_": Either((one, Listed(one)))
     for key, one in (

@@ -1,7 +1,7 @@
 """Stiffness of links given by a mesh or a library, computed when a robot is loaded.
 
-Afterwards the robot contains all data of its links that solvers need.  Solvers open no
-files and run no finite elements.
+The loaded robot contains all link data that solvers require, so that solvers neither
+read files nor run finite elements.
 """
 
 import hashlib
@@ -26,23 +26,23 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger("forcefit.links")
 _CACHE = logging.getLogger("forcefit.cache")
-# links of equal shape and material are solved only once per process
+# links with the same shape and material are solved only once per process
 _SOLVED: dict[str, MeshSolution] = {}
 
 
 def solve_links(robot: Robot) -> Robot:
-    """Compute the stiffness of every link given by a mesh or a library.
+    """Compute the stiffness of all links given by a mesh or a library.
 
     Args:
-        robot: robot as read from a file, or created in Python.
+        robot: robot read from a file or created in Python.
 
     Returns:
-        The robot for use in solvers; the same object if it has no such link.
+        Robot that solvers can use; the same object if it has no such links.
 
     Raises:
-        BadInput: a file cannot be read or is not usable, or an interface is invalid.
+        BadInput: a file is unreadable or unusable, or an interface is invalid.
     """
-    # libraries first, so that their errors are reported before the finite elements run
+    # libraries come first, so that their errors are reported before finite elements run
     frames = [
         frame
         for frame in sorted(robot.frames, key=lambda f: isinstance(f.link, MeshLink))
@@ -66,21 +66,21 @@ def _note(done: int, total: int) -> None:
 
 
 def solved_link(frame: Frame, accuracy: float = 0.005) -> Link:
-    """Return the link of one frame, with the data of its mesh or its library.
+    """Compute the stiffness of a mesh link, or read that of a library link.
 
     Args:
-        frame: frame with a mesh or a library link.
-        accuracy: required accuracy of the finite elements: error of every entry of K_E
+        frame: frame with a mesh or library link.
+        accuracy: required accuracy of the finite elements: error of each entry of K_E
             relative to sqrt(K_ii K_jj).
 
     Returns:
-        The link.
+        Link with its stiffness.
 
     Raises:
-        BadInput: a file cannot be read or is not usable, an interface is invalid,
-            ``up`` is parallel to the link, or the distance of the interfaces differs
-            from the distance of the two origins.
-        ValueError: the frame has another kind of link.
+        BadInput: a file is unreadable or unusable, an interface is invalid, ``up`` is
+            parallel to the link, or the distance between the interfaces differs from
+            the distance between the origins.
+        ValueError: the frame has neither a mesh nor a library link.
     """
     link, place = frame.link, f"frame {quoted(frame.name)}.link"
     try:
@@ -138,7 +138,7 @@ def _solve(
     ends = parse_interface(link.base, "base"), parse_interface(link.tip, "tip")
     base = interface_center(surface, ends[0], "base")
     tip = interface_center(surface, ends[1], "tip")
-    # before the finite elements run, because they take long
+    # checked before running the finite elements, which take longer
     _check_place(frame, link, tip - base)
     material = Material(link.young, link.poisson, link.density or 0.0)
     parts = [parse_part("parts", text) for text in link.parts]
@@ -149,13 +149,13 @@ def _solve(
 
 
 def _as_stored(solved: "MeshedLink") -> "MeshedLink":
-    """Return the solution without the surface, which only refinement needs."""
+    """Remove the surface from a solution, because only mesh refinement requires it."""
     solid = replace(solved.level.solid, walls={}, surface=None)
     return replace(solved, level=replace(solved.level, solid=solid))
 
 
 def _digest(path: Path) -> str:
-    """Return the SHA-256 of a file."""
+    """Return the SHA-256 hash of a file."""
     try:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
@@ -164,11 +164,11 @@ def _digest(path: Path) -> str:
 
 
 def _check_place(frame: Frame, link: MeshLink, mesh_span: NDArray) -> None:
-    """Raise BadInput if the distance of the interfaces differs from the origins'."""
+    """Check that the distance between the interfaces matches that of the origins."""
     try:
         section_axes(mesh_span, link.up)
     except BadInput as error:
-        raise BadInput(f'{error}; expected another direction of "up"') from None
+        raise BadInput(f'{error}; expected a different direction "up"') from None
     tip, wanted = mesh_turn(frame, mesh_span) @ mesh_span, between_origins(frame)
     most = 1e-6 + 1e-3 * float(np.linalg.norm(wanted))
     if link.axis is None and np.linalg.norm(tip - wanted) > most:
@@ -181,5 +181,5 @@ def _check_place(frame: Frame, link: MeshLink, mesh_span: NDArray) -> None:
 
 
 def _point(p: NDArray) -> str:
-    """Return the text of a point for a message."""
+    """Format a point for a message."""
     return "(" + ", ".join(f"{x:.6g}" for x in p) + ") m"

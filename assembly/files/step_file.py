@@ -1,4 +1,4 @@
-"""Plan files, which list the steps of an assembly (``docs/assembly_steps.md``)."""
+"""Reading of assembly plans, which list assembly steps (``docs/assembly_steps.md``)."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -69,41 +69,41 @@ def assemble_in_steps(
     errors: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
 ) -> list[StepResult]:
-    """Carry out a plan, or the plan of a file, and return the result of each step.
+    """Simulate the steps of an assembly plan.
 
     Args:
-        plan: the steps, or a TOML file with ``[[step]]`` tables.
-        posture: pose at which the robot of n frames is assembled.
-        errors: (k, n, 6) [rad, m] geometric errors of k machines; None for the errors
-            of the robot file.
-        gravity: (3,) [m/s^2] gravity in base axes, which acts from the beginning.  It
-            does not move parts that nothing holds yet.
+        plan: assembly plan, or a TOML file with ``[[step]]`` tables.
+        posture: posture in which the robot with n frames is assembled.
+        errors: geometric errors of k machines (k, n, 6) [rad, m]; None to use the
+            errors in the robot file.
+        gravity: gravity in base axes (3,) [m/s^2], which acts from the first step on.
+            Parts that are not held yet do not move under gravity.
 
     Returns:
-        The results, one per step.
+        Results of the steps, in order.
 
     Raises:
-        BadInput: the file violates a rule, or the plan does not fit the robot.
-        CannotAssemble: the conditions of rigid parts contradict each other.
-        FreeMotion: a load acts along a motion that nothing resists.
-        SolverFailed: the solver for the clearances did not converge.
+        BadInput: the file violates a rule, or the plan does not match the robot.
+        CannotAssemble: the constraints on rigid parts contradict each other.
+        FreeMotion: a load acts along a motion without resistance.
+        SolverFailed: the clearance solver did not converge.
     """
     steps = plan if isinstance(plan, Plan) else read_steps(plan, posture.robot)
     return run.assemble_in_steps(steps, posture, errors, gravity)
 
 
 def read_steps(path: Path | str, robot: Robot) -> Plan:
-    """Return the plan of a file, checked against a robot.
+    """Read an assembly plan and check it against a robot.
 
     Args:
         path: TOML file with ``[[step]]`` tables.
-        robot: the robot to be assembled.
+        robot: robot to be assembled.
 
     Returns:
-        The plan.
+        Assembly plan.
 
     Raises:
-        BadInput: the file violates a rule, or does not fit the robot.
+        BadInput: the file violates a rule, or the plan does not match the robot.
     """
     root = read_toml(path)
     tables = root.tables("step")
@@ -120,7 +120,7 @@ def read_steps(path: Path | str, robot: Robot) -> Plan:
 
 
 def _named(steps: list[Step], tables: list[Table]) -> tuple[Step, ...]:
-    """Return the steps; repeated default names get numbers."""
+    """Append numbers to repeated default names of steps."""
     count: dict[str, int] = {}
     named = []
     for step, table in zip(steps, tables, strict=True):
@@ -132,10 +132,10 @@ def _named(steps: list[Step], tables: list[Table]) -> tuple[Step, ...]:
 
 
 def _step(table: Table, robot: Robot) -> Step:
-    """Return the step of one ``[[step]]`` table."""
+    """Read a ``[[step]]`` table."""
     given = [kind for kind in KINDS if table.has(kind)]
     if len(given) != 1:
-        found = f"found {' and '.join(given)}" if given else "found no kind of step"
+        found = f"found {' and '.join(given)}" if given else "found no type of step"
         fault = f"{found}, expected one of {', '.join(KINDS)}"
         raise table.bad(given[-1] if given else "", fault)
     kind = given[0]
@@ -145,14 +145,14 @@ def _step(table: Table, robot: Robot) -> Step:
 
 
 def _name(table: Table, kind: str) -> str:
-    """Return the name of a step; by default its kind and the parts it acts on."""
+    """Return the name of a step, by default its type and the parts it acts on."""
     value = table.content[kind]
     parts = value if isinstance(value, list) else [value]
     return table.text("name", f"{kind} {' - '.join(map(str, parts))}", longest=400)
 
 
 def _fix(table: Table, name: str, robot: Robot) -> Fix:
-    """Return a step that fixes a frame, by default at its nominal position."""
+    """Read a step that fixes a frame, by default at its nominal position."""
     position = _values(table, "at", "rad or m")
     if position is None:
         position = dict.fromkeys(SCREW, 0.0)
@@ -160,31 +160,33 @@ def _fix(table: Table, name: str, robot: Robot) -> Fix:
 
 
 def _clamp(table: Table, name: str, robot: Robot) -> Step:
-    """Return a step that clamps a frame where it is, at a position, or by a force."""
+    """Read a step that clamps a frame: in place, at a position, or by a force."""
     frame = _frame(table, "clamp", robot)
     if not table.has("load"):
         position = _values(table, "at", "rad or m")
         return _held(table, Fix(name, frame, position, kind="clamp"))
     if table.has("at"):
-        raise table.bad("at", 'found "at" and "load", expected only one of them')
+        raise table.bad("at", 'found together with "load", expected only one of them')
     return Preload(name, frame, _wrench(table))
 
 
 def _held(table: Table, fix: Fix) -> Fix:
-    """Return a fixture with the stiffness stated in its table."""
+    """Add the stiffness specified in the table to a fixture."""
     stiffness = _values(table, "stiffness", "N m/rad or N/m") or {}
     for component, value in stiffness.items():
         if not 0 < value <= LARGEST:
             fault = f"found {value:g}, expected a number > 0, at most {LARGEST:g}"
             raise table.bad(f"stiffness.{component.lower()}", fault)
         if fix.position is not None and component not in fix.position:
-            fault = 'found a component that "at" leaves free, expected a fixed one'
+            fault = (
+                'found a component that "at" leaves free, expected a fixed component'
+            )
             raise table.bad(f"stiffness.{component.lower()}", fault)
     return replace(fix, stiffness=stiffness)
 
 
 def _join(table: Table, name: str, robot: Robot) -> Join:
-    """Return a step that closes a closure or bolts a joint."""
+    """Read a step that joins a closure or bolts a joint."""
     part = _part(table, "join", robot)
     locked: tuple[str, ...] = ()
     if isinstance(table.content.get("locked"), bool):
@@ -197,20 +199,20 @@ def _join(table: Table, name: str, robot: Robot) -> Join:
     leave_open = table.boolean("leave_open", False)
     if isinstance(part, str) and (locked or limit < inf or leave_open):
         key = "locked" if locked else "force_limit" if limit < inf else "leave_open"
-        fault = "found for a joint, which is bolted in its position; expected a closure"
+        fault = "found for a joint that is bolted in place; expected a closure"
         raise table.bad(key, fault)
     if leave_open and limit == inf:
-        raise table.bad("leave_open", 'found no "force_limit" with it, expected both')
+        raise table.bad("leave_open", 'found without "force_limit", expected both')
     return Join(name, part, locked, limit, leave_open)
 
 
 def _preload(table: Table, name: str, robot: Robot) -> Preload:
-    """Return a step that applies a load, which acts until it is released."""
+    """Read a step that applies a load, which acts until it is released."""
     return Preload(name, _frame(table, "preload", robot), _wrench(table))
 
 
 def _release(table: Table, name: str, robot: Robot) -> Release:
-    """Return a step that ends fixtures, clamps or loads of earlier steps."""
+    """Read a step that releases fixtures, clamps or loads of previous steps."""
     value = table.require("release", "the name of an earlier step, or a list of them")
     names = value if isinstance(value, list) else [value]
     if not names or not all(isinstance(n, str) for n in names):
@@ -220,13 +222,13 @@ def _release(table: Table, name: str, robot: Robot) -> Release:
 
 
 def _measure(table: Table, name: str, robot: Robot) -> Measure:
-    """Return a measurement step."""
+    """Read a measurement step."""
     part = _part(table, "measure", robot)
     return Measure(name, part, _names(table, "components", SCREW))
 
 
 def _adjust(table: Table, name: str, robot: Robot) -> Adjust:
-    """Return an adjustment step, with the reading that the adjustment minimises."""
+    """Read an adjustment step and the reading that it minimises."""
     components = _names(table, "components")
     reading = _part(table, "reading", robot)
     of: tuple[str, ...] = SCREW
@@ -252,7 +254,7 @@ _READERS: dict[str, Callable[[Table, str, Robot], Step]] = {
 
 
 def _frame(table: Table, key: str, robot: Robot) -> str:
-    """Return a frame's name; for a joint of several frames, its main frame."""
+    """Return the name of a frame, or of the main frame of a joint."""
     name = table.text(key, expected="the name of a frame")
     names = names_of(robot)
     if name not in names:
@@ -266,10 +268,10 @@ def _frame(table: Table, key: str, robot: Robot) -> str:
 
 
 def _part(table: Table, key: str, robot: Robot) -> tuple[str, str] | str:
-    """Return a frame, or the closure of two frames in either order.
+    """Return a frame, or a closure given by two frames in either order.
 
-    The closure that completes a joint can be named by the joint: ``ball`` then means
-    its frame ``ball.end``.
+    For a closure that completes a joint, the joint may be given instead of its last
+    frame, for example ``ball`` instead of ``ball.end``.
     """
     value = table.require(key, "a frame, or the two frames of a closure")
     if isinstance(value, str):
@@ -287,7 +289,7 @@ def _part(table: Table, key: str, robot: Robot) -> tuple[str, str] | str:
 def _names(
     table: Table, key: str, default: tuple[str, ...] | None = None
 ) -> tuple[str, ...]:
-    """Return the names of components of a screw."""
+    """Return a list of screw components."""
     if default is not None and not table.has(key):
         return default
     expected = f"a list of {', '.join(_COMPONENTS)}"
@@ -299,7 +301,7 @@ def _names(
 
 
 def _values(table: Table, key: str, unit: str) -> dict[str, float] | None:
-    """Return numbers by component of a screw; None if the key is absent."""
+    """Return numbers by screw component, or None if the key is absent."""
     if not table.has(key):
         return None
     inner, values = table.table(key), {}
@@ -312,13 +314,14 @@ def _values(table: Table, key: str, unit: str) -> dict[str, float] | None:
     inner.finish()
     if not values:
         raise table.bad(
-            key, f"found no component, expected some of {', '.join(_COMPONENTS)}"
+            key,
+            f"found no component, expected at least one of {', '.join(_COMPONENTS)}",
         )
     return values
 
 
 def _wrench(table: Table) -> np.ndarray:
-    """Return the (6,) [N m, N] wrench of ``load``."""
+    """Return the wrench (6,) [N m, N] given by ``load``."""
     inner = table.table("load") if table.has("load") else None
     if inner is None:
         raise table.bad("load", "missing; expected a table such as { fz = -50 }")
@@ -326,6 +329,6 @@ def _wrench(table: Table) -> np.ndarray:
     inner.finish()
     if not any(values):
         raise table.bad(
-            "load", f"found no component, expected some of {', '.join(_LOADS)}"
+            "load", f"found no component, expected at least one of {', '.join(_LOADS)}"
         )
     return np.array(values)

@@ -1,7 +1,7 @@
-"""Stored solutions of mesh links: finite elements of the same link run only once.
+"""Cache for the finite-element solutions of mesh links.
 
 A solution is identified by a hash of all data on which its numbers depend.  Files are
-written completely or not at all.  An unusable file counts as absent.
+written completely or not at all, and unusable files are ignored.
 """
 
 import hashlib
@@ -31,30 +31,29 @@ from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import whole_file
 
 _CACHE = logging.getLogger("forcefit.cache")
-# packages that read surfaces, mesh or solve; other versions of them can round
-# differently
+# packages that read surfaces, mesh or solve; rounding may differ between versions
 _LIBRARIES = ("numpy", "scipy", "pytetwild", "pypardiso", "mkl", "pyvista", "vtk",
               "gmsh", "meshio")  # fmt: skip
-_UNUSED = 90 * 86_400  # [s] time without use after which a solution is deleted
+_UNUSED = 90 * 86_400  # [s] unused solutions are deleted after this time
 
 
 def solution_key(link: MeshLink, digest: str, options: object) -> str:
-    """Return the key under which the solution of a link is stored.
+    """Return the cache key for the solution of a link.
 
     Args:
         link: link to be solved.  The path of its surface and the orientation of its
-            mesh are ignored, because a solution is expressed in the mesh's axes.
-        digest: SHA-256 of the surface file.
+            mesh are ignored, because solutions are expressed in mesh axes.
+        digest: SHA-256 hash of the surface file.
         options: :class:`forcefit.stiffness.fem.fea.FemOptions` of the solution.
 
     Returns:
-        A hash of the link, the options and the program; links with the same key have
-        equal solutions.
+        Hash of the link, the options and the program; links with the same key have
+        identical solutions.
     """
     from forcefit.stiffness.surface.surface_files import named_solid
 
     file, solid = named_solid(link.surface)
-    # only the suffix counts, because it determines the reader
+    # only the suffix is relevant, because it determines the reader
     name = Path(f"{file.suffix.lower()}#{solid}")
     content = replace(link, surface=name, up=None, frame_up=None, axis=None)
     text = "\n".join([digest, repr(content), repr(options), _program()])
@@ -63,22 +62,22 @@ def solution_key(link: MeshLink, digest: str, options: object) -> str:
 
 @cache
 def _program() -> str:
-    """Return the SHA-256 of the code that reads surfaces and solves links."""
+    """Return the SHA-256 hash of the code that reads surfaces and solves links."""
     return sources_hash(
         (forcefit.inputs, forcefit.stiffness, forcefit.assembly.files), _LIBRARIES
     )
 
 
 def stored_solution(key: str, solve: Callable[[], MeshSolution]) -> MeshSolution:
-    """Return the solution of a key: read from the disk, or solved and stored.
+    """Return a cached solution, or compute and store it.
 
     Args:
         key: result of :func:`solution_key`.
-        solve: function called if no solution is stored; other processes that need the
-            same key wait until it returns.
+        solve: function that computes the solution if it is not cached; other processes
+            that require the same solution wait until it returns.
 
     Returns:
-        The solution, bit-identical in both cases.
+        Solution, which is bit-identical in both cases.
     """
     folder = cache_folder()
     if folder is None:
@@ -89,7 +88,7 @@ def stored_solution(key: str, solve: Callable[[], MeshSolution]) -> MeshSolution
         _CACHE.info("finite elements of a link: stored in %s", path)
     else:
         with _one_process(path.with_suffix(".solving")):
-            # another process may have stored the solution meanwhile
+            # another process may have stored the solution in the meantime
             found = _read(path, key)
             if found is None:
                 found = solve()
@@ -99,7 +98,7 @@ def stored_solution(key: str, solve: Callable[[], MeshSolution]) -> MeshSolution
 
 @contextmanager
 def _one_process(mark: Path) -> Generator[None, None, None]:
-    """Let one process at a time continue; let all continue if the disk has no locks."""
+    """Let only one process at a time continue, if the disk supports locks."""
     with ExitStack() as stack:
         with suppress(OSError):
             stack.enter_context(locked_file(mark))
@@ -111,7 +110,7 @@ def _one_process(mark: Path) -> Generator[None, None, None]:
 
 
 def _read(path: Path, key: str) -> MeshSolution | None:
-    """Return the stored solution of a key; None if it is absent or invalid."""
+    """Read a cached solution; return None if it is absent or invalid."""
     try:
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as stored:
             content = json.loads(str(stored["content"]))
@@ -141,14 +140,14 @@ def _write(path: Path, key: str, solution: MeshSolution) -> None:
 
 
 def _remove_unused(folder: Path) -> None:
-    """Delete solutions that were not used for 90 days."""
+    """Delete solutions that have not been used for 90 days."""
     for path in folder.glob("link-*.npz"):
         if time.time() - path.stat().st_mtime > _UNUSED:
             path.unlink()
 
 
 def _encoded(value: Any, arrays: list[NDArray]) -> Any:
-    """Return a JSON-serializable value; arrays become indices into ``arrays``."""
+    """Encode a value for JSON; arrays are replaced by indices into ``arrays``."""
     if isinstance(value, np.ndarray):
         arrays.append(value)
         return {"array": str(len(arrays) - 1)}
@@ -169,7 +168,7 @@ def _encoded(value: Any, arrays: list[NDArray]) -> Any:
 
 
 def _decoded(value: Any, arrays: Mapping[str, NDArray]) -> Any:
-    """Return the value that was encoded by :func:`_encoded`."""
+    """Decode a value that was encoded by :func:`_encoded`."""
     if isinstance(value, list):
         return [_decoded(v, arrays) for v in value]
     if not isinstance(value, dict):

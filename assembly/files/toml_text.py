@@ -1,4 +1,4 @@
-"""TOML text of values and tables, with all digits of numbers and arrays on one line."""
+"""Formatting of TOML, with numbers at full precision and one line per array."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -15,12 +15,12 @@ def file_text(
     """Return the text of a robot file.
 
     Args:
-        values: values of the root table.
-        tables: tables by kind, each written as ``[[kind]]``.
-        diagnosis: values of the table ``[diagnosis]``, written before the other tables.
+        values: values in the root table.
+        tables: tables by type, each written as ``[[type]]``.
+        diagnosis: values in the table ``[diagnosis]``, which precedes all other tables.
 
     Returns:
-        The text; its first line marks files that can be overwritten.
+        Text whose first line marks the file as one that may be overwritten.
     """
     lines = [ROBOT_MARK, *_lines(values)]
     if diagnosis:
@@ -37,8 +37,8 @@ def _lines(table: Mapping[str, Any]) -> list[str]:
 
 
 def toml_value(value: Any) -> str:
-    """Return the text of a value in TOML."""
-    # not written by tomli-w, which puts every number of an array on a separate line
+    """Format a value in TOML."""
+    # tomli-w is not used, because it puts each number in an array on its own line
     if isinstance(value, bool | np.bool_):
         return str(value).lower()
     if isinstance(value, str):
@@ -52,11 +52,11 @@ def toml_value(value: Any) -> str:
 
 
 def _key(name: str) -> str:
-    """Return the text of a key, in quotes if necessary."""
+    """Format a key, with quotes if necessary."""
     bare = name and all(c.isascii() and (c.isalnum() or c in "-_") for c in name)
     return name if bare else toml_value(name)
 
 
 def _escaped(c: str) -> str:
-    """Return a character as it is written in double quotes."""
+    """Escape a character for a string in double quotes."""
     return f"\\u{ord(c):04x}" if c < " " or c in '"\\\x7f' else c

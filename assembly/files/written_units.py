@@ -1,4 +1,4 @@
-"""Lengths and angles of a file, given as numbers or as texts with a unit."""
+"""Lengths and angles in files, given as numbers or as texts with a unit."""
 
 import re
 from collections.abc import Sequence
@@ -6,7 +6,7 @@ from typing import Any
 
 from forcefit.inputs.table import BadInput, Table, describe
 
-UNITS = {  # for each dimension its units, as factors in m or rad
+UNITS = {  # units of each dimension, with conversion factors to m or rad
     "length": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
     "angle": {"rad": 1.0, "mrad": 1e-3, "deg": 0.017453292519943295},
 }
@@ -15,23 +15,22 @@ _TEXT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([A-Za-z]+
 
 
 def without_units(table: Table, key: str, dimension: str | Sequence[str]) -> None:
-    """Replace texts such as ``"200 mm"`` in a value by numbers in m or rad.
+    """Convert texts such as ``"200 mm"`` in a value to numbers in m or rad.
 
     Args:
-        table: table of the value; its content is changed.
-        key: key of the value, which can be absent, a number, a text, or lists of these.
-        dimension: ``"length"`` or ``"angle"``; or one dimension for each entry of a
-            list.
+        table: table with the value, which is modified in place.
+        key: key of the value, which may be absent, a number, a text, or a nested list.
+        dimension: ``"length"`` or ``"angle"``, or one dimension for each list entry.
 
     Raises:
-        BadInput: a text is not a number with a unit of that dimension.
+        BadInput: a text is not a number with a unit of the given dimension.
     """
     if key in table.content:
         table.content[key] = _plain(table, key, table.content[key], dimension)
 
 
 def _plain(table: Table, key: str, value: Any, dimension: str | Sequence[str]) -> Any:
-    """Return the value with texts replaced by numbers."""
+    """Convert the texts in a value to numbers."""
     if isinstance(value, list):
         if isinstance(dimension, str) or len(dimension) != len(value):
             dimension = [dimension if isinstance(dimension, str) else "length"] * len(
@@ -45,7 +44,7 @@ def _plain(table: Table, key: str, value: Any, dimension: str | Sequence[str]) -
 
 
 def _number(table: Table, key: str, text: str, dimension: str) -> float:
-    """Return the value of a text such as ``"200 mm"``, in m or rad."""
+    """Convert a text such as ``"200 mm"`` to a number in m or rad."""
     match = _TEXT.fullmatch(text)
     factor = UNITS[dimension].get(match.group(2)) if match else None
     if match is None or factor is None:

@@ -1,4 +1,4 @@
-"""Joint clearances, eqs (1)-(5): bounds of small screws, each of which is a cone.
+"""Joint clearances, eqs (1)-(5): second-order cone bounds on small screws.
 
 ======  ====================  =======  ==========================================
 symbol  code                  shape    meaning
@@ -6,12 +6,12 @@ symbol  code                  shape    meaning
 c-bar   ``clearance_bounds``  (n, 5)   [RXY RZ TXY TZ TXYZ], 0 rigid, inf free
 ======  ====================  =======  ==========================================
 
-The first four bounds are those of the paper.  The last bound, for (TX, TY, TZ), is a
-ball joint's clearance in its socket and replaces TXY and TZ.  The value is NaN for a
-bound that the joint does not use.
+The first four bounds are those of the paper.  The last one limits (TX, TY, TZ): it is
+the clearance of a ball joint in its socket and replaces TXY and TZ.  Bounds that a
+joint does not use are NaN.
 
-The free motion of a passive joint is treated as a clearance in one of these directions.
-This clearance is unbounded, or has the bound given in the file.
+The free motion of a passive joint is treated as a clearance in the corresponding
+direction, which is unbounded unless the robot file specifies a bound.
 """
 
 import numpy as np
@@ -19,27 +19,27 @@ from numpy.typing import NDArray
 
 from forcefit.assembly.model.robot import Clearance, Frame, Robot
 
-# components of the screw [RX RY RZ TX TY TZ] that each bound limits
+# components of the screw [RX RY RZ TX TY TZ] limited by each bound
 CONES = ((0, 1), (2,), (3, 4), (5,), (3, 4, 5))
 # keys of the five bounds in robot files
 BOUNDS = ("tilt", "spin", "radial", "axial", "ball")
 _BALL = BOUNDS.index("ball")
-# index of the bound of each screw component, for joints without the bound ``ball``
+# index of the bound on each screw component, for joints without the bound ``ball``
 _BOUND_OF_COMPONENT = (0, 0, 1, 2, 2, 3)
 
 
 def clearance_bounds(robot: Robot, own_axes_free: bool = False) -> NDArray:
-    """Return the bounds of every joint's clearance.
+    """Return the clearance bounds of all joints.
 
     Args:
-        robot: robot of n frames.
+        robot: robot with n frames.
         own_axes_free: whether passive joints with stiffness move freely about or along
-            their z axis.  If not, only the spring moves there, and ``spin``, if given,
-            is a clearance in series with the spring.
+            their z axis.  If False, only the spring moves in this direction, and a
+            given bound ``spin`` is a clearance in series with the spring.
 
     Returns:
-        (n, 5) [rad, rad, m, m, m] for [RXY RZ TXY TZ TXYZ]: 0 is rigid, inf is free,
-        NaN means that the joint does not have this bound.
+        Bounds (n, 5) [rad, rad, m, m, m] for [RXY RZ TXY TZ TXYZ]: 0 for rigid, inf for
+        free, NaN for bounds that the joint does not use.
     """
     bounds = np.zeros((len(robot.frames), len(BOUNDS)))
     for i, frame in enumerate(robot.frames):
@@ -56,16 +56,16 @@ def clearance_bounds(robot: Robot, own_axes_free: bool = False) -> NDArray:
 
 
 def component_bounds(bounds: NDArray) -> NDArray:
-    """Return the (n, 6) bounds of the screw components, from the bounds (n, 5)."""
+    """Convert clearance bounds (n, 5) to bounds (n, 6) on the screw components."""
     components = bounds[:, list(_BOUND_OF_COMPONENT)]
     return np.where(np.isnan(components), bounds[:, [_BALL]], components)
 
 
 def bound_name(columns: NDArray) -> str:
-    """Return the key of the bound of a cone, such as ``"tilt"``.
+    """Return the key of the bound that belongs to a cone, for example ``"tilt"``.
 
     Args:
-        columns: (6n, 1 to 3) columns of the cone, see
+        columns: columns of the cone (6n, 1 to 3); see
             :class:`forcefit.assembly.linear.closure.VirtualJoints`.
 
     Returns:
@@ -76,14 +76,14 @@ def bound_name(columns: NDArray) -> str:
 
 
 def own_cone(frame: Frame) -> int | None:
-    """Return the index of the bound of a passive joint's motion; None for a spring."""
+    """Return the index of the bound on a passive joint's free motion, or None."""
     if not frame.passive or frame.compliant:
         return None
     return 3 if frame.joint == "prismatic" else 1
 
 
 def scales_with_margin(robot: Robot) -> NDArray:
-    """Return (n, 5) bool: True for clearances, False for limits of free motions."""
+    """Return a mask (n, 5): True for clearances, False for limits on free motions."""
     scaled = np.ones((len(robot.frames), len(BOUNDS)), dtype=bool)
     for i, frame in enumerate(robot.frames):
         own = own_cone(frame)
@@ -93,23 +93,23 @@ def scales_with_margin(robot: Robot) -> NDArray:
 
 
 def has_bounded_motion(robot: Robot) -> bool:
-    """Return whether the motion of a passive joint is bounded."""
+    """Return whether the motion of at least one passive joint is bounded."""
     own = ~scales_with_margin(robot)
     return bool(np.isfinite(clearance_bounds(robot)[own]).any())
 
 
 def clearance_components(robot: Robot, screws: NDArray) -> NDArray:
-    """Return the components of clearance screws that the bounds limit.
+    """Return the components of clearance screws to which the bounds apply.
 
-    Component TZ of a helical joint is the translation relative to its thread,
-    TZ - h RZ.  All other components are those of the screw.
+    For a helical joint, component TZ is the translation relative to the thread,
+    TZ - h RZ.  All remaining components are those of the screw.
 
     Args:
-        robot: robot of n frames.
-        screws: (..., n, 6) [rad, m] clearances and motions of passive joints.
+        robot: robot with n frames.
+        screws: clearances and motions of passive joints (..., n, 6) [rad, m].
 
     Returns:
-        (..., n, 6) [rad, m]; the given array if there are no helical joints.
+        Components (..., n, 6) [rad, m]; the input array if there are no helical joints.
     """
     leads = np.array([frame.lead for frame in robot.frames])
     if not leads.any():
@@ -120,15 +120,15 @@ def clearance_components(robot: Robot, screws: NDArray) -> NDArray:
 
 
 def clearance_excess(screws: NDArray, bounds: NDArray) -> NDArray:
-    """Return the largest relative excess of clearance screws over cones, eqs (2)-(5).
+    """Return the largest relative violation of the clearance bounds, eqs (2)-(5).
 
     Args:
-        screws: (..., n, 6) [rad, m] clearance screws.
-        bounds: (n, 5) [rad, rad, m, m, m], see :func:`clearance_bounds`.
+        screws: clearance screws (..., n, 6) [rad, m].
+        bounds: bounds (n, 5) [rad, rad, m, m, m]; see :func:`clearance_bounds`.
 
     Returns:
-        (...) [-] largest value of size / bound - 1 over all positive finite bounds; for
-        a zero bound, the size in rad or m; at least 0.
+        Nonnegative violation (...) [-]: maximum of magnitude / bound - 1 over all
+        finite bounds.  For a zero bound, the magnitude in rad or m is used instead.
     """
     sizes = np.stack(
         [np.linalg.norm(screws[..., list(rows)], axis=-1) for rows in CONES], axis=-1
@@ -136,7 +136,7 @@ def clearance_excess(screws: NDArray, bounds: NDArray) -> NDArray:
     limited = np.isfinite(bounds)
     where_rigid = np.where(limited & (bounds == 0.0), sizes, 0.0)
     limited = np.broadcast_to(limited & (bounds > 0.0), sizes.shape)
-    with np.errstate(over="ignore"):  # division by a very small bound
+    with np.errstate(over="ignore"):  # a very small bound may cause overflow
         excess = np.divide(sizes, bounds, where=limited, out=np.ones_like(sizes)) - 1.0
     worst = np.maximum(excess, where_rigid).max(axis=(-2, -1))
     return np.maximum(0.0, worst)

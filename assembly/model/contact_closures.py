@@ -1,8 +1,8 @@
-"""Closures between parallel contacts of one joint; they are not loops of the mechanism.
+"""Closures between parallel contacts in a joint, which are not loops of the mechanism.
 
 A guide or a pad is modelled by two chains between the same two bodies
 (:mod:`forcefit.assembly.drawing.contacts`).  Each chain consists of fixed frames with
-clearances, and a closure joins the ends of the chains.
+clearances, and a closure connects the ends of both chains.
 """
 
 from functools import lru_cache
@@ -15,15 +15,14 @@ from forcefit.assembly.model.robot import Frame, Robot
 
 @lru_cache(maxsize=64)
 def contact_closures(robot: Robot) -> NDArray:
-    """Return which closures join the contacts of one joint.
+    """Identify the closures between contacts of the same joint.
 
     Args:
-        robot: any robot.
+        robot: robot whose closures are classified.
 
     Returns:
-        (closures,) bool, True if two conditions are satisfied: only clearances allow
-        the two frames of the closure to move relative to each other, and one of these
-        clearances is unbounded.
+        Mask (closures,), True if the two frames of the closure can move relative to
+        each other only within clearances, at least one of which is unbounded.
     """
     found = [_joins_contacts(robot, *pair) for pair in robot.closures]
     marks = np.array(found, dtype=bool)
@@ -33,36 +32,36 @@ def contact_closures(robot: Robot) -> NDArray:
 
 @lru_cache(maxsize=64)
 def contact_frames(robot: Robot) -> frozenset[str]:
-    """Return the names of the frames in the two chains of every contact closure."""
+    """Return the names of the frames in both chains of each contact closure."""
     pairs = zip(robot.closures, contact_closures(robot), strict=True)
     chains = [_apart(robot, *pair) for pair, of_contacts in pairs if of_contacts]
     return frozenset(frame.name for chain in chains for frame in chain)
 
 
 def _apart(robot: Robot, first: str, second: str) -> list[Frame]:
-    """Return the frames on the path from the base to only one of two frames."""
+    """Return the frames on the path from the base to exactly one of two frames."""
     paths = robot.on_path[[robot.index(first), robot.index(second)]]
     return [robot.frames[i] for i in np.flatnonzero(paths[0] != paths[1])]
 
 
 def _joins_contacts(robot: Robot, first: str, second: str) -> bool:
-    """Return whether two chains move only by clearances, one of which is unbounded."""
+    """Return whether a closure connects two contacts of the same joint."""
     apart = _apart(robot, first, second)
     return all(map(_moves_by_clearance, apart)) and any(map(_is_unbounded, apart))
 
 
 def _is_unbounded(frame: Frame) -> bool:
-    """Return whether a bound of the frame's clearance is infinite."""
+    """Return whether the frame has an unbounded clearance."""
     return frame.clearance is not None and np.inf in vars(frame.clearance).values()
 
 
 def _moves_by_clearance(frame: Frame) -> bool:
-    """Return whether a frame moves relative to its parent only by its clearance."""
+    """Return whether a frame moves relative to its parent only within a clearance."""
     others = frame.locked_at, frame.link, frame.joint_stiffness
     return frame.joint == "fixed" and all(other is None for other in others)
 
 
 def loops(robot: Robot) -> tuple[tuple[str, str], ...]:
-    """Return the closures of the mechanism, without those between contacts."""
+    """Return the closures of the mechanism, excluding those between contacts."""
     pairs = zip(robot.closures, contact_closures(robot), strict=True)
     return tuple(closure for closure, of_contacts in pairs if not of_contacts)

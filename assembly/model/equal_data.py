@@ -1,8 +1,8 @@
-"""Equality of objects by their data; each object computes a hash of its data once.
+"""Comparison of objects by their data, using a digest that is computed once per object.
 
-Numbers are compared bit by bit, so that equal objects have equal results and can share
-them.  For example, 0.0 and -0.0 count as different numbers, because an angle computed
-from them can be pi or -pi.  An integer equals the float of the same value.
+Numbers are compared bit by bit, so that equal objects have identical results, which can
+be cached.  For example, 0.0 differs from -0.0, because an angle computed from them can
+be pi or -pi.  An integer equals the float with the same value.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -19,7 +19,7 @@ _CACHED = {"_digest", "_hash"}
 
 
 class EqualData:
-    """Base class of frozen dataclasses (``eq=False``) that compare by their data."""
+    """Base class for frozen dataclasses (``eq=False``) compared by their data."""
 
     def __eq__(self, other: object) -> bool:
         if self is other:
@@ -32,7 +32,7 @@ class EqualData:
         return self._hash
 
     def _data(self) -> Iterable[Any]:
-        """Return the values by which objects are compared."""
+        """Return the values that are compared."""
         return _fields_of(self)
 
     @cached_property
@@ -47,18 +47,18 @@ class EqualData:
         return hash(self._digest)  # subclasses can compute a faster hash
 
     def __getstate__(self) -> dict[str, Any]:
-        # the digest is not pickled: hashes differ from process to process, and pickled
-        # links lack their solutions
+        # the digest is not pickled, because hashes differ between processes and pickled
+        # links do not contain their solutions
         return {key: value for key, value in vars(self).items() if key not in _CACHED}
 
 
 def _fields_of(thing: Any) -> Iterable[Any]:
-    """Return the values of the fields of a dataclass."""
+    """Return the field values of a dataclass."""
     return map(vars(thing).__getitem__, type(thing).__dataclass_fields__)
 
 
 def _feed(update: Callable[[bytes], None], value: Any) -> None:
-    """Add a value to a digest with its type and length, to distinguish all values."""
+    """Add a value to a digest, with its type and length to avoid ambiguity."""
     kind = type(value)
     if kind is np.ndarray:
         update(_head(value.dtype.char, value.shape))
@@ -77,7 +77,7 @@ def _feed(update: Callable[[bytes], None], value: Any) -> None:
 
 
 def _feed_parts(update: Callable[[bytes], None], value: Any) -> None:
-    """Add the parts of a value to a digest, or the text of a value without parts."""
+    """Add the items of a value to a digest, or its string if it has no items."""
     if is_dataclass(value):
         update(type(value).__name__.encode())
         parts = _fields_of(value)
@@ -95,5 +95,5 @@ def _feed_parts(update: Callable[[bytes], None], value: Any) -> None:
 
 @cache
 def _head(kind: str, shape: tuple[int, ...]) -> bytes:
-    """Return the bytes that precede the numbers of an array."""
+    """Return the bytes that precede the numbers of an array in a digest."""
     return f"a{kind}{shape}".encode()

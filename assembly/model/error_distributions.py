@@ -1,17 +1,18 @@
 """Probability distributions of geometric errors, and reproducible random draws.
 
-Each source is one component of one frame's delta l, equal to ``centre + scale s``:
+Each error source is one component of delta l at one frame, equal to
+``centre + scale s``:
 
 =========== ======================================================================
-uniform     s between -1 and 1; sizes from ``least`` to ``most`` with random signs,
-            or all positive (``signs = "literal"``, the paper's interval as printed)
-normal      s ~ N(0, 1), scale the standard deviation
-truncated   normal, cut off where abs(s) exceeds ``limit`` standard deviations
+uniform     magnitudes from ``least`` to ``most``, with random signs or all positive
+            (``signs = "literal"``, the interval as printed in the paper)
+normal      s ~ N(0, 1); the scale is the standard deviation
+truncated   normal, truncated where abs(s) exceeds ``limit`` standard deviations
 =========== ======================================================================
 
-The random numbers of draw i come from one position of a counter-based generator and do
-not depend on earlier draws.  A run can therefore be interrupted, resumed or distributed
-among processes without a change of its results.
+The random numbers for draw i are taken from a fixed position of a counter-based
+generator, independently of previous draws.  A run can therefore be interrupted, resumed
+or distributed over several processes without changing its results.
 
 Sources:
     Salmon, Moraes, Dror, Shaw (2011), Parallel random numbers: as easy as 1, 2, 3
@@ -32,30 +33,31 @@ from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 from forcefit.results.display import html_table, short_repr
 
 KINDS = ("uniform", "normal", "truncated")
-_LARGEST = 1e3  # [rad, m] upper limit of the numbers in a file of errors
-# names of the columns in the result of _rows
+_LARGEST = 1e3  # [rad, m] upper limit for numbers in a file with error distributions
+# names of the columns in the rows returned by _rows
 _COLUMNS = (
     "frame", "component", "kind", "centre", "scale", "least", "limit", "signed",
 )  # fmt: skip
-_WORDS = 4  # number of random numbers that one step of the Philox generator produces
+_WORDS = 4  # number of random numbers produced in one step of the Philox generator
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorSources:
-    """Independent random components of the geometric errors; m components in total.
+    """Independent random components of the geometric errors, m in total.
 
     Attributes:
-        robot: the robot of these frames.
-        frame: (m,) index of the frame.
-        component: (m,) component of the frame's screw.
-        kind: (m,) index into :data:`KINDS`.
-        centre: (m,) [rad or m] value at s = 0.
-        scale: (m,) [rad or m] factor by which s is multiplied, >= 0.
-        least: (m,) [-] smallest absolute value of s, below 1; only for uniform sources.
-        limit: (m,) [-] largest absolute value of s; only for truncated sources.
-        signed: (m,) bool, True if s can be positive or negative.
-        fixed: (n, 6) [rad, m] errors that are added to every draw, such as the
-            mismatch of the closures; None for zero.
+        robot: robot to which the frames belong.
+        frame: index of the frame (m,).
+        component: component of the error screw at the frame (m,).
+        kind: index into :data:`KINDS` (m,).
+        centre: value at s = 0 (m,) [rad or m].
+        scale: nonnegative factor by which s is multiplied (m,) [rad or m].
+        least: minimum absolute value of s (m,) [-], below 1; only for uniform sources.
+        limit: maximum absolute value of s (m,) [-]; only for truncated sources.
+        signed: whether s can be negative (m,).
+        fixed: errors (n, 6) [rad, m] that are added to each draw, for example to close
+            the loops; None for zero.
+        labels: name of each error, for example ``ball.TX``.
     """
 
     robot: Robot
@@ -83,33 +85,33 @@ class ErrorSources:
         return len(self.frame)
 
     def standard(self, uniform: NDArray) -> NDArray:
-        """Return the (..., m) values s for uniform random numbers between 0 and 1."""
+        """Transform uniform random numbers (..., m) in [0, 1) to values s (..., m)."""
         v = 2.0 * uniform - 1.0
         size = self.least + (1.0 - self.least) * np.where(self.signed, abs(v), uniform)
         uniform_values = np.where(self.signed, np.copysign(size, v), size)
         if not (self.kind > 0).any():
             return uniform_values
-        # only the part of the normal distribution between the limits is used
+        # the normal distribution is truncated at the limits
         tail = np.where(self.kind == 2, ndtr(-self.limit), 0.0)
         normal_values = ndtri(tail + np.maximum(uniform, 2.0**-54) * (1.0 - 2.0 * tail))
         return np.where(self.kind == 0, uniform_values, normal_values)
 
     def values(self, standard: NDArray) -> NDArray:
-        """Return the (..., m) [rad or m] errors for the values s."""
+        """Return the errors (..., m) [rad or m] for given values s."""
         return self.centre + self.scale * standard
 
     def uniforms(self, first: int, count: int, seed: int, stream: int = 0) -> NDArray:
-        """Return the (count, m) uniform random numbers in [0, 1) of some draws.
+        """Return the uniform random numbers that belong to a range of draws.
 
         Args:
-            first: number of the first draw.
+            first: index of the first draw.
             count: number of draws.
-            seed: seed of all draws, below 2^64.
-            stream: number of the stream; streams are independent.
+            seed: random seed, below 2^64.
+            stream: index of the random stream; different streams are independent.
 
         Returns:
-            The random numbers, one row for each draw.  The numbers of one draw do not
-            depend on ``first`` or ``count``.
+            Random numbers (count, m) in [0, 1), one row per draw.  Each row depends
+            only on the index of the draw, the seed and the stream.
         """
         steps = -(-max(1, len(self)) // _WORDS)
         philox = np.random.Philox(key=np.array([seed, stream], dtype=np.uint64))
@@ -118,24 +120,24 @@ class ErrorSources:
         return uniform[:, : len(self)]
 
     def draw(self, first: int, count: int, seed: int, stream: int = 0) -> NDArray:
-        """Return the (count, m) [rad or m] errors of draws; see :meth:`uniforms`."""
+        """Draw errors (count, m) [rad or m]; see :meth:`uniforms`."""
         return self.values(self.standard(self.uniforms(first, count, seed, stream)))
 
     def errors(self, values: NDArray) -> NDArray:
-        """Return (..., n, 6) [rad, m] delta l of every frame from values (..., m)."""
+        """Return delta l of all frames (..., n, 6) [rad, m] for values (..., m)."""
         full = np.zeros((*values.shape[:-1], len(self.robot.frames), 6))
         full[..., self.frame, self.component] = values
         return full if self.fixed is None else full + self.fixed
 
     @property
     def mean(self) -> NDArray:
-        """(m,) [rad or m] expected value of every error."""
+        """Expected value of each error (m,) [rad or m]."""
         one_sided = (self.kind == 0) & ~self.signed
         return self.centre + self.scale * np.where(one_sided, (1 + self.least) / 2, 0.0)
 
     @property
     def variance(self) -> NDArray:
-        """(m,) [rad^2 or m^2] variance of every error."""
+        """Variance of each error (m,) [rad^2 or m^2]."""
         a = self.least
         uniform = np.where(self.signed, (1 + a + a**2) / 3, (1 - a) ** 2 / 12)
         cut = np.where(self.kind == 2, self.limit, 8.0)
@@ -145,17 +147,17 @@ class ErrorSources:
         return self.scale**2 * np.where(self.kind == 0, uniform, normal)
 
     def of_numbers(self, slopes: NDArray) -> NDArray:
-        """Return derivatives by source (..., m), given those by error (..., n, 6)."""
+        """Select derivatives by source (..., m) from those by error (..., n, 6)."""
         return np.asarray(slopes[..., self.frame, self.component])
 
     @property
     def units(self) -> list[str]:
-        """Unit of each source."""
+        """Unit of each error."""
         return ["rad" if c < 3 else "m" for c in self.component.tolist()]
 
     @property
     def identity(self) -> list[NDArray]:
-        """Arrays that identify the draws: equal arrays mean equal draws."""
+        """Arrays that determine the draws for a given seed."""
         return [
             self.frame, self.component, self.kind, self.centre, self.scale,
             self.least, self.limit, self.signed,
@@ -163,20 +165,20 @@ class ErrorSources:
         ]  # fmt: skip
 
     def scaled(self, scale: NDArray) -> "ErrorSources":
-        """Return the same sources with new scales (m,) [rad or m]."""
+        """Return these sources with new scales (m,) [rad or m]."""
         return replace(self, scale=np.asarray(scale, dtype=float))
 
 
 def draw_generator(seed: int, draw: int, stream: int) -> np.random.Generator:
-    """Return the generator of the random numbers of one draw.
+    """Return a random generator for a single draw.
 
     Args:
-        seed: seed of all draws, below 2^64.
-        draw: number of the draw.
-        stream: number of a stream that :meth:`ErrorSources.uniforms` does not use.
+        seed: random seed, below 2^64.
+        draw: index of the draw.
+        stream: index of a stream that is not used by :meth:`ErrorSources.uniforms`.
 
     Returns:
-        A generator that depends only on these three numbers.
+        Generator that depends only on these three arguments.
     """
     philox = np.random.Philox(
         key=np.array([seed, stream], dtype=np.uint64),
@@ -189,23 +191,23 @@ def tolerance_sources(
     robot: Robot, tolerances: NDArray, frames: tuple[str, ...] | None = None,
     distribution: str = "uniform", deviations: float = 3.0,
 ) -> ErrorSources:  # fmt: skip
-    """Return the error sources for symmetric tolerances.
+    """Return error sources for symmetric tolerances.
 
     Args:
-        robot: robot of n frames.
-        tolerances: (6,) [rad, m] half widths of the tolerance intervals by component; 0
-            for a component without error.
-        frames: names of the frames and joints with errors.  If None, all frames whose
-            bodies have a geometric error or an elastic link.
-        distribution: ``"uniform"`` over the tolerance, or ``"truncated"``: normal, cut
-            at the tolerance.
+        robot: robot with n frames.
+        tolerances: half widths of the tolerance intervals (6,) [rad, m]; 0 for
+            components without error.
+        frames: names of the frames and joints with errors.  The default is all frames
+            whose bodies have a geometric error or an elastic link.
+        distribution: ``"uniform"`` over the tolerance interval, or ``"truncated"`` for
+            a normal distribution truncated at its ends.
         deviations: half width of the tolerance interval in standard deviations.
 
     Returns:
-        The sources, frame by frame.
+        Error sources, ordered by frame.
 
     Raises:
-        BadInput: a frame does not exist in the robot.
+        BadInput: the robot has no frame with one of the given names.
     """
     names = frames_named(robot, frames) if frames is not None else tuple(
         f.name for f in robot.frames if f.link is not None or f.geometric_error.any()
@@ -235,15 +237,16 @@ def tolerance_sources(
 def read_sources(
     path: Path | str, robot: Robot, fixed: NDArray | None = None
 ) -> ErrorSources:
-    """Return the error sources of a file; see ``docs/statistics.md``.
+    """Read error sources from a file; see ``docs/statistics.md``.
 
     Args:
         path: TOML file with ``[[errors]]`` tables.
-        robot: the robot with the frames named in the file.
-        fixed: (n, 6) [rad, m] errors that are added to every draw.
+        robot: robot with the frames named in the file.
+        fixed: errors (n, 6) [rad, m] that are added to each draw.
 
     Returns:
-        The sources in the order of the file; frames of a table in the robot's order.
+        Error sources in the order of the file; within a table, in the frame order of
+        the robot.
 
     Raises:
         BadInput: the file violates a rule.
@@ -269,7 +272,7 @@ def read_sources(
 
 
 def _rows(table: Table, robot: Robot) -> list[tuple]:
-    """Return one row per source of an ``[[errors]]`` table."""
+    """Return one row per error source in an ``[[errors]]`` table."""
     names = table.require("frames", "a list of frame names")
     if not isinstance(names, list) or not all(isinstance(n, str) for n in names):
         raise table.bad("frames", "expected a list of frame names")
@@ -300,7 +303,7 @@ def _rows(table: Table, robot: Robot) -> list[tuple]:
             if not (most[scale > 0] > 0).all():
                 raise table.bad(
                     "most",
-                    "expected a bound > 0 in every component whose deviation is > 0",
+                    "expected a bound > 0 for each component with a deviation > 0",
                 )
             limit = most / np.where(scale > 0, scale, 1.0)
     if not (scale >= 0).all():

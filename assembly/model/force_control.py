@@ -1,4 +1,4 @@
-"""Drives that apply a prescribed force and do not control the joint coordinate."""
+"""Force-controlled drives, which apply a prescribed force at a free joint."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -11,23 +11,24 @@ from forcefit.inputs.table import BadInput, nearest, quoted
 
 
 def with_drive_forces(robot: Robot, forces: Mapping[str, float]) -> Robot:
-    """Return a robot in which the named drives apply a given force and move freely.
+    """Switch the named drives to force control.
 
-    The joint of such a drive becomes passive.  Stiffness and clearance of the drive do
-    not act along its motion.  The force acts between its body and the part that its
-    joint carries.
+    The joint of a force-controlled drive becomes passive, and its stiffness and
+    clearance along the joint motion are removed.  The force acts between the body of
+    the frame and the part carried by the joint.
 
     Args:
-        robot: any robot.
-        forces: [N m or N] forces by the name of the drive's frame, positive in the
-            direction of increasing coordinate.
+        robot: robot with the drives.
+        forces: force [N m or N] by the name of the drive's frame, positive in the
+            direction of increasing joint coordinate.
 
     Returns:
-        The robot; the stiffness of its joints in other directions is unchanged.
+        Robot with force-controlled drives.  The joint stiffness in all remaining
+        directions stays unchanged.
 
     Raises:
-        BadInput: there is no drive of this name, or its stiffness couples its motion
-            with another direction.
+        BadInput: there is no drive with this name, or its stiffness couples the joint
+            motion with a different direction.
     """
     drives = [f.name for f in robot.frames if f.actuated or f.drive_force]
     for name in forces:
@@ -49,7 +50,7 @@ def with_drive_forces(robot: Robot, forces: Mapping[str, float]) -> Robot:
 
 
 def _released(frame: Frame, force: float) -> Frame:
-    """Return a frame whose joint moves freely under a constant force."""
+    """Return the frame with a joint that moves freely under a constant force."""
     if not frame.actuated:
         return replace(frame, drive_force=force)
     own, K, clearance = frame.own_axis, frame.joint_stiffness, frame.clearance
@@ -57,9 +58,9 @@ def _released(frame: Frame, force: float) -> Frame:
         others = np.arange(6) != own
         if K[own, others].any():
             raise BadInput(
-                f"frame {quoted(frame.name)}.joint_stiffness: found the drive's motion "
-                "coupled with other directions; expected zeros in its row and column "
-                "for a drive that applies a force"
+                f"frame {quoted(frame.name)}.joint_stiffness: found coupling between "
+                "the drive's motion and other directions; expected zeros in its row "
+                "and column for a force-controlled drive"
             )
         K = K.copy()
         K[own, own] = 0.0

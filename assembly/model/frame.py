@@ -1,9 +1,9 @@
-"""A frame of a manipulator: one body and the joint at the body's far end.
+"""Frame of a manipulator: a body and the joint at its distal end.
 
-The body connects the parent to the frame (``docs/robot_files.md``).  Small screws act
-at the frame, in its axes and in the paper's order: geometric error, link deformation,
-joint clearance, joint deformation.  The motion of the joint comes last.  It is about or
-along the z axis of the frame, and it moves the child frames.
+The body connects the parent to the frame (``docs/robot_files.md``).  The following
+small screws are composed at the frame, in its axes and in this order: geometric error,
+link deformation, joint clearance and joint deformation.  Last comes the motion of the
+joint about or along the z axis of the frame, which moves the child frames.
 """
 
 import math
@@ -28,29 +28,28 @@ LOCKED = (
     '0 (free, as a bearing), a number > 0 (a spring), or joint = "fixed"'
 )
 SLIDING_BALL = "found a bound on a sliding joint, expected radial"
-ONE_OF_BALL = 'found together with "ball", expected one of them'
+ONE_OF_BALL = 'found together with "ball", expected only one of them'
 NO_SPIN = "expected none: the motion along the thread has no clearance"
 
 FORCE_CONTROL = (
-    'expected a joint = "revolute" | "prismatic" | "helical" that is not actuated: a '
-    "drive that applies a force holds no coordinate"
+    'expected a joint = "revolute" | "prismatic" | "helical" that is not actuated, '
+    "because a force-controlled drive does not hold its coordinate"
 )
 
 
 @dataclass(frozen=True)
 class Clearance:
-    """Bounds of a joint's clearance, the paper's c-bar of eqs. (1)-(5).
+    """Clearance bounds of a joint, denoted by c-bar in eqs. (1)-(5) of the paper.
 
-    ``None`` means that the bound is not given.  The joint then has no clearance in this
-    direction.  Along the free motion of a passive joint, ``None`` means an unbounded
-    motion.
+    If a bound is ``None``, the joint has no clearance in this direction.  The only
+    exception is the free motion of a passive joint, which is then unbounded.
 
     Attributes:
-        radial: [m] radius of the disc for (TX, TY), eq. (2).
-        axial: [m] bound of abs(TZ), eq. (3).
-        tilt: [rad] radius of the disc for (RX, RY), eq. (4).
-        spin: [rad] bound of abs(RZ), eq. (5).
-        ball: [m] radius of the ball for (TX, TY, TZ), which replaces ``radial`` and
+        radial: radius of the disc for (TX, TY) [m], eq. (2).
+        axial: bound on abs(TZ) [m], eq. (3).
+        tilt: radius of the disc for (RX, RY) [rad], eq. (4).
+        spin: bound on abs(RZ) [rad], eq. (5).
+        ball: radius of the ball for (TX, TY, TZ) [m], which replaces ``radial`` and
             ``axial`` for a ball joint.
     """
 
@@ -66,25 +65,26 @@ class Clearance:
             raise BadInput(f"clearance.{key}: {ONE_OF_BALL}")
 
 
-# rules for the position in which a joint is bolted
+# rules that determine the position in which a joint is bolted
 LEFT = ("least", "uniform", "worst")
 
 
 @dataclass(frozen=True, eq=False)
 class LockedAt:
-    """A fixed joint with clearance that is bolted at one pose and rigid afterwards.
+    """Fixed joint with clearance that is bolted at one pose and is rigid thereafter.
 
     Attributes:
-        clearance: clearance of the joint before it is bolted.
-        pose: components ``tx .. rz`` [m, rad] of the platform at that pose.
-        joints: coordinates [rad or m] of drives at that pose, in place of ``pose``.  If
-            both are empty, the joint is bolted in the home pose.
-        left: position of the joint in its clearance when it is bolted, used for random
-            draws.  All three rules select among the positions of least energy:
-            ``"least"``, the least sum of squares; ``"uniform"``, a random position;
-            ``"worst"``, the largest pose error, which ``assembly error`` bounds.
-        screw: (6,) [rad, m] clearance that is locked in; it is part of the geometric
-            error.  Computed by :func:`forcefit.assembly.steps.bolted.bolt_joints`.
+        clearance: clearance of the joint before bolting.
+        pose: platform pose at which the joint is bolted, ``tx .. rz`` [m, rad].
+        joints: drive coordinates [rad or m] at that pose, as an alternative to
+            ``pose``.  If both are empty, the joint is bolted in the home pose.
+        left: position of the joint within its clearance at the time of bolting, used
+            for random draws.  Each rule selects one of the minimum-energy positions:
+            ``"least"`` the one with the minimum sum of squares, ``"uniform"`` a random
+            one, ``"worst"`` the one with the largest pose error, for which ``assembly
+            error`` computes bounds.
+        screw: locked-in clearance (6,) [rad, m], which is part of the geometric error.
+            Computed by :func:`forcefit.assembly.steps.bolted.bolt_joints`.
     """
 
     clearance: Clearance
@@ -104,43 +104,42 @@ class LockedAt:
 
 @dataclass(frozen=True, eq=False)
 class Frame(EqualData):
-    """One body and the joint at its far end; see the head of this module.
+    """Body and the joint at its distal end, as described at the top of this module.
 
     Attributes:
-        name: unique name of the frame; the part before a dot is the leg's name.
+        name: unique name of the frame; the part before a dot is the name of the leg.
         parent: name of the parent frame, or ``"base"``.
-        translation: (3,) [m] origin of the frame in the axes of the parent's frame
-            after the motion of the parent's joint.
-        rotation: (3,) [rad] rotation vector of the frame's axes relative to the same
-            axes of the parent's frame.
-        joint: type of the joint.  ``"revolute"`` rotates about the frame's z axis,
+        translation: origin of the frame (3,) [m], in the axes of the parent frame after
+            the motion of the parent joint.
+        rotation: rotation vector of the frame axes (3,) [rad], relative to the same
+            parent axes.
+        joint: type of the joint.  ``"revolute"`` rotates about the z axis of the frame,
             ``"prismatic"`` translates along it, ``"helical"`` does both, and
             ``"fixed"`` does not move.  The coordinate of a helical joint is the angle.
         actuated: whether a drive holds the joint at its commanded coordinate; otherwise
-            its motion is free.
-        position: [rad or m] joint coordinate in the home pose.
-        limits: [rad or m] least and largest coordinate that can be commanded; None
-            without limits.
-        geometric_error: (6,) [rad, m] geometric error delta l of the body.
-        tolerance: (6,) [rad, m] standard deviations of delta l about the given value. 0
-            means an exact component; None means that they are unknown.
-        clearance: clearance of the joint; None if it has none.
-        locked_at: pose at which a fixed joint is bolted, with its clearance before
-            bolting; None if it is not bolted.
-        joint_stiffness: (6, 6) stiffness K_B of the joint, or None.  ``inf`` on the
-            diagonal means a rigid direction.  Zeros in the row and column of a passive
-            joint's own motion leave this motion free.  If (6,) numbers are given, as in
-            robot files, they become the diagonal of the matrix.
-        drive_force: [N m or N] constant force of a drive on a passive joint, along the
-            motion of the joint; positive in the direction of increasing coordinate.
-        link: elasticity of the body, None if rigid.
-        mass: [kg] mass of the body in addition to the mass of its link.
-        centre_of_mass: (3,) [m] centre of this additional mass, in the frame's axes.
-        inertia: (3, 3) [kg m^2] moments of inertia of this additional mass about its
-            centre, in the frame's axes.  The matrix must be symmetric, and a rigid body
-            with its principal moments must exist.
-        pitch: [m] translation of a helical joint per turn, positive for a right-hand
-            thread; 0 for other joints.
+            the joint moves freely.
+        position: joint coordinate in the home pose [rad or m].
+        limits: minimum and maximum commanded coordinate [rad or m], or None.
+        geometric_error: geometric error delta l of the body (6,) [rad, m].
+        tolerance: standard deviations of delta l about the given value (6,) [rad, m]; 0
+            for exact components, None if unknown.
+        clearance: clearance of the joint, or None.
+        locked_at: pose at which a fixed joint is bolted, and its clearance before
+            bolting; None if the joint is not bolted.
+        joint_stiffness: stiffness K_B of the joint (6, 6), or None.  Rigid directions
+            have ``inf`` on the diagonal.  Zeros in the row and column of a passive
+            joint's own motion leave this motion free.  An array (6,), as in robot
+            files, specifies the diagonal.
+        drive_force: constant force of a drive on a passive joint [N m or N], along the
+            motion of the joint and positive in the direction of increasing coordinate.
+        link: elasticity of the body; None if rigid.
+        mass: mass of the body [kg], in addition to the mass of its link.
+        centre_of_mass: centre of this additional mass (3,) [m], in the frame axes.
+        inertia: moments of inertia of this additional mass about its centre (3, 3)
+            [kg m^2], in the frame axes.  The matrix must be symmetric, and its
+            principal moments must be those of a physically possible rigid body.
+        pitch: translation of a helical joint per turn [m], positive for a right-handed
+            thread; 0 for all remaining joint types.
     """
 
     name: str
@@ -176,13 +175,13 @@ class Frame(EqualData):
         if self.locked_at is not None and (self.joint != "fixed" or self.clearance):
             raise BadInput(
                 f"frame {quoted(self.name)}.locked_at: found a joint that moves or has "
-                'another clearance; expected joint = "fixed"'
+                'an additional clearance; expected joint = "fixed"'
             )
         if (self.joint == "helical") != (self.pitch != 0.0):
             raise BadInput(
                 f"frame {quoted(self.name)}.pitch: found {self.pitch:g} on a "
-                f"{self.joint} joint; expected 0 except on a helical joint, "
-                "where it is not 0"
+                f"{self.joint} joint; expected a nonzero pitch for a helical joint, "
+                "and 0 for all others"
             )
         if self.pitch and self.clearance and self.clearance.spin is not None:
             place = f"frame {quoted(self.name)}.clearance.spin"
@@ -203,18 +202,18 @@ class Frame(EqualData):
             fault = inertia_fault(self.inertia)
             if fault:
                 raise BadInput(f"frame {quoted(self.name)}.inertia: {fault}")
-            # files contain only the upper triangle
+            # symmetrised, because robot files contain only the upper triangle
             J = locked((self.inertia + self.inertia.T) / 2, (3, 3), "inertia")
             object.__setattr__(self, "inertia", J)
 
     @cached_property
     def _hash(self) -> int:
-        # these numbers differ between random errors and identified geometries
+        # these numbers distinguish robots with different errors or identified geometry
         numbers = self.translation.tobytes() + self.geometric_error.tobytes()
         return hash((self.name, numbers))
 
     def _figures(self) -> Figures:
-        """Return the fields in short form; rarely used fields only if not zero."""
+        """Return the fields in short form; rarely used fields are shown if nonzero."""
         shown = {f.name: brief(getattr(self, f.name)) for f in fields(self)[1:]}
         for name in ("drive_force", "pitch"):
             if not getattr(self, name):
@@ -226,17 +225,17 @@ class Frame(EqualData):
 
     @property
     def passive(self) -> bool:
-        """Whether the joint can move and has no position-controlled drive."""
+        """Whether the joint can move but has no position-controlled drive."""
         return self.joint != "fixed" and not self.actuated
 
     @property
     def compliant(self) -> bool:
-        """Whether the joint is passive and a spring resists its motion."""
+        """Whether the joint is passive and its motion is resisted by a spring."""
         return self.passive and bool(self.own_stiffness)
 
     @property
     def resistance(self) -> NDArray | None:
-        """(6, 6) K_B of the joint, zero along a passive motion; None if rigid."""
+        """K_B of the joint (6, 6), zero along a passive motion; None if rigid."""
         if self.joint_stiffness is not None or not self.passive:
             return self.joint_stiffness
         K = np.full(6, np.inf)
@@ -245,32 +244,32 @@ class Frame(EqualData):
 
     @property
     def lead(self) -> float:
-        """[m/rad] translation of a helical joint per angle, 0 for other joints."""
+        """Translation of a helical joint per angle [m/rad]; 0 for other joint types."""
         return self.pitch / (2 * math.pi)
 
     @property
     def turns(self) -> bool:
-        """Whether the coordinate is an angle: for revolute and helical joints."""
+        """Whether the coordinate is an angle (revolute and helical joints)."""
         return self.joint in {"revolute", "helical"}
 
     @property
     def own_axis(self) -> int:
-        """Index of the component of a screw that is the joint's motion: RZ or TZ.
+        """Index of the screw component of the joint motion: TZ if prismatic, else RZ.
 
-        TZ applies to prismatic joints.  RZ of a helical joint is its whole motion,
-        including the translation (:func:`forcefit.assembly.model.links.motion_map`).
+        For a helical joint, component RZ represents the complete motion, including the
+        translation; see :func:`forcefit.assembly.model.links.motion_map`.
         """
         return 5 if self.joint == "prismatic" else 2
 
     @property
     def own_stiffness(self) -> float | None:
-        """[N m/rad or N/m] K_B along the joint's motion; None without K_B."""
+        """K_B along the joint motion [N m/rad or N/m]; None without K_B."""
         K = self.joint_stiffness
         return None if K is None else float(K[self.own_axis, self.own_axis])
 
     @property
     def springs(self) -> NDArray | None:
-        """(6, 6) K_B of the springs, with ``inf`` along a free motion."""
+        """K_B of the springs (6, 6), with ``inf`` along a free motion, or None."""
         K = self.joint_stiffness
         if K is None or self.compliant or not self.passive:
             return K
@@ -294,15 +293,15 @@ def locked(value: ArrayLike, shape: tuple[int, ...], whose: str) -> NDArray:
     """Return a read-only copy of an array.
 
     Args:
-        value: the array, or a list of numbers.
-        shape: the required shape.
-        whose: name of the array, with which the error message begins.
+        value: array or nested list of numbers.
+        shape: required shape.
+        whose: name of the array, for error messages.
 
     Returns:
-        The array of floats.
+        Read-only array of floats.
 
     Raises:
-        ValueError: the shape differs, or a number is NaN.
+        ValueError: the shape is wrong, or the array contains NaN.
     """
     array = np.array(value, dtype=float)
     if array.shape != shape:
@@ -314,7 +313,7 @@ def locked(value: ArrayLike, shape: tuple[int, ...], whose: str) -> NDArray:
 
 
 def between_origins(frame: Frame) -> NDArray:
-    """Return the (3,) [m] vector from parent's to frame's origin, in frame axes."""
+    """Return the vector from the parent to the frame origin (3,) [m], in frame axes."""
     return np.asarray(rotation_matrix(frame.rotation).T @ frame.translation)
 
 
@@ -325,18 +324,18 @@ def beam_axis(frame: Frame) -> tuple[float, NDArray]:
         frame: frame whose link is a :class:`BeamLink`.
 
     Returns:
-        [m] length, and (3,) unit vector from base to tip in the frame's axes.
+        Length [m], and unit vector from base to tip (3,) in the frame axes.
 
     Raises:
-        ValueError: the frame has no beam, or the two origins coincide.
+        ValueError: the link is not a beam, or both origins coincide.
     """
     if not isinstance(frame.link, BeamLink):
         raise ValueError(f"frame '{frame.name}' has no beam")
     if frame.link.length is not None and frame.link.axis is not None:
         axis = np.array(frame.link.axis)
         return frame.link.length, axis / np.linalg.norm(axis)
-    # a revolute parent joint rotates the beam about its start: its length and direction
-    # in the frame's axes remain
+    # a revolute parent joint rotates the beam about its start, which changes neither
+    # its length nor its direction in the frame axes
     along = between_origins(frame)
     length = math.sqrt(along @ along)
     if length == 0.0:

@@ -1,8 +1,8 @@
-"""Series of frames that together form one joint with several freedoms.
+"""Series of frames that form one joint with several degrees of freedom.
 
-A series is recognised by the names of its frames, the types of their joints and their
-common point.  A robot file of bodies that was converted to a file of frames therefore
-keeps its joints.
+A series is recognised by the frame names, the joint types and the common point of the
+frames.  The joints are therefore preserved when a robot file with bodies is converted
+to a file with frames.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,9 +13,9 @@ import numpy as np
 from forcefit.assembly.model.frame import Frame
 from forcefit.stiffness.screws import rotation_matrix, transform
 
-_SAME = 1e-9  # [m] largest distance of two frames that count as one point
-# kind of joint by the ends of its frames' names and the types of their joints, in order
-# from the first body to the second
+_SAME = 1e-9  # [m] largest distance between frames that count as coincident
+# type of joint by the name endings and joint types of its frames, in order from the
+# first body to the second
 _SERIES: dict[tuple[tuple[str, str], ...], str] = {
     (("first", "revolute"), ("second", "revolute")): "universal",
     (
@@ -34,15 +34,15 @@ _SERIES: dict[tuple[tuple[str, str], ...], str] = {
 
 @dataclass(frozen=True)
 class NamedJoint:
-    """A joint that consists of several frames.
+    """Joint that consists of several frames.
 
     Attributes:
         name: name of the joint.
         kind: ``"universal"``, ``"spherical"``, ``"cylindrical"`` or ``"planar"``.
-        frames: names of its frames that can move, parents first.
-        main: name of the frame at the joint's point and in its axes.
-        carriers: names of the frames with its geometric error: two frames for a
-            universal joint, one for every other joint.
+        frames: names of the moving frames of the joint, parents first.
+        main: name of the frame whose origin and axes are those of the joint.
+        carriers: names of the frames that carry the geometric error of the joint: two
+            for a universal joint, otherwise one.
     """
 
     name: str
@@ -53,7 +53,7 @@ class NamedJoint:
 
 
 def joints_of(frames: Sequence[Frame]) -> dict[str, NamedJoint]:
-    """Return the joints of several frames by name, in the order of the frames.
+    """Return the joints that consist of several frames, by name in frame order.
 
     Args:
         frames: frames of a robot, parents first.
@@ -71,7 +71,7 @@ def joints_of(frames: Sequence[Frame]) -> dict[str, NamedJoint]:
 def _joint(
     known: Mapping[str, Frame], stem: str, parts: list[Frame]
 ) -> NamedJoint | None:
-    """Return the joint that frames with a common name form; None if they form none."""
+    """Return the joint formed by frames with a common name, or None."""
     ends = tuple((part.name[len(stem) + 1 :], part.joint) for part in parts)
     kind = _SERIES.get(ends) or _SERIES.get(ends[::-1])
     if kind is None or not _at_one_point(known, stem, parts):
@@ -84,7 +84,7 @@ def _joint(
 
 
 def _at_one_point(known: Mapping[str, Frame], stem: str, parts: list[Frame]) -> bool:
-    """Return whether frames are at one point, in series, with only contacts between."""
+    """Return whether frames coincide and are connected in series."""
     frame, T = parts[-1], np.eye(4)
     while frame is not parts[0]:
         T = transform(frame.translation, rotation_matrix(frame.rotation)) @ T

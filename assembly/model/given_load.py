@@ -1,4 +1,4 @@
-"""A load on the platform, as six numbers or by component: ``{"fz": -50}``."""
+"""Platform loads given as six numbers or by component, for example ``{"fz": -50}``."""
 
 from collections.abc import Mapping
 
@@ -16,20 +16,20 @@ COMPONENTS = tuple(name.lower() for name in WRENCH)
 
 
 def given_load(load: Load, whose: str = "load") -> NDArray:
-    """Return a load as an array.
+    """Convert a load to an array.
 
     Args:
-        load: (..., 6) [N m, N] ``[mx my mz fx fy fz]``; or a mapping from the names of
-            these components to numbers.  Each value is one number, or one number for
-            each of k points.  Components that are not given are zero.
-        whose: name of the argument, with which error messages begin.
+        load: array ``[mx my mz fx fy fz]`` (..., 6) [N m, N], or a mapping from these
+            component names to numbers.  Each value in the mapping is a single number or
+            an array with one number for each of k points.  Omitted components are zero.
+        whose: name of the argument, for error messages.
 
     Returns:
-        (..., 6) [N m, N]; (6,) or (k, 6) for a mapping.
+        Wrench (..., 6) [N m, N]; (6,) or (k, 6) for a mapping.
 
     Raises:
-        BadInput: a component is unknown, or is not a finite number of at most 1e40; the
-            message names the component.
+        BadInput: a component is unknown, or its value is not a finite number of
+            magnitude at most 1e40; the message names the component.
     """
     if not isinstance(load, Mapping):
         return np.array(load, dtype=float)
@@ -39,7 +39,7 @@ def given_load(load: Load, whose: str = "load") -> NDArray:
         shape = np.broadcast_shapes(*(values.shape for values in given.values()))
     except ValueError:
         counts = ", ".join(f"{name} {values.size}" for name, values in given.items())
-        expected = "expected one number per component, or equally many"
+        expected = "expected the same number of values for each component, or one"
         raise BadInput(f"{whose}: found {counts} numbers, {expected}") from None
     wrench = np.zeros((*shape, 6))
     for name, values in given.items():
@@ -48,13 +48,13 @@ def given_load(load: Load, whose: str = "load") -> NDArray:
 
 
 def one_load(load: Load) -> NDArray:
-    """Return one load as an array (6,) [N m, N].
+    """Convert a single load to an array (6,) [N m, N].
 
     Args:
         load: see :func:`given_load`.
 
     Returns:
-        Six numbers.
+        Wrench (6,) [N m, N].
 
     Raises:
         BadInput: the load is not six numbers or a mapping of components.
@@ -68,7 +68,7 @@ def one_load(load: Load) -> NDArray:
 
 
 def _numbers(value: ArrayLike, whose: str, name: str) -> NDArray:
-    """Return the value or values of a component as an array."""
+    """Convert the value or values of a component to an array."""
     expected = f"expected a number [{'N m' if name.startswith('m') else 'N'}]"
     whose = f"{whose} {name}"
     try:
@@ -77,6 +77,7 @@ def _numbers(value: ArrayLike, whose: str, name: str) -> NDArray:
         raise BadInput(f"{whose}: found {describe(value)}, {expected}") from None
     if numbers.ndim > 1 or not (np.abs(numbers) <= LARGEST).all():
         raise BadInput(
-            f"{whose}: found {describe(value)}, {expected} of size at most {LARGEST:g}"
+            f"{whose}: found {describe(value)}, {expected} of magnitude at most "
+            f"{LARGEST:g}"
         )
     return numbers

@@ -1,4 +1,4 @@
-"""Moments of inertia of rigid bodies: checks, conversion, and sums over bodies."""
+"""Moments of inertia of rigid bodies: validation, conversion and addition."""
 
 from collections.abc import Sequence
 
@@ -8,13 +8,13 @@ from numpy.typing import ArrayLike, NDArray
 # mass [kg], centre (3,) [m] and moments of inertia (3, 3) [kg m^2] about that centre
 MassProperties = tuple[float, NDArray, NDArray]
 
-# [-] accepted rounding of moments in files, relative to the largest moment
+# [-] tolerance for rounded moments in files, relative to the largest moment
 _ROUNDING = 1e-6
 _SIX = (np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2]))
 
 
 def inertia_matrix(six: ArrayLike) -> NDArray:
-    """Return the (3, 3) matrix with the entries Ixx, Iyy, Izz, Ixy, Ixz, Iyz."""
+    """Return the symmetric matrix (3, 3) of Ixx, Iyy, Izz, Ixy, Ixz and Iyz."""
     J = np.zeros((3, 3))
     J[_SIX] = six
     J[_SIX[::-1]] = six
@@ -22,45 +22,46 @@ def inertia_matrix(six: ArrayLike) -> NDArray:
 
 
 def six_moments(J: NDArray) -> list[float]:
-    """Return the entries Ixx, Iyy, Izz, Ixy, Ixz, Iyz of a (3, 3) matrix."""
+    """Return the entries Ixx, Iyy, Izz, Ixy, Ixz, Iyz of a matrix (3, 3)."""
     return [float(value) for value in J[_SIX]]
 
 
 def inertia_fault(J: NDArray) -> str:
-    """Return the reason why no body has these moments of inertia, or an empty text.
+    """Check that moments of inertia are physically possible.
 
     Args:
-        J: (3, 3) [kg m^2] moments of inertia.
+        J: moments of inertia (3, 3) [kg m^2].
 
     Returns:
-        Text for a message, with the found and the expected values.
+        Message with the values found and expected, or an empty string if the moments
+        are valid.
     """
     if not np.abs(J - J.T).max() <= _ROUNDING * np.abs(J).max():
-        return "found a matrix that is not symmetric, expected a symmetric one"
+        return "found a matrix that is not symmetric, expected a symmetric matrix"
     least, middle, most = np.linalg.eigvalsh(J)
     rounding = _ROUNDING * max(most, 0.0)
     if least < -rounding or most > least + middle + rounding:
         return (
             f"found principal moments {least:.4g}, {middle:.4g}, {most:.4g}; expected "
-            "none negative, and none larger than the sum of the other two"
+            "nonnegative moments, none of which exceeds the sum of the other two"
         )
     return ""
 
 
 def point_inertia(mass: float, arm: NDArray) -> NDArray:
-    """Return the (3, 3) [kg m^2] inertia of a point mass [kg] at ``arm`` (3,) [m]."""
+    """Return the inertia (3, 3) [kg m^2] of a point mass [kg] at ``arm`` (3,) [m]."""
     return np.asarray(mass * (arm @ arm * np.eye(3) - np.outer(arm, arm)))
 
 
 def joined_bodies(parts: Sequence[MassProperties]) -> MassProperties:
-    """Return mass, centre and moments of inertia of bodies that form one rigid body.
+    """Combine the mass properties of bodies that form one rigid body.
 
     Args:
         parts: mass, centre and moments of inertia of each body, in common axes.
 
     Returns:
-        Mass properties of the rigid body, by the parallel axis theorem.  The centre is
-        the origin if the mass is zero.
+        Mass, centre and moments of inertia of the rigid body, from the parallel axis
+        theorem.  If the mass is zero, the centre is the origin.
     """
     masses, centres = [mass for mass, _, _ in parts], [at for _, at, _ in parts]
     total, centre, J = float(sum(masses)), np.zeros(3), np.zeros((3, 3))

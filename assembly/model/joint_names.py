@@ -1,10 +1,11 @@
-"""Names of joints that consist of several frames, such as ``ball`` of ``ball.first``.
+"""Names of joints that consist of several frames, for example ``ball``.
 
-A joint of several freedoms is a series of passive frames at one point, each with one
-freedom (:mod:`forcefit.assembly.drawing.parts`).  One of these frames has the geometric
-error, the clearance and the springs of the joint.  In a universal joint, both frames
-have them.  A user names the joint; the functions of this module return the frames of
-that joint.  :mod:`forcefit.assembly.model.frame_series` finds the joints.
+A joint with several degrees of freedom is a series of coincident passive frames, for
+example ``ball.first``, each with one degree of freedom
+(:mod:`forcefit.assembly.drawing.parts`).  One of these frames carries the geometric
+error, clearance and springs of the joint; in a universal joint, both frames do.  Users
+refer to the joint, and this module finds the corresponding frames.  The joints
+themselves are found by :mod:`forcefit.assembly.model.frame_series`.
 """
 
 from collections.abc import Container, Sequence
@@ -13,7 +14,7 @@ from forcefit.assembly.model.frame_series import NamedJoint
 from forcefit.assembly.model.robot import BASE, Robot
 from forcefit.stiffness.screws import SCREW
 
-# ends of the names of the frames that model contacts (assembly/drawing/contacts.py)
+# name endings of the frames that model contacts (assembly/drawing/contacts.py)
 BORE = "bore_start", "bore_end"
 BEARING = "bearing_start", "bearing_end"
 _TURNS = "roll", "yaw_start", "yaw_end", "pitch_start", "pitch_end"
@@ -21,26 +22,26 @@ GUIDE, GUIDE_FAR = (
     tuple(f"{name}_{turn}" for turn in _TURNS) for name in ("guide", "guide_far")
 )
 PAD = "pad_1", "pad_2", "pad_3", "pad_4", "pad_5"
-# frames at which two chains of contacts begin and meet
+# frames at which two chains of contacts start and end
 CHAIN_START, CHAIN_END, FAR_END = "contacts_start", "contacts_end", "contacts_far_end"
 _CONTACTS = {
     *BORE, *BEARING, *GUIDE, *GUIDE_FAR, *PAD, CHAIN_START, CHAIN_END, FAR_END,
 }  # fmt: skip
-# for each component of a planar joint, the component of its frame slide_x, whose z axis
-# is the joint's x axis
+# for each component of a planar joint, the corresponding component of its frame
+# slide_x, whose z axis is the x axis of the joint
 _OF_PLANE = (2, 0, 1, 5, 3, 4)
 
 
 def row_of(robot: Robot, name: str) -> int:
-    """Return the row of the frame at the point and in the axes of a joint.
+    """Return the index of the frame whose origin and axes are those of a joint.
 
     Args:
-        robot: any robot.
+        robot: robot with the joint.
         name: name of a frame, or of a joint that consists of several frames.
 
     Returns:
-        The index of the frame.  For a universal or a spherical joint, this is its frame
-        ``first``; for a cylindrical or a planar joint, its frame ``turn``.
+        Index of the frame, which is ``first`` for a universal or spherical joint and
+        ``turn`` for a cylindrical or planar joint.
 
     Raises:
         BadInput: neither a frame nor a joint has this name.
@@ -50,16 +51,16 @@ def row_of(robot: Robot, name: str) -> int:
 
 
 def error_rows(robot: Robot, name: str) -> list[tuple[int, list[int]]]:
-    """Return the frames and components that contain the geometric error of a joint.
+    """Return the frames and components that carry the geometric error of a joint.
 
     Args:
-        robot: any robot.
+        robot: robot with the joint.
         name: name of a frame, or of a joint that consists of several frames.
 
     Returns:
-        For each frame with an error, its index, and its component for each of RX .. TZ
-        in the joint's axes.  A universal joint has two such frames, because each of its
-        bearings has the error.  Every other joint has one.
+        For each frame that carries the error, its index and its components that
+        correspond to RX .. TZ in the joint axes.  A universal joint has two such
+        frames, one per bearing; all remaining joints have one.
 
     Raises:
         BadInput: neither a frame nor a joint has this name.
@@ -72,16 +73,16 @@ def error_rows(robot: Robot, name: str) -> list[tuple[int, list[int]]]:
 
 
 def error_label(robot: Robot, row: int, component: int) -> str:
-    """Return the name of an error, such as ``ball.TX``.
+    """Return the name of an error component, for example ``ball.TX``.
 
     Args:
-        robot: any robot.
+        robot: robot with the frame.
         row: index of the frame.
-        component: component of the frame's error, 0 to 5 for RX .. TZ.
+        component: index of the component at the frame, 0 to 5 for RX .. TZ.
 
     Returns:
-        Name and component of the joint to which the frame belongs, if no other frame
-        has errors of that joint.  Otherwise the name and component of the frame.
+        Name and component of the joint, if the frame is the only one that carries the
+        error of this joint.  Otherwise the name and component of the frame.
     """
     name = robot.frames[row].name
     for joint in robot.joints.values():
@@ -93,15 +94,15 @@ def error_label(robot: Robot, row: int, component: int) -> str:
 
 
 def shown_name(robot: Robot, row: int) -> str:
-    """Return the name under which the clearance and the springs of a frame are shown.
+    """Return the displayed name for the clearance and springs of a frame.
 
     Args:
-        robot: any robot.
+        robot: robot with the frame.
         row: index of the frame.
 
     Returns:
-        The name of the joint to which the frame belongs, if no other frame has
-        clearance or springs of that joint.  Otherwise the name of the frame.
+        Name of the joint, if the frame is the only one that carries the clearance and
+        springs of this joint.  Otherwise the name of the frame.
     """
     name = robot.frames[row].name
     for joint in robot.joints.values():
@@ -111,17 +112,17 @@ def shown_name(robot: Robot, row: int) -> str:
 
 
 def clearance_name(robot: Robot, row: int, bound: str) -> str:
-    """Return the name under which a bound of a clearance is shown.
+    """Return the displayed name of a clearance bound.
 
     Args:
-        robot: any robot.
-        row: index of the frame that has the clearance.
+        robot: robot with the frame.
+        row: index of the frame with the clearance.
         bound: key of the bound: ``radial``, ``axial``, ``tilt``, ``spin`` or ``ball``.
 
     Returns:
-        For a contact of the joint ``rail``, ``"rail.clearance"``, because the bounds of
-        the contacts follow from the gaps of the joint.  Otherwise a name such as
-        ``"hinge.tilt"``.
+        A name such as ``"hinge.tilt"``.  For contacts of a joint ``rail``, the name is
+        ``"rail.clearance"``, because their bounds all follow from the gaps of the
+        joint.
     """
     if owner_of_contact(robot.frames[row].name, names_of(robot)):
         return f"{joint_of(robot, row)}.clearance"
@@ -132,13 +133,12 @@ def joint_of(robot: Robot, row: int) -> str:
     """Return the name of the drawn joint to which a frame belongs.
 
     Args:
-        robot: any robot.
+        robot: robot with the frame.
         row: index of the frame.
 
     Returns:
-        The name of the joint to which the frame belongs.  For a contact such as
-        ``foot.bore_start``, this is the joint ``foot``.  A frame of no such joint has
-        its own name.
+        Name of the joint, for example ``foot`` for the contact ``foot.bore_start``.  If
+        the frame does not belong to such a joint, the name of the frame.
     """
     frame = robot.frames[row]
     fixed = frame.joint == "fixed"
@@ -151,15 +151,15 @@ def joint_of(robot: Robot, row: int) -> str:
 
 
 def owner_of_contact(name: str, names: Container[str]) -> str:
-    """Return the joint or frame to which a contact belongs, or an empty text.
+    """Return the joint or frame to which a contact belongs.
 
     Args:
-        name: name of a frame, such as ``"foot.bore_start"``.
-        names: names of frames and joints.
+        name: name of a frame, for example ``"foot.bore_start"``.
+        names: names of all frames and joints.
 
     Returns:
-        ``"foot"`` for this example, if ``"foot"`` is one of ``names``.  Empty for a
-        frame that is not a contact.
+        For this example ``"foot"``, if it is contained in ``names``.  An empty string
+        if the frame is not a contact.
     """
     stem, _, end = name.rpartition(".")
     return stem if stem in names and end in _CONTACTS else ""
@@ -168,17 +168,17 @@ def owner_of_contact(name: str, names: Container[str]) -> str:
 def closing_names(
     closures: Sequence[Sequence[str]], names: Container[str]
 ) -> dict[str, str]:
-    """Return the names under which the frames are shown that a drawing adds at a loop.
+    """Return displayed names for the frames that a drawing adds at loop closures.
 
-    A drawn joint that closes a loop ends with a frame ``yrail.end``.  If the loop
-    closes at the base, the base has a frame ``yrail.base`` there.
+    A drawn joint ``yrail`` that closes a loop ends with a frame ``yrail.end``.  If the
+    loop is closed at the base, a frame ``yrail.base`` is added to the base.
 
     Args:
-        closures: pairs of names of frames.
-        names: names of frames and joints.
+        closures: pairs of frame names.
+        names: names of all frames and joints.
 
     Returns:
-        For each such frame, the name of the joint, or ``"base"``.
+        Name of the joint, or ``"base"``, for each added frame.
     """
     shown: dict[str, str] = {}
     for last, seat in closures:
@@ -191,26 +191,27 @@ def closing_names(
 
 
 def moves(robot: Robot, name: str) -> bool:
-    """Return whether a frame, or a joint of several frames, can move."""
+    """Return whether a joint, given by its name or its frame, can move."""
     return name in robot.joints or robot.frame(name).joint != "fixed"
 
 
 def names_of(robot: Robot) -> list[str]:
-    """Return the names of all frames, and of all joints of several frames."""
+    """Return the names of all frames and of all joints with several frames."""
     return [*(frame.name for frame in robot.frames), *robot.joints]
 
 
 def joint_paths(joint: NamedJoint, path: str) -> list[str]:
-    """Return the paths of the frames' numbers that one path of a joint's number means.
+    """Translate the path of a joint value to the paths of the frame values.
 
     Args:
         joint: joint that consists of several frames.
-        path: path such as ``"ball.clearance.ball"`` or ``"cross.geometric_error.rx"``.
-            The name of the leg at its beginning can be omitted.
+        path: path such as ``"ball.clearance.ball"`` or ``"cross.geometric_error.rx"``;
+            the leg name at the start may be omitted.
 
     Returns:
-        Paths in which the joint is replaced by the frame that has the number: two paths
-        for a universal joint, and none if the path does not belong to this joint.
+        Paths in which the joint name is replaced by the name of the frame that carries
+        the value: two paths for a universal joint, and none if the path does not belong
+        to this joint.
     """
     for name in (joint.name, joint.name.partition(".")[2]):
         if name and path.startswith(f"{name}."):

@@ -1,5 +1,5 @@
-"""Upper limits of numbers in files and options; larger numbers are mistakes."""
+"""Upper limits for numbers in files and options; larger numbers are rejected."""
 
-# [m] upper limit of lengths; also used for angles [rad] and components of directions
+# [m] upper limit for lengths, also used for angles [rad] and direction components
 LARGEST_LENGTH = 1e6
-LARGEST = 1e40  # [SI] upper limit of other numbers; its inverse is the lower limit
+LARGEST = 1e40  # [SI units] limit for other numbers; its inverse is the lower limit

@@ -1,4 +1,4 @@
-"""Elasticity models of a body: beam, stiffness matrix, mesh or library entry."""
+"""Elastic link models: beam, stiffness matrix, mesh and library entry."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -15,21 +15,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class BeamLink:
-    """A straight beam between the origins of the parent and of the frame.
+    """Straight beam between the origins of the parent and the frame.
 
     Attributes:
-        section: dimensions of the section, such as ``{"radius": 0.04}`` [m].
-        young: [Pa] Young's modulus.
-        poisson: [-] Poisson's ratio.
-        density: [kg/m^3] density; None if the link has no declared mass.
+        section: dimensions of the cross section, for example ``{"radius": 0.04}`` [m].
+        young: Young's modulus [Pa].
+        poisson: Poisson's ratio [-].
+        density: density [kg/m^3]; None if the link has no declared mass.
         theory: ``"timoshenko"`` or ``"euler"``.
-        length: [m] length of the beam; None for the distance between the two origins.
-        axis: unit vector from base to tip in the frame's axes, given together with
+        length: length of the beam [m]; None for the distance between both origins.
+        axis: unit vector from base to tip in the frame axes, given together with
             ``length``.
-        up: direction of the section's height in the frame's axes; None if it is not
-            given.
-        pieces: number of springs in series for finite motions; it has no effect on
-            small motions.
+        up: direction of the height of the cross section in the frame axes, or None.
+        pieces: number of springs in series for finite motions; without effect on small
+            motions.
     """
 
     section: dict[str, float]
@@ -45,10 +44,11 @@ class BeamLink:
 
 @dataclass(frozen=True, eq=False)
 class MatrixLink(EqualData):
-    """A link given by its stiffness K_E at the frame, in the frame's axes.
+    """Link given by its stiffness matrix.
 
     Attributes:
-        stiffness: (6, 6) [N m/rad .. N/m] symmetric positive definite.
+        stiffness: symmetric positive definite K_E (6, 6) [N m/rad .. N/m] at the frame,
+            in the frame axes.
     """
 
     stiffness: NDArray
@@ -60,14 +60,14 @@ class MatrixLink(EqualData):
 
 @dataclass(frozen=True, eq=False)
 class MeshSolution(EqualData):
-    """Finite-element solution of a mesh link, in the mesh's axes.
+    """Finite-element solution of a mesh link, in the axes of the mesh.
 
     Attributes:
         solved: stiffness and fields on the finest mesh.
-        young: [Pa] modulus used in the solution.
-        digest: SHA-256 of the surface file.
-        mass: (12, 12) [kg m^2 .. kg] consistent mass for screws of base and tip, each
-            at its end; zero without a density.
+        young: Young's modulus used in the solution [Pa].
+        digest: SHA-256 hash of the surface file.
+        mass: consistent mass matrix (12, 12) [kg m^2 .. kg] for the screws of base and
+            tip, each at its own interface; zero if no density is given.
     """
 
     solved: "MeshedLink"
@@ -82,23 +82,23 @@ class MeshSolution(EqualData):
 
 @dataclass(frozen=True)
 class MeshLink:
-    """A link whose K_E is computed by finite elements from its surface.
+    """Link whose K_E is computed by finite elements from its surface.
 
     Attributes:
-        surface: the surface file.
-        base: interface on the parent's side, as written in robot files.
-        tip: interface on the frame's side.
-        young: [Pa] Young's modulus.
-        poisson: [-] Poisson's ratio.
-        density: [kg/m^3] density, or None.
+        surface: surface file.
+        base: interface on the parent side, as specified in robot files.
+        tip: interface on the frame side.
+        young: Young's modulus [Pa].
+        poisson: Poisson's ratio [-].
+        density: density [kg/m^3], or None.
         unit: length unit of the surface file.
-        up: direction in the mesh's axes that, together with ``frame_up``, fixes the
-            rotation about the axis.
-        frame_up: the same direction in the frame's axes.
-        axis: direction from base to tip in the frame's axes; None for the direction
-            from the parent's origin to the frame's.
+        up: direction in the mesh axes that, together with ``frame_up``, fixes the
+            rotation about the link axis.
+        frame_up: the same direction in the frame axes.
+        axis: direction from base to tip in the frame axes; None for the direction from
+            the parent origin to the frame origin.
         interface: ``"rigid"`` or ``"distributing"``.
-        parts: parts of other materials, as read by
+        parts: parts with different materials, in the format of
             :func:`forcefit.stiffness.fem.part_text.parse_part`.
         solution: finite-element solution; None until
             :func:`forcefit.assembly.files.solved_links.solve_links` sets it.  It is
@@ -120,23 +120,22 @@ class MeshLink:
     solution: MeshSolution | None = field(default=None, compare=False, repr=False)
 
     def __getstate__(self) -> dict[str, Any]:
-        # a solution of tens of megabytes is not pickled; worker processes compute it
-        # again
+        # solutions of tens of megabytes are not pickled but recomputed by workers
         return {**vars(self), "solution": None}
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "MeshLink":
-        return self  # the object is frozen
+        return self  # instances are immutable
 
 
 @dataclass(frozen=True)
 class LibraryLink:
-    """A link whose K_E is an entry of a stiffness library.
+    """Link whose K_E is an entry of a stiffness library.
 
     Attributes:
         library: path of the library.
         key: key of the entry.
-        compliance: (6, 6) [rad/(N m) .. m/N] compliance of the entry at the frame, in
-            the frame's axes; None until
+        compliance: compliance of the entry (6, 6) [rad/(N m) .. m/N] at the frame, in
+            the frame axes; None until
             :func:`forcefit.assembly.files.solved_links.solve_links` sets it.
     """
 

@@ -1,4 +1,4 @@
-"""Lengths of links without a declared length: from a parent's origin to a frame's."""
+"""Lengths of links that extend from the origin of the parent to that of the frame."""
 
 from dataclasses import replace
 
@@ -11,31 +11,31 @@ from forcefit.inputs.table import BadInput, quoted
 from forcefit.stiffness.beam.beam import section_axes
 from forcefit.stiffness.screws import rotation_matrix
 
-_SAME_POINT = 1e-9  # [m] largest distance of two origins that count as coincident
+_SAME_POINT = 1e-9  # [m] largest distance between origins that count as coincident
 
 
 def with_spans(robot: Robot, home: NDArray) -> Robot:
-    """Return the robot with the lengths of all links computed and checked.
+    """Compute and check the lengths of all links.
 
-    A beam connects the two origins in the home pose.  If the parent's joint is
-    prismatic or helical and not at zero there, the distance differs from the frame's
-    translation, and the length is stored.
+    A beam connects both origins in the home pose.  If the parent joint is prismatic or
+    helical and its home coordinate is not zero, the distance between the origins
+    differs from the translation of the frame and is stored in the beam.
 
     Args:
         robot: robot as read from a file.
-        home: (n,) [rad or m] joint coordinates in the home pose.
+        home: joint coordinates in the home pose (n,) [rad or m].
 
     Returns:
-        The robot.  Beams whose length differs from the frame's translation have
+        Robot in which beams whose length differs from the translation of the frame have
         ``length`` and ``axis``.
 
     Raises:
-        BadInput: two origins coincide, or a direction is parallel to its beam.
+        BadInput: the origins of a link coincide, or ``up`` is parallel to its axis.
     """
     links: dict[str, Link] = {}
     for i, frame in enumerate(robot.frames):
         parent = robot.parents[i]
-        # a prismatic joint moves its children by q along z, a helical one by h q
+        # a joint moves its children along z, by q if prismatic and by h q if helical
         travel = own_screw(robot.frames[parent])[5] if parent >= 0 else 0.0
         shift = float(home[parent] * travel)
         shift = shift if abs(shift) > _SAME_POINT else 0.0
@@ -47,7 +47,7 @@ def with_spans(robot: Robot, home: NDArray) -> Robot:
 
 
 def _with_span(frame: Frame, link: BeamLink, shift: float) -> BeamLink:
-    """Return a beam with its length computed, after a check of its direction ``up``."""
+    """Compute the length of a beam, and check its direction ``up``."""
     if link.length is None or link.axis is None:
         axis = _span(frame, shift)
         length = float(np.linalg.norm(axis))
@@ -59,16 +59,16 @@ def _with_span(frame: Frame, link: BeamLink, shift: float) -> BeamLink:
         section_axes(axis, link.up)
     except BadInput as error:
         place = f"frame {quoted(frame.name)}.link.beam.up"
-        raise BadInput(f"{place}: {error}; expected another direction") from None
+        raise BadInput(f"{place}: {error}; expected a different direction") from None
     return spanned
 
 
 def _check_mesh(frame: Frame, link: MeshLink, shift: float) -> None:
-    """Raise BadInput if the direction or the rotation of a mesh is undefined."""
+    """Check that the direction and rotation of a mesh are defined."""
     if link.axis is None and shift:
         raise BadInput(
             f"frame {quoted(frame.name)}.link.mesh: found a mesh on a frame "
-            f"below a sliding joint whose home position is {shift:g} m; "
+            f"after a sliding joint with a home position of {shift:g} m; "
             'expected a home position of 0, or the "axis" of the mesh from '
             "base to tip"
         )
@@ -77,11 +77,11 @@ def _check_mesh(frame: Frame, link: MeshLink, shift: float) -> None:
         section_axes(axis, link.frame_up)
     except BadInput as error:
         place = f"frame {quoted(frame.name)}.up"
-        raise BadInput(f"{place}: {error}; expected another direction") from None
+        raise BadInput(f"{place}: {error}; expected a different direction") from None
 
 
 def _span(frame: Frame, shift: float) -> NDArray:
-    """Return (3,) [m] the vector from parent's to frame's origin, in frame axes."""
+    """Return the vector from the parent to the frame origin (3,) [m], in frame axes."""
     span = rotation_matrix(frame.rotation).T @ (frame.translation + [0.0, 0.0, shift])
     if np.linalg.norm(span) < _SAME_POINT:
         mesh = isinstance(frame.link, MeshLink)

@@ -1,12 +1,12 @@
-"""Largest stress in every link, computed from the wrench that the link transmits.
+"""Peak stress in each link, computed from the wrench that the link transmits.
 
-A link is clamped at its base and loaded by its frame's wrench at the tip; a beam with a
-density is also loaded by its weight.  The formulas for beams are in
-:mod:`forcefit.stiffness.beam.beam_stress`.  For links given by a surface, finite
-elements compute the stress of unit wrenches (:mod:`forcefit.stiffness.fem.stress`).
-The stress is singular at the edge of a clamped interface.  Points nearer to this edge
-than the radius of the interface are therefore omitted.  The stress of a link given only
-by its stiffness is unknown.
+A link is clamped at its base and loaded at the tip by the wrench at its frame; a beam
+with a density is also loaded by its own weight.  Beams are evaluated with the formulas
+in :mod:`forcefit.stiffness.beam.beam_stress`.  For links given by a surface, the
+stresses due to unit wrenches are computed by finite elements
+(:mod:`forcefit.stiffness.fem.stress`).  Because the stress is singular at the edge of a
+clamped interface, points closer to this edge than the interface radius are omitted.
+The stress is unknown for a link that is given only by its stiffness.
 """
 
 from collections.abc import Callable
@@ -22,21 +22,22 @@ from forcefit.stiffness.beam.beam import section_axes
 from forcefit.stiffness.beam.beam_stress import peak_beam_stress
 
 WEIGHTLESS = np.zeros(6)  # [N m, N]
-_CHUNK = 64  # wrenches per block: 64 x 20000 nodes x 6 numbers are 61 MB
+_CHUNK = 64  # wrenches per block; 64 x 20000 nodes x 6 numbers occupy 61 MB
 
 
 @dataclass(frozen=True, eq=False)
 class LinkStress:
-    """Peak stress of a link as a function of its wrench.
+    """Peak stress in a link as a function of its wrench.
 
     Attributes:
-        frame: name of the frame of the body.
-        row: index of that frame.
+        frame: name of the frame to which the link belongs.
+        row: index of this frame.
         method: ``"beam"`` or ``"finite elements"``, with a note on omitted points.
-        peak: function that returns (k,) [Pa] for (k, 6) [N m, N] wrenches of the link's
-            spring.  Its second argument, (k, 6) or (6,), is the part of the wrenches
-            due to the link's weight.  Both are at the frame, in its axes.
-        relative_error: [-] estimated error of the mesh; 0 for the formulas of beams.
+        peak: function that returns the peak stress (k,) [Pa] for wrenches of the link
+            spring (k, 6) [N m, N].  Its second argument, (k, 6) or (6,), is the part of
+            the wrenches due to the weight of the link.  Both refer to the frame and its
+            axes.
+        relative_error: estimated relative error due to the mesh [-]; 0 for beams.
     """
 
     frame: str
@@ -48,13 +49,13 @@ class LinkStress:
 
 @lru_cache(maxsize=16)
 def stressed_links(robot: Robot) -> tuple[LinkStress, ...]:
-    """Return the links whose stress can be computed, in the robot's order of frames.
+    """Return the links whose stress can be computed, in frame order.
 
     Args:
-        robot: any robot.
+        robot: robot with the links.
 
     Returns:
-        Beams with a declared shape of the section, and links given by a surface.
+        Beams with a declared cross section shape, and links given by a surface.
 
     Raises:
         BadInput: a mesh was not solved when the robot was loaded.
@@ -68,7 +69,7 @@ def stressed_links(robot: Robot) -> tuple[LinkStress, ...]:
 
 
 def stressed_names(robot: Robot) -> tuple[str, ...]:
-    """Return the frame names of :func:`stressed_links` without solving a link."""
+    """Return the frame names of :func:`stressed_links` without solving any link."""
     return tuple(
         frame.name for frame in robot.frames
         if isinstance(frame.link, MeshLink)
@@ -79,22 +80,22 @@ def stressed_names(robot: Robot) -> tuple[str, ...]:
 def peak_stresses(
     robot: Robot, wrenches: ArrayLike, at_tips: ArrayLike = 0.0
 ) -> NDArray:
-    """Return the largest von Mises stress in every link of :func:`stressed_links`.
+    """Return the peak von Mises stress in each link of :func:`stressed_links`.
 
     Args:
-        robot: robot of n frames.
-        wrenches: (..., n, 6) [N m, N] wrenches of every link's spring, at its frame in
-            its axes, see
+        robot: robot with n frames.
+        wrenches: wrenches of the link springs (..., n, 6) [N m, N], at each frame in
+            its axes; see
             :attr:`forcefit.assembly.linear.assembled.Assembly.wrenches`.
-        at_tips: (..., n, 6) [N m, N] part of the wrenches due to the links' weight, see
-            :attr:`forcefit.assembly.linear.load.FrameLoads.at_tips`.
+        at_tips: part of the wrenches due to the weight of the links (..., n, 6)
+            [N m, N]; see :attr:`forcefit.assembly.linear.load.FrameLoads.at_tips`.
 
     Returns:
-        (..., links) [Pa] in the order of :func:`stressed_links`.
+        Peak stresses (..., links) [Pa], in the order of :func:`stressed_links`.
 
     Raises:
         BadInput: a mesh was not solved when the robot was loaded.
-        ValueError: the shape does not fit the robot.
+        ValueError: the shape of ``wrenches`` does not match the robot.
     """
     w = np.asarray(wrenches, dtype=float)
     if w.shape[-2:] != (len(robot.frames), 6):
@@ -112,7 +113,7 @@ def peak_stresses(
 
 
 def _of_beam(frame: Frame) -> Callable[..., NDArray]:
-    """Return the peak stress of a beam as a function of its wrench."""
+    """Return the peak stress in a beam as a function of its wrench."""
     assert isinstance(frame.link, BeamLink)
     length, axis = beam_axis(frame)
     section, R = frame.link.section, section_axes(axis, frame.link.up)
@@ -120,7 +121,7 @@ def _of_beam(frame: Frame) -> Callable[..., NDArray]:
     def peak(wrench: NDArray, at_tip: NDArray = WEIGHTLESS) -> NDArray:
         tip = wrench - at_tip
         in_section_axes = np.hstack([tip[:, :3] @ R, tip[:, 3:] @ R])
-        # weight of the beam, half of which acts at the tip
+        # half of the weight of the beam acts at its tip
         weight = 2 * at_tip[..., 3:] @ R
         return peak_beam_stress(section, length, in_section_axes, weight)[0]
 
@@ -128,7 +129,7 @@ def _of_beam(frame: Frame) -> Callable[..., NDArray]:
 
 
 def _of_mesh(frame: Frame, row: int) -> LinkStress:
-    """Return the peak stress of a mesh link as a function of its wrench."""
+    """Return the peak stress in a mesh link as a function of its wrench."""
     from forcefit.stiffness.fem.stress import stress_influence, von_mises
 
     solved = mesh_solution(frame).solved

@@ -1,4 +1,4 @@
-"""Compliances of every body and joint of a robot."""
+"""Compliances of the bodies and joints of a robot."""
 
 from functools import lru_cache
 
@@ -20,16 +20,18 @@ from forcefit.stiffness.beam.sections import declared_section
 
 
 def link_compliances(robot: Robot) -> NDArray:
-    """Return the compliance of every body, K_E^-1 of eq. (6).
+    """Return the compliances of all bodies, K_E^-1 in eq. (6).
 
     Args:
-        robot: robot of n frames.
+        robot: robot with n frames.
 
     Returns:
-        (n, 6, 6) [rad/(N m) .. m/N] at each frame, in its axes; zero for rigid bodies.
+        Compliances (n, 6, 6) [rad/(N m) .. m/N] at each frame, in its axes; zero for
+        rigid bodies.
 
     Raises:
-        BadInput: a mesh or a library was not read when the robot was loaded.
+        BadInput: a mesh was not solved, or a library was not read, when the robot was
+            loaded.
     """
     C = np.zeros((len(robot.frames), 6, 6))
     for i, frame in enumerate(robot.frames):
@@ -38,10 +40,10 @@ def link_compliances(robot: Robot) -> NDArray:
     return C
 
 
-# results of the other frames stay cached if one frame of a robot changes
+# cached by frame, so that a change to one frame does not invalidate the others
 @lru_cache(maxsize=4096)
 def link_compliance(frame: Frame) -> NDArray:
-    """Return the (6, 6) compliance of a frame's body in its axes, a read-only array."""
+    """Return the read-only compliance (6, 6) of a frame's body, in the frame axes."""
     C = _compliance(frame)
     C.setflags(write=False)
     return C
@@ -67,14 +69,14 @@ def _compliance(frame: Frame) -> NDArray:
 
 
 def joint_compliances(robot: Robot) -> NDArray:
-    """Return the compliance of every joint, K_B^-1.
+    """Return the compliances of all joints, K_B^-1.
 
     Args:
-        robot: robot of n frames.
+        robot: robot with n frames.
 
     Returns:
-        (n, 6, 6) [rad/(N m) .. m/N] at each frame, in its axes; zero for directions
-        that are rigid, free or not given.
+        Compliances (n, 6, 6) [rad/(N m) .. m/N] at each frame, in its axes; zero for
+        directions that are rigid, free or not specified.
     """
     C = spring_compliances(robot)
     for i, frame in enumerate(robot.frames):
@@ -85,14 +87,14 @@ def joint_compliances(robot: Robot) -> NDArray:
 
 
 def spring_compliances(robot: Robot) -> NDArray:
-    """Return K_B^-1 of every joint in its components, see :func:`motion_map`.
+    """Return K_B^-1 of all joints in joint components; see :func:`motion_map`.
 
     Args:
-        robot: robot of n frames.
+        robot: robot with n frames.
 
     Returns:
-        (n, 6, 6) [rad/(N m) .. m/N]; zero for directions that are rigid, free or not
-        given.
+        Compliances (n, 6, 6) [rad/(N m) .. m/N]; zero for directions that are rigid,
+        free or not specified.
     """
     C = np.zeros((len(robot.frames), 6, 6))
     for i, frame in enumerate(robot.frames):
@@ -104,18 +106,18 @@ def spring_compliances(robot: Robot) -> NDArray:
 
 
 def compliance_factor(C: NDArray) -> NDArray:
-    """Return a factor L of a compliance C = L L^T; a screw L y has energy y.y/2.
+    """Factorise a compliance as C = L L^T, so that a screw L y has the energy y.y/2.
 
     Args:
-        C: (6, 6) symmetric positive semidefinite compliance in mixed units.
+        C: symmetric positive semidefinite compliance (6, 6) in mixed units.
 
     Returns:
-        (6, r) factor of full column rank r.
+        Factor L (6, r) with full column rank r.
     """
     size = np.sqrt(np.diag(C))
     soft = np.flatnonzero(size > 0)
-    # scale C to a unit diagonal first: entries in rad and m differ by many orders of
-    # magnitude
+    # C is scaled to a unit diagonal, because entries in rad and in m differ by many
+    # orders of magnitude
     scaled = C[np.ix_(soft, soft)] / np.outer(size[soft], size[soft])
     L = np.zeros((6, len(soft)))
     L[soft] = size[soft, None] * np.linalg.cholesky(scaled)
@@ -123,12 +125,12 @@ def compliance_factor(C: NDArray) -> NDArray:
 
 
 def own_screw(frame: Frame) -> NDArray:
-    """Return the (6,) unit screw of a joint's motion."""
+    """Return the unit screw of the joint motion (6,)."""
     return motion_map(frame)[:, frame.own_axis]
 
 
 def own_screws(robot: Robot) -> NDArray:
-    """Return the (n, 6) unit screws of the motions of all joints."""
+    """Return the unit screws of all joint motions (n, 6)."""
     frames = robot.frames
     screws = np.zeros((len(frames), 6))
     screws[np.arange(len(frames)), [frame.own_axis for frame in frames]] = 1.0
@@ -137,18 +139,18 @@ def own_screws(robot: Robot) -> NDArray:
 
 
 def motion_map(frame: Frame) -> NDArray:
-    """Return the (6, 6) map of a joint's components to its screw in the frame's axes.
+    """Return the map from joint components to the joint screw in the frame axes.
 
     The map is the identity except for helical joints.  Component RZ of a helical joint
-    is the motion along the thread, [0 0 1 0 0 h].  Component TZ is the additional
-    translation, TZ - h RZ.  K_B and clearances refer to these components, and so apply
-    relative to the thread.
+    is the motion along the thread, [0 0 1 0 0 h], and component TZ is the additional
+    translation, TZ - h RZ.  K_B and clearances refer to these components and therefore
+    act relative to the thread.
 
     Args:
-        frame: frame of a robot.
+        frame: frame with the joint.
 
     Returns:
-        (6, 6) map [-; m/rad in row TZ, column RZ].
+        Matrix (6, 6) [-; m/rad in row TZ, column RZ].
     """
     S = np.eye(6)
     S[5, 2] = frame.lead
@@ -156,18 +158,18 @@ def motion_map(frame: Frame) -> NDArray:
 
 
 def in_series(stiffness: NDArray | None, row: int, compliance: float) -> NDArray:
-    """Return K_B of a joint with an additional spring in series in one direction.
+    """Add a spring in series to K_B of a joint in one direction.
 
     Args:
-        stiffness: (6, 6) declared stiffness, None if rigid.
+        stiffness: declared stiffness (6, 6); None if rigid.
         row: index of the direction.
-        compliance: [rad/(N m) or m/N] compliance of the added spring.
+        compliance: compliance of the added spring [rad/(N m) or m/N].
 
     Returns:
-        (6, 6) stiffness with ``inf`` on the diagonal for rigid directions.
+        Stiffness (6, 6), with ``inf`` on the diagonal for rigid directions.
     """
     K = np.diag(np.full(6, np.inf)) if stiffness is None else np.array(stiffness)
-    free = np.diag(K) == 0.0  # a spring in series leaves a free motion free
+    free = np.diag(K) == 0.0  # free motions stay free with a spring in series
     K[free, free] = np.inf
     soft = np.isfinite(np.diag(K))
     C = np.zeros((6, 6))

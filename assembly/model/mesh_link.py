@@ -1,7 +1,7 @@
-"""Stored finite-element solution of a mesh link, in its frame's axes.
+"""Finite-element solutions of mesh links, transformed to frame axes.
 
-:func:`forcefit.assembly.files.solved_links.solve_links` solves the finite elements when
-a robot is loaded.
+The finite elements are solved by
+:func:`forcefit.assembly.files.solved_links.solve_links` when a robot is loaded.
 """
 
 from dataclasses import replace
@@ -25,8 +25,8 @@ def mesh_solution(frame: Frame) -> MeshSolution:
         frame: frame whose link is a :class:`forcefit.assembly.model.robot.MeshLink`.
 
     Returns:
-        The solution.  Its stiffness must be multiplied by :func:`modulus_factor` to
-        obtain the stiffness for the link's own modulus.
+        Solution, whose stiffness must be multiplied by :func:`modulus_factor` to obtain
+        the stiffness for Young's modulus of the link.
 
     Raises:
         BadInput: the link was not solved when the robot was loaded.
@@ -47,12 +47,12 @@ def refuse_unsolved(frame: Frame) -> NoReturn:
 
 
 def modulus_factor(frame: Frame) -> float:
-    """Return the ratio of a mesh link's modulus to that of its solution."""
+    """Return the ratio of Young's modulus of a mesh link to that of its solution."""
     return _mesh(frame).young / mesh_solution(frame).young
 
 
 def mesh_link_stiffness(frame: Frame) -> LinkStiffness:
-    """Return the stiffness of a frame's mesh link by finite elements, in frame axes.
+    """Return the finite-element stiffness of a frame's mesh link, in the frame axes.
 
     Args:
         frame: frame whose link is a :class:`forcefit.assembly.model.robot.MeshLink`.
@@ -73,15 +73,15 @@ def mesh_link_stiffness(frame: Frame) -> LinkStiffness:
 
 
 def mesh_link_mass(frame: Frame) -> tuple[NDArray, NDArray]:
-    """Return the consistent mass of a frame's mesh link, by finite elements.
+    """Return the consistent mass matrix of a frame's mesh link.
 
     Args:
         frame: frame whose link is a :class:`forcefit.assembly.model.robot.MeshLink`
             with a density.
 
     Returns:
-        (12, 12) [kg m^2 .. kg] for screws of base and tip, each at its end, in the
-        frame's axes; and the (3,) [m] vector from base to tip, in the frame's axes.
+        Mass matrix (12, 12) [kg m^2 .. kg] for the screws of base and tip, each at its
+        own interface, and the vector from base to tip (3,) [m]; both in the frame axes.
 
     Raises:
         BadInput: the link was not solved when the robot was loaded.
@@ -94,15 +94,15 @@ def mesh_link_mass(frame: Frame) -> tuple[NDArray, NDArray]:
 
 
 def mesh_turn(frame: Frame, mesh_span: NDArray) -> NDArray:
-    """Return the rotation from the axes of a frame's mesh to the frame's axes.
+    """Return the rotation from the mesh axes to the frame axes.
 
     Args:
         frame: frame whose link is a :class:`forcefit.assembly.model.robot.MeshLink`.
-        mesh_span: (3,) [m] vector from base to tip in the mesh's axes.
+        mesh_span: vector from base to tip in the mesh axes (3,) [m].
 
     Returns:
-        (3, 3) rotation that aligns the span with the link's ``axis``; without
-        ``axis``, with the line from the parent's origin to the frame's.
+        Rotation matrix (3, 3) that aligns the span with ``axis`` of the link or, by
+        default, with the line from the parent origin to the frame origin.
     """
     link = _mesh(frame)
     span = between_origins(frame) if link.axis is None else np.array(link.axis)
@@ -115,16 +115,16 @@ def mesh_rotation(
     up: tuple[float, float, float] | None = None,
     frame_up: tuple[float, float, float] | None = None,
 ) -> NDArray:
-    """Return the rotation from mesh to frame axes that aligns one span with the other.
+    """Return the rotation from mesh axes to frame axes that aligns two spans.
 
     Args:
-        mesh_span: (3,) [m] vector from base to tip in the mesh's axes.
-        span: (3,) direction of the span in the frame's axes.
-        up: direction in the mesh's axes that fixes the rotation about the span.
-        frame_up: direction of ``up`` in the frame's axes.
+        mesh_span: vector from base to tip in the mesh axes (3,) [m].
+        span: direction from base to tip in the frame axes (3,).
+        up: direction in the mesh axes that fixes the rotation about the span.
+        frame_up: direction that corresponds to ``up`` in the frame axes.
 
     Returns:
-        (3, 3) rotation; the smallest possible rotation if ``up`` is not given.
+        Rotation matrix (3, 3).  Without ``up``, the rotation with the smallest angle.
     """
     a, b = mesh_span / np.linalg.norm(mesh_span), span / np.linalg.norm(span)
     if up is not None and frame_up is not None:
@@ -134,22 +134,21 @@ def mesh_rotation(
     if sine < 1e-15:
         if cosine > 0:
             return np.eye(3)
-        # the spans are opposite: rotate by pi about the perpendicular nearest to an
-        # axis
+        # for opposite spans, rotate by pi about a perpendicular direction
         axis = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
         return rotation_matrix(np.pi * axis / np.linalg.norm(axis))
     return rotation_matrix(np.arctan2(sine, cosine) * axis / sine)
 
 
 def _triad(along: NDArray, up: NDArray) -> NDArray:
-    """Return right-handed axes: the first along a span, the third near ``up``."""
+    """Return right-handed axes: the first along a span, the third close to ``up``."""
     side = np.cross(up, along)
     side = side / np.linalg.norm(side)
     return np.column_stack([along, side, np.cross(along, side)])
 
 
 def _mesh(frame: Frame) -> MeshLink:
-    """Return the mesh link of a frame; raise ValueError if it has none."""
+    """Return the mesh link of a frame; raise ValueError if there is none."""
     if not isinstance(frame.link, MeshLink):
         raise ValueError(f"frame '{frame.name}' has no mesh link")
     return frame.link

@@ -1,4 +1,4 @@
-"""Conversion of frames from home poses in base axes to poses relative to parents."""
+"""Conversion of home poses in base axes to frame poses relative to their parents."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -9,19 +9,19 @@ from numpy.typing import NDArray
 from forcefit.assembly.model.frame import BASE, Frame
 from forcefit.stiffness.screws import rotation_matrix, rotation_vector, transform
 
-PlacedFrame = tuple[Frame, NDArray]  # a frame and its (4, 4) home pose
+PlacedFrame = tuple[Frame, NDArray]  # frame and its home pose (4, 4)
 
 
 def place_frames(placed: Iterable[PlacedFrame]) -> tuple[Frame, ...]:
-    """Return the frames with the translation and rotation of their home poses.
+    """Set the translation and rotation of frames from their home poses.
 
     Args:
-        placed: frames with (4, 4) home poses in base axes, parents first.  A home pose
-            excludes the motion of the frame's own joint; all other joints are at their
-            ``position``.
+        placed: frames and their home poses (4, 4) in base axes, parents first.  A home
+            pose excludes the motion of the frame's own joint; the joints of all
+            preceding frames are at their ``position``.
 
     Returns:
-        The frames, relative to their parents.
+        Frames with translation and rotation relative to their parents.
     """
     after = {BASE: np.eye(4)}
     frames = []
@@ -34,7 +34,7 @@ def place_frames(placed: Iterable[PlacedFrame]) -> tuple[Frame, ...]:
 
 
 def own_motion(frame: Frame) -> NDArray:
-    """Return the (4, 4) motion of a joint at its home position, about or along z."""
+    """Return the transform (4, 4) of a joint at its home position."""
     along = np.array([0.0, 0.0, frame.position])
     if frame.joint == "prismatic":
         return transform(along, np.eye(3))

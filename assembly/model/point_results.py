@@ -1,4 +1,4 @@
-"""Results of one point, or of many points with a leading point axis in every array."""
+"""Results at one point, or at many points along the first axis of each array."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -13,19 +13,19 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-Numbers = Any  # a number for one point, or an array (k,) for k points
-N = TypeVar("N", float, NDArray)  # type variable: number for one point, array for many
+Numbers = Any  # number for one point, or array (k,) for k points
+N = TypeVar("N", float, NDArray)  # number for one point, array for many
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PointResults:
-    """A result of one point, or of many points with a leading axis in its arrays.
+    """Result at one point, or at many points along the first axis of its arrays.
 
     Attributes:
-        AXES: for each field that can have a leading point axis, its number of axes for
-            one point.  An array with only this number of axes applies to all points.
-        VARIABLES: name of the array that each column of the table of many points
-            contains; columns are named as in :mod:`forcefit.assembly.model.tables`.
+        AXES: number of axes for one point, by field.  In a result at many points, an
+            array with only this number of axes applies to all points.
+        VARIABLES: field with the values of each variable in :meth:`to_xarray`, by the
+            name of the variable.
     """
 
     AXES: ClassVar[Mapping[str, int]]
@@ -35,7 +35,7 @@ class PointResults:
 
     @property
     def of_many(self) -> bool:
-        """Whether the object contains the results of many points."""
+        """Whether the object contains results at many points."""
         name, axes = next(iter(self.AXES.items()))
         return np.ndim(getattr(self, name)) > axes
 
@@ -48,7 +48,7 @@ class PointResults:
         return True
 
     def __getitem__(self, rows: Any) -> Self:
-        """Return one point by its number, or a selection by slice, numbers or mask."""
+        """Return the result at one point, or a selection by slice, indices or mask."""
         taken = {}
         for name, axes in self.AXES.items():
             values = getattr(self, name)
@@ -60,7 +60,7 @@ class PointResults:
         return (self[i] for i in range(len(self)))
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return a data set with dimension ``point``; see ``assembly.model.tables``."""
+        """Return a dataset with dimension ``point``; see ``assembly.model.tables``."""
         from forcefit.assembly.model.tables import points_dataset
 
         arrays = {name: getattr(self, own) for name, own in self.VARIABLES.items()}
@@ -76,7 +76,7 @@ class PointResults:
 
 
 def plain(values: Any) -> Any:
-    """Return an array unchanged, or as a number if it has no axes."""
+    """Convert an array without axes to a number; return other values unchanged."""
     if isinstance(values, np.ndarray):
         return values if values.ndim else values.item()
     return values.item() if isinstance(values, np.generic) else values

@@ -1,4 +1,4 @@
-"""Random geometric errors as in the paper's section IV, reproducible by a seed."""
+"""Reproducible random geometric errors, as in section IV of the paper."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,18 +15,17 @@ SIGNS = ("literal", "signed")
 
 @dataclass(frozen=True)
 class ErrorDraw:
-    """Parameters of a draw of geometric errors delta l.
+    """Parameters for drawing random geometric errors delta l.
 
     Attributes:
-        frames: names of the frames and joints with an error, in the order in which
-            random numbers are drawn.
-        least: (6,) [rad, m] smallest absolute value of each component.
-        most: (6,) [rad, m] largest absolute value of each component.
-        seed: seed of the random numbers.
-        signs: ``"literal"`` for positive errors only, as the paper's interval is
-            printed; or ``"signed"`` for the same absolute values with random signs.
-            The paper does not state which of them it used.  The median energies of the
-            two differ by a factor of five.
+        frames: names of the frames and joints with errors, in drawing order.
+        least: minimum absolute value of each component (6,) [rad, m].
+        most: maximum absolute value of each component (6,) [rad, m].
+        seed: random seed.
+        signs: ``"literal"`` for positive errors only, as the interval is printed in the
+            paper, or ``"signed"`` for the same absolute values with random signs.  The
+            paper does not state which one was used; the median energies differ by a
+            factor of five.
     """
 
     frames: tuple[str, ...]
@@ -37,21 +36,21 @@ class ErrorDraw:
 
 
 def draw_errors(robot: Robot, draw: ErrorDraw) -> NDArray:
-    """Return the errors of one draw.
+    """Draw random geometric errors.
 
-    Absolute values are uniform between ``least`` and ``most``, drawn frame by frame.
-    The signs are drawn afterwards from the same generator.  Both values of ``signs``
-    therefore lead to equal absolute values.
+    Absolute values are uniformly distributed between ``least`` and ``most`` and are
+    drawn frame by frame.  The signs are drawn afterwards from the same generator, so
+    that the absolute values do not depend on ``signs``.
 
     Args:
-        robot: robot of n frames.
-        draw: frames, sizes, seed and signs.
+        robot: robot with n frames.
+        draw: frames, magnitudes, seed and signs.
 
     Returns:
-        (n, 6) [rad, m] errors; zero for frames without a drawn error.
+        Errors (n, 6) [rad, m]; zero for all frames that are not listed.
 
     Raises:
-        BadInput: a frame does not exist in the robot.
+        BadInput: the robot has no frame with one of the given names.
         ValueError: ``signs`` is unknown.
     """
     if draw.signs not in SIGNS:
@@ -68,14 +67,15 @@ def draw_errors(robot: Robot, draw: ErrorDraw) -> NDArray:
 
 
 def frames_named(robot: Robot, names: Sequence[str]) -> tuple[str, ...]:
-    """Return frames and joints by full name, or by the part after a leg's dot.
+    """Expand names that apply to all legs to the full names of frames and joints.
 
     Args:
-        robot: any robot.
-        names: names such as ``["leg1.link_a"]``, or ``["link_a"]`` for all legs.
+        robot: robot with the frames.
+        names: full names, for example ``["leg1.link_a"]``, or names without the leg,
+            for example ``["link_a"]``, which apply to all legs.
 
     Returns:
-        Full names of frames, and of joints of several frames, in the robot's order.
+        Full names of frames and of joints with several frames, in frame order.
 
     Raises:
         BadInput: a name matches neither a frame nor a joint.
@@ -84,7 +84,7 @@ def frames_named(robot: Robot, names: Sequence[str]) -> tuple[str, ...]:
     frames = known[: len(robot.frames)]
     chosen = set()
     for name in names:
-        # a name that matches a frame does not select a joint
+        # frames take precedence over joints with the same name
         among = frames if name in frames else known
         fits = {k for k in among if k == name or k.split(".", 1)[-1] == name}
         if not fits:

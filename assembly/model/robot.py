@@ -1,8 +1,8 @@
-"""A manipulator as data: a tree of frames with closures.
+"""Data model of a manipulator: a tree of frames with loop closures.
 
-:mod:`forcefit.assembly.model.frame` defines a frame, and
-:mod:`forcefit.assembly.model.link_kinds` a link.  All their names can be imported from
-this module.
+Frames are defined in :mod:`forcefit.assembly.model.frame`, and link models in
+:mod:`forcefit.assembly.model.link_kinds`.  Their names can also be imported from this
+module.
 """
 
 from collections.abc import Iterable, Mapping
@@ -49,33 +49,33 @@ __all__ = [
 
 @dataclass(frozen=True, eq=False)
 class Robot(EqualData):
-    """A manipulator.
+    """Manipulator.
 
-    Frames are stored with parents first.  The rows of every array below are frames in
-    this order.  Robots are equal if all their data are equal, bit by bit.
+    Frames are stored with parents first, and the arrays of this class have one row per
+    frame in this order.  Robots are equal if all of their data are bit-identical.
 
     Attributes:
         name: name of the robot.
         platform: name of the frame whose pose error is computed.
         frames: all frames.
         closures: pairs of frames that must coincide after assembly.
-        description: description in one line.
+        description: one-line description.
         effects: parameters of the known effects of the machine, by name; see
             :mod:`forcefit.assembly.effects`.
-        session_effects: for each session, the effects that act only in this session.
+        session_effects: effects that act in only one session, by session.
         functions: known general effects of the machine.
-        learned_range: for each variable, by public name, its least and largest value in
-            the data from which the effects were identified.
-        reference_point: (3,) [m] point at which the robot was identified, in platform
-            axes; None if it was not identified.
-        diagnosis: data in the file on the diagnosis that identified the robot: verdict,
-            fitted rows, hold-out error, hash of the campaign, path of the covariance.
-        remarks: sentences on default values of the file that are easily overlooked.
+        learned_range: minimum and maximum of each variable, by public name, in the data
+            from which the effects were identified.
+        reference_point: point at which the robot was identified (3,) [m], in platform
+            axes; None if the robot was not identified.
+        diagnosis: data about the diagnosis that identified the robot: verdict, fitted
+            rows, hold-out error, hash of the campaign, path of the covariance.
+        remarks: sentences about default values in the file that are easily overlooked.
         callouts: tolerance callouts of features, as stated in the drawing.
-        fits: ISO 286 fits such as ``"12 H7/g6"`` by frame; ``radial`` of the frame's
+        fits: ISO 286 fits by frame, for example ``"12 H7/g6"``; ``radial`` of the
             clearance is the mean clearance of the fit.
-        fitted_ends: by frame, data of fits that determine ``tilt`` instead of
-            ``radial``.
+        fitted_ends: data of fits that determine ``tilt`` or ``spin`` instead of
+            ``radial``, by frame.
     """
 
     name: str
@@ -100,7 +100,7 @@ class Robot(EqualData):
     show = show
 
     def _figures(self) -> Figures:
-        """Return the numbers of the printed summary."""
+        """Return the values shown in the printed summary."""
         kinds = ("actuated", "passive")
         count = [f"{sum(getattr(f, k) for f in self.frames)} {k}" for k in kinds]
         titles = [function.title for function in self.functions]
@@ -127,10 +127,10 @@ class Robot(EqualData):
             name: name of the frame.
 
         Returns:
-            Index of the frame in every array of this robot.
+            Index of the frame in all arrays of this robot.
 
         Raises:
-            BadInput: there is no such frame; the message suggests the nearest name.
+            BadInput: there is no such frame; the message suggests the closest name.
         """
         try:
             return self._rows[name]
@@ -141,7 +141,7 @@ class Robot(EqualData):
             raise BadInput(f"{self.name}: no frame {quoted(name)}{hint}") from None
 
     def frame(self, name: str) -> Frame:
-        """Return the frame with a name; for errors see :meth:`index`."""
+        """Return the frame with a given name; see :meth:`index` for errors."""
         return self.frames[self.index(name)]
 
     @cached_property
@@ -154,18 +154,18 @@ class Robot(EqualData):
 
     @cached_property
     def joints(self) -> Mapping[str, NamedJoint]:
-        """Joints of several frames by name, such as ``ball`` of ``ball.first``."""
+        """Joints that consist of several frames, by name."""
         return joints_of(self.frames)
 
     @cached_property
     def parents(self) -> NDArray:
-        """(n,) index of each frame's parent, -1 for the base."""
+        """Index of each frame's parent (n,), -1 for the base."""
         rows = {BASE: -1, **self._rows}
         return np.array([rows[f.parent] for f in self.frames], dtype=int)
 
     @cached_property
     def on_path(self) -> NDArray:
-        """(n, n) bool; row i is True for the frames on the path from the base to i."""
+        """Mask (n, n) whose row i selects the frames on the path from the base to i."""
         count = len(self.frames)
         marks = np.eye(count, dtype=bool)
         for i, parent in enumerate(self.parents):
@@ -175,18 +175,18 @@ class Robot(EqualData):
 
     @cached_property
     def fixed_transforms(self) -> NDArray:
-        """(n, 4, 4) each frame seen from its parent's frame after the joint."""
+        """Transforms (n, 4, 4) from parent frames, after their joints, to frames."""
         t = np.array([f.translation for f in self.frames])
         return transform(t, rotation_matrix([f.rotation for f in self.frames]))
 
     @cached_property
     def errors(self) -> NDArray:
-        """(n, 6) [rad, m] the geometric errors delta l."""
+        """Geometric errors delta l (n, 6) [rad, m]."""
         return np.array([f.geometric_error for f in self.frames])
 
     @property
     def declared_errors(self) -> NDArray:
-        """(n, 6) [rad, m] geometric errors without locked-in clearances."""
+        """Geometric errors (n, 6) [rad, m] without locked-in clearances."""
         errors = self.errors.copy()
         for error, frame in zip(errors, self.frames, strict=True):
             if frame.locked_at is not None:
@@ -195,42 +195,42 @@ class Robot(EqualData):
 
     @cached_property
     def positions(self) -> NDArray:
-        """(n,) [rad or m] joint coordinates from which the home pose is solved."""
+        """Joint coordinates (n,) [rad or m] from which the home pose is computed."""
         return np.array([f.position for f in self.frames])
 
     @property
     def has_effects(self) -> bool:
-        """Whether the machine has known effects."""
+        """Whether the robot has known effects."""
         return bool(self.effects or self.session_effects or self.functions)
 
     @property
     def sessions(self) -> tuple[str, ...]:
-        """Names of the sessions with additional effects."""
+        """Names of the sessions that have additional effects."""
         named = [f.session for f in self.functions if f.session is not None]
         return tuple(dict.fromkeys([*self.session_effects, *named]))
 
     def without_effects(self) -> "Robot":
-        """Return the robot with only the declared frames and closures."""
+        """Return the robot without its known effects."""
         if not self.has_effects:
             return self
         return replace(self, effects={}, session_effects={}, functions=())
 
     def with_errors(self, errors: ArrayLike) -> "Robot":
-        """Return the same robot with other geometric errors.
+        """Return the robot with new geometric errors.
 
         Args:
-            errors: (n, 6) [rad, m] delta l of every frame; clearances that were
-                locked in before are not added to them.
+            errors: delta l of all frames (n, 6) [rad, m]; previously locked-in
+                clearances are discarded.
 
         Returns:
-            The new robot.
+            Robot with the given errors.
         """
         rows = locked(errors, (len(self.frames), 6), f"{self.name}: errors")
         frames = zip(self.frames, rows, strict=True)
         return replace(self, frames=tuple(_with_error(f, e) for f, e in frames))
 
     def with_links(self, links: dict[str, Link]) -> "Robot":
-        """Return the same robot with new link models at the named frames."""
+        """Return the robot with new link models for the named frames."""
         for name in links:
             self.index(name)
         frames = (replace(f, link=links.get(f.name, f.link)) for f in self.frames)
@@ -238,7 +238,7 @@ class Robot(EqualData):
 
 
 def _with_error(frame: Frame, error: NDArray) -> Frame:
-    """Return a frame with a new geometric error, without locked-in clearance."""
+    """Return the frame with a new geometric error and no locked-in clearance."""
     bolt = frame.locked_at
     if bolt is not None:
         bolt = replace(bolt, screw=np.zeros(6))
@@ -246,22 +246,22 @@ def _with_error(frame: Frame, error: NDArray) -> Frame:
 
 
 def _has_clearance(frame: Frame) -> bool:
-    """Return whether a frame has a clearance."""
+    """Return whether the joint of a frame has clearance."""
     return frame.clearance is not None
 
 
 def parents_first(frames: Iterable[Frame]) -> tuple[Frame, ...]:
-    """Sort frames so that parents precede children, otherwise in the given order.
+    """Sort frames so that parents precede their children.
 
     Args:
         frames: frames of one robot.
 
     Returns:
-        The sorted frames.
+        Sorted frames; the given order is preserved if it is already valid.
 
     Raises:
-        BadInput: two frames have the same name, a parent is missing, or parents form a
-            cycle.
+        BadInput: two frames have the same name, a parent is missing, or the parents
+            form a cycle.
     """
     frames = tuple(frames)
     rows: dict[str, int] = {}
@@ -270,8 +270,8 @@ def parents_first(frames: Iterable[Frame]) -> tuple[Frame, ...]:
             row = rows.get(frame.name)
             whose = "the root" if row is None else f"frame[{row + 1}]"
             raise BadInput(
-                f"frame[{i + 1}].name: found {quoted(frame.name)}, already the "
-                f"name of {whose}; expected another name"
+                f"frame[{i + 1}].name: found {quoted(frame.name)}, which is already "
+                f"the name of {whose}; expected a different name"
             )
         rows[frame.name] = i
     for frame in frames:
@@ -296,13 +296,13 @@ def parents_first(frames: Iterable[Frame]) -> tuple[Frame, ...]:
             raise BadInput(
                 f"frame {quoted(frame.name)}.parent: found "
                 f"{quoted(frame.parent)}, which leads to a cycle of parents; "
-                'expected parents that lead to "base"'
+                'expected a chain of parents that ends at "base"'
             )
     return _stable(frames, depth)
 
 
 def _stable(frames: tuple[Frame, ...], depth: dict[str, int]) -> tuple[Frame, ...]:
-    """Return frames unchanged if parents come first; otherwise sorted by depth."""
+    """Return frames unchanged if parents come first, otherwise sorted by depth."""
     seen = {BASE}
     for frame in frames:
         if frame.parent not in seen:

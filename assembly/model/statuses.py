@@ -1,6 +1,6 @@
 """Statuses of points and verdicts of comparisons, with their meanings.
 
-A status states whether a point has a result.  A verdict rates a result.
+A status states whether a result is available at a point.  A verdict assesses a result.
 """
 
 OK = "ok"
@@ -25,15 +25,15 @@ MEANINGS = {
     SOLVER_FAILED: "the search found no solution with a sufficient certificate",
     SIMULATION_FAILED: "the multibody simulation failed",
     INVALID_ROBOT: "the varied numbers are not those of a valid robot",
-    SINGULAR: "the posture is singular (more freedoms than nearby): the first-order "
-    "analysis is inconclusive",
+    SINGULAR: "the posture is singular (more degrees of freedom than nearby "
+    "postures): the first-order analysis is inconclusive",
     BEYOND_LIMITS: "a joint's coordinate is beyond its limits",
     BEYOND_SINGULARITY: "home and this posture are separated by a singularity",
     FREE_MOTION: "the platform has a free motion, without resistance",
     UNSTABLE: "the equilibrium has a direction of negative stiffness",
     NOT_PROVED: "the certificate of the solution is not sufficient",
 }
-# statuses of the points of a sweep; a file stores the index of the status in this list
+# statuses of sweep points; files store the index of the status in this tuple
 OF_POINTS = (
     OK, OUT_OF_REACH, CANNOT_ASSEMBLE, SOLVER_FAILED, INVALID_ROBOT, NO_EQUILIBRIUM,
     SINGULAR, BEYOND_LIMITS, BEYOND_SINGULARITY,
@@ -41,11 +41,11 @@ OF_POINTS = (
 # statuses of points at which no quantity is computed
 UNUSABLE = {OUT_OF_REACH, INVALID_ROBOT, SINGULAR, BEYOND_LIMITS}
 
-# verdicts on one compared value: OK, or one of the following
+# verdicts on a single value: OK, or one of the following
 FAILS = "fails"
 UNDECIDED = "undecided"
 NO_SIGNAL = "no signal"
-# verdicts on a whole comparison: NO_SIGNAL, or one of the following
+# verdicts on a complete comparison: NO_SIGNAL, or one of the following
 PASSED = "passed"
 FAILED = "failed"
 NOT_DECIDED = "not decided"

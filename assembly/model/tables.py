@@ -1,7 +1,8 @@
 """Results as labelled arrays (xarray) and tables (pandas).
 
-Names, dimensions and units are those of a sweep's NetCDF file.  Every variable has the
-attributes ``units`` and ``long_name``.  Both packages are imported at first use.
+Names, dimensions and units are the same as in the NetCDF file of a sweep.  Each
+variable has the attributes ``units`` and ``long_name``.  Both packages are imported on
+first use.
 """
 
 import math
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# variables that have another name in the table forcefit/results/quantities.py
+# variables whose name differs from that in forcefit/results/quantities.py
 _RENAMED = {
     "clearance_screw": "clearance", "link_screw": "link", "joint_screw": "joint",
     "stiffness": "axis_stiffness", "stiffness_matrix": "stiffness", "read_at": "point",
@@ -28,57 +29,57 @@ NO_LABELS: Mapping[str, Sequence[Any]] = {}
 
 
 class PlacedRobot(Protocol):
-    """A robot at a nominal posture."""
+    """Robot in a nominal posture."""
 
     @property
     def robot(self) -> Robot:
-        """The robot that is placed."""
+        """The robot."""
 
     def pose(self) -> dict[str, float]:
         """Return the nominal platform pose by component."""
 
 
 class ForcedAssembly(Protocol):
-    """An assembly computed by the linear model or with finite motions."""
+    """Assembly computed with the linear model or with finite motions."""
 
     @property
     def posture(self) -> PlacedRobot:
-        """Nominal configuration of the robot."""
+        """Nominal posture of the robot."""
 
     @property
     def clearance_screws(self) -> NDArray:
-        """(n, 6) [rad, m] clearances."""
+        """Displacements within the clearances (n, 6) [rad, m]."""
 
     @property
     def link_screws(self) -> NDArray:
-        """(n, 6) [rad, m] deformations of links."""
+        """Link deformations (n, 6) [rad, m]."""
 
     @property
     def joint_screws(self) -> NDArray:
-        """(n, 6) [rad, m] deformations of joints."""
+        """Joint deformations (n, 6) [rad, m]."""
 
     @property
     def tip_wrenches(self) -> NDArray:
-        """(n, 6) [N m, N] wrenches through bodies."""
+        """Wrenches transmitted by the bodies (n, 6) [N m, N]."""
 
     @property
     def joint_wrenches(self) -> NDArray:
-        """(n, 6) [N m, N] wrenches through joints."""
+        """Wrenches transmitted by the joints (n, 6) [N m, N]."""
 
     @property
     def closure_wrenches(self) -> NDArray:
-        """(closures, 6) [N m, N] wrenches of closures."""
+        """Wrenches transmitted by the closures (closures, 6) [N m, N]."""
 
 
 def assembly_dataset(assembly: ForcedAssembly) -> "xarray.Dataset":
-    """Return the results of an assembly as a data set, by frame and by closure.
+    """Return the results of an assembly as a dataset, by frame and by closure.
 
     Args:
-        assembly: assembly by the linear model or with finite motions.
+        assembly: assembly computed with the linear model or with finite motions.
 
     Returns:
-        Data set with dimensions ``frame``, ``screw``, ``wrench_component`` and
-        ``closure``; the components of the pose are scalar coordinates.
+        Dataset with dimensions ``frame``, ``screw``, ``wrench_component`` and
+        ``closure``; the pose components are scalar coordinates.
     """
     robot = assembly.posture.robot
     frames = {
@@ -108,36 +109,35 @@ def assembly_dataset(assembly: ForcedAssembly) -> "xarray.Dataset":
 
 
 def points_dataset(values: Mapping[str, NDArray]) -> "xarray.Dataset":
-    """Return the results of many points as a data set with the dimension ``point``.
+    """Return results at many points as a dataset with the dimension ``point``.
 
     Args:
-        values: (k, ...) arrays by the names of a sweep's variables.
+        values: arrays (k, ...), by the name of the sweep variable.
 
     Returns:
-        Data set with units.
+        Dataset with units.
     """
     count = len(next(iter(values.values())))
     return labelled(values, "point", np.arange(count))
 
 
 def frame_table(data: "xarray.Dataset", *rows: str) -> "pandas.DataFrame":
-    """Return variables over some dimensions as a table, one column per component.
+    """Convert a dataset to a table with one column per component.
 
     Args:
-        data: any data set; variables that lack one of the dimensions are omitted.
-        rows: the dimensions that become the index; each row is one of their points.
+        data: dataset; variables without all of the dimensions ``rows`` are omitted.
+        rows: dimensions that become the index of the table.
 
     Returns:
-        Table whose columns are pairs (variable, component).  The component is empty for
-        a variable without further dimensions.  For several further dimensions, it
-        consists of their labels, joined by dots.  ``attrs["units"]`` contains the unit
-        of every variable and dimension.
+        Table whose columns are pairs (variable, component).  The component consists of
+        the labels along the remaining dimensions, joined by dots; it is empty if there
+        are none.  ``attrs["units"]`` contains the unit of each variable and dimension.
     """
     import pandas
 
     columns: dict[tuple[str, str], NDArray] = {}
     sizes = {row: data.sizes[row] for row in rows}
-    # variables such as the components of postures in a list
+    # coordinates along the rows, for example the pose components in a list of postures
     kept = {
         str(name): v.variable.set_dims(sizes) for name, v in data.coords.items()
         if name not in data.dims and v.dims and {*v.dims} <= {*rows}
@@ -167,15 +167,15 @@ def frame_table(data: "xarray.Dataset", *rows: str) -> "pandas.DataFrame":
 
 
 def component_unit(unit: str, component: str) -> str:
-    """Return the unit of one component of a variable that mixes angles and lengths.
+    """Return the unit of one component of a variable with mixed units.
 
     Args:
-        unit: unit of the variable, such as ``"rad, m"``.
-        component: component as in :func:`frame_table`; its labels begin with R or T, M
-            or F, or are rotation and translation.
+        unit: unit of the variable, for example ``"rad, m"``.
+        component: component as in :func:`frame_table`, with labels that start with R or
+            T, or M or F, or equal ``rotation`` or ``translation``.
 
     Returns:
-        The unit of that component; the variable's unit if all components share it.
+        Unit of the component; the unit of the variable if all components share it.
     """
     kinds = [label[:1].upper() for label in component.split(".")]
     if unit.count(", ") == 1:
@@ -192,19 +192,17 @@ def labelled(
     points: Sequence[Any] | NDArray = (),
     labels: Mapping[str, Sequence[Any]] = NO_LABELS,
 ) -> "xarray.Dataset":
-    """Return arrays as a data set with units and meaning.
+    """Combine arrays into a dataset with units and descriptions.
 
     Args:
-        values: for each variable the array of the quantity with this name; or a pair of
-            a :class:`~forcefit.results.quantities.Quantity` with another name and its
-            array.
-        axis: name of the first dimension of every array; empty if there is none.
-        points: labels of that dimension.
-        labels: labels of the dimensions for which the table of quantities has no
-            labels.
+        values: for each variable, the array of the quantity with the same name, or a
+            pair of a :class:`~forcefit.results.quantities.Quantity` and its array.
+        axis: name of a common first dimension of all arrays, or empty.
+        points: labels along this dimension.
+        labels: labels along dimensions for which the table of quantities defines none.
 
     Returns:
-        The data set.
+        Labelled dataset.
     """
     import xarray
 

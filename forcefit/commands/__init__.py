@@ -1,4 +1,4 @@
-"""The commands: each parses its options, calls one function, and prints or saves.
+"""Command-line interface: each command parses its options and calls one function.
 
-Start with ``app.py``.  ``options.py`` defines the options that several commands share.
+Start with ``app.py``.  ``options.py`` defines the options shared by several commands.
 """

@@ -1,4 +1,4 @@
-"""Last step of every command: write and print results, and set the exit status."""
+"""Final step of a command: write and print its results, and set the exit status."""
 
 from typing import Any
 
@@ -11,9 +11,9 @@ def answer(results: dict[str, Any], text: str, status: str, json: str | None) ->
     """Write and print results; exit with status 1 if their status is not ``ok``.
 
     Args:
-        results: results as plain values (dictionaries, lists, numbers and texts).
-        text: the same results as text for the terminal.
-        status: status of the results, such as ``"ok"``.
+        results: results as plain values (dictionaries, lists, numbers and strings).
+        text: the same results, formatted for the terminal.
+        status: status of the results, for example ``"ok"``.
         json: path for the JSON output, ``"-"`` for standard output, or None.
 
     Raises:

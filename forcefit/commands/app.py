@@ -1,4 +1,4 @@
-"""The command ``forcefit``: the commands of the three packages, and ``study``."""
+"""Command ``forcefit``, which groups all subcommands, and the command ``study``."""
 
 import io
 import signal
@@ -84,14 +84,15 @@ def forcefit(
 def study(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Study file (TOML).")],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder to write.")
+        Path | None, typer.Option("-o", "--output", help="Output folder.")
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """Run every check of a study file and write one report.
+    """Run all checks of a study file and write one report.
 
-    Writes report.html (self-contained), results.json and results.nc.  Unless --output
-    is given, the study file names the folder.  The exit status is 1 if a check fails.
+    Writes report.html (self-contained), results.json and results.nc.  The study file
+    names the output folder, unless --output is given.  The exit status is 1 if a check
+    fails.
     """
     from forcefit.validation.study.headline import verdict
     from forcefit.validation.study.report import results_table
@@ -111,9 +112,9 @@ def study(
 
 
 def main() -> None:
-    """Run the command; bad input prints one line to stderr and gives exit status 2."""
+    """Run the command; on bad input, print one line and exit with status 2."""
     if not sys.warnoptions:
-        # Warnings of libraries are meant for programmers, who can show them with
+        # Library warnings are meant for programmers, who can enable them with
         # ``python -W default -m forcefit``.
         warnings.simplefilter("ignore")
     _print_any_letter()
@@ -121,8 +122,8 @@ def main() -> None:
     with _interrupts() as interrupts:
         try:
             with naming_packages():
-                # sys.argv is changed in place, so that the command recorded in a report
-                # contains the present names of the options
+                # sys.argv is modified in place, so that the command recorded in a
+                # report contains the current option names
                 sys.argv[1:] = with_new_names(sys.argv[1:])
                 status = app(prog_name="forcefit", standalone_mode=False)
         except BaseException as error:
@@ -133,8 +134,8 @@ def main() -> None:
 def _print_any_letter() -> None:
     r"""Print characters outside the encoding of standard output as ``\u03a9``.
 
-    Python already treats standard error in this way.  On Windows, the encoding of a
-    file or a pipe contains only 256 characters.
+    Python already does this for standard error.  On Windows, the default encoding of
+    files and pipes contains only 256 characters.
     """
     out = sys.stdout
     if isinstance(out, io.TextIOWrapper) and out.errors == "strict":
@@ -142,7 +143,7 @@ def _print_any_letter() -> None:
 
 
 def _status_after(error: BaseException, interrupted: bool) -> int:
-    """Return the exit status of an exception, and print its message to stderr."""
+    """Print the message of an exception to stderr and return the exit status."""
     if interrupted or isinstance(error, KeyboardInterrupt | typer.Abort):
         return _complain("interrupted", 130)
     match error:
@@ -153,10 +154,10 @@ def _status_after(error: BaseException, interrupted: bool) -> int:
         case BrokenPipeError():
             sys.stderr.close()
             return 1
-    # the parser raises this error for misspelt and missing options
+    # the option parser raises an error with this method for misspelt or missing options
     if not hasattr(error, "format_message"):
         raise error
-    # the message of this error is the help text itself
+    # the message of this error is the help text
     if type(error).__name__ == "NoArgsIsHelpError":
         print(error.format_message(), file=sys.stderr)
         return 2
@@ -167,8 +168,9 @@ def _status_after(error: BaseException, interrupted: bool) -> int:
 def _interrupts() -> Generator[list[int], None, None]:
     """Record whether Ctrl-C was pressed, and raise KeyboardInterrupt as usual.
 
-    When Ctrl-C interrupts compiled code, the code may raise a different error, such as
-    ``ValueError: Invalid bounding box`` of matplotlib.  The record reveals the cause.
+    Compiled code that is interrupted by Ctrl-C may raise a different error, for example
+    ``ValueError: Invalid bounding box`` in matplotlib.  The record shows that the error
+    was caused by Ctrl-C.
     """
     recorded: list[int] = []
     usual = signal.getsignal(signal.SIGINT) is signal.default_int_handler
@@ -188,7 +190,7 @@ def _interrupts() -> Generator[list[int], None, None]:
 
 
 def _with_found(message: str, error: BaseException) -> str:
-    """Add the refused value to a message of the parser, whose new versions omit it."""
+    """Append the rejected value to a parser message, because new versions omit it."""
     refused: list[dict] = getattr(error.__cause__, "errors", list)()
     values = [str(one.get("input")) for one in refused[:1] if one.get("input")]
     return "; ".join([message, *(f"found {quoted(v)}" for v in values)])

@@ -1,4 +1,4 @@
-"""The commands ``forcefit assembly ...``: parse options, call a function, print."""
+"""Command group ``forcefit assembly``, with the command ``error``."""
 
 from typing import Annotated
 
@@ -50,8 +50,8 @@ def error(
     assumption: Annotated[
         list[str] | None,
         typer.Option(
-            help="Assumption on the clearances: frozen | free | budget. Default: all "
-            "three; under a load frozen and free."
+            help="Assumption about open clearances: frozen | free | budget. Default: "
+            "all three, or frozen and free if a load is given."
         ),
     ] = None,
     load: LoadOption = None,
@@ -61,27 +61,29 @@ def error(
     energy_budget: Annotated[
         float,
         typer.Option(
-            help="Relative energy eta of the budget assumption: E <= (1 + eta) E*."
+            help="Relative energy margin eta of the budget assumption: "
+            "E <= (1 + eta) E*."
         ),
     ] = 0.05,
     tolerance_rotation: Annotated[
         float,
         typer.Option(
-            help="[rad] Largest accepted difference between the bounds of the rotation."
+            help="[rad] Largest accepted gap between the upper and lower rotation "
+            "bounds."
         ),
     ] = 1e-6,
     tolerance_translation: Annotated[
         float,
         typer.Option(
-            help="[m] Largest accepted difference between the bounds "
-            "of the translation."
+            help="[m] Largest accepted gap between the upper and lower translation "
+            "bounds."
         ),
     ] = 1e-6,
     at: AtOption = None,
     along: AlongOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Bound the largest pose error, problem (27)."""
+    """Bound the pose error from above and below, problem (27)."""
     from forcefit.assembly.linear.reference.pose_error import ASSUMPTIONS
     from forcefit.assembly.model.largest import LARGEST_LENGTH
     from forcefit.assembly.report.pose_errors import pose_error_of, pose_error_text

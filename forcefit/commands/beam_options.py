@@ -1,4 +1,4 @@
-"""Options that describe the section, the material and the theory of a beam."""
+"""Options for the cross section, material and theory of a beam."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ from forcefit.stiffness.link import LinkStiffness
 
 @dataclass(frozen=True)
 class BeamOptions:
-    """Values of the options that describe a beam; None if an option is not given."""
+    """Values of the beam options; None for options that are not given."""
 
     young: float
     poisson: float
@@ -26,7 +26,7 @@ class BeamOptions:
     theory: str = "timoshenko"
 
     def has_section(self) -> bool:
-        """Return whether the options describe a section."""
+        """Return whether at least one option describes a cross section."""
         lengths = (self.radius, self.inner_radius, self.width, self.height)
         return {*lengths, self.section_text} != {None}
 
@@ -36,7 +36,7 @@ class BeamOptions:
         return E, checked("--poisson", self.poisson, "1", above=-1, below=0.5)
 
     def declared(self) -> dict[str, float]:
-        """Return the given lengths [m] or constants of the section, by name."""
+        """Return the dimensions [m] or constants of the cross section, by name."""
         plain = {
             "radius": self.radius,
             "inner_radius": self.inner_radius,
@@ -49,7 +49,7 @@ class BeamOptions:
                 name = next(iter(given)).replace("_", "-")
                 raise BadInput(
                     f"--section: found together with --{name}; expected only one of "
-                    "them, remove the other"
+                    "the two options"
                 )
             constants = parse_assignments([self.section_text], "--section")
             check_section("--section", constants)
@@ -57,13 +57,13 @@ class BeamOptions:
         rectangle = "width" in given or "height" in given
         if ("radius" in given) == rectangle:
             raise BadInput(
-                "no single section found; expected either --radius, or --width and "
-                "--height, or --section"
+                "found no unique cross section; expected either --radius, or --width "
+                "and --height, or --section"
             )
         if rectangle and "inner_radius" in given:
             raise BadInput(
                 "--inner-radius: found together with --width and --height; expected "
-                "--radius of a tube (a box has --section "
+                "--radius for a tube (for a box, use --section "
                 "width=...,height=...,wall=...)"
             )
         for name in ("width", "height") if rectangle else ("radius",):
@@ -79,12 +79,12 @@ class BeamOptions:
         return given
 
     def section(self) -> Section:
-        """Return the section that the options describe, after checks of its values."""
+        """Return the cross section described by the options, after validation."""
         _, nu = self.material()
         return declared_section(self.declared(), nu)
 
     def checked_theory(self) -> str:
-        """Return the name of the beam theory; raise an error if it is not valid."""
+        """Return the name of the beam theory; raise BadInput if it is unknown."""
         if self.theory not in THEORIES:
             raise BadInput(
                 f"--theory: found {describe(self.theory)}"
@@ -95,7 +95,7 @@ class BeamOptions:
     def link(
         self, base: NDArray, tip: NDArray, up: NDArray | None = None
     ) -> LinkStiffness:
-        """Return the stiffness of the beam between two points, in their axes."""
+        """Return the stiffness of a straight beam between two points [m]."""
         E, nu = self.material()
         theory = self.checked_theory()
         C = beam_compliance(
@@ -111,6 +111,6 @@ class BeamOptions:
 
 
 def beam_name(theory: str) -> str:
-    """Return the full name of a beam theory, as printed in results."""
+    """Return the full name of a beam theory, as it is printed in results."""
     names = {"timoshenko": "Timoshenko beam", "euler": "Euler-Bernoulli beam"}
     return names[theory]

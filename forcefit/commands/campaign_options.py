@@ -1,4 +1,4 @@
-"""Options of commands that plan or simulate a campaign: ranges and noise."""
+"""Shared options of the commands that plan or simulate a measurement campaign."""
 
 from typing import Annotated
 
@@ -12,19 +12,17 @@ Reach = Annotated[
 ]
 Stroke = Annotated[
     float,
-    typer.Option(help="[m/rad] Travel of a prismatic drive for each rad of --reach."),
+    typer.Option(help="[m/rad] Travel of a prismatic drive per rad of --reach."),
 ]
 Force = Annotated[float, typer.Option(help="[N] Largest force on the platform.")]
 Temperature = Annotated[
     str,
     typer.Option(
-        help="Course of the temperature: swing (-0.5 to 6.5 K) | "
-        "around (-4 to 4 K) | constant (6 K)."
+        help="Temperature profile: swing (-0.5 to 6.5 K) | around (-4 to 4 K) | "
+        "constant (6 K)."
     ),
 ]
-CommandedIn = Annotated[
-    str, typer.Option(help="Quantities that are commanded: joints | pose.")
-]
+CommandedIn = Annotated[str, typer.Option(help="Commanded quantities: joints | pose.")]
 RotationNoise = Annotated[
     float, typer.Option(help="[rad] Standard deviation of a rotation reading.")
 ]

@@ -1,4 +1,4 @@
-"""The command ``forcefit check``: all messages about files, without computations."""
+"""Command ``forcefit check``: report all mistakes in input files."""
 
 import os.path
 from collections.abc import Callable
@@ -23,22 +23,22 @@ def check(
         typer.Argument(
             metavar="FILE...",
             help="Robots (also URDF, MJCF, SDF), studies, campaigns (folders), "
-            "tolerance plans, distributions of errors.",
+            "tolerance plans, error distributions.",
         ),
     ],
     robot: Annotated[
         str | None,
         typer.Option(
-            help="Robot whose frames tolerance plans and errors name: a file or a "
-            "built-in name."
+            help="Robot whose frames are named in tolerance plans and errors: a file "
+            "or a built-in name."
         ),
     ] = None,
     json: JsonOption = None,
 ) -> None:
     """Print all mistakes in files, not only the first.
 
-    No result is computed.  Each message is the one that a command prints when it reads
-    the file.  The exit status is 2 if a mistake is found.
+    No results are computed.  The messages are those that a command would print when
+    reading the file.  The exit status is 2 if a mistake is found.
     """
     results = [_checked(file, robot) for file in files]
     passed = not any(one["messages"] for one in results)
@@ -51,7 +51,7 @@ def check(
 
 
 def _checked(file: Path, robot: str | None) -> dict[str, Any]:
-    """Return the kind of one file and all messages about it."""
+    """Return the type of a file and all messages about it."""
     from forcefit.inputs.mending import all_messages
 
     try:
@@ -62,7 +62,7 @@ def _checked(file: Path, robot: str | None) -> dict[str, Any]:
 
 
 def _text(one: dict[str, Any]) -> str:
-    """Return the lines that the command prints about one file."""
+    """Format the messages about one file for the terminal."""
     from forcefit.inputs.mending import MOST_MESSAGES
 
     messages = one["messages"]
@@ -74,11 +74,11 @@ def _text(one: dict[str, Any]) -> str:
 
 
 def _reader(file: Path, robot: str | None) -> tuple[str, Callable[[], object]]:
-    """Return the kind of a file and the function that reads it.
+    """Return the type of a file and a function that reads it.
 
     Raises:
-        BadInput: the kind of the file is unknown, or ``--robot`` is missing although
-            the file needs a robot.
+        BadInput: the file type is unknown, or the file requires ``--robot``, which is
+            missing.
     """
     from forcefit.inputs.table import read_toml
 
@@ -107,18 +107,18 @@ def _reader(file: Path, robot: str | None) -> tuple[str, Callable[[], object]]:
         return "study", lambda: read_study(file, links=False)
     if "platform" in content:
         return "robot", lambda: _robot(file)
-    raise BadInput(f"{file}: found a file of another kind, expected a {_KINDS}")
+    raise BadInput(f"{file}: found an unknown type of file, expected a {_KINDS}")
 
 
 def _campaign(folder: Path) -> tuple[str, Callable[[], object]]:
-    """Return the word ``campaign`` and the function that reads the folder."""
+    """Return ``"campaign"`` and a function that reads the folder."""
     from forcefit.validation.campaign.campaign_file import read_campaign
 
     return "campaign", lambda: read_campaign(folder, links=False)
 
 
 def _robot(name: Path | str) -> "Robot":
-    """Return a robot; link libraries are read, but meshes are not solved."""
+    """Load a robot with its link libraries, but without solving its meshes."""
     from forcefit.assembly.exchange.robot_files import load_robot
     from forcefit.assembly.model.robot import MeshLink
 
@@ -129,9 +129,10 @@ def _robot(name: Path | str) -> "Robot":
 
 
 def _robot_for(file: Path, robot: str | None) -> "Robot":
-    """Return the robot that contains the frames named in a file."""
+    """Load the robot that defines the frames named in a file."""
     if robot is None:
         raise BadInput(
-            f"{file}: found names of frames; expected --robot ROBOT with these frames"
+            f"{file}: found frame names; expected --robot ROBOT, which defines these "
+            "frames"
         )
     return _robot(robot)

@@ -1,4 +1,4 @@
-"""The command ``forcefit stiffness compare``: finite elements compared with beams."""
+"""Command ``forcefit stiffness compare``: compare finite elements with beam theory."""
 
 from functools import partial
 from pathlib import Path
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 CurveFile = Annotated[
     Path | None,
-    typer.Option("--curve", help="File with the pieces of a curved beam (TOML)."),
+    typer.Option("--curve", help="File with the segments of a curved beam (TOML)."),
 ]
 
 
@@ -48,8 +48,8 @@ def compare(
     ratios: Annotated[
         str | None,
         typer.Option(
-            help="Instead of a SURFACE: compare straight bars of the section with "
-            "these slenderness ratios L / r, such as 5,10,20,40."
+            help="Instead of a SURFACE: compare straight bars with the given cross "
+            "section and these slenderness ratios L / r, for example 5,10,20,40."
         ),
     ] = None,
     radius: Radius = None,
@@ -65,26 +65,27 @@ def compare(
     unit: Annotated[
         str | None,
         typer.Option(
-            help="Unit of length of the file: m (the default), cm, mm, um, inch; a "
-            "STEP file states its own."
+            help="Length unit of the file: m (the default), cm, mm, um, inch; a STEP "
+            "file states its own unit."
         ),
     ] = None,
     accuracy: Annotated[
         float | None,
         typer.Option(
-            help="Required relative error of K. Default: 0.005; with --ratios 0.002."
+            help="Required relative accuracy of K. Default: 0.005, or 0.002 with "
+            "--ratios."
         ),
     ] = None,
     interface: Kind = "rigid",
     figure: FigureOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Compare K_E by finite elements with K_E of a beam.
+    """Compare K_E from finite elements with K_E of a beam.
 
-    The beam that is compared with a SURFACE is straight with the given section, or
-    follows --curve.  With --ratios, bars of several slenderness ratios L / r are
-    compared and the end effect is fitted.  Here r is twice the larger radius of
-    gyration of the section, which for a round bar is its radius.
+    A SURFACE is compared with a straight beam of the given cross section, or with the
+    curved beam defined by --curve.  With --ratios, bars with several slenderness ratios
+    L / r are compared and the end effect is fitted.  Here r is twice the larger radius
+    of gyration of the cross section, which equals the radius of a round bar.
     """
     from forcefit.commands.beam_options import BeamOptions
 
@@ -107,8 +108,8 @@ def compare(
         )
     if curve is not None and (options.has_section() or up is not None):
         raise BadInput(
-            "--curve: found together with options of the section or --up; the file "
-            "defines the sections and their axes: remove these options"
+            "--curve: found together with cross section options or --up; remove these "
+            "options, because the file defines the cross sections and their axes"
         )
     accuracy = 0.005 if accuracy is None else accuracy
     mesh = (surface, base, tip, unit or "m", accuracy, interface)
@@ -116,7 +117,7 @@ def compare(
 
 
 def _check_no_surface(**values: object) -> None:
-    """Raise an error if options of a SURFACE are given together with --ratios."""
+    """Raise BadInput if --ratios is combined with options that apply to a SURFACE."""
     for name, value in values.items():
         if value is not None:
             option = name if name == "SURFACE" else f"--{name}"
@@ -168,7 +169,7 @@ def _compare_bars(
     options: "BeamOptions", ratios: str, accuracy: float, interface: str,
     figure: Path | None, json: str | None,
 ) -> None:  # fmt: skip
-    """Compare meshed bars of several lengths with beams of the same section."""
+    """Compare meshed bars of several lengths with beams of the same cross section."""
     from forcefit.commands.options import parse_sizes
     from forcefit.stiffness.report.results import sweep_results, sweep_text
     from forcefit.stiffness.report.slenderness import sweep_slenderness

@@ -1,4 +1,4 @@
-"""The command ``forcefit convert``: import and export robots of other programs."""
+"""Command ``forcefit convert``: import and export robots in other file formats."""
 
 from pathlib import Path
 from typing import Annotated
@@ -28,26 +28,27 @@ def convert(
         int,
         typer.Option(
             "--format",
-            help="Format of a robot file: 1, frames and closures, or 2, bodies and "
-            "joints by points and axes.",
+            help="Version of the robot file format: 1 (frames and closures) or 2 "
+            "(bodies and joints given by points and axes).",
         ),
     ] = 1,
     loops: Annotated[
         Path | None,
         typer.Option(
-            help="File with loops and drives of a URDF (YAML, closed_loop). Default: a "
-            "YAML file in the same folder that has the name of the URDF, or robot.yaml."
+            help="File with the loops and drives of a URDF (YAML, closed_loop). "
+            "Default: a YAML file with the same name as the URDF in the same folder, "
+            "or robot.yaml."
         ),
     ] = None,
     overlay: Annotated[
         Path | None,
-        typer.Option(help="Elasticity, clearances and errors by frame (TOML)."),
+        typer.Option(help="Elasticity, clearances and errors of each frame (TOML)."),
     ] = None,
     points: Annotated[
         str | None,
         typer.Option(
-            help="Loops that are closed in a point only, without orientation: loop1 "
-            "(the first loop) or names of their ends, separated by commas; all; or "
+            help="Loops closed at a point only, with free orientation: loop1 (the "
+            "first loop) or the names of their ends, separated by commas; all; or "
             "none, which uses the declared types."
         ),
     ] = None,
@@ -57,11 +58,11 @@ def convert(
 ) -> None:
     """Convert a robot from or to URDF, MJCF and SDF.
 
-    If the home pose in the file does not close the loops, a new home pose is computed.
-    The written file is read back and compared with the original in 100 random postures.
-    Data that the written format cannot contain are listed.  If MuJoCo is installed, it
-    reads the same URDF or MJCF, and its robot is compared too.  The exit status is 1 if
-    the robots differ.
+    If the loops are not closed in the home pose of the file, a new home pose is
+    computed.  The output file is read back and compared with the original robot in 100
+    random postures.  Data that the output format cannot represent are listed.  If
+    MuJoCo is installed, the robot that it reads from the same URDF or MJCF is compared
+    as well.  The exit status is 1 if the robots differ.
     """
     from forcefit.assembly.exchange.convert import convert as convert_robot
     from forcefit.assembly.kinematics.closing import closing_of

@@ -1,7 +1,4 @@
-"""The commands ``forcefit validation predict``, ``carry``, ``compensate``, ``explain``.
-
-Each command parses its options, calls one function, and prints or saves.
-"""
+"""Commands ``forcefit validation predict``, ``carry``, ``compensate``, ``explain``."""
 
 import sys
 from pathlib import Path
@@ -40,12 +37,12 @@ def predict(
     ],
     json: JsonOption = None,
 ) -> None:
-    """Predict the readings of a campaign or a table.
+    """Predict readings for the commands of a campaign or table.
 
-    The geometric errors, effects and functions of the robot file are applied.  If the
-    file states uncertainties, each reading is written with an interval.  For measured
-    rows, the error of the prediction is printed.  If a row has no solution, its cells
-    are left empty and the exit status is 1.
+    The prediction includes the geometric errors, effects and functions of the robot
+    file.  If the file states uncertainties, an interval is written for each reading.
+    If the commands come with measurements, the prediction error is printed.  If a row
+    has no solution, its cells are left empty and the exit status is 1.
     """
     from forcefit.assembly.exchange.robot_files import load_robot
     from forcefit.results.text import readings_text
@@ -71,14 +68,14 @@ def predict(
 
 
 def _about(table: dict[str, Any]) -> list[str]:
-    """Return lines that state the assumptions and the uncertainty of a prediction."""
+    """Format the assumptions and the uncertainty of a prediction as lines of text."""
     from forcefit.results.text import readings_text
 
     lines = []
     if any(size > 0.0 for size in table["std"].values()):
         lines.append(
-            f"uncertainty of the model, 1 sigma: {readings_text(table['std'])}; noise "
-            f"of a reading: {readings_text(table['noise'])}"
+            f"model uncertainty, 1 sigma: {readings_text(table['std'])}; measurement "
+            f"noise: {readings_text(table['noise'])}"
         )
     if table["not_measured"]:
         names = ", ".join(table["not_measured"])
@@ -89,8 +86,8 @@ def _about(table: dict[str, Any]) -> list[str]:
         lines.append(f"registration: {table['registration']}")
     if table["identified_at"] is not None:
         lines.append(
-            f"readings of the point {table['reference_point']} [m]; the robot was "
-            f"identified at {table['identified_at']}"
+            f"predicted readings refer to the point {table['reference_point']} [m]; "
+            f"the robot was identified at {table['identified_at']}"
         )
     if table["extrapolated"]:
         count = len(table["extrapolated"])
@@ -112,29 +109,29 @@ def compensate(
     offsets: Annotated[
         Path | None,
         typer.Option(
-            help="Also write the correction of each drive in each row [rad or m] (CSV)."
+            help="Also write the correction of each drive [rad or m], row by row (CSV)."
         ),
     ] = None,
     diagnosed: Annotated[
         Path | None,
         typer.Option(
-            help="Results of validation diagnose (JSON), for the expected error."
+            help="Results of validation diagnose (JSON), used for the expected error."
         ),
     ] = None,
     as_read: Annotated[
         bool,
         typer.Option(
-            "--as-read", help="Also correct effects that change only the readings."
+            "--as-read", help="Also compensate effects that change only the readings."
         ),
     ] = False,
     json: JsonOption = None,
 ) -> None:
-    """Find the commands that cancel the robot's errors.
+    """Find the commands that compensate the robot's errors.
 
     ROBOT contains the identified errors, as written by diagnose --save.  TARGETS
-    contain the commands by which the nominal robot would reach the required poses.
-    Joint limits are respected, and loops remain closed.  If a row has no solution, its
-    command is not changed and the exit status is 1.
+    contains the commands with which the nominal robot would reach the required poses.
+    The corrected commands respect the joint limits and keep the loops closed.  If a row
+    has no solution, its command stays unchanged and the exit status is 1.
     """
     from forcefit.assembly.exchange.robot_files import load_robot
     from forcefit.validation.campaign.campaign_file import read_commands
@@ -159,7 +156,7 @@ def compensate(
 
 
 def _warned(commands: "Campaign") -> dict[str, Any]:
-    """Warn about variables that are outside the range of the identification data."""
+    """Warn about variables outside the range of the identification data."""
     from forcefit.validation.diagnosis.learned_range import beyond
 
     left = beyond(commands.robot, commands)
@@ -192,8 +189,8 @@ def carry(
     setup: Annotated[
         str,
         typer.Option(
-            help="Set-up rows: the first N rows of each session; or rows such as "
-            "1-20,31; or labels of rows."
+            help="Set-up rows: N for the first N rows of each session, row numbers "
+            "such as 1-20,31, or row labels."
         ),
     ],
     fit: Annotated[
@@ -204,18 +201,18 @@ def carry(
     ] = "registration",
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="The robot in these sessions (TOML)."),
+        typer.Option("-o", "--output", help="Robot fitted to these sessions (TOML)."),
     ] = None,
     json: JsonOption = None,
 ) -> None:
     """Fit a saved robot to a new session.
 
-    The pose of the measuring device, the effects of time and the quantities named by
-    --fit are fitted to the set-up rows of each session.  The parameters of the robot
-    are fitted too, with their stored covariance as prior.  The errors of the fitted and
-    of the declared robot are computed on the other rows.  No robot is written and the
-    exit status is 1 if the set-up rows are not sufficient, or if the fitted robot
-    predicts worse than the declared one.
+    The pose of the measuring device, time-dependent effects and the quantities named in
+    --fit are fitted to the set-up rows of each session.  The robot parameters are also
+    fitted, with their stored covariance as prior.  The prediction errors of the fitted
+    and the declared robot are evaluated on all remaining rows.  If there are too few
+    set-up rows, or if the fitted robot predicts worse than the declared one, no robot
+    is written and the exit status is 1.
     """
     from forcefit.assembly.exchange.robot_files import load_robot
     from forcefit.validation.campaign.campaign_file import read_campaign, read_commands
@@ -250,16 +247,17 @@ def explain(
     over: Annotated[
         list[str] | None,
         typer.Option(
-            help="Plotted range of a variable, such as q.drive=-1:1,cov.tilt=0:0.1."
+            help="Plotted range of each variable, for example "
+            "q.drive=-1:1,cov.tilt=0:0.1."
         ),
     ] = None,
     figure: FigureOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Show the functions of a robot file as curves.
+    """Plot the learned functions of a robot file.
 
-    The curves are plotted with confidence bands.  A function whose value depends on
-    earlier inputs is shown by its response to a unit step.
+    The curves are plotted with confidence bands.  For a function whose value depends
+    on earlier inputs, the response to a unit step is plotted.
     """
     from forcefit.assembly.exchange.robot_files import load_robot
     from forcefit.validation.correction import curves
@@ -269,8 +267,8 @@ def explain(
     machine = load_robot(robot)
     if not machine.functions:
         raise BadInput(
-            f"{robot}: found no learned function to show; expected a robot saved by "
-            "forcefit validation diagnose --save that has one"
+            f"{robot}: found no learned function; expected a robot with at least one, "
+            "as saved by forcefit validation diagnose --save"
         )
     shown = curves.curves_of(machine, _ranges(machine.functions, over or []))
     if figure is not None:
@@ -295,7 +293,7 @@ def _ranges(
         except ValueError:
             least = most = 0.0
         if not -1e15 < least < most < 1e15:
-            expected = "expected LEAST:LARGEST"
+            expected = "expected MINIMUM:MAXIMUM"
             raise BadInput(f"--over {name}: found {quoted(ends)}, {expected}")
         ranges[name] = (least, most)
     return ranges

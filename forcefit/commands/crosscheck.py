@@ -1,4 +1,4 @@
-"""The command ``forcefit validation crosscheck``, against a multibody simulation."""
+"""Command ``forcefit validation crosscheck``: compare with a multibody simulation."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -47,13 +47,13 @@ if TYPE_CHECKING:
 
 
 def parse_scales(text: str) -> list[float]:
-    """Return the factors on the errors and loads that ``--scale`` lists.
+    """Parse the scale factors on errors and loads given by ``--scale``.
 
     Args:
-        text: text such as ``"1,0.5,0.25"``.
+        text: comma-separated numbers, for example ``"1,0.5,0.25"``.
 
     Returns:
-        The factors.
+        Scale factors.
 
     Raises:
         BadInput: a value is not a number > 0, or fewer than two values are given.
@@ -85,24 +85,24 @@ def crosscheck(
     scale: Annotated[
         str,
         typer.Option(
-            help="Scales: factors on errors and load. Smaller ones are added if a "
+            help="Scale factors for errors and load. Smaller factors are added if a "
             "check is undecided."
         ),
     ] = "1,0.5,0.25,0.125",
     links: Annotated[
-        str, typer.Option(help="How the simulation models links: beam | spring | fem.")
+        str, typer.Option(help="Link model of the simulation: beam | spring | fem.")
     ] = "beam",
     with_clearance: Annotated[
         bool,
         typer.Option(
-            "--with-clearance", help="Keep the joints' clearances in both models."
+            "--with-clearance", help="Include joint clearances in both models."
         ),
     ] = False,
     state: Annotated[
         str | None,
         typer.Option(
-            help="Compare the platform's stiffness instead of the pose, in the state "
-            "exact (around the equilibrium with errors and loads).",
+            help="Compare the platform stiffness instead of the pose. The only state "
+            "is exact: around the equilibrium with errors and loads.",
         ),
     ] = None,
     grid: GridOption = None,
@@ -115,10 +115,11 @@ def crosscheck(
 ) -> None:
     """Compare with a multibody simulation at several scales.
 
-    Errors and loads are multiplied by each scale.  Joint clearances are left out in
-    both models, unless --with-clearance is given.  Then energies and springs are
-    compared instead of poses.  The exit status is 1 if a check fails.  It is also 1 if
-    the robot has neither errors nor a load, because then nothing can be compared.
+    Errors and loads are multiplied by each scale factor.  Both models neglect joint
+    clearances, unless --with-clearance is given; in that case, energies and spring
+    deflections are compared instead of poses.  The exit status is 1 if a check fails,
+    or if the robot has neither errors nor a load, because then there is nothing to
+    compare.
     """
     from forcefit.assembly.effects.robot_effects import apply_robot_effects
     from forcefit.assembly.exchange.robot_files import load_robot
@@ -134,8 +135,8 @@ def crosscheck(
     g, covariates = parse_gravity(gravity), parse_covariates(under)
     if with_clearance and figure is not None:
         raise BadInput(
-            "--figure: found together with --with-clearance; no slope is computed "
-            "with clearances: remove one of the two"
+            "--figure: found together with --with-clearance; remove one of the two, "
+            "because no slope is computed with clearances"
         )
     if state is not None:
         parse_state(state, ("exact",))
@@ -202,7 +203,7 @@ def _crosscheck_page(
     results: "Crosscheck | StiffnessCheck | None", failure: "dict[str, Any]",
     source: "Provenance",
 ) -> str:  # fmt: skip
-    """Return the report page of a comparison at one pose."""
+    """Return the report page for a comparison at one pose."""
     from forcefit.validation.crosscheck.crosscheck import Crosscheck
     from forcefit.validation.crosscheck.report import crosscheck_page, failure_page
     from forcefit.validation.crosscheck.stiffness_page import stiffness_check_page
@@ -218,7 +219,7 @@ def _crosscheck_grid(
     machine: "Robot", grid: str, compare: "Callable[[Posture], Any]", json: str | None,
     report: Path | None, source: "Provenance",
 ) -> None:  # fmt: skip
-    """Compare at every pose of a grid; show a progress bar."""
+    """Compare at every pose of a grid, with a progress bar."""
     from forcefit.assembly.sweeps.targets import parse_grid
     from forcefit.validation.crosscheck.poses import (
         check_poses,

@@ -1,4 +1,4 @@
-"""The command ``forcefit assembly deflection``."""
+"""Command ``forcefit assembly deflection``."""
 
 import math
 from typing import Annotated
@@ -32,8 +32,8 @@ def deflection(
     along: Annotated[
         str,
         typer.Option(
-            help="Component of the load that varies, as from:to:step [N or N m], "
-            "such as fz=0:-500:10."
+            help="Load component to vary, as from:to:step [N or N m], for example "
+            "fz=0:-500:10."
         ),
     ],
     pose: PoseOption = None,
@@ -52,23 +52,23 @@ def deflection(
         ),
     ] = "contact",
     back: Annotated[
-        bool, typer.Option("--back", help="Return to the first load afterwards.")
+        bool, typer.Option("--back", help="Then unload back to the first value.")
     ] = False,
     follow: Annotated[
         bool,
         typer.Option(
             "--follow",
-            help="Follow the equilibrium path by arc length past limit points, also "
-            "where it is unstable (finite motions, clearances at zero).",
+            help="Follow the equilibrium path by arc length beyond limit points, "
+            "including unstable branches (finite motions, clearances at zero).",
         ),
     ] = False,
     figure: FigureOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Compute load-deflection curves, up to critical loads.
+    """Compute load-deflection curves up to critical loads.
 
-    The curve includes free motion within clearances, contacts, elastic deformation and
-    jumps to another equilibrium.
+    The curve includes free motion within clearances, contact, elastic deformation and
+    jumps to a different equilibrium.
     """
     from forcefit.assembly.model.statuses import OK
     from forcefit.assembly.report.deflection import (
@@ -79,8 +79,8 @@ def deflection(
 
     if follow and back:
         raise BadInput(
-            "--follow: found together with --back; remove --back, because a followed "
-            "path turns at its limit points"
+            "--follow: found together with --back; remove --back, because the load "
+            "already reverses at the limit points of a followed path"
         )
     if figure is not None:
         check_writable(figure, PICTURE)
@@ -106,19 +106,18 @@ def deflection(
 
 
 def parse_along(text: str) -> tuple[int, list[float]]:
-    """Return the component and the values of ``--along``.
+    """Parse the load component and its values from ``--along``.
 
     Args:
-        text: text such as ``"fz=0:-500:10"``; the sign of the step does not matter.
+        text: for example ``"fz=0:-500:10"``; the sign of the step is ignored.
 
     Returns:
-        Row of the component in the wrench ``[M F]``, and the values of the load [N
-        m or N].  The last value is included if the distance is a multiple of the
-        step.
+        Index of the component in the wrench ``[M F]``, and the load values [N m or N].
+        The end value is included if the range is a multiple of the step.
 
     Raises:
-        BadInput: the text has a different form, the load is constant, or the curve
-            would have more than 10000 values.
+        BadInput: the text has an invalid form, the load is constant, or the curve would
+            have more than 10000 values.
     """
     from forcefit.assembly.model.largest import LARGEST
     from forcefit.stiffness.screws import WRENCH
@@ -138,8 +137,8 @@ def parse_along(text: str) -> tuple[int, list[float]]:
         raise BadInput(f"--along: found {describe(text)}, expected finite numbers")
     if step == 0.0 or start == stop:
         raise BadInput(
-            f"--along: found {describe(text)}, expected two different loads and a step "
-            "that is not 0"
+            f"--along: found {describe(text)}, expected two different loads and a "
+            "nonzero step"
         )
     count = math.floor(abs(stop - start) / abs(step) + 1e-9)
     if count >= _MOST:

@@ -1,4 +1,4 @@
-"""The command ``forcefit validation diagnose``."""
+"""Command ``forcefit validation diagnose``."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -23,7 +23,7 @@ def diagnose(
     calibrate: Annotated[
         int,
         typer.Option(
-            help="Number of campaigns that are simulated on the same design to "
+            help="Number of campaigns to simulate with the same design, in order to "
             "estimate error rates.",
             min=0,
             max=1_000_000,
@@ -33,21 +33,19 @@ def diagnose(
         bool,
         typer.Option(
             "--finite-motions",
-            help="Compute finite motions of the declared model instead of small ones.",
+            help="Use finite instead of small motions in the declared model.",
         ),
     ] = False,
     without: Annotated[
         list[str] | None,
         typer.Option(
-            help="Name of an effect that is left out; or function (all functions), "
-            "geometry (geometric errors), springs (stiffnesses)."
+            help="Effect to exclude: its name, or function (all functions), geometry "
+            "(geometric errors), springs (stiffnesses)."
         ),
     ] = None,
     only: Annotated[
         list[str] | None,
-        typer.Option(
-            help="Consider only effects with this name; names as for --without."
-        ),
+        typer.Option(help="Consider only this effect; names as for --without."),
     ] = None,
     prior: Annotated[
         list[str] | None,
@@ -58,12 +56,12 @@ def diagnose(
         typer.Option(help="Also write the robot with the identified effects."),
     ] = None,
 ) -> None:
-    """Identify effects that a model lacks from measured deviations.
+    """Identify effects missing from a model from measured data.
 
     The verdict is explained, learned, none_needed, ambiguous, outside_library or
-    not_enough_rows.  The errors before and after identification are computed on
-    held-out rows, which are used neither to choose nor to fit a model.  --save writes
-    the identified robot if it predicts these rows better than the declared robot.
+    not_enough_rows.  The errors before and after identification are evaluated on
+    held-out rows, which are not used to select or fit a model.  --save writes the
+    identified robot if it predicts these rows better than the declared robot.
     """
     from forcefit.validation.campaign.campaign_file import read_campaign
     from forcefit.validation.diagnosis import results
@@ -102,7 +100,7 @@ def diagnose(
 
 
 def _odds(without: list[str], only: list[str], prior: list[str]) -> dict[str, float]:
-    """Return the factor on the prior odds of each effect that an option names."""
+    """Return the factor on the prior odds of each effect named in an option."""
     from forcefit.assembly.effects import LIBRARY
 
     names = [*LIBRARY, "function", "geometry", "springs"]
@@ -117,7 +115,7 @@ def _odds(without: list[str], only: list[str], prior: list[str]) -> dict[str, fl
         except ValueError:
             value = float("nan")
         if not 0.0 < value < 1e9:
-            expected = "expected NAME=FACTOR, above 0"
+            expected = "expected NAME=FACTOR with a factor > 0"
             raise BadInput(f"--prior: found {quoted(text)}, {expected}")
         factors.append(("--prior", name, value))
     for option, name, value in factors:
@@ -128,7 +126,7 @@ def _odds(without: list[str], only: list[str], prior: list[str]) -> dict[str, fl
 
 
 def _worse(diagnosis: "Diagnosis") -> str:
-    """Return the reason why the identified robot is not saved, for a message."""
+    """Return the reason why the identified robot is not saved."""
     if not len(diagnosis.fit.unknowns) and not diagnosis.effects:
         return "the diagnosis found no error or effect in addition to the declared ones"
     after, before = diagnosis.after.normalised, diagnosis.before.normalised

@@ -1,4 +1,4 @@
-"""The option --errors, which replaces the errors of a robot by one draw."""
+"""Option --errors, which replaces the declared errors of a robot by a random draw."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 ErrorsOption = Annotated[
     Path | None,
     typer.Option(
-        help="Distributions of errors (TOML); one draw from them replaces the robot's "
-        "declared errors."
+        help="Error distributions (TOML); one random draw replaces the declared errors "
+        "of the robot."
     ),
 ]
 
@@ -21,14 +21,14 @@ ErrorsOption = Annotated[
 def with_errors(
     posture: "Posture", errors: Path | None, seed: int, own: bool
 ) -> "Posture":
-    """Return the posture with one draw of errors, or with the declared errors.
+    """Return the posture with one random draw of errors, or with the declared errors.
 
     Args:
-        posture: with the declared errors of its robot.
-        errors: file of the distributions; None for the declared errors.
-        seed: of the draw.
-        own: whether the draw replaces the declared errors; otherwise it is added to
-            them, as errors at rest that close the loops.
+        posture: posture of the robot with its declared errors.
+        errors: file with error distributions, or None to use the declared errors.
+        seed: random seed of the draw.
+        own: whether the draw replaces the declared errors.  Otherwise it is added to
+            them, and the declared errors, with which the loops close, stay fixed.
     """
     if errors is None:
         return posture

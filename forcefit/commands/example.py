@@ -1,4 +1,4 @@
-"""The command ``forcefit example``, which writes the files of the examples."""
+"""Command ``forcefit example``: write the files of the examples."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,12 +11,12 @@ from forcefit.inputs.writing import check_writable, write_bytes
 
 
 class _Example(NamedTuple):
-    """An example that the command can write.
+    """Example that the command can write.
 
     Attributes:
         about: short description of the example.
-        files: files and folders of the example, relative to the parent of ``examples``.
-        first: a command to run first.
+        files: files and folders, relative to the parent folder of ``examples``.
+        first: command to run first.
     """
 
     about: str
@@ -58,7 +58,7 @@ EXAMPLES = {
         "pip install ./examples/extension",
     ),
     "campaign": _Example(
-        "measurements of an arm whose model lacks an effect",
+        "measurements of an arm with an effect that its model neglects",
         ("examples/campaign",),
         "forcefit validation diagnose examples/campaign",
     ),
@@ -68,12 +68,12 @@ EXAMPLES = {
         "python examples/paper_figure5.py",
     ),
     "hexapod": _Example(
-        "accuracy gained by half the clearance in a hexapod, in Python",
+        "accuracy gained in a hexapod by halving the clearance, in Python",
         ("examples/hexapod_accuracy.py", "examples/hexapod_errors.toml"),
         "python examples/hexapod_accuracy.py",
     ),
     "path": _Example(
-        "a path of the hexapod, for its errors under acceleration",
+        "a path for the hexapod, to compute its errors under acceleration",
         ("examples/hexapod_path.csv",),
         "forcefit assembly path hexapod --path examples/hexapod_path.csv",
     ),
@@ -105,9 +105,9 @@ EXAMPLES = {
             f"python examples/{name}/convert.py --help",
         )
         for name, about in (
-            ("hangprinter", "a cable-driven printer, by its motor forces"),
+            ("hangprinter", "a cable-driven printer, from its motor forces"),
             ("hilti", "a construction robot"),
-            ("ipa_ur10", "a UR10, by a tracker"),
+            ("ipa_ur10", "a UR10, from a laser tracker"),
             ("serial_robots", "a UR5 and a WAM"),
             ("voron", "a printer's gantry"),
         )
@@ -120,7 +120,7 @@ def example(
         list[str] | None,
         typer.Argument(
             metavar="[NAME]...",
-            help="Names of examples; without a name, all are listed.",
+            help="Names of examples; if omitted, all examples are listed.",
         ),
     ] = None,
     output: Annotated[
@@ -129,8 +129,9 @@ def example(
 ) -> None:
     """Write the files of examples, as in the repository.
 
-    The commands in the README and in the documentation can then be run in that folder.
-    Nothing is written if a file of the same name exists with different content.
+    The commands in the README and in the documentation can then be run in the output
+    folder.  Nothing is written if a file with the same name but different content
+    exists.
     """
     if not names:
         for name, one in EXAMPLES.items():
@@ -140,7 +141,7 @@ def example(
         if name not in EXAMPLES:
             raise BadInput(f"example: found {quoted(name)}{nearest(name, EXAMPLES)}")
     if not output.is_dir():
-        raise BadInput(f"{output}: found no such folder; expected an existing folder")
+        raise BadInput(f"{output}: folder not found; expected an existing folder")
     root = _root()
     files = dict.fromkeys(
         path for name in names for part in EXAMPLES[name].files
@@ -158,7 +159,7 @@ def example(
 
 
 def _root() -> Path:
-    """Return the folder of the examples, in the installed package or in a checkout."""
+    """Return the parent folder of the examples, in the package or in a checkout."""
     package = Path(__file__).parents[1]
     for folder in (package, package.parent):
         if (folder / "examples" / "irsbot2.toml").is_file():
@@ -177,14 +178,13 @@ def _files(root: Path, part: str) -> Iterator[Path]:
 
 
 def _is_absent(target: Path, source: Path) -> bool:
-    """Return whether an example file is absent; refuse a file of other content."""
+    """Return whether the target is absent; raise BadInput if its content differs."""
     if not target.exists():
         check_writable(next(p for p in target.parents if p.exists()) / target.name)
         return True
     if not target.is_file() or target.read_bytes() != source.read_bytes():
         raise BadInput(
-            f"{target}: found a file with other content than the example's; expected "
-            "the same content or no file: it is not overwritten, choose another "
-            "folder"
+            f"{target}: found a file whose content differs from the example; it is not "
+            "overwritten, choose a different folder"
         )
     return False

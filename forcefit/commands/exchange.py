@@ -1,4 +1,4 @@
-"""The command ``forcefit validation import``, which reads measuring devices."""
+"""Command ``forcefit validation import``: import the files of a measuring device."""
 
 from pathlib import Path
 from typing import Annotated
@@ -14,32 +14,33 @@ from forcefit.inputs.writing import write_json
 
 def import_(
     files: Annotated[
-        list[Path], typer.Argument(metavar="FILE...", help="Exports of the device.")
+        list[Path], typer.Argument(metavar="FILE...", help="Files of the device.")
     ],
     targets: Annotated[
-        Path, typer.Option(help="Robot, targets on its platform, units (TOML).")
+        Path, typer.Option(help="Robot, targets on the platform, units (TOML).")
     ],
     commands: Annotated[
         Path, typer.Option(help="Table of commands: id, q.* or pose.*, time, load.*.")
     ],
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="Folder of the new campaign.")
+        Path, typer.Option("-o", "--output", help="Folder for the new campaign.")
     ],
     json: JsonOption = None,
     diagnose: Annotated[
         bool,
         typer.Option(
             "--diagnose",
-            help="Also run validation diagnose; --json and --report write its results.",
+            help="Also run validation diagnose; --json and --report then write the "
+            "results of the diagnosis.",
         ),
     ] = False,
     report: ReportOption = None,
 ) -> None:
-    """Make a campaign from the files of a measuring device.
+    """Create a campaign from the files of a measuring device.
 
-    Readings are assigned to commands by name, by time or by order.  The pose of the
-    device is fitted.  Interchanged targets and outliers are reported; outliers are not
-    written to the campaign.
+    Readings are matched to commands by name, by time or by order.  The pose of the
+    device is fitted.  Interchanged targets and outliers are reported, and outliers are
+    omitted from the campaign.
     """
     from forcefit.validation.exchange.tracker import import_readings
 

@@ -1,4 +1,4 @@
-"""The command ``forcefit assembly frequencies``."""
+"""Command ``forcefit assembly frequencies``."""
 
 from typing import Annotated
 
@@ -42,7 +42,7 @@ def frequencies(
     count: Annotated[int, typer.Option(help="Number of modes.", min=1, max=1000)] = 6,
     json: JsonOption = None,
 ) -> None:
-    """Compute natural frequencies and modes with the drives held.
+    """Compute natural frequencies and modes with locked drives.
 
     The robot file must declare the masses of the bodies.
     """

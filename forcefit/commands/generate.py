@@ -1,4 +1,4 @@
-"""The command ``forcefit validation generate``, which simulates a campaign."""
+"""Command ``forcefit validation generate``: simulate a measurement campaign."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -24,14 +24,14 @@ from forcefit.commands.progress import progress_bars
 from forcefit.inputs.errors import BadInput, checked
 from forcefit.inputs.writing import check_json, check_new_folder, write_json
 
-DEFAULT_STRENGTH = 5.0  # [-] default ratio of the size of an effect to the noise
+DEFAULT_STRENGTH = 5.0  # [-] default size of an effect divided by the noise
 
 
 def parse_effects(texts: list[str] | None) -> dict[str, float]:
-    """Return the names and sizes of effects from ``--effect``.
+    """Parse the names and sizes of effects from ``--effect``.
 
     Args:
-        texts: texts such as ``["self_weight", "link_length=3"]``.
+        texts: for example ``["self_weight", "link_length=3"]``.
 
     Returns:
         Size of each effect as a multiple of the measurement noise, by name.
@@ -58,14 +58,15 @@ def parse_effects(texts: list[str] | None) -> dict[str, float]:
 
 def generate(
     robot: RobotArgument,
-    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder to write.")],
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Output folder.")],
     truth: Annotated[
-        Path, typer.Option(help="File for the hidden effects, not inside FOLDER.")
+        Path, typer.Option(help="File for the hidden effects, outside FOLDER.")
     ],
     effect: Annotated[
         list[str] | None,
         typer.Option(
-            "--effect", help="Hidden effect: NAME, or NAME=MULTIPLE of the noise (5)."
+            "--effect",
+            help="Hidden effect: NAME, or NAME=MULTIPLE of the noise (default 5).",
         ),
     ] = None,
     configurations: Annotated[
@@ -74,7 +75,7 @@ def generate(
     rows: Annotated[
         int,
         typer.Option(
-            help="Number of measurements; the configurations alternate.",
+            help="Number of measurements, cycling through the configurations.",
             min=1,
             max=1_000_000,
         ),
@@ -85,7 +86,7 @@ def generate(
     loads: Annotated[
         str,
         typer.Option(
-            help="Loads: many (sizes and directions) | one (always the same)."
+            help="Loads: many (different sizes and directions) | one (constant)."
         ),
     ] = "many",
     temperature: Temperature = "swing",
@@ -98,13 +99,12 @@ def generate(
     error_size: Annotated[
         float,
         typer.Option(
-            help="[rad] Largest declared error of an angle; the largest error of a "
-            "length is "
+            help="[rad] Largest declared angular error; the largest linear error is "
             "0.5 mm per mrad."
         ),
     ] = 0.0,
     outliers: Annotated[
-        int, typer.Option(help="Number of outliers: rows with a large error.", min=0)
+        int, typer.Option(help="Number of outlier rows, with a large error.", min=0)
     ] = 0,
     missing: Annotated[
         float, typer.Option(help="Fraction of missing readings, from 0 to 1.")
@@ -117,15 +117,15 @@ def generate(
     ] = 0.0,
     at: AtOption = None,
     program: Annotated[
-        str, typer.Option(help="Simulation program: multibody | springs (faster).")
+        str, typer.Option(help="Simulation: multibody | springs (faster).")
     ] = "multibody",
-    seed: Annotated[int, typer.Option(help="Seed of all draws.", min=0)] = 0,
+    seed: Annotated[int, typer.Option(help="Random seed.", min=0)] = 0,
     json: JsonOption = None,
 ) -> None:
-    """Simulate a campaign with effects that the file lacks.
+    """Simulate a campaign with effects not in the file.
 
     Writes campaign.toml, measurements.csv and robot.toml to FOLDER.  Joints have no
-    clearance, unless a clearance is among the hidden effects.
+    clearance, unless one of the hidden effects is a clearance.
     """
     import numpy as np
 
@@ -169,8 +169,8 @@ def generate(
     check_json(str(truth))
     if folder.resolve() in truth.resolve().parents:
         raise BadInput(
-            f"--truth {truth}: found a place inside {folder}, where the hidden "
-            "effects would be visible; expected a file outside that folder"
+            f"--truth {truth}: found a path inside {folder}, where the hidden effects "
+            "would be visible; expected a file outside that folder"
         )
     machine = without_clearance(load_robot(robot))
     if error_size:

@@ -1,4 +1,4 @@
-"""Help texts of the commands, with the options in titled groups."""
+"""Command-line help that lists the options in titled groups."""
 
 from typing import Any
 
@@ -24,10 +24,10 @@ _GROUP_OF = {
 
 
 class GroupedCommand(TyperCommand):
-    """A command whose help text lists its options in groups."""
+    """Command whose help lists its options in groups."""
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
-        """Write the arguments, and then each group of options."""
+        """Write the arguments followed by each group of options."""
         rows: dict[str, list[tuple[str, str]]] = {
             title: [] for title in ("Arguments", _WHAT, *GROUPS)
         }
@@ -42,7 +42,7 @@ class GroupedCommand(TyperCommand):
 
 
 class Commands(typer.Typer):
-    """A group of commands whose help texts list their options in groups."""
+    """Command group whose commands list their options in groups."""
 
     def command(self, name: str | None = None, **settings: Any) -> Any:
         """Register a command; see :meth:`typer.Typer.command` for the arguments."""
@@ -50,7 +50,7 @@ class Commands(typer.Typer):
 
 
 def _title_of(param: Any) -> str:
-    """Return the title under which the help lists a parameter."""
+    """Return the title of the help group that lists a parameter."""
     if param.param_type_name == "argument":
         return "Arguments"
     groups = [_GROUP_OF[name] for name in param.opts if name in _GROUP_OF]

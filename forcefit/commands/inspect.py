@@ -1,4 +1,4 @@
-"""The command ``forcefit validation inspect``."""
+"""Command ``forcefit validation inspect``."""
 
 from pathlib import Path
 from typing import Annotated
@@ -28,12 +28,12 @@ def inspect(
 ) -> None:
     """Inspect measured data; characteristics of ISO 9283 and 230-2.
 
-    The report states the numbers of rows, the ranges of loads and covariates, the noise
-    estimated from repeats against the declared sigma, the visible effects, and the
-    effects that this design cannot distinguish.  With --iso it states characteristics
-    from repeats instead: accuracy and repeatability of pose, accuracy of distance,
-    drift; and reversal, repeatability and accuracy of readings approached from both
-    sides.
+    The report lists the numbers of rows, the ranges of loads and covariates, the noise
+    estimated from repeats compared with the declared sigma, the detectable effects, and
+    the effects that cannot be distinguished with this design.  With --iso, it lists
+    characteristics computed from repeats instead: pose accuracy and repeatability,
+    distance accuracy and drift, as well as the reversal value, repeatability and
+    accuracy of positions approached from both sides.
     """
     from forcefit.validation.campaign.campaign_file import read_campaign
     from forcefit.validation.inspection.inspection import inspect_campaign

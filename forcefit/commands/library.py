@@ -1,4 +1,4 @@
-"""The command ``forcefit stiffness library``, for stored link stiffnesses."""
+"""Command ``forcefit stiffness library``: build and query stored link stiffnesses."""
 
 from functools import partial
 from pathlib import Path
@@ -17,7 +17,7 @@ def library(
         Path,
         typer.Argument(
             metavar="SPEC|LIBRARY",
-            help="Build file (TOML), whose missing entries are computed; or the folder "
+            help="Build file (TOML) whose missing entries are computed, or the folder "
             "of a library.",
         ),
     ],
@@ -28,12 +28,12 @@ def library(
     at: Annotated[
         list[str] | None,
         typer.Option(
-            help="Parameters at which K_E is interpolated between entries, with an "
-            "error; in SI units, such as radius=0.02,length=0.4."
+            help="Interpolate K_E at these parameters [SI units] and estimate the "
+            "error, for example radius=0.02,length=0.4."
         ),
     ] = None,
     family: Annotated[
-        str, typer.Option(help="With --at: family of parts given by their surfaces.")
+        str, typer.Option(help="With --at: part family given by its surfaces.")
     ] = "",
     to: Annotated[
         str | None,
@@ -52,8 +52,8 @@ def library(
 ) -> None:
     """Build a library of link stiffnesses, or read one.
 
-    A build file computes the entries that are missing.  A library lists its entries;
-    --at interpolates between them, and --to exports them.
+    For a build file, the missing entries are computed.  For a library, the entries are
+    listed; --at interpolates between them, and --to exports them.
     """
     named = path.suffix.lower() == ".toml" and not path.is_dir()
     is_spec = path.is_file() or named
@@ -94,7 +94,7 @@ def _build(spec: Path, workers: int, json: str | None) -> None:
 
 
 def _list(folder: Path, json: str | None) -> None:
-    """Print the entries of a library and their estimated errors."""
+    """Print the library entries and their estimated errors."""
     from forcefit.stiffness.report.library import read_library
 
     entries = read_library(folder)
@@ -106,7 +106,7 @@ def _list(folder: Path, json: str | None) -> None:
 
 
 def _look_up(folder: Path, at: list[str], family: str, json: str | None) -> None:
-    """Print K_E interpolated between entries of a library, and its estimated error."""
+    """Print the interpolated K_E and its estimated error."""
     from forcefit.commands.options import parse_assignments
     from forcefit.stiffness.link import scaled
     from forcefit.stiffness.report.library import look_up, read_library
@@ -123,7 +123,7 @@ def _look_up(folder: Path, at: list[str], family: str, json: str | None) -> None
 
 
 def _export(folder: Path, to: str, key: str | None, json: str | None) -> None:
-    """Print a library as CSV, or K_E of one entry in the format of another program."""
+    """Print a library as CSV, or K_E of one entry in the format ``to``."""
     from forcefit.stiffness.report.export import library_csv, stiffness_for
     from forcefit.stiffness.report.library import read_entry, read_library
 

@@ -1,4 +1,4 @@
-"""The command ``forcefit stiffness convert``, between K_E and other programs' files."""
+"""Command ``forcefit stiffness convert``: exchange K_E with other programs."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -21,7 +21,7 @@ def convert(
         typer.Argument(
             metavar="FILE",
             help="K_E or a full stiffness matrix (.mtx, .pch, .dmig, .npy, .npz), or "
-            "results of a link that were written with --json (.json).",
+            "link results written with --json (.json).",
         ),
     ],
     to: Annotated[
@@ -32,52 +32,53 @@ def convert(
         ),
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="File to write, see --to.")
+        Path | None, typer.Option("-o", "--output", help="Output file; see --to.")
     ] = None,
     base: Annotated[
         str | None,
         typer.Option(
-            help='Held interface: a node (default: 1), or "z=0" [m] with --nodes.'
+            help='Fixed interface: a node (default: 1), or "z=0" [m] with --nodes.'
         ),
     ] = None,
     tip: Annotated[
         str | None,
         typer.Option(
-            help="Interface at which the screw is read: a node (default: 2), or "
+            help="Interface at which the screw is evaluated: a node (default: 2), or "
             '"z=0.4" [m] with --nodes.'
         ),
     ] = None,
     nodes: Annotated[
         Path | None,
         typer.Option(
-            help="Positions of nodes: lines of number, x, y, z; or an input "
-            "file with them."
+            help="Node positions: lines with number, x, y, z; or an input file that "
+            "contains them."
         ),
     ] = None,
     mass: Annotated[
-        Path | None, typer.Option(help="Mass matrix of the same degrees of freedom.")
+        Path | None,
+        typer.Option(help="Mass matrix for the same degrees of freedom."),
     ] = None,
     unit: Annotated[
         str,
         typer.Option(
-            help="Unit of lengths in the matrices: m, cm, mm, um, inch; forces are in "
-            "N, angles in rad."
+            help="Length unit of the matrices: m, cm, mm, um, inch; forces are in N, "
+            "angles in rad."
         ),
     ] = "m",
     order: Annotated[
         str | None,
         typer.Option(
-            help="Order of a node's degrees of freedom if the file does not name them: "
-            "translations-first (default), rotations-first."
+            help="Order of the degrees of freedom at each node, if the file does not "
+            "name them: translations-first (default), rotations-first."
         ),
     ] = None,
     json: JsonOption = None,
 ) -> None:
     """Read and write K_E in the formats of other programs.
 
-    A matrix is condensed onto the base and tip interfaces, and K_E is printed.  With
-    --to and --output, K_E is also written as a stiffness matrix of two nodes, at the
-    base and at the tip.
+    The matrix is condensed onto the base and tip interfaces, and K_E is printed.  With
+    --to and --output, K_E is also written as a stiffness matrix with one node at the
+    base and one at the tip.
     """
     if (to is None) != (output is None):
         raise BadInput(
@@ -96,17 +97,17 @@ def convert(
 def _saved(
     file: Path, to: str | None, options: dict[str, Any]
 ) -> "tuple[NDArray, NDArray]":
-    """Return K_E and the vector from tip to base of a file of results."""
+    """Return K_E and the vector from tip to base [m] from a results file."""
     from forcefit.stiffness.exchange.export_link import read_link_results
 
     for name, value in options.items():
         if value is not None:
             raise BadInput(
                 f"{name}: found together with the results {file}; remove the option, "
-                "because it belongs to the matrix of another program"
+                "which applies only to matrices from other programs"
             )
     if to is None:
-        raise BadInput("--to: missing; expected the format of the file to write")
+        raise BadInput("--to: missing; expected the format of the output file")
     return read_link_results(file)
 
 
@@ -114,7 +115,7 @@ def _imported(
     file: Path, mass: Path | None, nodes: Path | None, base: str, tip: str, unit: str,
     order: str | None,
 ) -> "LinkStiffness":  # fmt: skip
-    """Return the link of a matrix of another program."""
+    """Return the link condensed from a matrix of another program."""
     from forcefit.stiffness.exchange.import_link import import_link
 
     return import_link(
@@ -124,7 +125,7 @@ def _imported(
 
 
 def _report(link: "LinkStiffness", json: str | None) -> None:
-    """Print K_E of a link, or write it as JSON."""
+    """Print K_E of a link, and write it as JSON if requested."""
     from forcefit.stiffness.report.results import link_results, link_text
 
     write_json(link_results(link), json)
@@ -136,19 +137,19 @@ def _write(
     stiffness: "NDArray", offset: "NDArray", to: str | None, unit: str,
     output: Path | None,
 ) -> None:  # fmt: skip
-    """Write K_E as a matrix for another program, if a file is named."""
+    """Write K_E as a matrix for another program, if an output file is given."""
     from forcefit.stiffness.exchange.export_link import link_file
 
     if to is None or output is None:
         return
     content = link_file(stiffness, offset, to, unit)
     if (to == "numpy") != (output.suffix.lower() == ".npy"):
-        expected = ".npy" if to == "numpy" else "another than .npy"
+        expected = ".npy" if to == "numpy" else "other than .npy"
         raise BadInput(
-            f"--output: found {quoted(output.name)}, expected the ending {expected} "
-            f"for --to {to}, so that forcefit can read the file again"
+            f"--output: found {quoted(output.name)}, expected a file extension "
+            f"{expected} for --to {to}, so that forcefit can read the file back"
         )
-    # an existing file may be replaced only if it contains a matrix of the same format
+    # an existing file is replaced only if it contains a matrix in the same format
     endings, begins = (output.suffix.lower(),), (content[:8].lower(),)
     check_writable(output, Kind(f"a matrix for {to}", endings, begins))
     write_bytes(content, output)

@@ -1,4 +1,4 @@
-"""The command ``forcefit new``, which writes a robot file to start from."""
+"""Command ``forcefit new``: write a template for a robot file."""
 
 import sys
 from pathlib import Path
@@ -12,24 +12,27 @@ from forcefit.inputs.writing import check_writable, write_text
 
 def new(
     name: Annotated[
-        str, typer.Argument(metavar="NAME", help="Name of the robot; NAME.toml.")
+        str,
+        typer.Argument(
+            metavar="NAME", help="Name of the robot; the file is NAME.toml."
+        ),
     ],
     kind: Annotated[
         str | None,
         typer.Option(
-            help="Joints of a leg from the base: UPS | RUS | UPU | PRS | RRR (planar) "
-            "| delta. If it is missing, a terminal asks for it."
+            help="Joints of each leg, starting at the base: UPS | RUS | UPU | PRS | "
+            "RRR (planar) | delta. If omitted, forcefit prompts for it."
         ),
     ] = None,
     legs: Annotated[
         int | None,
-        typer.Option(help="Number of legs. Default: 6 for UPS and RUS, else 3."),
+        typer.Option(help="Number of legs. Default: 6 for UPS and RUS, otherwise 3."),
     ] = None,
 ) -> None:
-    """Write a robot file of bodies and joints, with comments.
+    """Write a commented robot file with bodies and joints.
 
-    The file can be solved without changes. Replace its numbers by those of your robot.
-    An existing file is not overwritten.
+    The file can be solved as it is. Replace its numbers with those of your robot. An
+    existing file is not overwritten.
     """
     from forcefit.assembly.files.new_robot import KINDS, new_robot
 
@@ -41,8 +44,8 @@ def new(
         )
     if path.exists():
         raise BadInput(
-            f"{path}: found a file, expected none: it is not overwritten, choose "
-            "another name"
+            f"{path}: the file already exists and is not overwritten; choose a "
+            "different name"
         )
     check_writable(path)
     if kind is None:
@@ -54,7 +57,7 @@ def new(
 
 
 def _asked(legs: int | None) -> tuple[str, int | None]:
-    """Ask the user for the kind and the number of legs, and return both."""
+    """Prompt for the leg type and, unless it is given, the number of legs."""
     from forcefit.assembly.files.new_robot import KINDS
 
     for word, each in KINDS.items():

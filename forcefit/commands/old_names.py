@@ -1,7 +1,8 @@
-"""Old names of commands and options, which print a message and work for one release.
+"""Deprecated names of commands and options, supported for one more release.
 
-The commands themselves accept only the new names, and ``--help`` lists only these.  Old
-names that the public file formats contain remain valid without a message.
+The commands themselves accept only the new names, and ``--help`` lists only the new
+names.  Using a deprecated name prints a message, except for names that are still part
+of a public file format.
 """
 
 import sys
@@ -9,7 +10,7 @@ from collections.abc import Sequence
 
 from forcefit.inputs.errors import BadInput
 
-# for each replaced command, the words that now select the same function
+# for each replaced command, the words that now invoke the same function
 COMMANDS: dict[str, tuple[str, ...]] = {
     "assembly exact": ("assembly", "solve", "--state", "exact"),
     "assembly zone": ("assembly", "solve", "--quantities", "margin"),
@@ -27,8 +28,8 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "validation iso": ("validation", "inspect", "--iso"),
 }
 _PICTURE: dict[str, tuple[str, ...]] = {"-o": ("--figure",), "--output": ("--figure",)}
-# for each command, its old options and the words that replace them; the value of an
-# option remains after these words
+# for each command, its old options and their replacements; the value of an option
+# follows the replacement
 OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
     "assembly error": {
         "--reading": ("--assumption",),
@@ -76,21 +77,21 @@ OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
     "stiffness stress": {"--wrench": ("--load",)},
 }
 
-# for each option, its old values and the new values that replace them
+# for each option, its old values and their replacements
 VALUES = {"--compliant": {"free": "margin_free", "rigid": "margin"}}
 STAY = {("assembly error", "--reading"), ("stiffness beam", "--axis")}
 
 
 def with_new_names(words: Sequence[str]) -> list[str]:
-    """Replace old names of commands and options by the new names.
+    """Replace old names of commands and options with the new names.
 
     Each replacement is reported once on stderr.
 
     Args:
-        words: words of the command line, without the program's name.
+        words: command-line arguments, without the program name.
 
     Returns:
-        The words of the command line with new names only.
+        Command-line arguments that contain new names only.
     """
     renamed = _renamed_options(words)
     end = words.index("--") if "--" in words else len(words)
@@ -114,7 +115,7 @@ def with_new_names(words: Sequence[str]) -> list[str]:
 
 
 def _with_new_command(words: list[str]) -> list[str]:
-    """Replace the words of a command that was merged with another command."""
+    """Replace the name of a command that was merged into another command."""
     for old, new in COMMANDS.items():
         count = len(old.split())
         if words[:count] == old.split():
@@ -128,19 +129,19 @@ def _with_new_command(words: list[str]) -> list[str]:
 
 
 def _parts(word: str) -> tuple[str, str, str]:
-    """Split a word into option, "=" and value; also split words such as ``-ofile``."""
+    """Split an argument into option, "=" and value; ``-ofile`` is split as well."""
     if word.startswith("--") or not word.startswith("-"):
         return word.partition("=")
     return word[:2], "=" * bool(word[2:]), word[2:]
 
 
 def _staying(words: Sequence[str]) -> list[str]:
-    """Return the old options of the command that public file formats still contain."""
+    """Return old options of the command that are still used in public file formats."""
     return [old for command, old in STAY if list(words[:2]) == command.split()]
 
 
 def _renamed_options(words: Sequence[str]) -> dict[str, tuple[str, ...]]:
-    """Return the old options, and their replacements, of the command that is called."""
+    """Return the old options of the given command and their replacements."""
     renamed: dict[str, tuple[str, ...]] = {}
     for command, options in OPTIONS.items():
         path = command.split()

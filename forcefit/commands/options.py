@@ -1,4 +1,4 @@
-"""Options that several commands share, and functions that parse their values.
+"""Options shared by several commands, and functions that parse their values.
 
 Every error message names the option.
 """
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def _built_in_names(incomplete: str) -> list[str]:
-    """Return the names of built-in robots that begin with the given text."""
+    """Complete the name of a built-in robot."""
     from forcefit.assembly.robots import BUILT_IN
 
     return [name for name in BUILT_IN if name.startswith(incomplete)]
@@ -39,7 +39,7 @@ RobotArgument = Annotated[
 PoseOption = Annotated[
     list[str] | None,
     typer.Option(
-        "--pose", help="Nominal platform pose [m, rad], such as tx=0.1,tz=-0.5."
+        "--pose", help="Nominal platform pose [m, rad], for example tx=0.1,tz=-0.5."
     ),
 ]
 
@@ -47,14 +47,17 @@ PoseOption = Annotated[
 JointOption = Annotated[
     list[str] | None,
     typer.Option(
-        "--joint", help="Coordinates of the drives [rad or m], such as leg1.drive=0.1."
+        "--joint",
+        help="Drive coordinates [rad or m], for example leg1.drive=0.1.",
     ),
 ]
 
 
 LoadOption = Annotated[
     list[str] | None,
-    typer.Option("--load", help="Load on the platform [N, N m], such as fx=10,mz=1."),
+    typer.Option(
+        "--load", help="Load on the platform [N, N m], for example fx=10,mz=1."
+    ),
 ]
 
 
@@ -62,7 +65,7 @@ DriveForceOption = Annotated[
     list[str] | None,
     typer.Option(
         "--drive-force",
-        help="Forces of force-controlled drives [N m or N], such as elbow=200.",
+        help="Forces of force-controlled drives [N m or N], for example elbow=200.",
     ),
 ]
 
@@ -71,7 +74,8 @@ AtOption = Annotated[
     list[str] | None,
     typer.Option(
         "--at",
-        help="Point of the platform, in platform axes [m], such as 0,0,-0.1 or z=-0.1.",
+        help="Point on the platform, in platform axes [m], for example 0,0,-0.1 or "
+        "z=-0.1.",
     ),
 ]
 
@@ -79,14 +83,17 @@ AtOption = Annotated[
 AlongOption = Annotated[
     list[str] | None,
     typer.Option(
-        "--along", help="Direction of a translation or rotation, such as tx=1,tz=-1."
+        "--along",
+        help="Direction of a translation or a rotation, for example tx=1,tz=-1.",
     ),
 ]
 
 
 GravityOption = Annotated[
     list[str] | None,
-    typer.Option("--gravity", help="Gravity in base axes [m/s^2], such as z=-9.81."),
+    typer.Option(
+        "--gravity", help="Gravity in base axes [m/s^2], for example z=-9.81."
+    ),
 ]
 
 
@@ -94,9 +101,8 @@ UnderOption = Annotated[
     list[str] | None,
     typer.Option(
         "--under",
-        help="Values of covariates of the robot's effects: "
-        "temperature=5,time=0,approach=1; "
-        "session=NAME.",
+        help="Covariates on which the effects of the robot depend: "
+        "temperature=5,time=0,approach=1; session=NAME.",
     ),
 ]
 
@@ -105,9 +111,8 @@ RestOption = Annotated[
     str | None,
     typer.Option(
         "--rest",
-        help="Frame in a loop that does not close at home; the gap is added to this "
-        "frame's "
-        "geometric error.",
+        help="Frame in a loop that is open at the home pose; the gap is added to the "
+        "geometric error of this frame.",
     ),
 ]
 
@@ -116,21 +121,21 @@ MismatchOption = Annotated[
     str | None,
     typer.Option(
         "--mismatch",
-        help="spring: redundant elastic drives deform to close the gap of their "
-        "coordinates "
-        "(--joint, or those at home).",
+        help="spring: redundant elastic drives deform to close the gap that their "
+        "coordinates (--joint, or those at home) leave open.",
     ),
 ]
 
 
 SeedOption = Annotated[
-    int, typer.Option("--seed", help="Seed of the random errors.", min=0, max=2**63 - 1)
+    int,
+    typer.Option("--seed", help="Seed for the random errors.", min=0, max=2**63 - 1),
 ]
 
 
 GridOption = Annotated[
     str | None,
-    typer.Option("--grid", help="Grid of poses, such as tx=-0.2:0.2:0.1,tz=-0.5."),
+    typer.Option("--grid", help="Grid of poses, for example tx=-0.2:0.2:0.1,tz=-0.5."),
 ]
 
 
@@ -144,17 +149,17 @@ JsonOption = Annotated[
     str | None,
     typer.Option(
         "--json",
-        help="Write results as JSON to a file; - is stdout.",
+        help="Write results as JSON to a file, or to stdout if the file is -.",
         callback=check_json,
     ),
 ]
 
 
 def parse_load(texts: list[str] | None, option: str = "--load") -> list[float] | None:
-    """Return the wrench ``[mx my mz fx fy fz]`` of an option, or None if it is absent.
+    """Parse the wrench ``[mx my mz fx fy fz]`` of an option; None if it is absent.
 
     Args:
-        texts: texts such as ``["fx=10,mz=1"]``; omitted components are zero.
+        texts: for example ``["fx=10,mz=1"]``; omitted components are zero.
         option: name of the option, for messages.
 
     Returns:
@@ -174,22 +179,23 @@ def parse_load(texts: list[str] | None, option: str = "--load") -> list[float] |
 
 
 def parse_gravity(texts: list[str] | None) -> list[float] | None:
-    """Return the gravity (3,) [m/s^2] of ``--gravity``; see :func:`parse_vector`."""
+    """Parse gravity (3,) [m/s^2] from ``--gravity``; see :func:`parse_vector`."""
     return parse_vector(texts, "--gravity")
 
 
 def parse_vector(texts: list[str] | None, option: str) -> list[float] | None:
-    """Return three numbers given by component, or None if the option is absent.
+    """Parse a vector given by its components, or return None if the option is absent.
 
     Args:
-        texts: texts such as ``["z=-9.81"]``.
+        texts: for example ``["z=-9.81"]``; omitted components are zero.
         option: name of the option, for messages.
 
     Returns:
-        The numbers along x, y and z.
+        Components along x, y and z.
 
     Raises:
-        BadInput: a name is not x, y or z, or a value is not a number of at most 1e6.
+        BadInput: a name is not x, y or z, or a value is not a number whose magnitude is
+            at most 1e6.
     """
     if not texts:
         return None
@@ -205,17 +211,17 @@ def parse_vector(texts: list[str] | None, option: str) -> list[float] | None:
 def parse_state(
     text: str, valid: Sequence[str] = ("nominal", "contact", "exact")
 ) -> Any:
-    """Return the state in which K_C is taken, from ``--state``.
+    """Check and return the value of ``--state``, the state for which K_C is computed.
 
     Args:
         text: value of the option.
-        valid: states that the command accepts.
+        valid: states supported by the command.
 
     Returns:
         The state.
 
     Raises:
-        BadInput: the text is not among the valid states.
+        BadInput: the command does not support the state.
     """
     if text not in valid:
         raise BadInput(f"--state: found {describe(text)}{nearest(text, valid)}")
@@ -223,16 +229,16 @@ def parse_state(
 
 
 def parse_point(texts: list[str] | None) -> tuple[float, float, float]:
-    """Return the point of ``--at``, or the platform's origin if the option is absent.
+    """Parse the point of ``--at``; the default is the origin of the platform.
 
     Args:
-        texts: texts such as ``["0,0,-0.1"]`` or ``["z=-0.1"]``.
+        texts: for example ``["0,0,-0.1"]`` or ``["z=-0.1"]``.
 
     Returns:
-        Three coordinates [m].
+        Coordinates x, y and z [m].
 
     Raises:
-        BadInput: the text is neither three numbers nor numbers by component, or a
+        BadInput: the text contains neither three numbers nor named components, or a
             number is not finite or exceeds 1e6.
     """
     if not texts:
@@ -247,17 +253,17 @@ def parse_point(texts: list[str] | None) -> tuple[float, float, float]:
     point = comma_numbers(text)
     if point.shape != (3,) or not (abs(point) <= LARGEST_LENGTH).all():
         raise BadInput(
-            f"--at: found {describe(text)}, expected three numbers of size at most "
-            f"{LARGEST_LENGTH:g} [m] such as 0,0,-0.1, or z=-0.1"
+            f"--at: found {describe(text)}, expected three numbers of magnitude at "
+            f"most {LARGEST_LENGTH:g} [m], for example 0,0,-0.1, or z=-0.1"
         )
     return float(point[0]), float(point[1]), float(point[2])
 
 
 def parse_direction(texts: list[str] | None) -> list[float] | None:
-    """Return the direction of ``--along`` as a unit screw of the platform.
+    """Parse the direction of ``--along`` as a unit screw of the platform.
 
     Args:
-        texts: texts such as ``["tx=1,tz=-1"]``.
+        texts: for example ``["tx=1,tz=-1"]``.
 
     Returns:
         Six numbers ``[rx ry rz tx ty tz]``; None if the option is absent.
@@ -277,8 +283,8 @@ def parse_direction(texts: list[str] | None) -> list[float] | None:
     length = math.hypot(*given.values())
     if length == 0.0 or len({name[0] for name, value in given.items() if value}) > 1:
         raise BadInput(
-            "--along: expected components of a translation or of a rotation, "
-            "such as tx=1,tz=-1: not all zero, and not of both kinds"
+            "--along: expected either translation or rotation components (not both), "
+            "at least one of them nonzero, for example tx=1,tz=-1"
         )
     return [given.get(name, 0.0) / length for name in names]
 
@@ -288,7 +294,7 @@ def posture_of(
     rest: str | None = None, mismatch: str | None = None, own_errors: bool = True,
     note: bool = True, links: bool = True, drive_force: list[str] | None = None,
 ) -> Any:  # fmt: skip
-    """Return the posture of ``--pose`` or ``--joint``; home if both are absent.
+    """Return the posture given by ``--pose`` or ``--joint``, or the home posture.
 
     Args:
         robot: name or file of the robot.
@@ -296,16 +302,17 @@ def posture_of(
         joint: value of ``--joint``.
         rest: value of ``--rest``.
         mismatch: value of ``--mismatch``.
-        own_errors: whether the robot keeps its declared errors in addition.
+        own_errors: whether the declared errors of the robot stay in effect in addition
+            to those that close its loops.
         note: whether to print remarks on the posture to stderr.
-        links: of :func:`forcefit.assembly.exchange.robot_files.load_robot`.
-        drive_force: of ``--drive-force``.
+        links: see :func:`forcefit.assembly.exchange.robot_files.load_robot`.
+        drive_force: value of ``--drive-force``.
 
     Returns:
-        The posture, with the effects of the robot's file applied.
+        Posture with the effects of the robot file applied.
 
     Raises:
-        BadInput: an effect loads the robot, and the command supports no loads.
+        BadInput: an effect loads the robot, which the calling command does not support.
     """
     from forcefit.assembly.effects.robot_effects import apply_robot_effects
 
@@ -316,7 +323,7 @@ def posture_of(
     if applied.gravity is not None or applied.load.any():
         raise BadInput(
             f"{robot}: found effects that load the robot, which this command does not "
-            "compute; use assembly solve or validation crosscheck instead"
+            "support; use assembly solve or validation crosscheck instead"
         )
     return applied.posture
 
@@ -326,7 +333,7 @@ def declared_posture(
     rest: str | None = None, mismatch: str | None = None, own_errors: bool = True,
     note: bool = True, links: bool = True, drive_force: list[str] | None = None,
 ) -> Any:  # fmt: skip
-    """Return the posture of the options, without the effects of the robot's file.
+    """Return the posture given by the options, without the effects of the robot file.
 
     Remarks on the posture are printed to stderr if ``note`` is true.
     """
@@ -369,23 +376,23 @@ def declared_under(
     note: bool = True,
     drive_force: list[str] | None = None,
 ) -> Any:
-    """Return the robot under loads and covariates, with the effects of its file.
+    """Return the loaded robot with the effects of its file applied.
 
     Args:
         robot: name or file of the robot.
         pose: value of ``--pose``.
         joint: value of ``--joint``.
-        load: load on the platform.
-        gravity: gravity in base axes.
-        under: covariates of the effects.
+        load: value of ``--load``.
+        gravity: value of ``--gravity``.
+        under: value of ``--under``.
         finite: whether the exact model is used.
         rest: value of ``--rest``.
         mismatch: value of ``--mismatch``.
         note: whether to print remarks on the posture to stderr.
-        drive_force: of ``--drive-force``.
+        drive_force: value of ``--drive-force``.
 
     Returns:
-        The posture, loads and conditions with the effects applied.
+        Posture, loads and conditions with the effects applied.
     """
     from forcefit.assembly.effects.robot_effects import apply_robot_effects
 
@@ -400,7 +407,7 @@ def declared_under(
 
 
 def note_massless(robot: Any, gravity: list[float] | None) -> None:
-    """Print a note to stderr if gravity is given but no body has a mass."""
+    """Print a note to stderr if gravity is given but no body has mass."""
     from forcefit.assembly.linear.load import massless
 
     for remark in massless(robot, gravity):
@@ -416,23 +423,23 @@ def note_loose(robot: Any) -> None:
 
 
 def note_closing(robot: Any, rest: str | None, mismatch: str | None) -> None:
-    """Print to stderr how ``--rest`` or ``--mismatch`` closed the robot's loops."""
+    """Print to stderr how ``--rest`` or ``--mismatch`` has closed the loops."""
     asked = [option for option in (rest, mismatch) if option is not None]
     for remark in robot.remarks[len(robot.remarks) - len(asked) :]:
         print(f"forcefit: note: {robot.name}: {remark}", file=sys.stderr)
 
 
 def parse_covariates(texts: list[str] | None) -> dict[str, float | str]:
-    """Return the values of covariates that ``--under`` sets.
+    """Parse the covariates given by ``--under``.
 
     Args:
-        texts: texts such as ``["temperature=5,approach=1"]``.
+        texts: for example ``["temperature=5,approach=1"]``.
 
     Returns:
-        Numbers by name; the value of ``session`` is a text.
+        Values by name: numbers, except for ``session``, which is a string.
 
     Raises:
-        BadInput: a text is not of the form ``NAME=VALUE``.
+        BadInput: an assignment does not have the form ``NAME=VALUE``.
     """
     parts = [part.strip() for text in texts or () for part in text.split(",")]
     named = [part.partition("=")[2].strip() for part in parts if _names_session(part)]
@@ -448,14 +455,14 @@ def _names_session(assignment: str) -> bool:
 
 
 def parse_axis(option: str, text: str) -> "NDArray":
-    """Return a direction given as ``x``, ``-y`` or ``1,0,2``.
+    """Parse a direction given as ``x``, ``-y`` or ``1,0,2``.
 
     Args:
         option: name of the option, for the message.
         text: value of the option.
 
     Returns:
-        (3,) vector of any length except zero.
+        Nonzero vector (3,) of arbitrary length.
 
     Raises:
         BadInput: the text is neither an axis nor three numbers.
@@ -472,27 +479,27 @@ def parse_axis(option: str, text: str) -> "NDArray":
     vector = comma_numbers(text)
     if vector.shape != (3,) or not vector.any():
         raise BadInput(
-            f"{option}: found {describe(text)}, expected x, y, z or three numbers "
-            "such as 0,0,1, not all zero"
+            f"{option}: found {describe(text)}, expected x, y, z or a nonzero vector "
+            "such as 0,0,1"
         )
     largest = np.abs(vector).max()
-    # the square of a number such as 1e300 would exceed the range of floats
+    # the square of a number such as 1e300 would overflow
     return vector if 1e-150 < largest < 1e150 else vector / largest
 
 
 def parse_sizes(option: str, text: str, unit: str) -> list[float]:
-    """Return positive numbers separated by commas, in ascending order.
+    """Parse positive numbers separated by commas and sort them in ascending order.
 
     Args:
-        option: name of the option, for the message.
+        option: name of the option, for messages.
         text: value of the option.
-        unit: unit for the message.
+        unit: unit of the numbers, for messages.
 
     Returns:
-        The numbers.
+        Sorted numbers.
 
     Raises:
-        BadInput: a number is not finite and > 0, or is given twice.
+        BadInput: a number is not finite and positive, or is given twice.
     """
     try:
         sizes = sorted(float(part) for part in text.split(","))

@@ -1,4 +1,4 @@
-"""The command ``forcefit assembly path``: errors by inertia along a path."""
+"""Command ``forcefit assembly path``: compute errors due to inertia along a path."""
 
 import sys
 from collections.abc import Callable, Generator
@@ -41,47 +41,46 @@ def path(
     path: Annotated[
         Path,
         typer.Option(
-            help="CSV table of the path: pose.tx .. or q.<frame>, optionally time [s] "
-            "and id."
+            help="CSV table of the path, with columns pose.tx .. or q.<frame>, and "
+            "optionally time [s] and id."
         ),
     ],
     profile: Annotated[
         str | None,
         typer.Option(
-            help="Profile of the motion from rest to rest: quintic | seventh | "
-            "trapezoid."
+            help="Rest-to-rest motion profile: quintic | seventh | trapezoid."
         ),
     ] = None,
     duration: Annotated[
-        float | None, typer.Option(help="[s] Time of the profile.")
+        float | None, typer.Option(help="[s] Duration of the motion with a profile.")
     ] = None,
     speed: Annotated[
         float | None,
         typer.Option(
-            help="[m/s] Largest speed of the platform with a profile; of drives "
-            "[rad/s or m/s]."
+            help="Maximum speed with a profile: of the platform [m/s], or of the "
+            "drives [rad/s or m/s]."
         ),
     ] = None,
     acceleration: Annotated[
         float | None,
         typer.Option(
-            help="[m/s^2] Largest acceleration of the platform with a profile; of "
-            "drives [rad/s^2 or m/s^2]."
+            help="Maximum acceleration with a profile: of the platform [m/s^2], or of "
+            "the drives [rad/s^2 or m/s^2]."
         ),
     ] = None,
     interval: Annotated[
         float | None,
-        typer.Option(help="[s] Time between the rows of a table without times."),
+        typer.Option(help="[s] Time between rows, for a table without times."),
     ] = None,
     ends: Annotated[
         str,
         typer.Option(
-            help="State at the ends of a path with times: rest (zero speed and "
+            help="State at both ends of a path with times: rest (zero speed and "
             "acceleration) | moving."
         ),
     ] = "rest",
     points: Annotated[
-        int, typer.Option(help="Number of computed instants, equally spaced.")
+        int, typer.Option(help="Number of equally spaced instants to compute.")
     ] = 201,
     load: LoadOption = None,
     gravity: GravityOption = None,
@@ -94,7 +93,7 @@ def path(
     state: Annotated[
         str,
         typer.Option(
-            help="State of the platform's compliance: nominal (clearances at zero) | "
+            help="State for the platform compliance: nominal (clearances at zero) | "
             "contact (errors, loads, clearances) | exact (finite motions)."
         ),
     ] = "nominal",
@@ -104,16 +103,16 @@ def path(
     mismatch: MismatchOption = None,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="Also write all numbers (NetCDF)."),
+        typer.Option("-o", "--output", help="Also write all results (NetCDF)."),
     ] = None,
     figure: FigureOption = None,
     report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Compute the errors that inertia causes along a path.
+    """Compute pose errors due to inertia along a path.
 
-    The robot file must declare the masses of the bodies.  Vibration is not included.
-    With -o, an interrupted computation resumes when the command is run again.
+    The robot file must declare the masses of the bodies.  Vibration is neglected.  With
+    -o, an interrupted computation resumes when the command is run again.
     """
     from forcefit.assembly.model.largest import LARGEST
     from forcefit.assembly.path.request import errors_along_path
@@ -144,7 +143,7 @@ def path(
 
 
 def _closed(robot: str, rest: str | None, mismatch: str | None) -> Any:
-    """Return the robot; its closures closed as the options specify."""
+    """Load the robot and close its loops as specified by the options."""
     from forcefit.assembly.exchange.robot_files import load_robot
     from forcefit.assembly.kinematics.closing import closing_of
 
@@ -170,7 +169,7 @@ def _resumable(output: Path | None) -> Generator[Callable[[int], int], None, Non
         from forcefit.assembly.sweeps.sweep import journal_path
 
         print(
-            f"forcefit: interrupted; {done[0]} points are kept in "
+            f"forcefit: interrupted; {done[0]} points are stored in "
             f"{journal_path(output)}: run the same command again to continue",
             file=sys.stderr,
         )
@@ -181,7 +180,7 @@ def _write(
     summary: dict[str, Any], errors: Any, source: Any, figure: Path | None,
     report: Path | None,
 ) -> None:  # fmt: skip
-    """Write picture and page."""
+    """Write the figure and the report, if requested."""
     from forcefit.assembly.path.report import path_page, plot_path
 
     if figure is not None:

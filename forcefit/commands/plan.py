@@ -1,4 +1,4 @@
-"""The command ``forcefit validation plan``, which designs a campaign."""
+"""Command ``forcefit validation plan``: design a measurement campaign."""
 
 from pathlib import Path
 from typing import Annotated
@@ -28,7 +28,7 @@ from forcefit.inputs.writing import check_new_folder, write_json
 def plan(
     robot: RobotArgument,
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="Folder of the new campaign.")
+        Path, typer.Option("-o", "--output", help="Folder for the new campaign.")
     ],
     rows: Annotated[
         int, typer.Option(help="Number of measurements.", min=1, max=1_000_000)
@@ -45,13 +45,13 @@ def plan(
     rotation: RotationNoise = 1e-5,
     position: PositionNoise = 5e-6,
     at: AtOption = None,
-    seed: Annotated[int, typer.Option(help="Seed of the candidate rows.", min=0)] = 0,
+    seed: Annotated[int, typer.Option(help="Seed for the candidate rows.", min=0)] = 0,
     json: JsonOption = None,
 ) -> None:
     """Plan measurements that distinguish effects.
 
-    Writes campaign.toml, measurements.csv without readings and robot.toml.  The times
-    and temperatures in the table are targets; replace them by the measured values.
+    Writes campaign.toml, robot.toml, and measurements.csv without readings.  The times
+    and temperatures in this table are targets; replace them with measured values.
     """
     from forcefit.assembly.exchange.robot_files import load_robot
     from forcefit.validation.inspection import planning

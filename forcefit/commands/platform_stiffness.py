@@ -1,4 +1,4 @@
-"""The command ``forcefit assembly stiffness``."""
+"""Command ``forcefit assembly stiffness``."""
 
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -48,28 +48,29 @@ def stiffness(
     state: Annotated[
         str,
         typer.Option(
-            help="nominal (clearances at zero; with clearances also contact) | "
-            "contact (errors, loads, clearances) | exact (internal forces and loads "
-            "stiffen or soften)."
+            help="nominal (clearances at zero; for robots with clearances, contact is "
+            "computed as well) | contact (errors, loads, clearances) | exact (includes "
+            "stiffening and softening by loads and internal forces)."
         ),
     ] = "nominal",
     length: Annotated[
         float | None,
         typer.Option(
-            help="[m] Characteristic length that multiplies angles in eigenstiffnesses."
+            help="[m] Characteristic length by which angles are multiplied in "
+            "eigenstiffnesses."
         ),
     ] = None,
     by: Annotated[
         list[str] | None,
         typer.Option(
-            help="Path of a value in the robot file; the derivative of the compliance "
-            "by this value is also computed."
+            help="Path of a value in the robot file; also compute the derivative of "
+            "the compliance with respect to this value."
         ),
     ] = None,
     figure: FigureOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Compute the platform's stiffness and each part's compliance."""
+    """Compute platform stiffness and the compliance of each part."""
     from forcefit.assembly.model.statuses import OK
     from forcefit.assembly.report.platform_stiffness import stiffness_of, stiffness_text
     from forcefit.assembly.report.share_pictures import plot_shares
@@ -78,8 +79,8 @@ def stiffness(
         check_writable(figure, PICTURE)
     if by and drive_force:
         raise BadInput(
-            "--by: found together with --drive-force; write drive_force into the robot "
-            "file, from which the derivatives are computed"
+            "--by: found together with --drive-force; declare drive_force in the robot "
+            "file instead, because the derivatives are computed from this file"
         )
     if length is not None:
         checked("--length", length, "m", above=0)
@@ -122,7 +123,7 @@ def _slopes(
     asked: tuple[Any, ...],
     under: list[str] | None,
 ) -> "tuple[dict[str, NDArray], dict[str, str]]":
-    """Return derivatives of the compliance in one state, or why one does not exist."""
+    """Return compliance derivatives in one state, and reasons for missing ones."""
     from forcefit.assembly.platform_stiffness.tangent_slopes import TangentState
     from forcefit.assembly.sweeps.parameters import load_design
     from forcefit.assembly.sweeps.stiffness_slopes import CannotChange, stiffness_slopes
@@ -142,7 +143,7 @@ def _slopes(
 
 
 def _print_slopes(results: dict[str, Any]) -> None:
-    """Print a line for each derivative; the line of a missing one states the reason."""
+    """Print one line per derivative, or the reason why it is missing."""
     for key in ("slopes", "slopes_contact"):
         name = key.removeprefix("slopes").replace("_", " ")
         for path, slope in results.get(key, {}).items():

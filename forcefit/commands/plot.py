@@ -1,4 +1,4 @@
-"""The command ``forcefit assembly plot``, and the option ``--csv`` of others."""
+"""Command ``forcefit assembly plot``, and the shared option ``--csv``."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,7 +11,7 @@ from forcefit.inputs.writing import PICTURE, TABLE, check_writable, save_figure
 
 
 def _table(path: Path | None) -> Path | None:
-    """Raise an error before the computation if the table could not be written."""
+    """Check before the computation that the table can be written."""
     if path is not None:
         check_writable(path, TABLE)
     return path
@@ -21,7 +21,7 @@ CsvOption = Annotated[
     Path | None,
     typer.Option(
         "--csv",
-        help="Also write a CSV table with a row for each point and a column for each "
+        help="Also write a CSV table with one row per point and one column per "
         "component.",
         callback=_table,
     ),
@@ -32,44 +32,45 @@ def plot(
     file: Annotated[
         Path,
         typer.Argument(
-            metavar="FILE", help="Data set of a sweep, draws or tolerances."
+            metavar="FILE", help="Data set of a sweep, of draws or of tolerances."
         ),
     ],
     picture: FigureOption = None,
     csv: CsvOption = None,
     at: Annotated[
         list[str] | None,
-        typer.Option(help="For the figure: values on the other axes, such as draw=3."),
+        typer.Option(
+            help="For the figure: values on the remaining axes, for example draw=3."
+        ),
     ] = None,
     kind: Annotated[
         str | None,
         typer.Option(
-            help="Kind of the figure: histogram | tornado | allocation. Default: a "
-            "kind that suits the file."
+            help="Type of figure: histogram | tornado | allocation. Default: a type "
+            "that suits the file."
         ),
     ] = None,
     quantities: Annotated[
         list[str] | None,
         typer.Option(
-            help="Variables of the figure, or their components, such as "
-            "stiffness.FX,translation or wrench.leg1.link_a.FZ. The name of a "
-            "variable alone selects all its components."
+            help="Variables or components to plot, for example "
+            "stiffness.FX,translation or wrench.leg1.link_a.FZ. The name of a variable "
+            "selects all of its components."
         ),
     ] = None,
     rows: Annotated[
         str | None,
         typer.Option(
-            help="Axes whose values are the rows of the CSV table, instead of "
-            "points, such as "
-            "quantity,group."
+            help="Axes that span the rows of the CSV table instead of points, for "
+            "example quantity,group."
         ),
     ] = None,
 ) -> None:
     """Plot a saved file, or write it as a CSV table.
 
-    A figure shows maps, lines, histograms or tolerances.  A table contains a row for
-    each point and a column for each component of every variable.  The first column, id,
-    numbers the rows from 0.  The column headings state the units in brackets.
+    Figures show maps, lines, histograms or tolerances.  Tables contain one row per
+    point and one column per component of each variable.  The first column, id, numbers
+    the rows from 0.  Column headings state the units in brackets.
     """
     from forcefit.assembly.sweeps.point_table import write_point_table
 
@@ -88,7 +89,7 @@ def plot(
 
 
 def _check_goes_with(option: str, path: Path | None, others: dict[str, Any]) -> None:
-    """Raise an error for options of an output that was not requested."""
+    """Raise BadInput for options that apply to an output that was not requested."""
     for name, value in others.items():
         if value and path is None:
             raise BadInput(

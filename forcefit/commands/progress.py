@@ -16,8 +16,8 @@ _DELAY = 2.0  # [s] shortest time between two lines of progress
 def one_thread() -> AbstractContextManager:
     """Limit linear algebra to one thread, because the matrices of a posture are small.
 
-    Idle threads would wait actively and slow down the working thread.  If the package
-    ``threadpoolctl`` is not installed, the number of threads is not limited.
+    With more threads, idle ones would spin and slow down the working thread.  Without
+    the package ``threadpoolctl``, the number of threads is not limited.
     """
     try:
         from threadpoolctl import threadpool_limits
@@ -27,7 +27,7 @@ def one_thread() -> AbstractContextManager:
 
 
 class _Links(logging.Handler):
-    """Log handler that prints a line or advances a bar for each link that is solved."""
+    """Log handler that reports each solved link with a line or a progress bar."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -48,7 +48,7 @@ class _Links(logging.Handler):
                 self.bar = None
 
     def _begin(self) -> None:
-        """Start a bar on stderr if stderr is a terminal without another bar."""
+        """Start a bar, if stderr is a terminal that does not show a bar yet."""
         from rich.console import Console
         from rich.errors import LiveError
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
@@ -67,7 +67,7 @@ class _Links(logging.Handler):
 
 
 def report_loading() -> None:
-    """Show the progress of finite elements that are solved while a robot is loaded."""
+    """Report the progress of finite element solutions while a robot is being loaded."""
     log = logging.getLogger("forcefit.links")
     log.setLevel(logging.DEBUG)
     log.handlers = [_Links()]
@@ -77,8 +77,8 @@ def report_loading() -> None:
 def progress_lines() -> Generator[Any, None, None]:
     """Print progress lines for a computation that is usually short; yield ``update``.
 
-    ``update(what, done, most)`` prints a line if two seconds have passed since the last
-    one. A bar is not shown, because the total number of steps is not known in advance.
+    ``update(what, done, most)`` prints at most one line every two seconds. No bar is
+    shown, because the total number of steps is not known in advance.
     """
     last = time.monotonic()
 
@@ -95,8 +95,9 @@ def progress_lines() -> Generator[Any, None, None]:
 def progress_bars() -> Generator[Any, None, None]:
     """Show progress bars on stderr; yield ``update(what, done, total)``.
 
-    If stderr is not a terminal, bars are printed only at the end, and a line is printed
-    for each task that takes longer than two seconds.  Bars are removed after bad input.
+    If stderr is not a terminal, the bars are printed only at the end, in addition to
+    one line for each task that takes longer than two seconds.  On bad input, the bars
+    are removed.
     """
     from rich.console import Console
     from rich.progress import (
@@ -127,7 +128,7 @@ def progress_bars() -> Generator[Any, None, None]:
                     )
                     waiting[-1].daemon = True
                     waiting[-1].start()
-                # points of an earlier run must not count in the rate of this run
+                # points from an earlier run must not count towards the rate of this run
                 tasks[what] = bars.add_task(what, total=total, completed=done, rate="")
                 began[what] = time.monotonic(), done
             start, before = began[what]

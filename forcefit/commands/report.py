@@ -1,4 +1,4 @@
-"""The command ``forcefit report``, and the option ``--report`` of other commands."""
+"""Command ``forcefit report``, and the shared option ``--report``."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,7 +17,7 @@ app = Commands(no_args_is_help=True)
 
 
 def _checked(path: Path | None) -> Path | None:
-    """Raise an error before the computation if the report could not be written."""
+    """Check before the computation that the report can be written."""
     if path is not None:
         check_writable(path, PAGE)
     return path
@@ -26,12 +26,12 @@ def _checked(path: Path | None) -> Path | None:
 ReportOption = Annotated[
     Path | None,
     typer.Option(
-        "--report", help="Also write a report as one HTML file.", callback=_checked
+        "--report", help="Also write a report as a single HTML file.", callback=_checked
     ),
 ]
 _File = Annotated[
     Path,
-    typer.Argument(metavar="FILE", help="A report, or the JSON results of a command."),
+    typer.Argument(metavar="FILE", help="A report, or JSON results of a command."),
 ]
 
 
@@ -47,7 +47,7 @@ def compare(
     page: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Compare two runs: the values that differ, largest change first."""
+    """List values that differ between two runs, largest first."""
     from forcefit.page.comparison import compare as compare_results
     from forcefit.page.comparison import comparison_page, comparison_text
 
@@ -64,7 +64,7 @@ def compare(
 
 
 def _results(path: Path) -> dict:
-    """Return the results that a report or a JSON file contains."""
+    """Return the results contained in a report or a JSON file."""
     from forcefit.page.page import results_in
 
     try:
@@ -75,14 +75,14 @@ def _results(path: Path) -> dict:
 
 
 def provenance(*sources: Path | str | None) -> "Provenance":
-    """Return the command that is running and the files that it reads.
+    """Return the current command line and the files that the command reads.
 
     Args:
-        sources: files, folders of which all files are read, names of built-in robots,
-            or None.
+        sources: files, folders whose files are all read, names of built-in robots, or
+            None.
 
     Returns:
-        The command as typed, and the paths of the files that exist.
+        Command line, and the paths of those sources that are existing files.
     """
     from forcefit.page.page import Provenance, command_line
 
@@ -97,5 +97,5 @@ def provenance(*sources: Path | str | None) -> "Provenance":
 
 
 def campaign_provenance(campaign: Path) -> "Provenance":
-    """Return the command that is running and the files in the folder of a campaign."""
+    """Return the current command line and the files in the campaign folder."""
     return provenance(campaign if campaign.is_dir() else campaign.parent)

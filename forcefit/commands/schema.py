@@ -1,4 +1,4 @@
-"""The command ``forcefit schema``."""
+"""Command ``forcefit schema``."""
 
 import json
 from typing import Annotated
@@ -14,14 +14,14 @@ def schema(
         list[str] | None,
         typer.Argument(
             help="Name of the schema: robot, campaign, steps, or a command such as "
-            "assembly solve; without a name all names are listed."
+            "assembly solve. If omitted, all names are listed."
         ),
     ] = None,
 ) -> None:
     """Print the JSON Schema of robot files, campaigns or results.
 
-    Editors use a schema to complete and check files, for example after forcefit schema
-    robot > robot.schema.json
+    Editors can use a schema to complete and check files. To store the schema of robot
+    files, run forcefit schema robot > robot.schema.json
     """
     from forcefit.assembly.files.robot_schema import ROBOT_FILE
     from forcefit.assembly.files.step_file import PLAN_FILE

@@ -1,4 +1,4 @@
-"""The command ``forcefit assembly show``."""
+"""Command ``forcefit assembly show``."""
 
 import os
 import sys
@@ -38,16 +38,16 @@ def show(
         Path | None,
         typer.Option(
             "--figure",
-            help="Picture to write: PNG, JPEG, BMP, TIFF, GIF (with --closing) or HTML "
-            "(an interactive scene). A window opens if --figure and --json are absent.",
+            help="Output file: PNG, JPEG, BMP, TIFF, GIF (with --closing) or HTML (an "
+            "interactive scene). Without --figure and --json, a window opens.",
         ),
     ] = None,
     closing: Annotated[
         bool,
         typer.Option(
             "--closing",
-            help="Show the robot closing as an animation: from bodies with geometric "
-            "errors to the assembly of least energy.",
+            help="Animate how the loops close, from the unassembled bodies with "
+            "geometric errors to the minimum-energy assembly.",
         ),
     ] = False,
     pose: PoseOption = None,
@@ -57,7 +57,7 @@ def show(
     load: LoadOption = None,
     drive_force: DriveForceOption = None,
     exaggeration: Annotated[
-        float | None, typer.Option(help="Factor on displacements.")
+        float | None, typer.Option(help="Scale factor for displacements.")
     ] = None,
     error_body: Annotated[
         str | None,
@@ -69,16 +69,16 @@ def show(
     assumption: Annotated[
         str | None,
         typer.Option(
-            help="Assumption for the set of --error-body: frozen | free | budget. "
-            "Default: budget; under a load frozen."
+            help="Assumption about open clearances for --error-body: frozen | free | "
+            "budget. Default: budget, or frozen if a load is given."
         ),
     ] = None,
     json: JsonOption = None,
 ) -> None:
     """Plot the robot and its errors; print its mobility.
 
-    The nominal and the forced robot are drawn.  With --json and without --figure,
-    nothing is drawn.
+    Both the nominal and the assembled robot are drawn.  With --json but without
+    --figure, nothing is drawn.
     """
     from forcefit.assembly.linear.energy import (
         CannotAssemble,
@@ -100,7 +100,7 @@ def show(
         raise BadInput("--closing: found no --figure, expected --figure FILE.gif")
     if closing and error_body is not None:
         raise BadInput(
-            "--closing: found it together with --error-body, expected one of them"
+            "--closing: found together with --error-body, expected only one of the two"
         )
     for option, value, valid in (
         ("--error-body", error_body, PARTS), ("--assumption", assumption, ASSUMPTIONS)
@@ -110,8 +110,8 @@ def show(
     if exaggeration is not None:
         if scene:
             raise BadInput(
-                "--exaggeration: found it together with an HTML figure, whose slider "
-                "sets the factor; expected a picture"
+                "--exaggeration: found together with an HTML figure, in which a slider "
+                "sets the factor; expected a different file format"
             )
         checked("--exaggeration", exaggeration, "1", above=0)
     wrench = parse_load(load)
@@ -119,7 +119,7 @@ def show(
     if loaded and error_body is not None and assumption == "budget":
         raise BadInput(
             "--assumption: found budget together with a load, but the budget bound "
-            "is defined for a robot without load; expected frozen or free"
+            "is defined only for an unloaded robot; expected frozen or free"
         )
     assumption = assumption or ("frozen" if loaded else "budget")
     posture = posture_of(robot, pose, joint, rest, mismatch, drive_force=drive_force)
@@ -148,14 +148,14 @@ def show(
 
 
 def _is_page(path: Path) -> bool:
-    """Return whether the ending of a path is that of an HTML page."""
+    """Return whether the file extension denotes an HTML page."""
     return path.suffix.lower() in PAGE.endings
 
 
 def _write_scene(
     assembly: Any, figure: Path, error_body: str | None, assumption: str
 ) -> None:
-    """Write the interactive scene of reports and notebooks as a separate HTML page."""
+    """Write the interactive scene, as used in reports, to its own HTML page."""
     from forcefit.assembly.report.show import show
     from forcefit.page.picture import Picture
 
@@ -168,7 +168,7 @@ def _draw(
     assembly: Any, figure: Path | None, exaggeration: float | None,
     error_body: str | None, assumption: str,
 ) -> None:  # fmt: skip
-    """Write the picture to a file, or open a window that shows it."""
+    """Write the picture to a file, or show it in a window."""
     from forcefit.assembly.report.plot import plot_assembly
 
     plotter = plot_assembly(

@@ -1,4 +1,4 @@
-"""The command ``forcefit assembly solve``."""
+"""Command ``forcefit assembly solve``."""
 
 from typing import Annotated, Any
 
@@ -40,14 +40,14 @@ def solve(
         str,
         typer.Option(
             help="contact (small motions) | exact (finite motions, which satisfy the "
-            "closures exactly)."
+            "loop closures exactly)."
         ),
     ] = "contact",
     quantities: Annotated[
         str | None,
         typer.Option(
-            help="margin: compute only the zone margins, which are the factors on all "
-            "clearances at which the robot just assembles without force."
+            help="margin: compute only the zone margins, that is, the factors on all "
+            "clearances at which the robot can just be assembled without force."
         ),
     ] = None,
     json: JsonOption = None,
@@ -67,7 +67,7 @@ def solve(
 
 
 def _results(applied: Any) -> tuple[dict[str, Any], str]:
-    """Return the solution for small motions, problem (22), and its text."""
+    """Return results for small motions, problem (22), also as text."""
     from forcefit.assembly.model.statuses import OK
     from forcefit.assembly.report.results import solution_of, solution_text
 
@@ -79,7 +79,7 @@ def _results(applied: Any) -> tuple[dict[str, Any], str]:
 
 
 def _exact_results(applied: Any) -> tuple[dict[str, Any], str]:
-    """Return the solution for finite motions, and its text."""
+    """Return results for finite motions, also as text."""
     from forcefit.assembly.report.results import exact_of, exact_text
 
     with one_thread(), progress_lines() as update:
@@ -91,7 +91,7 @@ def _exact_results(applied: Any) -> tuple[dict[str, Any], str]:
 
 
 def _check_margins(quantities: str, exact: bool, **loads: list[str] | None) -> None:
-    """Raise an error for other quantities than margins, or for options they ignore."""
+    """Raise BadInput for quantities other than margins and for inapplicable options."""
     for name in (part.strip() for part in quantities.split(",")):
         if name not in _MARGINS:
             hint = nearest(name, _MARGINS)
@@ -108,7 +108,7 @@ def _solve_margins(
     robot: str, pose: list[str] | None, joint: list[str] | None, rest: str | None,
     mismatch: str | None, drive_force: list[str] | None, json: str | None,
 ) -> None:  # fmt: skip
-    """Write and print the zone margins; link stiffnesses are not computed."""
+    """Write and print the zone margins, without computing link stiffnesses."""
     from forcefit.assembly.report.first_order import singular_status
     from forcefit.assembly.report.results import zone_of, zone_text
 

@@ -1,4 +1,4 @@
-"""The commands ``forcefit assembly statistics`` and ``tolerances``."""
+"""Commands ``forcefit assembly statistics`` and ``forcefit assembly tolerances``."""
 
 import sys
 from collections.abc import Generator, Sequence
@@ -46,17 +46,16 @@ if TYPE_CHECKING:
 ClearanceOption = Annotated[
     str,
     typer.Option(
-        help="Positions within the clearances for pose errors: worst (largest error) "
-        "| uniform | contact (pressed by a wrench of random direction; --load for "
-        "known loads) | least (of the least-energy solution)."
+        help="Positions within the clearances, for pose errors: worst (largest error) "
+        "| uniform | contact (closed by a wrench of random direction; specify a known "
+        "load with --load) | least (of the minimum-energy solution)."
     ),
 ]
 ContactLengthOption = Annotated[
     float | None,
     typer.Option(
-        help="[m] With --clearance contact: length, the ratio of random moments to "
-        "forces. "
-        "Default: the longest body."
+        help="[m] With --clearance contact: ratio of the random moments to the random "
+        "forces. Default: length of the longest body."
     ),
 ]
 
@@ -66,8 +65,8 @@ def statistics(
     errors: Annotated[
         Path | None,
         typer.Option(
-            help="Distributions of the errors (TOML), in addition to the "
-            "[[tolerance]] of the robot file."
+            help="Error distributions (TOML), in addition to the [[tolerance]] entries "
+            "of the robot file."
         ),
     ] = None,
     pose: PoseOption = None,
@@ -78,7 +77,7 @@ def statistics(
     rest: RestOption = None,
     mismatch: MismatchOption = None,
     draws: Annotated[
-        int, typer.Option(help="Number of draws of the errors.", min=2, max=10**9)
+        int, typer.Option(help="Number of random error draws.", min=2, max=10**9)
     ] = 10_000,
     seed: SeedOption = 1,
     clearance: ClearanceOption = "worst",
@@ -86,15 +85,14 @@ def statistics(
     limit: Annotated[
         list[str] | None,
         typer.Option(
-            help="Limit of a result in SI units, such as energy=5 or "
-            "translation=2e-4; may be "
-            "repeated."
+            help="Limit on a result in SI units, for example energy=5 or "
+            "translation=2e-4; may be repeated."
         ),
     ] = None,
     yield_strength: Annotated[
         float | None,
         typer.Option(
-            help="[Pa] Yield strength of the links, the limit of their stress."
+            help="[Pa] Yield strength of the links, used as the stress limit."
         ),
     ] = None,
     importance: Annotated[
@@ -117,8 +115,8 @@ def statistics(
     state: Annotated[
         str | None,
         typer.Option(
-            help="Also compute the distribution of the platform's stiffness in a "
-            "state: contact (clearances pressed or free) | exact (also internal "
+            help="Also compute the distribution of the platform stiffness in this "
+            "state: contact (each clearance open or closed) | exact (includes internal "
             "forces)."
         ),
     ] = None,
@@ -126,35 +124,39 @@ def statistics(
         bool,
         typer.Option(
             "--capability",
-            help="Also compute Cp, Cpk and parts per million of every --limit.",
+            help="Also compute Cp, Cpk and parts per million for each --limit.",
         ),
     ] = False,
     worst_case: Annotated[
         bool,
         typer.Option(
             "--worst-case",
-            help="Also compute the largest pose errors over all errors within "
-            "tolerance and all clearances.",
+            help="Also compute the largest pose errors over all geometric errors "
+            "within tolerance and all positions within the clearances.",
         ),
     ] = False,
     confidence: Annotated[
-        float, typer.Option(help="Confidence of all intervals.")
+        float, typer.Option(help="Confidence level of all intervals.")
     ] = 0.95,
     workers: Annotated[
         int, typer.Option(help="Number of threads.", min=1, max=1024)
     ] = 1,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="NetCDF file of all draws.")
+        Path | None,
+        typer.Option(
+            "-o", "--output", help="NetCDF file for the results of all draws."
+        ),
     ] = None,
     figure: FigureOption = None,
     report: ReportOption = None,
     csv: CsvOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Draw random errors: estimate yield and pose errors.
+    """Estimate yield and pose errors from random draws.
 
-    With OUTPUT, finished draws are stored in OUTPUT.journal.  After an interruption,
-    the same command continues from this journal and produces the same file.
+    If OUTPUT is given, finished draws are stored in OUTPUT.journal.  After an
+    interruption, the same command continues from this journal and produces the same
+    file.
     """
     from forcefit.assembly.report.first_order import posture_status
     from forcefit.assembly.report.results import status_line
@@ -246,13 +248,13 @@ def statistics(
 
 
 def _check_word(option: str, word: str, valid: Sequence[str]) -> None:
-    """Raise an error for a word that is not valid."""
+    """Raise BadInput if the value of an option is not valid."""
     if word not in valid:
         raise BadInput(f'{option}: found "{word[:60]}"{nearest(word, valid)}')
 
 
 def _check_clearance_model(clearance: str, contact_length: float | None) -> None:
-    """Raise an error for an unknown model, or a length that the model does not use."""
+    """Raise BadInput for an unknown clearance model or an inapplicable length."""
     from forcefit.assembly.statistics.clearance_positions import CLEARANCE_MODELS
 
     _check_word("--clearance", clearance, tuple(CLEARANCE_MODELS))
@@ -273,7 +275,7 @@ def _interruptible(output: Path | None) -> Generator[None, None, None]:
     try:
         yield
     except KeyboardInterrupt:
-        kept = f"; finished results are kept in {output}.journal" if output else ""
+        kept = f"; finished results are stored in {output}.journal" if output else ""
         print(f"forcefit: interrupted{kept}", file=sys.stderr)
         raise typer.Exit(130) from None
 
@@ -281,19 +283,17 @@ def _interruptible(output: Path | None) -> Generator[None, None, None]:
 def tolerances(
     robot: RobotArgument,
     grid: Annotated[
-        str, typer.Option(help="Workspace, such as tx=-0.2:0.2:0.1,tz=-0.5.")
+        str, typer.Option(help="Workspace, for example tx=-0.2:0.2:0.1,tz=-0.5.")
     ],
     plan: Annotated[
         Path | None,
-        typer.Option(
-            help="Plan with costs of tolerances and limits of results (TOML)."
-        ),
+        typer.Option(help="Plan with tolerance costs and limits on results (TOML)."),
     ] = None,
     quantities: Annotated[
         str,
         typer.Option(
-            help="Zone margin for the present errors: margin_free (compliant joints "
-            "free about their own axis) | margin (rigid)."
+            help="Zone margin for the declared errors: margin_free (compliant joints "
+            "turn freely about their own axes) | margin (compliant joints are rigid)."
         ),
     ] = "margin_free",
     clearance: ClearanceOption = "worst",
@@ -303,7 +303,7 @@ def tolerances(
     draws: Annotated[
         int,
         typer.Option(
-            help="Number of draws that verify the tolerances.", min=0, max=10**9
+            help="Number of draws used to verify the tolerances.", min=0, max=10**9
         ),
     ] = 2000,
     output: Annotated[
@@ -314,12 +314,13 @@ def tolerances(
     csv: CsvOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Assess the present errors; with a plan, allocate tolerances.
+    """Assess declared errors; with a plan, allocate tolerances.
 
-    Without --plan, the command computes the largest factor on the errors of the robot
-    at which it assembles at every posture, and the errors that govern its margin.  With
-    OUTPUT, finished results are stored in OUTPUT.journal.  After an interruption, the
-    same command continues from this journal and produces the same file.
+    Without --plan, the command computes the largest factor on the declared errors for
+    which the robot can be assembled in all postures, and the errors that govern this
+    margin.  If OUTPUT is given, finished results are stored in OUTPUT.journal.  After
+    an interruption, the same command continues from this journal and produces the same
+    file.
     """
     from dataclasses import replace
 
@@ -390,8 +391,8 @@ def tolerances(
             texts.append(present_text(results["present"]))
         elif asked_plan is None:
             raise BadInput(
-                f"{machine.name}: found no geometric_error of a frame; expected one "
-                "to be compared with the zone margin, or a --plan of tolerances"
+                f"{machine.name}: found no geometric_error in any frame; expected at "
+                "least one, for comparison with the zone margin, or --plan"
             )
         if asked_plan is not None:
             whose = identity_of(postures, asked_plan, draws)
@@ -421,7 +422,7 @@ def _save_allocation(
     allocation: "Allocation", output: Path | None, figure: Path | None,
     csv: Path | None,
 ) -> None:  # fmt: skip
-    """Write the tolerances as a data set, a figure and a table, as far as requested."""
+    """Write the tolerances as a data set, a figure and a table, where requested."""
     from forcefit.assembly.statistics.allocated_tolerances import tolerance_dataset
     from forcefit.assembly.statistics.plot import allocation_figure
     from forcefit.assembly.sweeps.dataset import save_dataset

@@ -1,4 +1,4 @@
-"""The command ``forcefit assembly steps``."""
+"""Command ``forcefit assembly steps``."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 def steps(
     robot: RobotArgument,
-    plan: Annotated[Path, typer.Argument(help="Steps of assembly (TOML).")],
+    plan: Annotated[Path, typer.Argument(help="Assembly steps (TOML).")],
     pose: PoseOption = None,
     joint: JointOption = None,
     rest: RestOption = None,
@@ -38,14 +38,14 @@ def steps(
     best: Annotated[
         str | None,
         typer.Option(
-            help="Find the order of the joining steps that minimises: force (the "
-            "largest closing force) | energy (at the end) | error (translation of the "
-            "platform at the end)."
+            help="Find the order of the joining steps that minimises: force (maximum "
+            "closing force) | energy (final energy) | error (final translation error "
+            "of the platform)."
         ),
     ] = None,
     errors: Annotated[
         Path | None,
-        typer.Option(help="Distributions of errors of many machines (TOML)."),
+        typer.Option(help="Error distributions of a series of machines (TOML)."),
     ] = None,
     draws: Annotated[
         int | None,
@@ -55,10 +55,11 @@ def steps(
     report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Assemble the robot step by step, in the order of a plan.
+    """Simulate the assembly of the robot step by step.
 
-    Each step is an equilibrium that starts from the previous one.  The results are
-    closing forces, energies, the spring-back at releases, and locked-in wrenches.
+    Each step computes an equilibrium, starting from that of the previous step.  The
+    results are closing forces, energies, spring-back on release, and locked-in
+    wrenches.
     """
     from forcefit.assembly.files.step_file import read_steps
     from forcefit.assembly.model.error_distributions import read_sources

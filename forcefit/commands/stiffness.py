@@ -1,4 +1,4 @@
-"""The commands ``forcefit stiffness ...``: parse options, call a function, print."""
+"""Command group ``forcefit stiffness``: stiffness and stress of links."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -66,7 +66,7 @@ def beam(
     poisson: Poisson,
     file: Annotated[
         Path | None,
-        typer.Argument(metavar="FILE", help="Pieces of a curved beam (TOML)."),
+        typer.Argument(metavar="FILE", help="Segments of a curved beam (TOML)."),
     ] = None,
     length: Annotated[
         float | None,
@@ -80,18 +80,18 @@ def beam(
     along: Annotated[
         str | None,
         typer.Option(
-            help="Direction from base to tip: x (the default), y, z, or a vector such "
-            "as 1,0,2."
+            help="Direction from base to tip: x (the default), y, z, or a vector, for "
+            "example 1,0,2."
         ),
     ] = None,
     up: Up = None,
     theory: Theory = "timoshenko",
     json: JsonOption = None,
 ) -> None:
-    """Compute K_E of a beam, straight or along a curve.
+    """Compute K_E of a straight or curved beam.
 
-    A straight beam has a length and a constant section.  For a tapered, bent or
-    L-shaped beam, FILE describes the pieces.
+    A straight beam is defined by its length and a constant cross section.  For a
+    tapered, curved or L-shaped beam, FILE defines the segments.
     """
     from forcefit.commands.beam_options import BeamOptions
     from forcefit.stiffness.report.results import link_results, link_text
@@ -103,8 +103,8 @@ def beam(
         link = _straight_link(options, length, along or "x", up)
     elif options.has_section() or not length is along is up is None:
         raise BadInput(
-            f"{file}: found together with --length, --along, --up or options of a "
-            "section; the file defines them: remove these options"
+            f"{file}: found together with --length, --along, --up or cross section "
+            "options; remove these options, because the file defines them"
         )
     else:
         link, _, _ = curve_link(file, options)
@@ -116,7 +116,7 @@ def beam(
 def _straight_link(
     options: "BeamOptions", length: float | None, along: str, up: str | None
 ) -> "LinkStiffness":
-    """Return the stiffness of a straight beam of constant section."""
+    """Return the stiffness of a straight beam of constant cross section."""
     import numpy as np
 
     from forcefit.commands.options import parse_axis
@@ -125,7 +125,7 @@ def _straight_link(
     if length is None:
         raise BadInput(
             "--length: missing; expected the length of a straight beam [m], or a "
-            "FILE with the pieces of a curved beam"
+            "FILE with the segments of a curved beam"
         )
     axis = parse_axis("--along", along)
     tip = checked("--length", length, "m", above=0) * axis / np.linalg.norm(axis)
@@ -149,9 +149,10 @@ def fea(
     report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Compute K_E by finite elements, refined to the required accuracy.
+    """Compute K_E by finite elements.
 
-    --part list prints the name, volume and bounding box of each solid in a STEP file.
+    The mesh is refined until the required accuracy is reached.  --part list prints the
+    name, volume and bounding box of each solid in a STEP file.
     """
     from forcefit.inputs.errors import checked
     from forcefit.stiffness.fem.fea import Budget, FemOptions, solve_link
@@ -162,8 +163,8 @@ def fea(
     if part and "list" in part:
         if part != ["list"] or base or tip or mass or young or poisson or report:
             raise BadInput(
-                "--part list: found together with other options; expected it alone, "
-                "because it only lists the solids of a STEP file"
+                "--part list: found together with other options; remove them, because "
+                "the command only lists the solids of a STEP file"
             )
         _list_solids(surface, json)
         return
@@ -213,7 +214,7 @@ def stress(
     tip: Tip,
     load: Annotated[
         list[str] | None,
-        typer.Option(help="Load at the tip [N, N m], such as fx=10,mz=1."),
+        typer.Option(help="Load at the tip [N, N m], for example fx=10,mz=1."),
     ] = None,
     young: YoungOfRest = None,
     poisson: PoissonOfRest = None,
@@ -222,14 +223,15 @@ def stress(
     gravity: Annotated[
         list[str] | None,
         typer.Option(
-            help="Gravity in the file's axes [m/s^2], such as z=-9.81, for stresses "
-            "due to the link's own weight."
+            help="Gravity in the axes of the file [m/s^2], for example z=-9.81, for "
+            "stresses due to the weight of the link."
         ),
     ] = None,
     away: Annotated[
         float | None,
         typer.Option(
-            help="Distance from the interfaces [m]. Default: one interface radius."
+            help="Minimum distance from the interfaces [m]. Default: one interface "
+            "radius."
         ),
     ] = None,
     radius: Radius = None,
@@ -246,7 +248,7 @@ def stress(
 ) -> None:
     """Compute the peak von Mises stress away from clamped edges.
 
-    If a section is given, the beam formula is evaluated too.
+    If a cross section is given, the stress from beam theory is computed as well.
     """
     import numpy as np
 
@@ -264,12 +266,12 @@ def stress(
     )
     if not load and not gravity:
         raise BadInput(
-            "--load: missing; expected a load [N, N m] such as fx=10, or --gravity"
+            "--load: missing; expected a load [N, N m], for example fx=10, or --gravity"
         )
     if part and options.has_section():
         raise BadInput(
-            "--part: found together with a section; the compared beam has one "
-            "material only: remove --part or the section"
+            "--part: found together with a cross section; remove one of the two, "
+            "because beam theory supports only one material"
         )
     if gravity and figure is not None:
         raise BadInput(

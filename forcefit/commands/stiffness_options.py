@@ -1,4 +1,4 @@
-"""Arguments and options that several stiffness commands share, and their parsers."""
+"""Arguments and options shared by several stiffness commands, and their parsers."""
 
 import logging
 from pathlib import Path
@@ -27,57 +27,57 @@ Poisson = Annotated[float, typer.Option(help="Poisson's ratio.")]
 YoungOfRest = Annotated[
     float | None,
     typer.Option(
-        "--young", help="Young's modulus [Pa] of the material outside all --part."
+        "--young", help="Young's modulus [Pa] of the material outside all --part parts."
     ),
 ]
 PoissonOfRest = Annotated[
     float | None,
     typer.Option(
-        "--poisson", help="Poisson's ratio of the material outside all --part."
+        "--poisson", help="Poisson's ratio of the material outside all --part parts."
     ),
 ]
 Radius = Annotated[float | None, typer.Option(help="Outer radius [m].")]
 InnerRadius = Annotated[float | None, typer.Option(help="Inner radius of a tube [m].")]
 Width = Annotated[
-    float | None, typer.Option(help="Width of the section, normal to `up` [m].")
+    float | None, typer.Option(help="Width of the cross section, normal to --up [m].")
 ]
 Height = Annotated[
-    float | None, typer.Option(help="Height of the section, along `up` [m].")
+    float | None, typer.Option(help="Height of the cross section, along --up [m].")
 ]
 SectionText = Annotated[
     str | None,
     typer.Option(
         "--section",
-        help="Any section, instead of these lengths, in SI units: "
+        help="General cross section in SI units, instead of radius, width and height: "
         "width=0.06,height=0.04,wall=0.003 (a box); ...,web=0.004,flange=0.006 (an "
         "I); area=..,I_y=..,I_z=..,J=..,shear_y=..,shear_z=...",
     ),
 ]
 Up = Annotated[
     str | None,
-    typer.Option(help="Direction of the section's z axis: x, y, z or 0,0,1."),
+    typer.Option(help="Direction of the cross section's z axis: x, y, z or 0,0,1."),
 ]
 Theory = Annotated[str, typer.Option(help="Beam theory: timoshenko or euler.")]
 Base = Annotated[
     str,
     typer.Option(
-        help='Held interface: "z=0", "bore=0,0,0/0,1,0/0.01", "disc=..." [m].'
+        help='Fixed interface: "z=0", "bore=0,0,0/0,1,0/0.01", "disc=..." [m].'
     ),
 ]
 Tip = Annotated[
     str,
     typer.Option(
-        help="Interface at which the screw is read, in the form of --base [m]."
+        help="Interface at which the screw is evaluated, in the form of --base [m]."
     ),
 ]
 Unit = Annotated[
     str,
     typer.Option(
-        help="Unit of length of the file: m, cm, mm, um, inch; a STEP file states its "
-        "own."
+        help="Length unit of the file: m, cm, mm, um, inch; a STEP file states its own "
+        "unit."
     ),
 ]
-Accuracy = Annotated[float, typer.Option(help="Required relative error of K.")]
+Accuracy = Annotated[float, typer.Option(help="Required relative accuracy of K.")]
 Kind = Annotated[
     str,
     typer.Option(
@@ -89,10 +89,11 @@ Parts = Annotated[
     list[str] | None,
     typer.Option(
         "--part",
-        help="Part with another material: "
-        '"z=0.2..0.4/young=2e11,poisson=0.3,density=7800", a box along the mesh\'s '
+        help="Part with a different material: "
+        '"z=0.2..0.4/young=2e11,poisson=0.3,density=7800" for a box aligned with the '
         'axes [m], or "solid=one+other/young=..." for solids of a STEP file, which '
-        "--part list of fea prints. May be repeated; the last part has precedence.",
+        "are listed by fea --part list. May be repeated; the last part takes "
+        "precedence.",
     ),
 ]
 Masses = Annotated[
@@ -110,23 +111,22 @@ OptionalSurface = Annotated[
 OptionalBase = Annotated[
     str | None,
     typer.Option(
-        help='Held interface: "z=0", "bore=0,0,0/0,1,0/0.01", "disc=..." [m]; '
+        help='Fixed interface: "z=0", "bore=0,0,0/0,1,0/0.01", "disc=..." [m]; '
         "required for a mesh."
     ),
 ]
 OptionalTip = Annotated[
     str | None,
     typer.Option(
-        help="Interface at which the screw is read, in the form of --base [m]; "
-        "required for a "
-        "mesh."
+        help="Interface at which the screw is evaluated, in the form of --base [m]; "
+        "required for a mesh."
     ),
 ]
 TimeLimit = Annotated[float, typer.Option(help="Time limit of the solution [s].")]
 
 
 def tell_progress() -> None:
-    """Print the number of unknowns, the error and the expected time of each mesh."""
+    """Print the number of unknowns, the error and the expected time for each mesh."""
     log = logging.getLogger("forcefit.finite_elements")
     log.setLevel(logging.INFO)
     log.handlers = [logging.StreamHandler()]
@@ -135,17 +135,17 @@ def tell_progress() -> None:
 def parse_interfaces(
     base: str | None, tip: str | None
 ) -> "tuple[Interface, Interface]":
-    """Return the interfaces that ``--base`` and ``--tip`` describe."""
+    """Parse the interfaces given by ``--base`` and ``--tip``."""
     from forcefit.stiffness.surface.interface import parse_interface
 
     if base is None or tip is None:
         option = "--base" if base is None else "--tip"
-        raise BadInput(f'{option}: missing; expected an interface, such as "z=0"')
+        raise BadInput(f'{option}: missing; expected an interface such as "z=0"')
     return parse_interface(base, "--base"), parse_interface(tip, "--tip")
 
 
 def parse_up(text: str | None) -> "NDArray | None":
-    """Return the direction of the section's z axis, or None if the option is absent."""
+    """Parse the direction of the cross section's z axis; None if it is absent."""
     from forcefit.commands.options import parse_axis
 
     return None if text is None else parse_axis("--up", text)
@@ -154,7 +154,7 @@ def parse_up(text: str | None) -> "NDArray | None":
 def parse_materials(
     young: float | None, poisson: float | None, density: float, parts: list[str] | None
 ) -> "list[Material]":
-    """Return the materials of a link: the main material first, then those of parts."""
+    """Return the materials of a link: the main material followed by those of parts."""
     from forcefit.commands.beam_options import BeamOptions
     from forcefit.inputs.errors import checked
     from forcefit.stiffness.fem.material import Material
@@ -176,7 +176,7 @@ def parse_materials(
 
 
 def parse_accuracy(value: float) -> float:
-    """Return the required accuracy; raise an error if it is out of range."""
+    """Return the required accuracy; raise BadInput if it is out of range."""
     from forcefit.inputs.errors import checked
 
     return checked("--accuracy", value, "1", least=1e-5, below=0.5)
@@ -185,7 +185,7 @@ def parse_accuracy(value: float) -> float:
 def curve_link(
     path: Path, options: "BeamOptions"
 ) -> "tuple[LinkStiffness, float, float]":
-    """Return a curved beam, the size of its section [m], and its length [m]."""
+    """Return a curved beam, the size of its cross section [m], and its length [m]."""
     from forcefit.commands.beam_options import beam_name
     from forcefit.stiffness.beam.curve import curve_compliance, curve_length
     from forcefit.stiffness.beam.curve_file import read_curve

@@ -1,4 +1,4 @@
-"""The command ``forcefit assembly sweep``."""
+"""Command ``forcefit assembly sweep``."""
 
 import sys
 from contextlib import ExitStack
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 
 def _list_quantities(names: list[str] | None) -> list[str] | None:
-    """Print the names of all data variables of sweeps if ``list`` is requested."""
+    """Print the names of all sweep variables if the value is ``list``."""
     if names == ["list"]:
         from forcefit.assembly.sweeps.selection import quantities_text
 
@@ -57,43 +57,44 @@ def sweep(
     grid: Annotated[
         str | None,
         typer.Option(
-            help="Grid of postures, such as tx=-0.2:0.2:0.025,tz=-0.5, or "
+            help="Grid of postures, for example tx=-0.2:0.2:0.025,tz=-0.5, or "
             "q.<frame>=.. for joints."
         ),
     ] = None,
     poses: Annotated[
         Path | None,
         typer.Option(
-            help="CSV table of postures: pose.tx .. or q.<frame>, optionally id."
+            help="CSV table of postures, with columns pose.tx .. or q.<frame>, and "
+            "optionally id."
         ),
     ] = None,
     vary: Annotated[
         list[str] | None,
         typer.Option(
-            help="Values of the robot file to vary: PATH=VALUE,.. or "
+            help="Values in the robot file to vary: PATH=VALUE,.. or "
             "PATH=FIRST:LAST:STEP."
         ),
     ] = None,
     errors: Annotated[
-        Path | None, typer.Option(help="Distributions of the errors (TOML).")
+        Path | None, typer.Option(help="Error distributions (TOML).")
     ] = None,
     draws: Annotated[
         int | None,
-        typer.Option(help="Number of draws of errors at each point.", min=1, max=10**9),
+        typer.Option(help="Number of error draws at each point.", min=1, max=10**9),
     ] = None,
     seed: SeedOption = 1,
     assumption: Annotated[
         str,
         typer.Option(
-            help="Assumption of the pose error bounds: frozen | free | budget | none."
+            help="Assumption about open clearances in the pose error bounds: frozen | "
+            "free | budget | none."
         ),
     ] = "frozen",
     quantities: Annotated[
         list[str] | None,
         typer.Option(
-            help="Names of data variables to compute and store, such as energy,margin. "
-            "Default: the variables of a sweep without this option. list prints all "
-            "names.",
+            help="Variables to compute and store, for example energy,margin; default "
+            "stands for the default variables. list prints all names.",
             callback=_list_quantities,
             is_eager=True,
         ),
@@ -104,9 +105,9 @@ def sweep(
     state: Annotated[
         str | None,
         typer.Option(
-            help="Also compute K_C and the compliance of each part: nominal "
-            "(clearances at zero) | contact | exact (both with errors, loads and "
-            "clearances)."
+            help="Also compute K_C and the compliance of each part in this state: "
+            "nominal (clearances at zero) | contact | exact (the latter two with "
+            "errors, loads and clearances)."
         ),
     ] = None,
     frequencies: Annotated[
@@ -114,14 +115,13 @@ def sweep(
     ] = None,
     near: Annotated[
         float,
-        typer.Option(
-            help="Distance from a singularity [-] below which it is reported."
-        ),
+        typer.Option(help="Report singularities closer than this distance [-]."),
     ] = 0.02,
     yield_strength: Annotated[
         float | None,
         typer.Option(
-            help="[Pa] Yield strength of the links, for stress and safety factor."
+            help="[Pa] Yield strength of the links; also compute stress and safety "
+            "factor."
         ),
     ] = None,
     load: LoadOption = None,
@@ -135,7 +135,7 @@ def sweep(
     ] = None,
     scheduler: Annotated[
         str | None,
-        typer.Option(help="Address of a Dask cluster, such as tcp://HOST:PORT."),
+        typer.Option(help="Address of a Dask cluster, for example tcp://HOST:PORT."),
     ] = None,
     figure: FigureOption = None,
     csv: CsvOption = None,
@@ -189,8 +189,8 @@ def sweep(
     note_closing(asked.question.robot, rest, mismatch)
     if frequencies is not None and (any(wrench or ()) or any(g or ())):
         print(
-            "forcefit: note: the frequencies leave out load and gravity; "
-            "assembly frequencies --state exact includes them",
+            "forcefit: note: the frequencies neglect load and gravity; to include "
+            "them, use assembly frequencies --state exact",
             file=sys.stderr,
         )
     done = [0]
@@ -206,7 +206,7 @@ def sweep(
             run_sweep(asked, output, note, solver, held)
     except KeyboardInterrupt:
         print(
-            f"forcefit: interrupted; {done[0]} of {asked.size} points are kept "
+            f"forcefit: interrupted; {done[0]} of {asked.size} points are stored "
             f"in {journal_path(output)}: run the same command again to continue",
             file=sys.stderr,
         )
@@ -226,7 +226,7 @@ def sweep(
 
 
 def _solver(workers: int | None, scheduler: str | None) -> "Solver":
-    """Return the solver of blocks: in this process, in several, or on a cluster."""
+    """Return a solver that runs in this process, in several, or on a cluster."""
     if workers is None and scheduler is None:
         from forcefit.assembly.sweeps.sweep import solve_here
 

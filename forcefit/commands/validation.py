@@ -1,4 +1,4 @@
-"""The group of commands ``forcefit validation``."""
+"""Command group ``forcefit validation``."""
 
 from forcefit.commands.correction import carry, compensate, explain, predict
 from forcefit.commands.crosscheck import crosscheck

@@ -1,4 +1,4 @@
-"""The command ``forcefit validation validity``: errors due to assumptions."""
+"""Command ``forcefit validation validity``: estimate errors due to assumptions."""
 
 from pathlib import Path
 from typing import Annotated
@@ -48,26 +48,26 @@ def validity(
         bool,
         typer.Option(
             "--solids",
-            help="Also mesh links as solids, which takes seconds for each shape.",
+            help="Also mesh links as solids, which takes several seconds per shape.",
         ),
     ] = False,
     grid: GridOption = None,
     poses: Annotated[
         Path | None,
-        typer.Option(help="CSV table of poses: pose.tx .. or q.*."),
+        typer.Option(help="CSV table of poses, with columns pose.tx .. or q.*."),
     ] = None,
     json: JsonOption = None,
     figure: FigureOption = None,
     report: ReportOption = None,
 ) -> None:
-    """Estimate the errors due to the assumptions of the model.
+    """Estimate errors due to modelling assumptions.
 
-    The errors of position, rotation and energy are estimated at one pose or at many.
-    Four assumptions are tested: linear closures, beams instead of solids, weights at
-    the ends of links, and a disc and a cone as clearance zone of a pin in two bushes.
-    Errors above 20 um or 1 % are marked.  With --solids, errors of the stiffness of the
-    platform are also estimated.  The exit status is 1 if the robot has neither errors
-    nor a load, because then nothing can be compared.
+    Errors in position, rotation and energy are estimated at one or several poses.  Four
+    assumptions are tested: linear closures, beams instead of solids, weights lumped at
+    the ends of the links, and a disc and a cone as the clearance zone of a pin in two
+    bushes.  Errors above 20 um or 1 % are marked.  With --solids, errors in the
+    platform stiffness are estimated as well.  The exit status is 1 if the robot has
+    neither errors nor a load, because then there is nothing to compare.
     """
     from forcefit.assembly.sweeps.targets import grid_targets, parse_grid, read_targets
     from forcefit.validation.assumptions.over_poses import costs_at, costs_over_poses
@@ -83,14 +83,14 @@ def validity(
     given = [bool(pose or joint), grid is not None, poses is not None]
     if sum(given) > 1:
         raise BadInput(
-            "found more than one option for poses; expected one of --pose or "
+            "found several options that define poses; expected only one of --pose or "
             "--joint, --grid, --poses"
         )
     if figure is not None:
         if not solids:
             raise BadInput(
                 "--figure: found without --solids; add --solids, because the figure "
-                "shows the error that solids reveal"
+                "shows the errors of beams compared with solids"
             )
         check_writable(figure, PICTURE)
     wrench, g = parse_load(load), parse_gravity(gravity)

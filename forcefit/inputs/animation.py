@@ -1,4 +1,4 @@
-"""Writing of animations as GIF files, completely or not at all."""
+"""Writing of GIF animations, completely or not at all."""
 
 import io
 from collections.abc import Iterable
@@ -7,20 +7,21 @@ from typing import Any
 
 from forcefit.inputs.writing import Kind, check_writable, write_bytes
 
-# pillow, which writes GIF, is a requirement of matplotlib
+# pillow, which writes the GIF, is installed with matplotlib
 ANIMATION = Kind("an animation", (".gif",), (b"gif8",), ("matplotlib",))
-_COLOURS = 64  # number of colours that all pictures share
+_COLOURS = 64  # size of the colour palette of each frame
 
 
 def save_animation(pictures: Iterable[tuple[Any, int]], path: Path | str) -> None:
-    """Write an animation that repeats, completely or not at all.
+    """Write a looping animation, completely or not at all.
 
     Args:
-        pictures: each (rows, columns, 3) values from 0 to 255, and its duration [ms].
-        path: path with an ending of :data:`ANIMATION`.
+        pictures: for each frame, an array (rows, columns, 3) of values from 0 to 255
+            and the duration [ms].
+        path: path with a file extension of :data:`ANIMATION`.
 
     Raises:
-        BadInput: the ending is not valid, or the file cannot be written.
+        BadInput: the file extension is invalid, or the file cannot be written.
     """
     from PIL import Image
 

@@ -1,4 +1,4 @@
-"""Parsing of numbers given by name, such as ``young=2e11,poisson=0.3``."""
+"""Parsing of named numbers, for example ``young=2e11,poisson=0.3``."""
 
 import math
 from collections.abc import Iterable
@@ -7,12 +7,12 @@ from forcefit.inputs.errors import BadInput, nearest
 
 
 def check_components(given: Iterable[str], place: str, names: Iterable[str]) -> None:
-    """Raise an error if numbers are given for unknown components.
+    """Check that all component names are known.
 
     Args:
-        given: names for which numbers are given.
+        given: names to check.
         place: option or argument, for the message.
-        names: valid names of components.
+        names: valid component names.
 
     Raises:
         BadInput: a given name is not valid.
@@ -26,19 +26,19 @@ def check_components(given: Iterable[str], place: str, names: Iterable[str]) -> 
 def parse_assignments(
     texts: Iterable[str], option: str, largest: float = 1e40
 ) -> dict[str, float]:
-    """Return numbers given as ``NAME=VALUE``, separated by commas or in several texts.
+    """Parse ``NAME=VALUE`` assignments, separated by commas or in several strings.
 
     Args:
-        texts: texts such as ``["tx=0.1,tz=-0.5", "rz=0"]``.
+        texts: for example ``["tx=0.1,tz=-0.5", "rz=0"]``.
         option: name of the option, for error messages.
         largest: largest accepted absolute value.
 
     Returns:
-        The numbers by name.
+        Numbers by name.
 
     Raises:
-        BadInput: a text has a different form, or a number is not finite, too large or
-            given twice.
+        BadInput: an assignment has an invalid form, or a number is not finite, too
+            large or given twice.
     """
     values: dict[str, float] = {}
     for part in ",".join(texts).split(","):
@@ -57,8 +57,8 @@ def parse_assignments(
             )
         if abs(value) > largest:
             raise BadInput(
-                f"{option} {name[:60]}: found {value:g}, expected a number of size at "
-                f"most {largest:g}"
+                f"{option} {name[:60]}: found {value:g}, expected a number of "
+                f"magnitude at most {largest:g}"
             )
         values[name] = value
     return values

@@ -1,6 +1,6 @@
-"""Entry points: objects that other installed distributions add to forcefit.
+"""Entry points through which other installed distributions extend forcefit.
 
-A distribution names its objects in its ``pyproject.toml``::
+A distribution declares its objects in its ``pyproject.toml``::
 
     [project.entry-points."forcefit.readers"]
     cad = "their_package.robots:read"
@@ -21,20 +21,20 @@ Result = TypeVar("Result")
 
 
 def installed_names(group: str) -> tuple[str, ...]:
-    """Return the names in a group in alphabetical order, without importing anything."""
+    """Return the names in a group, sorted alphabetically, without importing them."""
     return tuple(sorted({point.name for point in _points(group, tuple(sys.path))}))
 
 
 def load_installed(group: str, name: str, kind: str) -> tuple[Any, str]:
-    """Import the object that a distribution installed under a name.
+    """Import the object that a distribution has installed under a name.
 
     Args:
-        group: group of the entry points, such as ``"forcefit.effects"``.
+        group: entry point group, for example ``"forcefit.effects"``.
         name: one of :func:`installed_names`.
-        kind: word for the kind of object in messages, such as ``"effect"``.
+        kind: type of the object as used in messages, for example ``"effect"``.
 
     Returns:
-        The object, and a text that names it: ``"the effect their:WEAR of
+        The object, and a description such as ``"the effect their:WEAR of
         their-robots"``.
 
     Raises:
@@ -61,15 +61,15 @@ def load_installed(group: str, name: str, kind: str) -> tuple[Any, str]:
 
 
 def naming_owner(function: Callable[..., Result], words: str) -> Callable[..., Result]:
-    """Return a function whose errors name the distribution that installed it.
+    """Wrap a function so that its errors name the distribution that installed it.
 
     Args:
-        function: function of another distribution.
-        words: text that names the function, from :func:`load_installed`.
+        function: function from another distribution.
+        words: description of the function, from :func:`load_installed`.
 
     Returns:
-        A function with the same result.  An error other than ``BadInput`` is replaced
-        by a ``BadInput`` that contains ``words`` and has this error as its cause.
+        Function with the same result.  An error other than ``BadInput`` is replaced by
+        a ``BadInput`` that contains ``words`` and has the original error as its cause.
     """
 
     @wraps(function)
@@ -85,12 +85,12 @@ def naming_owner(function: Callable[..., Result], words: str) -> Callable[..., R
 
 
 def _fault(error: Exception) -> str:
-    """Return the type and the message of an error in one line."""
+    """Return the type and message of an error on one line."""
     return one_line(f"{type(error).__name__}: {error}", 200)
 
 
 def version_of_installed(group: str, name: str) -> str:
-    """Return the name and version of the distribution that installs an object."""
+    """Return the name and version of the distribution that provides an object."""
     dists = [point.dist for point in _named(group, name) if point.dist is not None]
     return ", ".join(f"{dist.name} {dist.version}" for dist in dists)
 
@@ -102,7 +102,7 @@ def _named(group: str, name: str) -> list[EntryPoint]:
 
 @lru_cache(maxsize=16)
 def _points(group: str, path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
-    """Return the entry points of a group; ``path`` is ``sys.path``, the cache key."""
+    """Return the entry points of a group; the cache key ``path`` is ``sys.path``."""
     return tuple(entry_points(group=group))
 
 

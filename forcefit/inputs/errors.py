@@ -1,6 +1,6 @@
-"""Error messages: one line with the place, the value found and the value expected.
+"""Error messages: one line that states the place, the value found and what is expected.
 
-:class:`BadInput` is a ``ValueError``.  The command line prints it and exits with
+The command line prints :class:`BadInput`, a subclass of ``ValueError``, and exits with
 status 2.  Long values are abbreviated to keep the message short.
 """
 
@@ -11,19 +11,19 @@ import sys
 import unicodedata
 from collections.abc import Iterable
 
-# largest number of characters of a message: path, place, value found and value expected
+# [characters] longest message, including path, place, value found and value expected
 _LONGEST_MESSAGE = 800
 
 
 class BadInput(ValueError):
-    """Error in an input; the message is one line."""
+    """Error in the input, with a one-line message."""
 
     def __init__(self, message: str) -> None:
         super().__init__(one_line(message, _LONGEST_MESSAGE))
 
 
 def one_line(text: str, longest: int) -> str:
-    """Return a text without control characters; a long text is cut in the middle."""
+    """Escape control characters and shorten a long text in the middle."""
     if len(text) > longest:
         half = (longest - 5) // 2
         text = f"{text[:half]} ... {text[-half:]}"
@@ -31,29 +31,29 @@ def one_line(text: str, longest: int) -> str:
 
 
 def printable(text: str) -> bool:
-    """Return whether a text lacks line breaks, control codes and lone surrogates."""
+    """Return whether a text has no line breaks, control codes or lone surrogates."""
     return not any(unicodedata.category(c) in {"Cc", "Cs", "Zl", "Zp"} for c in text)
 
 
 def plot_label(text: str) -> str:
-    """Escape a text for matplotlib, which reads a formula between dollar signs.
+    """Escape dollar signs, between which matplotlib would parse a formula.
 
     Args:
-        text: text that may contain a name chosen by a user.
+        text: text that may contain a user-defined name.
 
     Returns:
-        The escaped text.
+        Escaped text.
     """
     return text.replace("$", r"\$")
 
 
 def quoted(name: str) -> str:
-    """Return a name in double quotes on one line, abbreviated if it is long."""
+    """Return a name in double quotes, on one line and abbreviated if necessary."""
     return f'"{one_line(name, 60)}"'
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:
-    """Return ``'; did you mean "x"?'``, or the valid names if none is similar."""
+    """Return ``'; did you mean "x"?'``, or list the valid names if none is similar."""
     names = list(dict.fromkeys(str(v) for v in valid))
     close = difflib.get_close_matches(name[:200], names, n=1, cutoff=0.6)
     if close:
@@ -64,13 +64,13 @@ def nearest(name: str, valid: Iterable[str]) -> str:
 
 
 def describe(value: object) -> str:
-    """Return a short description of a wrong value."""
+    """Return a short description of an invalid value."""
     text = _SHORT.repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 class _Short(reprlib.Repr):
-    """Python's abbreviated ``repr``, also for integers with thousands of digits."""
+    """Abbreviated ``repr`` that also handles integers with thousands of digits."""
 
     def repr_bool(self, x: bool, level: int) -> str:
         return str(x).lower()
@@ -86,8 +86,8 @@ _SHORT.maxstring = 60
 _SHORT.maxlist = 8
 
 
-# Upper limit in SI units, above any length, modulus or density.  The inverse is the
-# lower limit.
+# upper limit in SI units, which exceeds any length, modulus or density; its inverse is
+# the lower limit
 LARGEST = 1e15
 
 
@@ -100,22 +100,22 @@ def checked(
     least: float = -math.inf,
     below: float = math.inf,
 ) -> float:
-    """Return a number after checking that it is finite and inside its range.
+    """Check that a number is finite and within its range, and return it.
 
     Args:
         option: name of the option, for example ``--length``, for the error message.
-        value: the number given by the user.
-        unit: unit for the error message.
-        above: bound that the value must exceed.
-        least: smallest value allowed.
-        below: bound that the value must not reach.
+        value: number given by the user.
+        unit: unit, for the error message.
+        above: exclusive lower bound.
+        least: inclusive lower bound.
+        below: exclusive upper bound.
 
     Returns:
         The value.
 
     Raises:
-        BadInput: the value is not finite, is outside its range, or is too large
-            or too small for a physical quantity.
+        BadInput: the value is not finite, is out of range, or is too large or too small
+            for a physical quantity.
     """
     if abs(value) > sys.float_info.max:  # true for very large integers
         value = math.copysign(math.inf, 1 if value > 0 else -1)
@@ -123,8 +123,8 @@ def checked(
         in_range = abs(value) <= LARGEST and (above != 0 or value >= 1 / LARGEST)
         if not in_range:
             raise BadInput(
-                f"{option}: found {value:g}, expected a size between {1 / LARGEST:g} "
-                f"and {LARGEST:g} [{unit}]"
+                f"{option}: found {value:g}, expected a magnitude between "
+                f"{1 / LARGEST:g} and {LARGEST:g} [{unit}]"
             )
         return value
     limits = [

@@ -1,8 +1,8 @@
-"""File locks, with which only one program at a time writes a file.
+"""File locks, which ensure that only one process at a time writes a file.
 
-The operating system locks an extra file ``FILE.lock`` next to the file until the
-program ends.  If a program is killed, ``FILE.lock`` remains; the next program removes
-it.
+The lock is held on an additional file ``FILE.lock`` in the same folder.  If a process
+is killed, the operating system releases the lock, and the next process that uses it
+removes ``FILE.lock``.
 """
 
 import atexit
@@ -12,27 +12,27 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-# error numbers that network disks without support for locks return
+# error numbers returned by network disks that do not support locks
 _NO_LOCKS = {errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP}
-_POLL = 0.01  # [s] time between two attempts to lock a file
+_POLL = 0.01  # [s] time between attempts to lock a file
 
 
 @contextmanager
 def locked_file(path: Path, wait: bool = True) -> Generator[None, None, None]:
-    """Lock a file so that other forcefit programs cannot write it.
+    """Lock a file so that other forcefit processes cannot write it.
 
-    Nothing is locked if the package filelock is not installed or the disk does not
+    The file is not locked if the package filelock is missing or if the disk does not
     support locks.
 
     Args:
-        path: file to lock.  The program that holds the lock may rename or remove it.
-        wait: whether to wait until another program unlocks the file.
+        path: file to lock.  The process that holds the lock may rename or remove it.
+        wait: whether to wait until other processes have released the lock.
 
     Yields:
         None; the file is locked until the block ends.
 
     Raises:
-        BlockingIOError: another program has locked the file, and ``wait`` is False.
+        BlockingIOError: another process has locked the file, and ``wait`` is False.
         OSError: the file cannot be opened.
     """
     with _lock(path.with_name(path.name + ".lock"), wait):
@@ -42,10 +42,10 @@ def locked_file(path: Path, wait: bool = True) -> Generator[None, None, None]:
 
 @contextmanager
 def _lock(own: Path, wait: bool) -> Generator[None, None, None]:
-    """Lock an extra file during a block, and remove this file at the end."""
+    """Hold a lock on the file ``own`` during a block, and then remove this file."""
     try:
         from filelock import FileLock, Timeout
-    except ModuleNotFoundError:  # forcefit also works without the package filelock
+    except ModuleNotFoundError:  # filelock is optional
         yield
         return
     lock = FileLock(own, thread_local=False, poll_interval=_POLL)
@@ -56,7 +56,7 @@ def _lock(own: Path, wait: bool) -> Generator[None, None, None]:
             lock.acquire(timeout=-1 if wait else 0)
         except Timeout:
             raise BlockingIOError(errno.EWOULDBLOCK, "locked", str(own)) from None
-        except BaseException as error:  # for example because of a full disk or a signal
+        except BaseException as error:  # for example a full disk or a signal
             if new and not lock.is_locked:
                 own.unlink(missing_ok=True)
             if getattr(error, "errno", None) not in _NO_LOCKS:
@@ -67,8 +67,8 @@ def _lock(own: Path, wait: bool) -> Generator[None, None, None]:
         del _locks[id(lock)]
 
 
-# locks that are released when the program ends, because a signal may have prevented
-# their release
+# locks to release when the process ends, because a signal may have prevented their
+# release
 _locks: dict[int, tuple[Any, Path]] = {}
 
 
@@ -79,9 +79,9 @@ def _release_all() -> None:
 
 
 def _release(lock: Any, own: Path) -> None:
-    """Remove a lock file and release the lock; keep other programs' lock files."""
-    # The file is removed while it is locked: a waiting program then notices the removal
-    # and creates a new file.  Windows removes the file when the lock is released.
+    """Release a lock and remove its file, unless another process holds the lock."""
+    # The file is removed while it is still locked, so that a waiting process notices
+    # the removal and creates a new file.  Windows removes it on release.
     if lock.is_locked:
         with suppress(OSError):
             own.unlink()

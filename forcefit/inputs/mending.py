@@ -1,14 +1,14 @@
-"""Collection of all messages about a file, although a reader stops at the first error.
+"""Collect all messages about a file from a reader that stops at the first error.
 
-:func:`all_messages` runs a reader repeatedly.  After each error it replaces the faulty
-value at the place that the message names.  The new value is the valid name that the
-message suggests or a value of the required type.  If neither is known, the row or table
-is left out.  All messages therefore come from the reader, and its rules are not
-repeated here.
+:func:`all_messages` runs the reader repeatedly.  After each error, it replaces the
+faulty value at the place named in the message, either by the valid name suggested in
+the message or by a value of the required type.  If neither is known, the row or table
+is omitted.  All messages therefore come from the reader, and its rules are not
+duplicated here.
 
-Some messages, such as that of a closure with a gap, name no value in the file.  A
-replaced value could cause such a message.  It is therefore reported only if it is the
-first one, or if the reader repeats it after all replaced numbers were changed again.
+Some messages do not refer to a value in the file, for example when a closure has a gap.
+Such a message could be caused by a replaced value.  It is therefore reported only if it
+is the first message, or if it reappears after all replaced numbers have been changed.
 """
 
 import re
@@ -26,8 +26,8 @@ from forcefit.inputs.mended_table import (
 )
 from forcefit.inputs.table import MENDING, BadInput, Table
 
-MOST_MESSAGES = 50  # limit, because a wrong unit may cause a message for each row
-# tables that other tables name: if one were left out, each use of its name would fail
+MOST_MESSAGES = 50  # limited, because a wrong unit may cause one message per row
+# tables that are referred to by name: omitting one would invalidate each reference
 _NAMED = {"frame", "body", "joint", "leg"}
 _HINT = re.compile(r'(?:did you mean |; valid: |; found )"?([^",?]+)"?')
 _FOUND = re.compile(r"""(?:found|no frame) ["']([^"']*)["']""")
@@ -37,16 +37,16 @@ _LINE = re.compile(r"line (\d+)\b")
 
 @dataclass
 class _Mended:
-    """The values that are replaced in the next run of the reader.
+    """Values to replace in the next run of the reader.
 
     Attributes:
-        renamed: new names of keys; an empty name means that the key is left out.
+        renamed: new names of keys; a key with an empty new name is omitted.
         values: replacement values, of which the last one is used; None means that the
-            key is left out.
-        lines: files and numbers of the lines that are replaced by blank lines.
-        reading: record of the present run, including the tables that are left out.
-        guessed: whether a value was replaced by a text that no message suggests, or was
-            left out, so that later messages may follow from it.
+            key is omitted.
+        lines: file and line number of each line that is replaced by a blank line.
+        reading: record of the current run, including omitted tables.
+        guessed: whether a value was omitted, or replaced by text that no message
+            suggests, so that later messages may be a consequence.
     """
 
     renamed: dict[Place, str] = field(default_factory=dict)
@@ -56,7 +56,7 @@ class _Mended:
     guessed: bool = False
 
     def text(self, path: str, text: str) -> str:
-        """Return the text of a file with its faulty lines replaced by blank lines."""
+        """Replace the faulty lines in the text of a file by blank lines."""
         blank = {number for file, number in self.lines if file == path}
         if not blank:
             return text
@@ -64,7 +64,7 @@ class _Mended:
         return "\n".join("" if n in blank else x for n, x in enumerate(lines, 1))
 
     def root(self, content: dict[str, Any], file: str) -> Table:
-        """Return the root table of a file with its faulty values replaced."""
+        """Return the root table of a file, with faulty values replaced."""
         for (name, path), new in self.renamed.items():
             if name == file:
                 owner, key = _owner(content, path), path[-1]
@@ -81,10 +81,10 @@ class _Mended:
         return MendedTable(content, file, "", reading=self.reading)
 
     def mend(self, message: str) -> tuple[bool, bool]:
-        """Replace the value at the place that a message names.
+        """Replace the value at the place named in a message.
 
         Returns:
-            Whether such a value exists, and whether it was replaced before.
+            Whether such a value exists, and whether it has been replaced before.
         """
         for table in sorted(self.reading.tables, key=lambda t: -len(t.place)):
             for start in dict.fromkeys((table.place, table.first_place)):
@@ -102,7 +102,7 @@ class _Mended:
             tried[-1] = changed_numbers(tried[-1], k)
 
     def _mend_line(self, message: str) -> tuple[bool, bool]:
-        """Replace the table row that a message names by a blank line."""
+        """Replace the CSV row named in a message by a blank line."""
         file, _, rest = message.partition(": ")
         line = _LINE.match(rest)
         if line is None or not file.endswith(".csv") or int(line[1]) == 1:
@@ -114,7 +114,7 @@ class _Mended:
         return not again, again
 
     def _mend_key(self, table: MendedTable, rest: str) -> tuple[bool, bool]:
-        """Replace the value of the key with which a text begins."""
+        """Replace the value of the key at the start of ``rest``."""
         path, content = table.path, table.content
         key, rest = _key_of(content, rest)
         while key and rest.startswith(".") and isinstance(content[key], dict):
@@ -131,7 +131,7 @@ class _Mended:
         if not rest[len(key) :].startswith(": missing"):
             return self._leave_out((table.file, path))
         place = table.file, (*path, key)
-        # if this key was left out before, the message is about its absence
+        # if this key has been omitted before, the message is a consequence
         if hint is not None and hint[0].startswith("; found ") and (
             place not in self.values
         ):  # fmt: skip
@@ -139,7 +139,7 @@ class _Mended:
         return self._replace(place, None)
 
     def _rename(self, place: Place, name: str) -> tuple[bool, bool]:
-        """Read a value under another name; leave it out if the name is empty."""
+        """Rename a key, or omit it if the new name is empty."""
         again = place in self.renamed
         if again and not self.renamed[place]:
             return False, again
@@ -148,7 +148,7 @@ class _Mended:
         return True, again
 
     def _replace(self, place: Place, value: Any) -> tuple[bool, bool]:
-        """Replace a value, or leave out the value or the list item that contains it."""
+        """Replace a value, or omit it or the list item that contains it."""
         tried = self.values.setdefault(place, [])
         again = bool(tried)
         known = [value, self.reading.offers.get(place)]
@@ -161,7 +161,7 @@ class _Mended:
         return self._leave_out(place)[0], again
 
     def _leave_out(self, place: Place) -> tuple[bool, bool]:
-        """Leave out the list item that contains a place, unless it is referred to."""
+        """Omit the list item that contains a place, unless other tables refer to it."""
         file, path = place
         while path and not isinstance(path[-1], int):
             path = path[:-1]
@@ -174,13 +174,13 @@ class _Mended:
             if t.file == file and t.path[:-1] == path[:-1]
         }  # fmt: skip
         if of_list <= self.reading.left_out | {(file, path)}:
-            return False, False  # the reader would refuse a file without any such table
+            return False, False  # the reader requires at least one such table
         self.reading.left_out.add((file, path))
         self.guessed = self.guessed or not unused or path[-2] == "joint"
         return True, False
 
     def _is_unused(self, file: str, path: tuple[str | int, ...]) -> bool:
-        """Return whether the name of a body or joint is nowhere else in the file."""
+        """Return whether a body or joint is not referred to anywhere in the file."""
         tables = {t.path: t.content for t in self.reading.tables if t.file == file}
         if path[-2] not in {"body", "joint"} or path not in tables:
             return False
@@ -191,15 +191,15 @@ class _Mended:
 
 
 def all_messages(read: Callable[[], object]) -> list[str]:
-    """Return all messages of a reader about the files that it reads.
+    """Collect all messages of a reader about the files that it reads.
 
     Args:
         read: reader that raises :class:`BadInput` at the first mistake.  It is called
-            once for each message and a few more times.
+            once per message, plus a few additional times.
 
     Returns:
-        The messages in the order in which the mistakes are found, at most
-        :data:`MOST_MESSAGES`; empty if there are none.
+        Messages in the order in which the mistakes are found, at most
+        :data:`MOST_MESSAGES`.
     """
     mended, messages = _Mended(), list[str]()
     token = MENDING.set(mended)
@@ -228,7 +228,7 @@ def all_messages(read: Callable[[], object]) -> list[str]:
 def _is_repeated(
     read: Callable[[], object], mended: _Mended, message: str
 ) -> bool:  # fmt: skip
-    """Return whether a message does not depend on the numbers that were replaced."""
+    """Return whether a message is independent of the replaced numbers."""
     if mended.guessed:
         return False
     before = {place: list(tried) for place, tried in mended.values.items()}
@@ -255,7 +255,7 @@ def _owner(content: dict[str, Any], path: tuple[str | int, ...]) -> Any:
 
 
 def _key_of(content: dict[str, Any], text: str) -> tuple[str, str]:
-    """Return the longest key with which a text begins, and the text after the key."""
+    """Split a text into the longest key at its start and the text that follows."""
     for key in sorted(content, key=len, reverse=True):
         if text.startswith(key) and text[len(key) : len(key) + 1] in {".", ":", "["}:
             return key, text[len(key) :]
@@ -265,7 +265,7 @@ def _key_of(content: dict[str, Any], text: str) -> tuple[str, str]:
 def _suggested(
     value: Any, found: re.Match[str] | None, hint: re.Match[str] | None
 ) -> Any:  # fmt: skip
-    """Return a value with the name that a message suggests, or None without a name."""
+    """Return a value with the name suggested in a message, or None if there is none."""
     if found is None or hint is None:
         return None
     if value == found[1]:

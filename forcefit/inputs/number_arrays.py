@@ -1,4 +1,4 @@
-"""Conversion of plain values from a file or an option to numbers and arrays."""
+"""Conversion of values from files and options to numbers and arrays."""
 
 import math
 
@@ -9,7 +9,7 @@ from forcefit.inputs.errors import describe
 
 
 def find_fault(value: object, shape: tuple[int, ...], infinite: bool = False) -> str:
-    """Describe what is wrong with an array, with the place counted from 1.
+    """Describe the first fault in an array, with its position counted from 1.
 
     Args:
         value: nested lists that are not a valid array, or a value of another type.
@@ -17,7 +17,7 @@ def find_fault(value: object, shape: tuple[int, ...], infinite: bool = False) ->
         infinite: whether inf is allowed.
 
     Returns:
-        The wrong entry or row with its place, or the abbreviated whole value.
+        The invalid entry or row with its position, or the abbreviated value.
     """
     if not isinstance(value, list):
         return describe(value)
@@ -34,7 +34,7 @@ def find_fault(value: object, shape: tuple[int, ...], infinite: bool = False) ->
 
 
 def number_array(value: object) -> NDArray | None:
-    """Return nested lists as an array, or None if they are ragged or not numeric."""
+    """Convert nested lists to an array; return None if ragged or not numeric."""
     if not isinstance(value, list):
         return None
     if value and all(isinstance(v, list) for v in value):
@@ -45,7 +45,7 @@ def number_array(value: object) -> NDArray | None:
 
 
 def comma_numbers(text: str) -> NDArray:
-    """Return the numbers between commas, or an empty array if one is not finite."""
+    """Parse comma-separated finite numbers; return an empty array if one is invalid."""
     try:
         numbers = np.array([float(part) for part in text.split(",")])
     except ValueError:
@@ -54,7 +54,7 @@ def comma_numbers(text: str) -> NDArray:
 
 
 def as_number(value: object) -> float:
-    """Return a number as a float, or NaN for any other value, including booleans."""
+    """Convert a number to a float; return NaN for other values, including booleans."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return math.nan
     try:
@@ -64,5 +64,5 @@ def as_number(value: object) -> float:
 
 
 def _proper(values: list) -> bool:
-    """Return whether all values are numbers that a float can represent, inf or NaN."""
+    """Return whether all values are floats or integers within the range of floats."""
     return all(isinstance(v, float) or not math.isnan(as_number(v)) for v in values)

@@ -1,7 +1,7 @@
-"""Optional packages, which only some functions need, and how to install them.
+"""Optional packages, and installation hints if one of them is missing.
 
-A module imports an optional package inside the function that uses it.  If the package
-is missing, :func:`naming_packages` raises an error of one line.  All commands use it.
+Optional packages are imported inside the functions that use them.  If a package is
+missing, :func:`naming_packages`, which all commands use, raises a one-line error.
 """
 
 from collections.abc import Generator
@@ -25,12 +25,12 @@ _EXTRAS = {
     "xarray": "sweeps",
     "yaml": "yaml",
 }
-# packages that every installation of forcefit contains
+# packages that are installed with forcefit
 _REQUIRED = (
     "clarabel", "cvxpy", "exudyn", "filelock", "jinja2", "numpy", "pytetwild",
     "pyvista", "rich", "scipy", "threadpoolctl", "typer", "vtkmodules",
 )  # fmt: skip
-# packages whose distribution has a different name than the imported module
+# distribution names that differ from the name of the imported module
 _DISTRIBUTIONS = {"yaml": "pyyaml", "vtkmodules": "vtk"}
 
 
@@ -38,14 +38,14 @@ _DISTRIBUTIONS = {"yaml": "pyyaml", "vtkmodules": "vtk"}
 def naming_packages(
     whose: str = "this command", instead: str = ""
 ) -> Generator[None, None, None]:
-    """Replace the import error of a block by a message with installation instructions.
+    """Replace an import error in a block by a message with installation instructions.
 
     Args:
-        whose: name of the function or command that needs the package.
-        instead: alternative without the package.
+        whose: function or command that requires the package, for the message.
+        instead: alternative that does not require the package, for the message.
 
     Raises:
-        BadInput: a package that forcefit uses is missing.
+        BadInput: a package used by forcefit is missing.
         ModuleNotFoundError: any other module is missing.
     """
     try:
@@ -66,10 +66,10 @@ def naming_packages(
 
 
 def need(*packages: str) -> None:
-    """Raise an error before a computation if a required package is not installed.
+    """Check that packages are installed, before starting a computation.
 
     Args:
-        packages: names by which the packages are imported.
+        packages: import names of the packages.
 
     Raises:
         ModuleNotFoundError: a package is missing; the message names the first one.

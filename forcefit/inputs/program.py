@@ -1,4 +1,4 @@
-"""Hash of the program's source code and of the versions of its libraries."""
+"""Hash of the source code and of the library versions."""
 
 import hashlib
 from collections.abc import Sequence
@@ -8,22 +8,20 @@ from types import ModuleType
 
 
 def sources_hash(packages: Sequence[ModuleType], libraries: Sequence[str]) -> str:
-    """Return the SHA-256 of packages' Python sources and of the versions of libraries.
+    """Return the SHA-256 hash of Python sources and library versions.
 
     Args:
-        packages: packages; the contents of all ``.py`` files in their folders are
-            hashed.
-        libraries: names of distributions; a missing distribution changes the hash.
+        packages: packages whose ``.py`` files are hashed, including subfolders.
+        libraries: names of distributions; installing or removing one changes the hash.
 
     Returns:
-        The hash, which does not depend on where the packages are installed.
+        Hash that does not depend on where the packages are installed.
     """
     digest = hashlib.sha256()
     for package in packages:
         root = Path(str(package.__file__)).parent
         for path in sorted(root.rglob("*.py")):
-            # line ends differ between checkouts and are therefore unified before
-            # hashing
+            # line endings may differ between checkouts
             source = path.read_bytes().replace(b"\r\n", b"\n")
             name = path.relative_to(root.parent).as_posix()
             digest.update(f"{name} {len(source)}\n".encode() + source)
@@ -32,7 +30,7 @@ def sources_hash(packages: Sequence[ModuleType], libraries: Sequence[str]) -> st
 
 
 def _version(name: str) -> str:
-    """Return the version of a distribution, or a text that states its absence."""
+    """Return the version of a distribution, or ``absent`` if it is not installed."""
     try:
         return version(name)
     except PackageNotFoundError:

@@ -1,4 +1,4 @@
-"""Old names of arguments, fields and values, valid for one release with a warning."""
+"""Deprecated names of arguments, fields and values, supported for one more release."""
 
 import warnings
 from collections.abc import Callable, Mapping
@@ -11,12 +11,12 @@ C = TypeVar("C", bound=type)
 
 
 def warn_renamed(old: str, new: str, frames: int = 3) -> None:
-    """Warn that a name in the caller's code has been replaced.
+    """Warn that a name in the caller's code is deprecated.
 
     Args:
         old: name in the caller's code.
-        new: present name.
-        frames: number of frames of the call stack from here to the caller's line that
+        new: current name.
+        frames: number of stack frames from this function to the caller's line that
             contains the name.
     """
     warnings.warn(f"{old} is now {new}", FutureWarning, stacklevel=frames)
@@ -25,14 +25,14 @@ def warn_renamed(old: str, new: str, frames: int = 3) -> None:
 def renamed_keywords(
     **new_names: str | tuple[str, Mapping[Any, Any]],
 ) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Return a decorator that accepts old names of keyword arguments and warns.
+    """Return a decorator that accepts deprecated keyword arguments with a warning.
 
     Args:
-        new_names: for each old keyword, the present keyword; or the present keyword
-            together with a mapping from old to present values.
+        new_names: for each old keyword, the current keyword, or the current keyword
+            together with a mapping from old to current values.
 
     Returns:
-        The decorator.
+        Decorator.
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
@@ -54,13 +54,13 @@ def renamed_keywords(
 
 
 def renamed_fields(**new_names: str) -> Callable[[C], C]:
-    """Return a decorator for dataclasses that accepts old names of fields and warns.
+    """Return a dataclass decorator that accepts deprecated fields with a warning.
 
     Args:
-        new_names: present field for each old field.
+        new_names: current field name for each old name.
 
     Returns:
-        The decorator.
+        Decorator.
     """
 
     def decorate(cls: C) -> C:
@@ -72,15 +72,15 @@ def renamed_fields(**new_names: str) -> Callable[[C], C]:
 
 
 def current_value(argument: str, value: str, new_values: Mapping[str, str]) -> str:
-    """Return the present word for an old word, with a warning.
+    """Replace a deprecated argument value by the current one, with a warning.
 
     Args:
         argument: name of the argument, for the warning.
-        value: word in the caller's code.
-        new_values: present word for each old word.
+        value: value in the caller's code.
+        new_values: current value for each deprecated value.
 
     Returns:
-        The present word; ``value`` itself if it is not an old word.
+        The current value, which is ``value`` itself unless it is deprecated.
     """
     if value not in new_values:
         return value

@@ -1,7 +1,7 @@
-"""Reader of TOML files that reports each mistake by a separate error message.
+"""TOML reader with precise error messages.
 
-A message names the file, the place in the file, the value found and the value expected.
-For a wrong name, the message suggests the most similar valid name; see
+Each message states the file, the place in the file, the value found and what is
+expected.  For an unknown name, the message suggests the most similar valid name; see
 ``forcefit/inputs/errors.py``.
 """
 
@@ -41,9 +41,9 @@ __all__ = [
     "read_toml",
 ]
 
-# [byte] largest accepted file; the file of a robot with a million frames is smaller
+# [byte] largest accepted file; even a robot file with a million frames is smaller
 _LARGEST_FILE = 64 << 20
-# pattern of a key that consists of more than 100 names, such as a.a.a. ...
+# matches a key that consists of more than 100 names, such as a.a.a. ...
 _DEEP_KEY = re.compile(r"(?<![\w-])(?:[\w-]+\s*\.\s*){100}")
 
 
@@ -51,10 +51,10 @@ class Mending(Protocol):
     """Replacement of faulty values while a file is read; see ``mending.py``."""
 
     def text(self, path: str, text: str) -> str:
-        """Return the text to be read instead of the given text of a file."""
+        """Return the text to parse in place of the text of a file."""
 
     def root(self, content: dict[str, Any], file: str) -> "Table":
-        """Return the root table to be read instead of the content of a file."""
+        """Return the root table to read in place of the content of a file."""
 
 
 MENDING: ContextVar[Mending | None] = ContextVar("mending", default=None)
@@ -70,7 +70,7 @@ def read_bytes(path: Path | str) -> bytes:
         The bytes of the file.
 
     Raises:
-        BadInput: the file is absent, is a folder, or is unreadable or too large.
+        BadInput: the file does not exist, is a folder, is unreadable, or is too large.
     """
     try:
         with Path(path).open("rb") as file:  # a pipe may never end
@@ -81,7 +81,7 @@ def read_bytes(path: Path | str) -> bytes:
     if len(content) > _LARGEST_FILE:
         raise BadInput(
             f"{path}: found a file larger than {_LARGEST_FILE >> 20} MiB, "
-            "expected a smaller one"
+            "expected a smaller file"
         )
     return content
 
@@ -91,14 +91,14 @@ def read_text(path: Path | str, encoding: str = "utf-8-sig") -> str:
 
     Args:
         path: path of the file.
-        encoding: encoding of the text, if the file itself states another one.
+        encoding: text encoding, if the file itself states one other than UTF-8.
 
     Returns:
-        The text with line ends ``\n``.
+        Text with line endings ``\n``.
 
     Raises:
-        BadInput: the file is absent, is a folder, is unreadable or too large,
-            is not in this encoding, or contains a NUL character.
+        BadInput: the file does not exist, is a folder, is unreadable, is too large, is
+            not in this encoding, or contains a NUL character.
     """
     content, name = read_bytes(path), encoding.upper().removesuffix("-SIG")
     try:
@@ -117,13 +117,13 @@ def read_text(path: Path | str, encoding: str = "utf-8-sig") -> str:
 
 
 def read_rows(path: Path | str) -> list[list[str]]:
-    """Return the cells of a CSV file as a list for each line.
+    """Return the cells of a CSV file, as one list per line.
 
     Args:
         path: path of the file.
 
     Returns:
-        The cells as text; an empty list for a blank line.
+        Cells as strings; an empty list for a blank line.
 
     Raises:
         BadInput: the file cannot be read, or a quoted cell is not closed.
@@ -142,13 +142,13 @@ def read_toml(path: Path | str) -> "Table":
         path: path of the file.
 
     Returns:
-        The root table; its methods read the keys.
+        Root table, whose methods read the keys.
 
     Raises:
-        BadInput: the file cannot be read or is not TOML.
+        BadInput: the file cannot be read or is not valid TOML.
     """
     text = read_text(path)
-    if _DEEP_KEY.search(text):  # tomllib would need minutes for such a key
+    if _DEEP_KEY.search(text):  # tomllib would take minutes to parse such a key
         raise BadInput(f"{path}: not valid TOML: nested too deeply")
     mending = MENDING.get()
     try:
@@ -158,23 +158,24 @@ def read_toml(path: Path | str) -> "Table":
         return Table(content, str(path), "")
     except RecursionError:
         raise BadInput(f"{path}: not valid TOML: nested too deeply") from None
-    # the error text of tomllib ends with the line and column
+    # the message of tomllib ends with the line and column
     except tomllib.TOMLDecodeError as error:
         reason = one_line(str(error), 200)
         raise BadInput(f"{path}: not valid TOML: {reason}") from None
-    except ValueError:  # Python refuses integers of thousands of digits
-        reason = "found a whole number of thousands of digits"
+    except ValueError:  # Python does not parse integers with thousands of digits
+        reason = "found an integer with thousands of digits"
         raise BadInput(f"{path}: not valid TOML: {reason}") from None
 
 
 @dataclass(eq=False)
 class Table:
-    """A TOML table that records which keys were read, so that it can refuse all others.
+    """TOML table that records which keys are read, so that unknown keys are detected.
 
     Attributes:
         content: keys and values of the table.
         file: name of the file, for error messages.
-        place: place in the file, such as ``frame "elbow".link``; empty at the root.
+        place: place in the file, for example ``frame "elbow".link``; empty for the
+            root.
     """
 
     content: dict[str, Any]
@@ -183,12 +184,12 @@ class Table:
     _asked: set[str] = field(default_factory=set)
 
     def bad(self, key: str, message: str) -> BadInput:
-        """Return the error for a key of this table; the caller raises it."""
+        """Create the error for a key of this table; the caller raises it."""
         where = ".".join(part for part in (self.place, key) if part)
         return BadInput(f"{self.file}: {where}{': ' if where else ''}{message}")
 
     def has(self, key: str) -> bool:
-        """Return whether the key exists, and record the key as read."""
+        """Return whether the key exists, and mark it as read."""
         self._asked.add(key)
         return key in self.content
 
@@ -198,7 +199,7 @@ class Table:
         return self.content.get(key, default)
 
     def require(self, key: str, expected: str) -> Any:
-        """Return the unchecked value of a key that must exist.
+        """Return the unchecked value of a required key.
 
         Args:
             key: name of the key.
@@ -231,14 +232,14 @@ class Table:
             default: value of an absent key; without a default, an absent key is an
                 error.
             expected: description of a valid value, for the error message.
-            longest: largest number of characters of the string.
+            longest: maximum number of characters.
 
         Returns:
             The string.
 
         Raises:
-            BadInput: the key is missing and has no default; or the value is not a
-                string, is empty or too long, or has line breaks or other control
+            BadInput: the key is missing and has no default, or the value is not a
+                string, is empty or too long, or contains line breaks or other control
                 characters.
         """
         if default is not None and not self.has(key):
@@ -255,7 +256,7 @@ class Table:
         return value
 
     def choice(self, key: str, valid: Iterable[str], default: str | None = None) -> str:
-        """Return a string that must be among the valid ones.
+        """Return a string that must be one of several valid strings.
 
         Returns:
             The string.
@@ -273,10 +274,10 @@ class Table:
         return value
 
     def boolean(self, key: str, default: bool) -> bool:
-        """Return the boolean value of a key.
+        """Return a boolean.
 
         Returns:
-            The value, or the default.
+            The value, or the default if the key is absent.
 
         Raises:
             BadInput: the value is neither true nor false.
@@ -322,9 +323,9 @@ class Table:
             unit: unit for the error message.
             default: value of an absent key; without a default, an absent key is an
                 error.
-            above: bound that the value must exceed.
-            least: smallest accepted value.
-            below: bound that the value must not reach.
+            above: exclusive lower bound.
+            least: inclusive lower bound.
+            below: exclusive upper bound.
             largest: largest accepted absolute value.
 
         Returns:
@@ -332,7 +333,7 @@ class Table:
 
         Raises:
             BadInput: the key is missing and has no default, or the value is not a
-                number or out of range.
+                number or is out of range.
         """
         limits = [
             f"> {above:g}" if above > -math.inf else "",
@@ -350,7 +351,7 @@ class Table:
             raise self.bad(key, f"found {value_text}, expected {expected}")
         if abs(value) > largest:
             value_text = describe(self.content[key])
-            expected = f"a number of size at most {largest:g} {of_unit}".rstrip()
+            expected = f"a number of magnitude at most {largest:g} {of_unit}".rstrip()
             raise self.bad(key, f"found {value_text}, expected {expected}")
         return value
 
@@ -363,7 +364,7 @@ class Table:
         *,
         largest: float = math.inf,
     ) -> NDArray:
-        """Return an array of finite numbers of a given shape.
+        """Return an array of finite numbers with a given shape.
 
         Args:
             key: name of the key.
@@ -390,12 +391,12 @@ class Table:
             fault = find_fault(value, shape)
             raise self.bad(key, f"found {fault}, expected {expected}")
         if np.abs(array).max(initial=0.0) > largest:
-            expected = f"numbers of size at most {largest:g} [{unit}]"
+            expected = f"numbers of magnitude at most {largest:g} [{unit}]"
             raise self.bad(key, f"found {describe(value)}, expected {expected}")
         return array
 
     def table(self, key: str) -> "Table":
-        """Return the table under a key of this table.
+        """Return the inner table with a given key.
 
         Returns:
             The table.
@@ -409,10 +410,10 @@ class Table:
         return self._inner(value, ".".join(filter(None, (self.place, key))), key)
 
     def tables(self, key: str) -> list["Table"]:
-        """Return the tables of ``[[key]]``; an empty list if the key is absent.
+        """Return the list of tables ``[[key]]``, which is empty if the key is absent.
 
         Returns:
-            A :class:`Table` for each list item; messages number the items from 1.
+            One :class:`Table` per list item; messages number the items from 1.
 
         Raises:
             BadInput: the value is not a list of tables.
@@ -430,14 +431,14 @@ class Table:
     def _inner(
         self, content: dict[str, Any], place: str, *at: str | int
     ) -> "Table":  # fmt: skip
-        """Return an inner table; ``at`` is its key and, in a list, its number."""
+        """Create an inner table; ``at`` is its key and, in a list, its number."""
         return Table(content, self.file, place)
 
     def finish(self) -> None:
-        """Raise an error if the table contains keys that were not read.
+        """Check that the table contains no keys other than those that were read.
 
         Raises:
-            BadInput: an unknown key was found; the message names it.
+            BadInput: the table contains an unknown key, which the message names.
         """
         for key in self.content:
             if key not in self._asked:

@@ -1,7 +1,7 @@
 """Writing of output files, either completely or not at all.
 
-The content is written to ``FILE.part`` in the same folder, which is renamed when it is
-complete.  If a program is killed, the next program overwrites its ``FILE.part``.
+The content is written to ``FILE.part`` in the same folder, and the file is renamed when
+it is complete.  If a process is killed, the next one overwrites ``FILE.part``.
 """
 
 import io
@@ -24,14 +24,13 @@ from forcefit.inputs.packages import need
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of file that commands write.
+    """Type of file that commands write.
 
     Attributes:
-        name: name of the kind, for error messages.
-        endings: valid endings of the file names.
-        begins: accepted first bytes of the files; upper and lower case are
-        equivalent.
-        packages: optional packages that write the files.
+        name: description for error messages, with an article.
+        endings: valid file extensions.
+        begins: possible first bytes of a file, in lower case; case is ignored.
+        packages: optional packages required to write the file.
     """
 
     name: str
@@ -62,17 +61,17 @@ ROBOT = Kind(
 
 
 def check_writable(path: Path | str, kind: Kind | None = None) -> None:
-    """Raise an error, before a long computation, if a file cannot be written.
+    """Check that a file can be written, before starting a long computation.
 
     Args:
-        path: path of a file that will be written later.
-        kind: kind of the file; an existing file must be of this kind.
+        path: path of the file that will be written later.
+        kind: type of the file, which an existing file must match.
 
     Raises:
-        BadInput: the ending is not valid, or the folder is absent or not
-            writable.  The same error is raised if a file exists that is not
-            regular, not writable, or of another kind.
-        ModuleNotFoundError: a package that writes this kind is missing.
+        BadInput: the file extension is invalid, or the folder does not exist or is not
+            writable.  This error is also raised if an existing file is not a regular
+            file, is not writable, or has a different type.
+        ModuleNotFoundError: a package required to write the file is missing.
     """
     path = Path(path)
     if kind is not None:
@@ -100,7 +99,7 @@ def check_writable(path: Path | str, kind: Kind | None = None) -> None:
 
 
 def _check_there(path: Path, mode: int, kind: Kind | None) -> None:
-    """Raise an error if an existing file is not writable or is of another kind."""
+    """Check that an existing file is writable and has the expected type."""
     if stat.S_ISDIR(mode):
         raise BadInput(f"{path}: found a folder, expected a file or nothing")
     if not stat.S_ISREG(mode):
@@ -119,13 +118,13 @@ def _check_there(path: Path, mode: int, kind: Kind | None) -> None:
         raise BadInput(unwritable(path, error)) from None
     if not head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(kind.begins):
         raise BadInput(
-            f"{path}: found a file that is not {kind.name}; expected such a file, or "
-            "no file: it is not overwritten, write to another file"
+            f"{path}: found a file that is not {kind.name}; it is not overwritten, "
+            "write to a different file"
         )
 
 
 def unwritable(path: Path | str, error: Exception) -> str:
-    """Return the error message of a file that cannot be written, with the reason."""
+    """Compose the message for a file that cannot be written, with the reason."""
     number = getattr(error, "errno", None)
     reason = os.strerror(number) if number else str(error)
     return f"{path}: cannot be written: {reason}"
@@ -136,11 +135,12 @@ def whole_file(path: Path | str) -> Generator[Path, None, None]:
     """Write a file completely or not at all.
 
     Args:
-        path: path of the file; if it is a symbolic link, the target is written.
+        path: path of the file; for a symbolic link, the target is written.
 
     Yields:
-        The path to write to.  At the end of the block the written file is renamed.
-        After an error the written file is removed, and an older file is unchanged.
+        Temporary path to write to.  At the end of the block, the written file is
+        renamed to ``path``.  After an error, it is removed, and an existing file at
+        ``path`` stays unchanged.
 
     Raises:
         BadInput: the file cannot be written, for example because the disk is full.
@@ -166,13 +166,13 @@ def whole_file(path: Path | str) -> Generator[Path, None, None]:
 
 
 def check_new_folder(folder: Path | str) -> None:
-    """Raise an error, before a long computation, if a folder cannot be filled.
+    """Check that a folder can be written, before starting a long computation.
 
     Args:
         folder: path of a new or empty folder.
 
     Raises:
-        BadInput: the folder contains a file, or cannot be written.
+        BadInput: the folder is not empty or cannot be written.
     """
     folder = Path(folder)
     check_writable(folder.parent / f"{folder.name}.new")
@@ -191,10 +191,10 @@ def whole_folder(folder: Path | str) -> Generator[Path, None, None]:
         folder: path of a new or empty folder.
 
     Yields:
-        The folder in which the block must write the files.
+        Temporary folder to which the block must write the files.
 
     Raises:
-        BadInput: the folder contains a file, or cannot be written.
+        BadInput: the folder is not empty or cannot be written.
     """
     folder = Path(folder)
     check_new_folder(folder)
@@ -213,14 +213,14 @@ def whole_folder(folder: Path | str) -> Generator[Path, None, None]:
 
 
 def path_from(folder: Path, path: Path | str) -> str:
-    """Return a path relative to a folder, with slashes on every system.
+    """Return a path relative to a folder, with slashes on every operating system.
 
     Args:
-        folder: folder of the file in which the path will be written.
-        path: absolute path, or path relative to the working folder.
+        folder: folder that contains the file in which the path will be stored.
+        path: absolute path, or path relative to the working directory.
 
     Returns:
-        The path relative to the folder; the absolute path if it is on another drive.
+        Path relative to the folder, or the absolute path if it is on a different drive.
     """
     try:
         return Path(os.path.relpath(path, folder)).as_posix()
@@ -232,13 +232,13 @@ def write_text(text: str, path: Path | str) -> None:
     r"""Write a text file completely or not at all.
 
     Args:
-        text: text with line ends ``\n``, which are not converted; encoded in UTF-8.
+        text: text with line endings ``\n``, which are preserved; encoded as UTF-8.
         path: path of the file.
 
     Raises:
         BadInput: the file cannot be written.
     """
-    # file names in the text may contain bytes that are not UTF-8
+    # file names in the text may contain bytes that are not valid UTF-8
     write_bytes(text.encode("utf-8", errors="backslashreplace"), path)
 
 
@@ -260,15 +260,15 @@ def save_figure(figure: Any, path: Path | str) -> None:
     """Write a figure completely or not at all.
 
     Args:
-        figure: figure of matplotlib.
-        path: path with an ending of :data:`PICTURE`.
+        figure: matplotlib figure.
+        path: path with a file extension of :data:`PICTURE`.
 
     Raises:
-        BadInput: the ending is not valid, or the file cannot be written.
+        BadInput: the file extension is invalid, or the file cannot be written.
     """
     check_writable(path, PICTURE)
     content = io.BytesIO()
-    # for a character that the font lacks, matplotlib draws a box and warns
+    # matplotlib warns and draws a box for characters missing from the font
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         figure.savefig(content, dpi=150, format=Path(path).suffix[1:].lower())
@@ -279,11 +279,11 @@ def save_pixels(pixels: Any, path: Path | str) -> None:
     """Write an RGB picture completely or not at all.
 
     Args:
-        pixels: (rows, columns, 3) values from 0 to 255.
-        path: path with an ending of :data:`PIXELS`.
+        pixels: array (rows, columns, 3) of values from 0 to 255.
+        path: path with a file extension of :data:`PIXELS`.
 
     Raises:
-        BadInput: the ending is not valid, or the file cannot be written.
+        BadInput: the file extension is invalid, or the file cannot be written.
     """
     from matplotlib.image import imsave
 
@@ -295,7 +295,7 @@ def save_pixels(pixels: Any, path: Path | str) -> None:
 
 
 def check_json(target: str | None) -> str | None:
-    """Raise an error, before a long computation, if the JSON cannot be written.
+    """Check that the JSON output can be written, before starting a long computation.
 
     Args:
         target: a path, ``"-"`` for standard output, or None for no output.
@@ -315,7 +315,7 @@ def write_json(results: dict, target: str | None) -> None:
     """Write results as JSON to a file, completely or not at all, or to standard output.
 
     Args:
-        results: plain values; infinities and NaN become null.
+        results: plain values or arrays; infinities and NaN become null.
         target: a path, ``"-"`` for standard output, or None for no output.
 
     Raises:
@@ -331,7 +331,7 @@ def write_json(results: dict, target: str | None) -> None:
 
 
 def plain(value: Any) -> Any:
-    """Return a value for JSON: arrays become lists, infinities and NaN become None."""
+    """Convert a value for JSON: arrays become lists, infinities and NaN become None."""
     if isinstance(value, dict):
         return {str(k): plain(v) for k, v in value.items()}
     if hasattr(value, "tolist"):

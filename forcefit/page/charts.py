@@ -1,8 +1,8 @@
-"""Charts and maps of a page, which plotly.js draws from data in SI units.
+"""Charts and maps, drawn by plotly.js from data in SI units.
 
-A chart is a list of plotly traces.  Every axis defines an SI unit and a display unit.
-A map shows several quantities over one or two axes; a click shows all values of a
-point. A scene shows a robot, see :mod:`forcefit.assembly.report.scene`.
+A chart consists of plotly traces.  Each axis defines an SI unit and a display unit.  A
+map shows several quantities over one or two axes; clicking a point shows all of its
+values. A scene shows a robot; see :mod:`forcefit.assembly.report.scene`.
 """
 
 import html
@@ -19,7 +19,7 @@ from forcefit.page.tables import Value
 from forcefit.results.units import shown_in
 
 BLUE, RED, GREY = "#1f6fb4", "#c0392b", "#858e97"
-# colours of the lines and bars of a chart; grey is used only for the sum of other bars
+# colours of lines and bars; grey is reserved for bars that show the sum of the rest
 COLOURS = (
     BLUE, RED, "#2e8b57", "#8e5ea2", "#d98b1f", "#179cb0", "#a3541c", "#d2679f",
     "#7d8f14", "#5b63d3", "#e2703a", "#0f7a6c",
@@ -28,12 +28,12 @@ COLOURS = (
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis of a chart.
+    """Axis of a chart.
 
     Attributes:
-        title: words that describe the quantity of the axis.
-        unit: SI unit; empty for a dimensionless number.
-        options: options of the plotly axis, such as ``{"type": "log"}``.
+        title: description of the quantity.
+        unit: SI unit; empty for a dimensionless quantity.
+        options: options of the plotly axis, for example ``{"type": "log"}``.
     """
 
     title: str
@@ -43,13 +43,13 @@ class Axis:
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """One quantity of a map.
+    """Quantity shown in a map.
 
     Attributes:
         key: name of the quantity in the results.
-        title: words that describe the quantity.
+        title: description of the quantity.
         unit: SI unit.
-        values: (nx, ny), or (nx,) over one axis; NaN where a point has no value.
+        values: array (nx, ny), or (nx,) over one axis; NaN where there is no value.
     """
 
     key: str
@@ -59,7 +59,7 @@ class Layer:
 
 
 def label(name: str) -> str:
-    """Return a name for plotly.js, with HTML tags escaped."""
+    """Escape HTML tags in a name for plotly.js."""
     return html.escape(name, quote=False)
 
 
@@ -67,17 +67,17 @@ def chart(
     traces: Sequence[Mapping[str, Any]], x: Axis, y: Axis, caption: str,
     bars: str = "overlay",
 ) -> str:  # fmt: skip
-    """Return a chart of plotly traces whose data are in SI units.
+    """Return a chart of plotly traces with data in SI units.
 
     Args:
-        traces: traces of plotly.js; ``x``, ``y`` and ``error_*.array`` are in SI units.
-        x: the horizontal axis.
-        y: the vertical axis.
+        traces: plotly traces; ``x``, ``y`` and ``error_*.array`` are in SI units.
+        x: horizontal axis.
+        y: vertical axis.
         caption: text below the chart.
-        bars: arrangement of several bars at one position: ``"overlay"`` or ``"stack"``.
+        bars: arrangement of bars at the same position: ``"overlay"`` or ``"stack"``.
 
     Returns:
-        HTML of a chart, which is drawn when the page is opened.
+        HTML of the chart, which is drawn when the page is opened.
     """
     axes = {"x": _axis(x, [t["x"] for t in traces]),
             "y": _axis(y, [t["y"] for t in traces])}  # fmt: skip
@@ -92,14 +92,14 @@ def bars(
     values: Mapping[str, float], x: Axis, caption: str, line: float = 1.0,
     rest: str = "",
 ) -> str:  # fmt: skip
-    """Return a chart of horizontal bars with their values, the first bar at the top.
+    """Return a horizontal bar chart with the first bar at the top.
 
     Args:
-        values: lengths of the bars [SI], by name.
-        x: the horizontal axis.
+        values: lengths of the bars [SI units], by name.
+        x: horizontal axis.
         caption: text below the chart.
-        line: [SI] coordinate of a line across all bars; NaN for no line.
-        rest: name of the bar that shows the sum of all other items; it is grey.
+        line: coordinate [SI units] of a line across all bars, or NaN for no line.
+        rest: name of the bar, drawn in grey, that shows the sum of all remaining items.
 
     Returns:
         HTML of the chart.
@@ -124,15 +124,15 @@ def matrix(
     values: ArrayLike, names: Sequence[str], title: str, caption: str, around: bool,
     most: float = 1.0,
 ) -> str:  # fmt: skip
-    """Return a chart of a square matrix, in which coloured cells show the numbers.
+    """Return a heat map of a square matrix, with the numbers printed in the cells.
 
     Args:
-        values: (n, n) matrix.
+        values: matrix (n, n).
         names: names of the rows and columns.
         title: title of the colour scale.
         caption: text below the chart.
-        around: if True, the colour scale is centred at zero; if False, it extends from
-            0 to ``most``.
+        around: whether the colour scale is centred at zero; otherwise it ranges from 0
+            to ``most``.
         most: upper end of the colour scale.
 
     Returns:
@@ -158,12 +158,12 @@ def value_map(
     axes: Sequence[tuple[Axis, NDArray]], layers: Sequence[Layer], states: NDArray,
     caption: str,
 ) -> str:  # fmt: skip
-    """Return a map of quantities over a grid; a click shows all values of a point.
+    """Return a map of quantities over a grid; clicking a point shows all its values.
 
     Args:
         axes: one or two axes, with their values in SI units.
-        layers: the quantities; a constant quantity is stated in a sentence instead.
-        states: state of every point, as text.
+        layers: quantities to map; a constant quantity is stated in a sentence instead.
+        states: state of each point, as text.
         caption: text below the map.
 
     Returns:
@@ -196,10 +196,10 @@ def value_map(
 
 
 def scene(spec: Mapping[str, Any], caption: str) -> str:
-    """Return a robot that the reader can rotate, zoom and close.
+    """Return a robot that the reader can rotate, zoom and assemble.
 
     Args:
-        spec: plain values in SI units, in the form that ``page.js`` reads.
+        spec: plain values in SI units, in the format that ``page.js`` reads.
         caption: text below the robot.
 
     Returns:
@@ -209,23 +209,23 @@ def scene(spec: Mapping[str, Any], caption: str) -> str:
 
 
 def grid(*charts: str) -> str:
-    """Return HTML that places charts in a row."""
+    """Arrange charts side by side."""
     return piece("grid", charts)
 
 
 def _constant(layer: Layer) -> float | None:
-    """Return the value of a constant layer; NaN if the layer varies or lacks values."""
+    """Return the value of a constant layer, NaN if it is empty, None if it varies."""
     values = np.asarray(layer.values, dtype=float)
     finite = values[np.isfinite(values)]
     if not len(finite):
         return float("nan")
-    # a smaller variation is due to rounding, which a map would show as a pattern
+    # a smaller variation is rounding error, which a map would show as a pattern
     same = np.ptp(finite) <= 1e-9 * np.abs(finite).max()
     return float(finite[0]) if same else None
 
 
 def _unit(unit: str, values: ArrayLike) -> dict[str, Any]:
-    """Return the display unit for data in an SI unit, and the factor to this unit."""
+    """Return the display unit for data in an SI unit, and the conversion factor."""
     array = np.asarray(values, dtype=float) if unit else np.zeros(0)
     finite = array[np.isfinite(array)]
     shown = shown_in(unit, float(np.abs(finite).max()) if len(finite) else 0.0)
@@ -233,7 +233,7 @@ def _unit(unit: str, values: ArrayLike) -> dict[str, Any]:
 
 
 def _axis(axis: Axis, data: Sequence[ArrayLike]) -> dict[str, Any]:
-    """Return an axis for ``page.js``, with a display unit that suits the data."""
+    """Return an axis for ``page.js``, with a suitable display unit for the data."""
     arrays = [np.ravel(np.asarray(d, dtype=float)) for d in data if axis.unit]
     values = np.concatenate(arrays) if arrays else np.zeros(0)
     return _unit(axis.unit, values) | {
@@ -242,5 +242,5 @@ def _axis(axis: Axis, data: Sequence[ArrayLike]) -> dict[str, Any]:
 
 
 def _figure(spec: Mapping[str, Any], kind: str, caption: str) -> str:
-    """Return the HTML of a figure whose content ``page.js`` draws."""
+    """Return the HTML of a figure that is drawn by ``page.js``."""
     return piece("figure", kind, plain(spec), caption)

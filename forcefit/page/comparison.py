@@ -1,4 +1,4 @@
-"""Comparison of two results: all values that differ, the largest change first."""
+"""Comparison of two results: all values that differ, largest change first."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,9 +10,9 @@ from forcefit.page.page import Page, Provenance, Tile, page, section
 from forcefit.page.tables import Cell, Value, table
 from forcefit.results.quantities import in_words, unit_of
 
-SAME = 1e-9  # largest relative difference that is attributed to rounding
-_LISTED = 60  # number of changes that are always shown, about two printed sheets
-# keys of values that describe accuracy or cost; these values are not compared
+SAME = 1e-9  # largest relative difference attributed to rounding
+_LISTED = 60  # number of changes shown without unfolding, about two printed pages
+# keys of values that describe accuracy or computing time, which are not compared
 _MEASURES = {"certificate", "seconds", "cuts"}
 _NAMES = ("name", "part", "what", "error", "term", "frame", "component")
 _HEADLINES = {"worst_clearance", "within_limits", "error", "allocation"}
@@ -21,12 +21,12 @@ _FIGURES = {("solution", "energy"), ("zone", "margin"), ("zone", "margin_free")}
 
 @dataclass(frozen=True)
 class Change:
-    """A number or text that differs between two results.
+    """Number or text that differs between two results.
 
     Attributes:
-        place: keys that lead to the number or text.
-        before: value in the first result; None if the result has no value.
-        after: value in the second result; None if the result has no value.
+        place: keys that lead to the value.
+        before: value in the first result, or None if it is missing.
+        after: value in the second result, or None if it is missing.
     """
 
     place: tuple[str, ...]
@@ -35,7 +35,7 @@ class Change:
 
     @property
     def relative(self) -> float:
-        """Relative change; infinite from zero, NaN if a value is missing."""
+        """Relative change; infinite if the first value is 0, NaN if one is missing."""
         a, b = self.before, self.after
         if not (_is_number(a) and _is_number(b)):
             return math.nan
@@ -43,12 +43,12 @@ class Change:
 
     @property
     def name(self) -> str:
-        """The place of the value, described in words."""
+        """Place of the value in words."""
         return ", ".join(map(in_words, self.place))
 
     @property
     def unit(self) -> str:
-        """SI unit of the last key that has a known unit; empty if no key has one."""
+        """SI unit of the last key with a known unit, or empty if there is none."""
         units = (unit_of(key) for key in reversed(self.place))
         return next(filter(None, units), "")
 
@@ -59,10 +59,11 @@ class Comparison:
 
     Attributes:
         names: names of both results.
-        titles: subject of each result, such as its robot.
-        changes: changes of numbers, the largest relative change first; then of texts.
+        titles: subject of each result, for example the name of the robot.
+        changes: changed numbers, sorted by decreasing relative change, followed by
+            changed texts.
         same: number of equal values.
-        only: places that exist in only one of the results.
+        only: values that exist in only one of the results.
     """
 
     names: tuple[str, str]
@@ -91,8 +92,8 @@ def compare(
         names: names of both results.
 
     Returns:
-        All differences.  The numbers of a certificate are not compared, because they
-        bound the errors of other numbers.
+        All differences.  Certificates are not compared, because they are only bounds on
+        the errors of the results.
     """
     a, b = (dict(_leaves(one, ())) for one in (first, second))
     both = [place for place in a if place in b]
@@ -112,7 +113,7 @@ def compare(
 
 
 def _leaves(value: Any, place: tuple[str, ...]) -> Any:
-    """Yield every number and text of a result, with the keys that lead to it."""
+    """Yield each number and text in a result, with the keys that lead to it."""
     if isinstance(value, Mapping):
         for key, one in value.items():
             if key not in _MEASURES:
@@ -125,7 +126,7 @@ def _leaves(value: Any, place: tuple[str, ...]) -> Any:
 
 
 def _named(row: Any) -> str:
-    """Return the name by which a list item is matched; empty if it has none."""
+    """Return the name used to match a list item, or an empty string."""
     if not isinstance(row, Mapping):
         return ""
     names = (row.get(key) for key in _NAMES)
@@ -133,7 +134,7 @@ def _named(row: Any) -> str:
 
 
 def _is_number(value: Any) -> bool:
-    """Return whether a value is a number but not a boolean."""
+    """Return whether a value is a number, excluding booleans."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
@@ -145,7 +146,7 @@ def _vector(place: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _sizes(leaves: Mapping[tuple[str, ...], Any]) -> dict[tuple[str, ...], float]:
-    """Return the largest component of each vector, the scale of its rounding errors."""
+    """Return the largest component of each vector, which scales its rounding errors."""
     sizes: dict[tuple[str, ...], float] = {}
     for place, value in leaves.items():
         if _is_number(value) and math.isfinite(value):
@@ -155,28 +156,31 @@ def _sizes(leaves: Mapping[tuple[str, ...], Any]) -> dict[tuple[str, ...], float
 
 
 def _same(a: Any, b: Any, size: float) -> bool:
-    """Return whether two values are equal up to rounding errors of the given size."""
+    """Return whether two values agree, up to rounding errors relative to ``size``."""
     if _is_number(a) and _is_number(b):
         return math.isclose(a, b, rel_tol=SAME, abs_tol=max(1e-15, 1e-3 * SAME * size))
     return bool(a == b)
 
 
 def _is_headline(place: tuple[str, ...]) -> bool:
-    """Return whether a place is that of a headline number, not a vector component."""
+    """Return whether a place refers to a headline number."""
     if any(key.isdigit() for key in place):
         return False
     return place[0] in _HEADLINES or place[-2:] in _FIGURES
 
 
 def _size(change: Change) -> tuple[int, float, tuple[str, ...]]:
-    """Return a sort key: headline numbers, other numbers by change, then texts."""
+    """Return a sort key: headline numbers, then other numbers, then texts.
+
+    Numbers within a group are sorted by decreasing relative change.
+    """
     relative = change.relative
     group = 2 if math.isnan(relative) else int(not _is_headline(change.place))
     return (group, 0.0 if group == 2 else -abs(relative), change.place)
 
 
 def _title(results: Mapping[str, Any]) -> str:
-    """Return the title, the campaign or the robot that a result describes."""
+    """Return the title, campaign or robot described by a result."""
     keys = [key for key in ("title", "campaign", "robot") if key in results]
     return str(results[keys[0]]) if keys else "results"
 
@@ -191,14 +195,14 @@ def _plain(change: Change) -> dict[str, Any]:
 
 
 def comparison_text(comparison: Comparison, most: int = 20) -> str:
-    """Return a comparison as text.
+    """Format a comparison as text.
 
     Args:
         comparison: comparison of two results.
-        most: largest number of lines.
+        most: maximum number of changes to list.
 
     Returns:
-        A sentence with the number of changes, and then a line for each change.
+        A sentence with the number of changes, followed by one line per change.
     """
     lines = [_sentence(comparison)]
     for one in comparison.changes[:most]:
@@ -211,7 +215,7 @@ def comparison_text(comparison: Comparison, most: int = 20) -> str:
 
 
 def _brief(value: Any) -> str:
-    """Return a value as a short text."""
+    """Format a value briefly."""
     return f"{value:.6g}" if _is_number(value) else str(value)[:60]
 
 
@@ -232,7 +236,7 @@ def comparison_page(comparison: Comparison, provenance: Provenance) -> str:
         provenance: command, and the paths of both files.
 
     Returns:
-        HTML that does not refer to other files.
+        Self-contained HTML.
     """
     numbers = [c for c in comparison.changes if not math.isnan(c.relative)]
     tiles = [
@@ -270,7 +274,7 @@ def comparison_page(comparison: Comparison, provenance: Provenance) -> str:
 def _listed(
     changes: Sequence[Change], names: tuple[str, str], what: str
 ) -> Iterator[str]:
-    """Yield a table of the first changes, and a folded table of the other changes."""
+    """Yield a table of the first changes, and a folded table of the remaining ones."""
     head = ["quantity", *names, "change"]
     yield table(head, [_row(one) for one in changes[:_LISTED]], what)
     more = [_row(one) for one in changes[_LISTED:]]
@@ -280,7 +284,7 @@ def _listed(
 
 
 def _row(change: Change) -> list[Cell]:
-    """Return a change as a row of the table."""
+    """Return the table row of a change."""
     cells = [
         Value(v, change.unit, 6) if _is_number(v) else "-" if v is None else str(v)
         for v in (change.before, change.after)
@@ -289,6 +293,6 @@ def _row(change: Change) -> list[Cell]:
 
 
 def _percent(change: Change) -> str:
-    """Return the relative change in per cent, as text."""
+    """Format the relative change in per cent."""
     relative = change.relative
     return f"{100 * relative:+.3g} %" if math.isfinite(relative) else "-"

@@ -1,13 +1,13 @@
-"""A page: conclusions, sections, assumptions and provenance.
+"""Report page with conclusions, sections, assumptions and provenance.
 
 ======================  =============================================================
-:func:`page`            the whole page, from its pieces
+:func:`page`            composes the page
 :class:`Tile`           one conclusion at the top
-:class:`Provenance`     command, versions, and hashes of the files that were read
+:class:`Provenance`     command, versions, and hashes of the input files
 ======================  =============================================================
 
-plotly.js draws the charts.  It is stored compressed in the page, so that the page needs
-no network.
+The charts are drawn by plotly.js, which is embedded in compressed form, so that the
+page works offline.
 """
 
 import base64
@@ -29,20 +29,20 @@ from forcefit.page.markup import packaged, piece
 from forcefit.page.tables import Value, table
 
 _PACKAGES = ("numpy", "scipy", "clarabel", "cvxpy", "exudyn")
-_DIGITS = 300  # largest number of decimal digits of an integer that fits a float
-# CSS class and word of the verdict: favourable, favourable with reservation, or not
+_DIGITS = 300  # integers with at most this many decimal digits fit into a float
+# CSS class and label of the verdict: favourable, with reservations, unfavourable
 _STATES = {True: ("good", "OK"), None: ("mixed", "Caution"), False: ("bad", "Not OK")}
 _HEADING = re.compile(r'<section id="([^"]+)"><h2>(.*?) <a class=anchor')
 
 
 @dataclass(frozen=True)
 class Tile:
-    """A conclusion at the top of a page.
+    """Conclusion at the top of a page.
 
     Attributes:
         title: subject of the conclusion.
-        answer: the conclusion in a few words or numbers.
-        note: a sentence, given as texts and numbers.
+        answer: conclusion, in a few words or numbers.
+        note: explanatory sentence, composed of texts and numbers.
     """
 
     title: str
@@ -52,12 +52,12 @@ class Tile:
 
 @dataclass(frozen=True)
 class Provenance:
-    """Origin of the numbers of a page.
+    """Origin of the numbers on a page.
 
     Attributes:
-        command: command that computed the numbers; empty if no command did.
-        files: files that the command read.
-        settings: further settings as text, such as the seed.
+        command: command that computed the numbers; empty outside the command line.
+        files: input files.
+        settings: additional settings as text, for example the seed.
     """
 
     command: str = ""
@@ -67,20 +67,21 @@ class Provenance:
 
 @dataclass(frozen=True)
 class Page:
-    """The content of a page.
+    """Content of a page.
 
     Attributes:
         title: title of the page.
-        verdict: the conclusion in one sentence.
-        good: whether the result is favourable (green); None if it has a reservation
-            (amber).  ``docs/reports.md`` states the rule of each report.
+        verdict: conclusion in one sentence.
+        good: whether the result is favourable (green); None if it is favourable with
+            reservations (amber).  ``docs/reports.md`` states the criteria of each
+            report.
         tiles: main conclusions, shown at the top.
         about: text below the title that states what was computed.
-        body: pieces of HTML in the order in which they are shown.
-        assumed: assumptions, each as a sentence.
+        body: HTML fragments in order of appearance.
+        assumed: assumptions, one sentence each.
         provenance: origin of the numbers.
-        results: plain values, stored in the page for ``forcefit report compare``.
-        details: further sentences, shown below the verdict.
+        results: plain values, embedded in the page for ``forcefit report compare``.
+        details: additional sentences, shown below the verdict.
     """
 
     title: str
@@ -96,7 +97,7 @@ class Page:
 
 
 def command_line() -> str:
-    """Return the forcefit command as typed, or an empty text in another program."""
+    """Return the forcefit command as typed, or an empty string in other programs."""
     import shlex
 
     name = Path(sys.argv[0]).name
@@ -105,13 +106,13 @@ def command_line() -> str:
 
 
 def page(content: Page) -> str:
-    """Return a page as an HTML text that does not refer to other files.
+    """Render a page as self-contained HTML.
 
     Args:
         content: content of the page.
 
     Returns:
-        HTML that contains the results as JSON, in SI units and with all digits.
+        HTML in which the results are embedded as JSON, in SI units at full precision.
     """
     sections = [
         *filter(None, content.body),
@@ -128,7 +129,7 @@ def page(content: Page) -> str:
 
 
 def results_in(text: str, where: str) -> dict[str, Any]:
-    """Return the results that a page or a JSON file contains.
+    """Extract the results from a page or a JSON file.
 
     Args:
         text: text of a page, or of a JSON file written by a command.
@@ -144,42 +145,42 @@ def results_in(text: str, where: str) -> dict[str, Any]:
     if text.lstrip()[:15].lower() == "<!doctype html>":
         _, own, rest = text.partition(mark)
         if not own:
-            raise BadInput(f"{where}: found a page without results of forcefit")
+            raise BadInput(f"{where}: found an HTML page without forcefit results")
         text = rest.partition("</script>")[0]
     try:
         results = json.loads(text, parse_int=_whole)
     except (ValueError, RecursionError):  # brackets may be nested too deeply
-        expected = "a report of forcefit or the JSON file of a command"
+        expected = "a forcefit report or JSON results of a command"
         found = "text that is neither HTML nor JSON"
         raise BadInput(f"{where}: found {found}, expected {expected}") from None
     if not isinstance(results, dict):
-        raise BadInput(f"{where}: found a JSON list or value, expected results")
+        raise BadInput(f"{where}: found a JSON list or value, expected a JSON object")
     return results
 
 
 def _whole(text: str) -> int | float:
-    """Return a JSON integer as a number, or infinity if it is too large for a float."""
+    """Parse a JSON integer; return infinity if it is too large for a float."""
     return int(text) if len(text) <= _DIGITS else float(text)
 
 
 def section(title: str, *pieces: str) -> str:
-    """Return a section whose heading is a link to itself."""
+    """Return a section whose heading links to itself."""
     name = re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")
     return piece("section", title, f"section-{name}", pieces)
 
 
 def paragraph(*texts: str | Value) -> str:
-    """Return a paragraph of texts and numbers."""
+    """Return a paragraph composed of texts and numbers."""
     return piece("paragraph", texts)
 
 
 def listed(texts: Sequence[str]) -> str:
-    """Return an HTML list of texts."""
+    """Return texts as an HTML list."""
     return piece("list", texts)
 
 
 def _provenance(provenance: Provenance) -> str:
-    """Return a table of the command, the versions and the file hashes."""
+    """Return a table with the command, package versions and file hashes."""
     rows = [["command", provenance.command]] if provenance.command else []
     rows += [[name, value] for name, value in provenance.settings.items()]
     rows += [["forcefit", _version("forcefit")], ["Python", platform.python_version()]]
@@ -197,20 +198,21 @@ def _version(package: str) -> str:
 
 
 def _digest(path: Path) -> str:
-    """Return the SHA-256 hash of the present content of a file."""
+    """Return the SHA-256 hash of the current content of a file."""
     try:
         return hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:
-        return f"cannot be read any more: {error.strerror}"
+        return f"can no longer be read: {error.strerror}"
 
 
 @cache
 def packed_plotly() -> str:
-    """Return plotly.js as text: reduced to the traces that pages use, and compressed.
+    """Return compressed plotly.js, reduced to the trace types that pages use.
 
-    ``plotly/build.mjs`` creates the reduced file.  A browser decompresses it in 0.1 s.
+    The reduced file is created by ``plotly/build.mjs``.  A browser decompresses it in
+    0.1 s.
 
     Returns:
-        A gzip file, encoded in base64.
+        Gzip file, encoded in base64.
     """
     return base64.b64encode(packaged("plotly/plotly.min.js.gz")).decode()

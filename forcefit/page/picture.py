@@ -1,4 +1,4 @@
-"""Interactive figures for notebooks: a figure of a page in a separate frame."""
+"""Interactive figures for notebooks, each embedded in its own frame."""
 
 import html
 import sys
@@ -17,14 +17,14 @@ _HEIGHT = 760  # [px] height of a scene with its controls and caption
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A figure that the reader of a notebook can rotate, scale and switch.
+    """Interactive figure for notebooks.
 
-    The figure contains plotly.js (0.8 MB).  It therefore needs neither the network nor
-    a running Python process.
+    The figure embeds plotly.js (0.8 MB), so that it works offline and without a running
+    Python process.
 
     Attributes:
         title: title of the figure.
-        html: a complete HTML page, which may also be written to a file.
+        html: complete HTML page, which can also be written to a file.
     """
 
     title: str
@@ -34,21 +34,21 @@ class Picture:
         return f"Picture of {self.title}: its html is a page for a browser"
 
     def _repr_html_(self) -> str:
-        """Return the page in a frame, which isolates its styles and its identifiers."""
+        """Return the page in a frame, which isolates its styles and identifiers."""
         title, inside = (html.escape(text) for text in (self.title, self.html))
         style = f"width:100%;height:{_HEIGHT}px;border:0;background:white"
         return f'<iframe title="{title}" style="{style}" srcdoc="{inside}"></iframe>'
 
 
 def picture(title: str, figure: str) -> Picture:
-    """Return a figure of :mod:`forcefit.page.charts` as a picture.
+    """Convert a figure of :mod:`forcefit.page.charts` to a picture for notebooks.
 
     Args:
-        title: title of the page that contains the figure.
+        title: title of the figure.
         figure: HTML of the figure.
 
     Returns:
-        The picture.
+        Picture that a notebook displays.
     """
     style, script = (packaged(name).decode() for name in ("page.css", "page.js"))
     page = piece("alone", title, figure, style, script, packed_plotly())
@@ -56,15 +56,16 @@ def picture(title: str, figure: str) -> Picture:
 
 
 def in_notebook() -> bool:
-    """Return whether the code runs in a notebook, that is, in IPython with a kernel."""
+    """Return whether the code runs in a notebook (IPython with a kernel)."""
     return getattr(_shell(), "kernel", None) is not None
 
 
 def show_figures_of_cells() -> None:
-    """Let a notebook display a matplotlib figure that is the result of a cell.
+    """Enable notebooks to display matplotlib figures that are returned by a cell.
 
-    IPython displays such figures only after pyplot has made a figure.  If the user
-    chose a display method, such as ``%matplotlib inline``, it is not changed.
+    By default, IPython displays such figures only after pyplot has created a figure.  A
+    display method chosen by the user, for example ``%matplotlib inline``, stays in
+    effect.
     """
     if not in_notebook():
         return
@@ -76,12 +77,12 @@ def show_figures_of_cells() -> None:
 
 
 def _png(figure: "Figure") -> bytes:
-    """Return a figure as a PNG picture."""
+    """Render a figure as PNG."""
     content = BytesIO()
     figure.savefig(content, format="png")
     return content.getvalue()
 
 
 def _shell() -> Any:
-    """Return the shell of IPython, or None outside IPython."""
+    """Return the IPython shell, or None outside IPython."""
     return getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()

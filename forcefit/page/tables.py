@@ -1,4 +1,4 @@
-"""Tables and numbers of a page, stored in SI units so that the unit can be changed."""
+"""Tables and numbers on a page, stored in SI units so that units can be switched."""
 
 import math
 from collections.abc import Sequence
@@ -7,16 +7,16 @@ from dataclasses import dataclass
 from forcefit.page.markup import piece
 from forcefit.results.units import Shown, number_text, shown_in
 
-_LONG = 48  # [characters] a cell with a longer text may be wrapped
+_LONG = 48  # [characters] longer texts may be wrapped in a cell
 Marked = tuple[dict[str, str], str]  # attributes and text of a cell
 
 
 @dataclass(frozen=True)
 class Value:
-    """A number with its unit.
+    """Number with its unit.
 
     Attributes:
-        value: value in SI.
+        value: value in SI units.
         unit: SI unit; empty for a dimensionless number.
         digits: number of significant digits on the page.
     """
@@ -27,13 +27,13 @@ class Value:
 
     @property
     def text(self) -> str:
-        """The number in its display unit, as text."""
+        """Number in its display unit, as text."""
         shown = shown_in(self.unit, self.value)
         return number_text(self.value * shown.factor, shown.shown, self.digits)
 
     @property
     def attributes(self) -> dict[str, str]:
-        """The SI value with all digits, its unit, and its text in a display unit."""
+        """HTML attributes: SI value at full precision, SI unit and text in SI units."""
         unit = shown_in(self.unit).unit
         si = number_text(self.value, unit, self.digits)
         marks = {"data-v": repr(float(self.value))}
@@ -44,16 +44,16 @@ class Value:
 def rotation_and_translation(
     rotation: float, translation: float, digits: int = 4
 ) -> list[str | Value]:
-    """Return the magnitudes of a rotation [rad] and of a translation [m] as text."""
+    """Compose text from the magnitudes of a rotation [rad] and a translation [m]."""
     return [Value(rotation, "rad", digits), " and ", Value(translation, "m", digits)]
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of numbers in one unit, which the column head states.
+    """Column of numbers in a common unit, which is stated in the column heading.
 
     Attributes:
-        title: words that describe the quantity.
+        title: description of the quantity.
         unit: SI unit.
         digits: number of significant digits on the page.
     """
@@ -69,15 +69,15 @@ Cell = str | float | Value
 def table(
     head: Sequence[str | Column], rows: Sequence[Sequence[Cell]], name: str = "table"
 ) -> str:
-    """Return a table; a click on its head sorts it, and a button copies it as CSV.
+    """Return a table that can be sorted by its headings and copied as CSV.
 
     Args:
-        head: head of each column; numbers below a :class:`Column` are in its unit.
+        head: column headings; numbers in a :class:`Column` are in its unit.
         rows: cells, each a text, a number (in a :class:`Column`) or a :class:`Value`.
         name: name of the table, for the label of the copy button.
 
     Returns:
-        HTML, in which special characters of the texts are escaped.
+        HTML in which special characters are escaped.
     """
     columns = [_shown_column(h, [row[k] for row in rows]) for k, h in enumerate(head)]
     heads = [_head_cell(h, s) for h, s in zip(head, columns, strict=True)]
@@ -89,7 +89,7 @@ def table(
 
 
 def _shown_column(head: str | Column, cells: Sequence[Cell]) -> Shown:
-    """Return the display unit of a column, chosen by the size of its numbers."""
+    """Return the display unit of a column, chosen by the magnitude of its numbers."""
     if isinstance(head, str):
         return Shown("", "", 1.0)
     sizes = [abs(c) for c in cells if isinstance(c, int | float) and math.isfinite(c)]
@@ -97,7 +97,7 @@ def _shown_column(head: str | Column, cells: Sequence[Cell]) -> Shown:
 
 
 def _head_cell(head: str | Column, shown: Shown) -> Marked:
-    """Return the title and unit of a column."""
+    """Return the attributes and text of a column heading."""
     if isinstance(head, str):
         return {}, head
     if not shown.unit:
@@ -107,7 +107,7 @@ def _head_cell(head: str | Column, shown: Shown) -> Marked:
 
 
 def _cell(cell: Cell, head: str | Column, shown: Shown) -> Marked:
-    """Return the HTML cell of a text, a number in the column's unit, or a ``Value``."""
+    """Return the attributes and text of a cell."""
     if isinstance(cell, str):
         return {"class": "long"} if len(cell) > _LONG else {}, cell
     if isinstance(cell, Value):

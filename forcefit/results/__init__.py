@@ -1,4 +1,4 @@
-"""Quantities of all results: a table that defines names, units and descriptions.
+"""Names, units and descriptions of all result quantities.
 
 Start with :mod:`forcefit.results.quantities`.
 """

@@ -1,12 +1,11 @@
 """Short representations of objects: a title and a few values with their units.
 
-A dataclass uses these functions by one line in its body::
+To use them, a dataclass contains the line::
 
     __repr__, _repr_html_ = short_repr, html_table
 
-The values come from the method ``_figures`` of the object.  Without this method, the
-abbreviated fields of the object are shown.  The text is for a console, and the HTML
-table is for a notebook.  Both are a few lines long.
+The values are taken from the method ``_figures`` of the object or, without such a
+method, from its abbreviated fields.  Consoles show the text, notebooks the HTML table.
 """
 
 import html
@@ -19,53 +18,53 @@ from numpy.typing import ArrayLike, NDArray
 
 Figures = dict[str, str]
 
-_LONGEST = 72  # [characters] limit on the text of a value
-# largest array that is shown with its elements; of a longer array, the shape is shown
+_LONGEST = 72  # [characters] maximum length of the text of a value
+# largest number of elements shown; for a longer array, the shape is shown instead
 _FEW = 6
 
 
 def short_repr(self: Any) -> str:
-    """Return a title and one line for each value.
+    """Return a title followed by one line per value.
 
     Args:
-        self: a dataclass; its method ``_figures`` is optional.
+        self: dataclass instance, with an optional method ``_figures``.
 
     Returns:
-        Lines of text.
+        Text of several lines.
     """
     return listing(title(self), _figures(self))
 
 
 def show(self: Any, **options: Any) -> Any:
-    """Return a picture: interactive in a notebook, otherwise a matplotlib figure.
+    """Draw an object: interactively in a notebook, otherwise as a matplotlib figure.
 
     Args:
         self: object to draw.
         options: options of ``forcefit.show``.
 
     Returns:
-        The picture of ``forcefit.show``.
+        Result of ``forcefit.show``.
     """
-    import forcefit  # its public names are imported at their first use
+    import forcefit  # public names are imported on first use
 
     return forcefit.show(self, **options)
 
 
 def listing(title: str, lines: Mapping[str, str], notes: Sequence[str] = ()) -> str:
-    """Return a title, aligned lines of names and values, and notes as text."""
+    """Format a title, aligned names and values, and notes as text."""
     width = max(map(len, lines), default=0)
     rows = [f"  {words:{width}}  {value}" for words, value in lines.items()]
     return "\n".join([title, *rows, *(f"note: {note}" for note in notes)])
 
 
 def html_table(self: Any) -> str:
-    """Return an HTML table of the values below a title, for notebooks.
+    """Return an HTML table with a title and one row per value, for notebooks.
 
     Args:
-        self: a dataclass; its method ``_figures`` is optional.
+        self: dataclass instance, with an optional method ``_figures``.
 
     Returns:
-        HTML, in which special characters of names are escaped.
+        HTML in which special characters are escaped.
     """
     rows = "".join(
         f'<tr><th style="text-align:left">{html.escape(name)}</th>'
@@ -77,7 +76,7 @@ def html_table(self: Any) -> str:
 
 
 def title(thing: object) -> str:
-    """Return the kind of an object with its name, or with the name of its robot."""
+    """Return the type of an object with its name or the name of its robot."""
     kind = type(thing).__name__
     posture = getattr(thing, "posture", None)
     owner = getattr(thing, "robot", None) or getattr(posture, "robot", None)
@@ -89,7 +88,7 @@ def title(thing: object) -> str:
 
 
 def brief(value: object) -> str:
-    """Return a value as a short text; only its kind if the text would be too long."""
+    """Format a value briefly, or return only its type and size if it is too long."""
     if isinstance(value, np.ndarray):
         if 0 < value.size <= _FEW and value.dtype.kind in "fiu":
             return "[" + " ".join(f"{v:.4g}" for v in value.ravel()) + "]"
@@ -109,20 +108,20 @@ def brief(value: object) -> str:
 
 
 def numbers(values: Iterable[float]) -> str:
-    """Return a text of numbers in brackets, rounded by :func:`rounded`."""
+    """Format numbers in brackets, after applying :func:`rounded`."""
     return "[" + " ".join(f"{rounded(v):.4g}" for v in values) + "]"
 
 
 def rounded(value: float) -> float:
-    """Round a number for display; a size below 1e-9 is rounding and becomes 0."""
+    """Replace a number by 0 for display if its magnitude is below 1e-9."""
     return 0.0 if abs(value) < 1e-9 else float(value)
 
 
 def pose_text(pose: Mapping[str, float]) -> str:
-    """Return a pose as text, rotations first as in a screw.
+    """Format a pose as text, with rotations first as in a screw.
 
     Args:
-        pose: all or some of the components ``rx .. tz`` [rad, m].
+        pose: some or all of the components ``rx .. tz`` [rad, m].
 
     Returns:
         Text such as ``[0 0 0] rad, [0.1 0 -0.5] m``.
@@ -134,39 +133,42 @@ def pose_text(pose: Mapping[str, float]) -> str:
 
 
 def screw_text(screw: ArrayLike) -> str:
-    """Return a platform screw (6,) [rad, m] as text."""
+    """Format a platform screw (6,) [rad, m] as text."""
     s = 1e3 * np.asarray(screw, dtype=float)
     return f"{numbers(s[:3])} mrad, {numbers(s[3:])} mm"
 
 
 def largest(screws: ArrayLike) -> str:
-    """Return the largest rotation and the largest translation of screws (..., 6)."""
+    """Format the largest rotation and largest translation among screws (..., 6)."""
     parts = np.asarray(screws, dtype=float).reshape(-1, 2, 3)
     turn, shift = 1e3 * np.linalg.norm(parts, axis=-1).max(axis=0, initial=0.0)
     return f"{turn:.4g} mrad, {shift:.4g} mm" if turn or shift else "none"
 
 
 def largest_row(sizes: ArrayLike) -> int:
-    """Return the row of the largest number; the first row of numbers equal to 1e-9.
+    """Return the index of the largest number.
+
+    Among numbers that agree within a relative tolerance of 1e-9, the first one is
+    chosen, so that the result does not depend on the processor.
 
     Args:
-        sizes: (k,) numbers >= 0, with k > 0.
+        sizes: nonnegative numbers (k,), with k > 0.
 
     Returns:
-        Row number, which does not depend on the processor.
+        Index of the number.
     """
     values = np.asarray(sizes, dtype=float)
     return int(np.argmax(values >= (1 - 1e-9) * np.nanmax(values)))
 
 
 def bracket(bounds: Sequence[float] | NDArray, unit: str) -> str:
-    """Return a lower and an upper bound [rad or m] as text in mrad or mm."""
+    """Format a lower and an upper bound [rad or m] as text in mrad or mm."""
     low, high = 1e3 * bounds[0], 1e3 * bounds[1]
     return f"{low:.6g} to {high:.6g} {unit}" if low < float("inf") else "without bound"
 
 
 def _figures(thing: Any) -> Figures:
-    """Return the values that represent an object: ``_figures`` or the fields."""
+    """Return the values that represent an object, from ``_figures`` or its fields."""
     if hasattr(thing, "_figures"):
         return thing._figures()
     shown = [one.name for one in fields(thing) if one.repr and one.name != "name"]
@@ -174,6 +176,6 @@ def _figures(thing: Any) -> Figures:
 
 
 def _cut(text: str) -> str:
-    """Return a text on one line, shortened to the largest allowed length."""
+    """Put a text on one line and shorten it to the maximum length."""
     text = " ".join(text.split())
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4]} ..."

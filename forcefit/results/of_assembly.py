@@ -1,4 +1,4 @@
-"""Records of the JSON of ``forcefit assembly ...`` and ``convert``."""
+"""Records for the JSON output of ``forcefit assembly ...`` and ``forcefit convert``."""
 
 from collections.abc import Mapping
 
@@ -15,7 +15,7 @@ from forcefit.results.records import (
 
 _SHARE = number("share")
 _AXIS = ("axis",)
-# records that several outputs contain
+# records used in several outputs
 POSE = record("rx? ry? rz? tx? ty? tz?")
 _POSTURE = record("robot status reason?", pose=POSE)
 INTERVAL = record("probability lower upper undecided?")

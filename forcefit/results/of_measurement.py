@@ -1,4 +1,4 @@
-"""Records of the JSON of commands on measured data."""
+"""Records for the JSON output of commands that process measured data."""
 
 from collections.abc import Mapping
 

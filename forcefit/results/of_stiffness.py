@@ -1,4 +1,4 @@
-"""Records of the JSON of ``forcefit stiffness ...``."""
+"""Records for the JSON output of ``forcefit stiffness ...``."""
 
 from collections.abc import Mapping
 
@@ -33,7 +33,7 @@ _MATRICES = number("stiffness", "N m/rad .. N/m", "length", "row", "column")
 _OVER_LENGTHS = number("difference", "1", "length", "row", "column")
 _END_EFFECT = number("end effect, times r / L", "1", "row", "column")
 _STRESS = record("von_mises", place=number("place", "m", "axis"))
-# A later version may add keys to an entry.  Older versions must not remove these keys.
+# Later versions may add keys to an entry, which older versions must not remove.
 _ENTRY = Record(
     record(
         "stiffness_error", LINK, format=text("format"), key=text("key"),

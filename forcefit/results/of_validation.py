@@ -1,4 +1,4 @@
-"""Records of the JSON of cross-checks, ``study``, ``check`` and ``report compare``."""
+"""Records for the JSON output of cross-checks, studies, checks and comparisons."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""Records of the JSON output of every command, composed of quantities of the table."""
+"""Records for the JSON output of all commands."""
 
 from collections.abc import Mapping
 

@@ -1,7 +1,7 @@
-"""Table of quantities: words, unit, symbol, meaning and dimensions of every result.
+"""Table of quantities: description, unit, symbol and dimensions of each result.
 
 A quantity has the same name in Python, JSON, NetCDF files and tables.  The records in
-:mod:`forcefit.results.outputs` compose the ``--json`` outputs from these names.
+:mod:`forcefit.results.outputs` compose the ``--json`` output from these names.
 """
 
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 Kind = Literal["number", "integer", "string", "boolean"]
-# labels of the dimensions that several quantities share
+# labels along dimensions that are shared by several quantities
 LABELS: dict[str, tuple[str, ...]] = {
     "screw": ("RX", "RY", "RZ", "TX", "TY", "TZ"),
     "wrench_component": ("MX", "MY", "MZ", "FX", "FY", "FZ"),
@@ -23,15 +23,15 @@ _MATRIX = ("screw", "wrench_component")
 
 @dataclass(frozen=True)
 class Quantity:
-    """One quantity of the results.
+    """Quantity in the results.
 
     Attributes:
         words: name of the quantity in reports and texts, without an article.
         unit: SI unit.  ``"1"`` denotes a dimensionless number, and ``"rad, m"`` the two
             halves of a screw.  The unit is empty if the result itself states it.
         dims: names of the dimensions; those in :data:`LABELS` have a fixed length.
-        meaning: definition of the quantity, if the words are not sufficient.
-        symbol: symbol of the quantity in the paper; empty if the paper has none.
+        meaning: definition of the quantity, if its name is not sufficient.
+        symbol: symbol in the paper; empty if the paper does not define one.
         kind: type of the values.
         shown: display unit in texts, if it differs from the SI unit.
         digits: number of significant digits in texts.
@@ -48,7 +48,7 @@ class Quantity:
 
     @property
     def display_unit(self) -> str:
-        """Unit in which texts show the values."""
+        """Unit used in texts."""
         return self.shown or self.unit
 
     @property
@@ -58,22 +58,22 @@ class Quantity:
 
 
 def number(words: str, unit: str = "1", *dims: str) -> Quantity:
-    """Return a quantity whose values are floating-point numbers."""
+    """Return a quantity with floating-point values."""
     return Quantity(words, unit, dims)
 
 
 def text(words: str, *dims: str, meaning: str = "") -> Quantity:
-    """Return a quantity whose values are texts."""
+    """Return a quantity with string values."""
     return Quantity(words, dims=dims, meaning=meaning, kind="string")
 
 
 def count(words: str, *dims: str, meaning: str = "") -> Quantity:
-    """Return a quantity of integers."""
+    """Return a quantity with integer values."""
     return Quantity(words, dims=dims, meaning=meaning, kind="integer")
 
 
 def flag(words: str, *dims: str) -> Quantity:
-    """Return a quantity whose values are booleans."""
+    """Return a quantity with boolean values."""
     return Quantity(words, dims=dims, kind="boolean")
 
 
@@ -185,7 +185,7 @@ QUANTITIES: Mapping[str, Quantity] = {
         meaning="certified lower bound of the zone margin, compliant joints free"
     ),
     "energy": Quantity(
-        "assembly energy", "J", meaning="least elastic energy of the closed robot, "
+        "assembly energy", "J", meaning="minimum elastic energy of the closed robot, "
         "eq. (22)",
         symbol="E", digits=6,
     ),
@@ -194,7 +194,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "energy_without_clearance": Quantity(
         "energy without clearances", "J",
-        meaning="least elastic energy of the closed robot with all clearances at zero",
+        meaning="minimum elastic energy of the closed robot with zero clearances",
     ),
     "platform_screw": Quantity(
         "platform error", "rad, m", _SCREW,
@@ -561,12 +561,12 @@ QUANTITIES: Mapping[str, Quantity] = {
 
 
 def in_words(key: str) -> str:
-    """Return words for a key of the results, or the key if it is not listed."""
+    """Return the name of a quantity in words, or the key if it is not in the table."""
     return QUANTITIES[key].words if key in QUANTITIES else key.replace("_", " ")
 
 
 def unit_of(key: str) -> str:
-    """Return the SI unit of a key; empty if pure, of mixed units or unknown."""
+    """Return the SI unit of a key; empty if dimensionless, mixed or unknown."""
     unit = QUANTITIES[key].unit if key in QUANTITIES else ""
     mixed = unit == "1" or "," in unit or ".." in unit or " or " in unit
     return "" if mixed else unit

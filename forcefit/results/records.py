@@ -1,4 +1,4 @@
-"""Records, which declare the quantities in a JSON result and their nesting."""
+"""Declarations of the structure of JSON results."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -21,7 +21,7 @@ Content = Union[
 
 @dataclass(frozen=True)
 class Record:
-    """A JSON object whose keys are declared.
+    """JSON object with declared keys.
 
     Attributes:
         content: declared content of each key.
@@ -36,64 +36,68 @@ class Record:
 
 @dataclass(frozen=True)
 class Each:
-    """A JSON object whose keys are names, such as frame names, with equal contents."""
+    """JSON object whose keys are arbitrary names, for example of frames.
+
+    All values have the same declared content.
+    """
 
     content: Content
 
 
 @dataclass(frozen=True)
 class Listed:
-    """A JSON list whose items all have the same declared content."""
+    """JSON list whose items all have the same declared content."""
 
     content: Content
 
 
 @dataclass(frozen=True)
 class Either:
-    """A value that matches one of several declared contents."""
+    """Value that matches one of several declared contents."""
 
     contents: tuple[Content, ...]
 
 
 @dataclass(frozen=True)
 class Words:
-    """A text that equals one of several words."""
+    """Value that equals one of several words."""
 
     words: tuple[str | int, ...]
 
 
 @dataclass(frozen=True)
 class Anything:
-    """A value of any type."""
+    """Value of any type."""
 
 
 @dataclass(frozen=True)
 class WithUnits:
-    """A content in which each number may also be a text with a unit."""
+    """Content in which each number may also be a string with a unit."""
 
     content: Content
 
 
 def record(names: str = "", /, *merged: Record, **content: Content) -> Record:
-    """Return a record composed of quantities, other records and further contents.
+    """Compose a record of quantities, other records and additional keys.
 
     Args:
-        names: names separated by blanks; a question mark after a name, or an underscore
-            after a key, marks it as optional.
-        merged: other records, whose keys are added to the record.
-        content: contents of further keys.
+        names: names of quantities, separated by blanks; a trailing question mark marks
+            an optional quantity.
+        merged: records whose keys are included.
+        content: additional keys and their contents; a trailing underscore, which is not
+            part of the key, marks an optional key.
 
     Returns:
-        The record, with its keys in the order of the arguments.
+        Record with its keys in the order of the arguments.
 
     Raises:
-        KeyError: a name is not in the table.
+        KeyError: a name is not in the table of quantities.
     """
     every: dict[str, Content] = {}
     optional: set[str] = set()
     for name in names.split():
         key = name.rstrip("?")
-        QUANTITIES[key]  # raises the error for a name that is not in the table
+        QUANTITIES[key]  # raises KeyError for an unknown name
         every[key] = key
         optional |= {key} if name.endswith("?") else set()
     for other in merged:

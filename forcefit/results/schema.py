@@ -1,7 +1,7 @@
 """JSON Schema (draft 2020-12) of outputs and input files, generated from their records.
 
-Every value of an output may be null, except for booleans.  Null represents a number
-that is not finite, or a result that is missing because a computation failed.
+Values in an output may be null.  Null represents a number that is not finite, or a
+result that is missing because a computation failed.
 """
 
 from typing import Any
@@ -22,15 +22,15 @@ DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def schema_of(content: Content, title: str = "", file: bool = False) -> dict[str, Any]:
-    """Return the schema of a record.
+    """Return the JSON Schema of a record.
 
     Args:
-        content: usually a record.
+        content: declared content, usually a record.
         title: title of the schema.
-        file: whether the content is an input file in TOML, which has no null.
+        file: whether the content is a TOML input file, in which null does not exist.
 
     Returns:
-        The schema as plain values.
+        Schema as plain values.
     """
     schema = _schema(content)
     return {"$schema": DRAFT, "title": title} | (
@@ -39,7 +39,7 @@ def schema_of(content: Content, title: str = "", file: bool = False) -> dict[str
 
 
 def _without_null(schema: Any) -> Any:
-    """Remove null from the types that a schema allows."""
+    """Remove null from the types allowed by a schema."""
     if isinstance(schema, list):
         return [_without_null(one) for one in schema]
     if not isinstance(schema, dict):
@@ -51,7 +51,7 @@ def _without_null(schema: Any) -> Any:
 
 
 def _schema(content: Content) -> dict[str, Any]:
-    """Return the schema of any content."""
+    """Return the schema of a declared content."""
     match content:
         case str():
             return _schema(QUANTITIES[content])
@@ -74,7 +74,7 @@ def _schema(content: Content) -> dict[str, Any]:
 
 
 def _with_texts(schema: Any) -> Any:
-    """Allow a text in addition to each number of a schema."""
+    """Allow a string in place of each number in a schema."""
     if isinstance(schema, list):
         return [_with_texts(one) for one in schema]
     if not isinstance(schema, dict):
@@ -88,7 +88,7 @@ def _with_texts(schema: Any) -> Any:
 
 
 def _object(content: Record) -> dict[str, Any]:
-    """Return the schema of an object whose keys are declared."""
+    """Return the schema of an object with declared keys."""
     one: dict[str, Any] = {
         "type": ["object", "null"],
         "properties": {key: _schema(inner) for key, inner in content.content.items()},
@@ -112,7 +112,7 @@ def _array(one: Quantity, dims: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _described(schema: dict[str, Any], one: Quantity) -> dict[str, Any]:
-    """Return a schema extended by the words, meaning and unit of a quantity."""
+    """Add the name, meaning and unit of a quantity to its schema."""
     words = f"{one.words}: {one.meaning}" if one.meaning else one.words
     unit = "" if one.unit in {"", "1"} or one.kind != "number" else f" [{one.unit}]"
     return schema | {"description": words + unit}

@@ -1,6 +1,6 @@
-"""Results as text: a line for each quantity of the table, and tables of numbers.
+"""Formatting of results as text: one line per quantity, and tables of numbers.
 
-Commands and the short representation of an object print the same lines.
+Commands and the short representations of objects print the same lines.
 """
 
 import math
@@ -15,14 +15,14 @@ from forcefit.results.units import FACTORS
 
 
 def value_text(quantity: Quantity | str, value: Any) -> str:
-    """Return a value as text in the display unit of its quantity.
+    """Format a value in the display unit of its quantity.
 
     Args:
-        quantity: the quantity, or its name in the table.
-        value: a number, vector, text, boolean or list of these, or None.
+        quantity: quantity, or its name in the table.
+        value: number, vector, string, boolean, pose, list of strings, or None.
 
     Returns:
-        Text with the unit; ``none`` if the number does not exist.
+        Text with the unit; ``none`` if the value is None or NaN.
     """
     known = QUANTITIES[quantity] if isinstance(quantity, str) else quantity
     if value is None or (isinstance(value, float) and math.isnan(value)):
@@ -52,12 +52,12 @@ def value_text(quantity: Quantity | str, value: Any) -> str:
 
 
 def in_unit(value: float, unit: str, digits: int = 4) -> str:
-    """Return a number in SI units as text in a display unit, such as ``um``."""
+    """Format a number, given in SI units, in a display unit such as ``um``."""
     return _with_unit(f"{FACTORS.get(unit, 1.0) * value + 0.0:.{digits}g}", unit)
 
 
 def readings_text(sizes: Mapping[str, float | None], digits: int = 4) -> str:
-    """Return errors of readings as text; unknown errors are left out.
+    """Format errors of readings as text, omitting unknown errors.
 
     Args:
         sizes: ``position`` [m], ``rotation`` [rad], and ``normalised``, the error
@@ -77,15 +77,15 @@ def readings_text(sizes: Mapping[str, float | None], digits: int = 4) -> str:
 
 
 def lines_of(results: Mapping[str, Any], names: str) -> dict[str, str]:
-    """Return the words and values of quantities in results.
+    """Format selected quantities of a result.
 
     Args:
         results: plain values of a command.
         names: names of quantities, separated by blanks; a dot separates a record from
-            its key.  Absent quantities and the status ``ok`` are left out.
+            its key.  Absent quantities and the status ``ok`` are omitted.
 
     Returns:
-        Values as text; the keys are the words of the quantities.
+        Values as text; the keys are the names of the quantities in words.
     """
     lines: dict[str, str] = {}
     for path in names.split():
@@ -99,7 +99,7 @@ def lines_of(results: Mapping[str, Any], names: str) -> dict[str, str]:
 
 
 def forced_lines(assembly: Any) -> dict[str, str]:
-    """Return the pose, load, energy and platform error of a forced assembly as text."""
+    """Format the pose, load, energy and platform error of a forced assembly."""
     values = {
         "pose": assembly.posture.pose(),
         "energy": assembly.energy,
@@ -113,11 +113,12 @@ def forced_lines(assembly: Any) -> dict[str, str]:
 def table_lines(
     head: Sequence[str], rows: Mapping[str, Sequence[Any]], digits: int = 5
 ) -> list[str]:
-    """Return aligned rows of numbers below column heads.
+    """Format a table with aligned columns.
 
     Args:
-        head: head of the row names, then the head of each column with its unit.
-        rows: numbers or texts of each row, by row name; a number that is not finite is
+        head: heading of the row names, followed by the heading of each column with its
+            unit.
+        rows: numbers or texts in each row, by row name; a number that is not finite is
             printed as a dash.
         digits: number of significant digits.
 
@@ -141,10 +142,10 @@ def table_lines(
 
 
 def _cell(value: float, digits: int) -> str:
-    """Return a number of a table as text."""
+    """Format a number in a table."""
     return f"{value + 0.0:.{digits}g}" if math.isfinite(value) else "-"
 
 
 def _with_unit(text: str, unit: str) -> str:
-    """Return a text followed by the unit, if there is a unit."""
+    """Append the unit to a text, unless the quantity is dimensionless."""
     return text if unit in {"", "1"} else f"{text} {unit}"

@@ -1,9 +1,10 @@
-"""Display units: chosen by size on pages, and by quantity in text."""
+"""Display units, chosen by magnitude on pages and by quantity in texts."""
 
 import math
 from dataclasses import dataclass
 
-# for each SI unit: (smallest size [SI], display unit, factor), the largest unit first
+# for each SI unit: smallest magnitude [SI units], display unit and conversion factor,
+# with the largest display unit first
 _SHOWN: dict[str, tuple[tuple[float, str, float], ...]] = {
     "m": ((1e-4, "mm", 1e3), (0.0, "µm", 1e6)),
     "rad": ((0.1, "deg", 180 / math.pi), (1e-4, "mrad", 1e3), (0.0, "µrad", 1e6)),
@@ -16,7 +17,7 @@ _SHOWN: dict[str, tuple[tuple[float, str, float], ...]] = {
 }
 
 
-# display units of text: number shown = factor * number in SI
+# display units in texts: displayed number = factor * number in SI units
 FACTORS = {
     "mm": 1e3, "um": 1e6, "mrad": 1e3, "urad": 1e6, "MPa": 1e-6, "%": 1e2,
 }  # fmt: skip
@@ -38,15 +39,16 @@ class Shown:
 
 
 def shown_in(unit: str, size: float = 1.0) -> Shown:
-    """Return the display unit for numbers of an SI unit.
+    """Return the display unit for numbers in an SI unit.
 
     Args:
-        unit: SI unit, such as ``"m"``; empty, ``"1"`` or ``"-"`` if the number is
-            dimensionless.
-        size: [unit] largest absolute value of the numbers.
+        unit: SI unit, for example ``"m"``; empty, ``"1"`` or ``"-"`` for dimensionless
+            numbers.
+        size: largest absolute value of the numbers [unit].
 
     Returns:
-        The display unit and its factor; the SI unit if no other unit is customary.
+        Display unit and conversion factor; the SI unit itself if the table has no
+        display unit for it.
     """
     if unit in {"", "1", "-"}:
         return Shown("", "", 1.0)
@@ -59,7 +61,7 @@ def shown_in(unit: str, size: float = 1.0) -> Shown:
 
 
 def number_text(value: float, unit: str = "", digits: int = 4) -> str:
-    """Return a number with its unit as text; ``none`` for NaN."""
+    """Format a number with its unit; NaN becomes ``none``, infinity ``unbounded``."""
     if math.isnan(value):
         return "none"
     if math.isinf(value):

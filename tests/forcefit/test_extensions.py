@@ -262,7 +262,7 @@ BROKEN_PARTS = [
     ("small", "model broken:small of their-tools returned an array of shape "),
     ("loose", "model broken:loose of their-tools: stiffness is not positive"),
     ("ragged", "model broken:ragged of their-tools returned no array of "),
-    ("cine", 'found "cine", expected a link model of an installed package; did you'),
+    ("cine", 'found "cine", expected an installed link model; did you mean'),
     ("arm.three", "the reader broken:read of their-tools failed: ValueEr"),
     ("arm.count", "of their-tools returned int, expected a Robot"),
     ("arm.absent", "of their-tools cannot be imported: "),

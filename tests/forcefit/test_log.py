@@ -1,4 +1,4 @@
-"""Lines on the loggers of forcefit: silent unless they are requested."""
+"""Log messages of forcefit, which are shown only on request."""
 
 import logging
 import subprocess

@@ -27,7 +27,7 @@ URDF = '<robot name="r"><link name="base"/></robot>\n'
 
 @pytest.fixture
 def files(tmp_path):
-    """Files that a package reads, which none here gets as far as reading."""
+    """Return files that require a package; the missing package is reported first."""
     texts = {
         "a.msh": MSH,
         "a.step": "ISO-10303-21;\n",

@@ -28,7 +28,7 @@ def import_of(owner, names):
 
 
 def stub_of(owners):
-    """The stub that says what the table of public names says."""
+    """Return the stub file that corresponds to the table of public names."""
     imports = [import_of(owner, names) for owner, names in owners.items()]
     public = "".join(f'    "{name}",\n' for name in ff.__all__)
     return (
@@ -70,7 +70,7 @@ def test_reference_names_the_functions_of_every_command():
 
 
 def checked(checker, folder, code):
-    """Exit status and what a type checker prints of a user's lines."""
+    """Return the exit status and output of a type checker for some user code."""
     file = folder / "users_lines.py"
     file.write_text(code, encoding="utf-8")
     command = {

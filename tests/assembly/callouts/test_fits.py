@@ -1,4 +1,4 @@
-"""ISO 286 fits against worked limits, and the distribution of the clearance."""
+"""Tests of ISO 286 fits: tabulated limits and the distribution of the clearance."""
 
 import numpy as np
 import pytest
@@ -117,11 +117,11 @@ def test_tolerance_table_has_the_195_values_of_the_transcribed_standard(row):
 @pytest.mark.parametrize(("text", "message"), [
     ("12 H7/z6", '"z6", expected one of the letters'),
     ("12 H7-g6", 'found "12 H7-g6", expected a fit such as "12 H7/g6"'),
-    ("12 h7/G6", "capital letters are holes"),
+    ("12 h7/G6", "capital letters denote holes"),
     ("12 H4/g6", '"H4", expected a grade from 5 to 11'),
     ("600 H7/g6", "a nominal size of 600 mm, expected over 0 and up to 500"),
     ("0 H7/g6", "a nominal size of 0 mm"),
-    ("12 K10/h6", '"K10", expected K of a grade from 6 to 8'),
+    ("12 K10/h6", '"K10", expected K with a grade from 6 to 8'),
     ("25 H7/p6", "an interference fit (-35 to -1 um)"),
     ("1 HJ7/g6", '"HJ7"'),
 ])  # fmt: skip

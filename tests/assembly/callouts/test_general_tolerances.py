@@ -1,4 +1,4 @@
-"""ISO 2768 tables and texts of tolerances."""
+"""Tests of the ISO 2768 tables and of the parsing of tolerances."""
 
 import pytest
 

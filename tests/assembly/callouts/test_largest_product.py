@@ -1,4 +1,4 @@
-"""The support of discs and double cones together against another solver."""
+"""Comparison of the support function of intersected zones with cvxpy."""
 
 import cvxpy as cp
 import numpy as np
@@ -9,7 +9,7 @@ from forcefit.assembly.callouts.largest_product import largest_product
 
 @pytest.mark.parametrize("seed", range(6))
 def test_support_of_discs_and_double_cones_agrees_with_cvxpy(seed):
-    """Two double cones, two discs and intervals that bound five coordinates."""
+    """The zone is bounded by double cones, discs and intervals in five coordinates."""
     rng = np.random.default_rng(seed)
     bounds = [*np.split(np.eye(5), 5), rng.normal(size=(2, 5)), rng.normal(size=(2, 5))]
     cones = [rng.normal(size=(3, 5)), rng.normal(size=(3, 5))]

@@ -1,4 +1,4 @@
-"""Zones of callouts against worked numbers, closed forms and brute force."""
+"""Tolerance zones compared with hand calculations, closed forms and brute force."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ def drawn(zone, distribution="uniform", cp=1.0, count=100_000):
 
 
 def reach(zone, height):
-    """Largest offset of the axis at a height, over directions."""
+    """Return the largest offset of the axis at a height, over all directions."""
     angles = np.linspace(0, np.pi, 13)
     rows = [np.array([np.cos(a), np.sin(a)]) @ offset_rows(height) for a in angles]
     return max(zone.support(row) for row in rows)
@@ -277,7 +277,7 @@ def test_point_zone_is_a_ball():
 
 
 def test_zone_at_maximum_material_grows_with_the_hole():
-    """12 H7 with 0.05 (M): 0.050 mm at the least hole to 0.068 mm at the largest."""
+    """12 H7 with 0.05 (M): 0.050 mm for the smallest, 0.068 mm for the largest hole."""
     zone = axis_position(WIDTH, LENGTH, bonus=18e-6)
     assert zone.support(np.eye(6)[3]) == pytest.approx(34e-6)
     screws = drawn(zone, count=400_000)
@@ -300,7 +300,7 @@ def test_shift_tolerance_along_a_direction_has_no_component_across_it():
 
 
 def test_draws_of_a_wide_zone_that_lie_in_a_narrow_zone_are_distributed_as_its_draws():
-    """Position 20 mm within position 0.05 mm on the same bore: the tighter holds."""
+    """A position tolerance of 20 mm has no effect together with one of 0.05 mm."""
     narrow = axis_position(WIDTH, LENGTH)
     zone = intersection([axis_position(20e-3, LENGTH), narrow])
     screws = drawn(zone, count=20_000)

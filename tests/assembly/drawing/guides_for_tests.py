@@ -16,19 +16,19 @@ SIGNS = list(itertools.product((1, -1), (1, -1)))
 
 
 def guide_slabs(gaps=(C, C)):
-    """(8, 6) rows, each of at most 1 on a screw in the guide's axes."""
+    """Return rows (8, 6) with |row @ screw| <= 1 for screws in the guide axes."""
     rows = [np.array([0, s * L / 2, r * T / 2, 1, 0, 0]) / gaps[0] for s, r in SIGNS]
     rows += [np.array([s * L / 2, 0, r * W / 2, 0, 1, 0]) / gaps[1] for s, r in SIGNS]
     return np.array(rows)
 
 
 def pad_slabs():
-    """(4, 6) rows, likewise."""
+    """Return rows (4, 6) with |row @ screw| <= 1 for screws in the pad axes."""
     return np.array([[s * B, r * A, 0, 0, 0, 1] for s, r in SIGNS]) / G_PAD
 
 
 def support(direction, slabs, equal=None):
-    """Most of direction @ screw where abs(slabs @ screw) <= 1, a linear programme."""
+    """Maximise direction @ screw subject to |slabs @ screw| <= 1."""
     both = np.vstack([slabs, -slabs])
     zero = None if equal is None else np.zeros(len(equal))
     scale = np.array([1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5])
@@ -42,14 +42,14 @@ def support(direction, slabs, equal=None):
 
 
 def at(point):
-    """(6, 6) map of a screw at a point to the origin."""
+    """Return the map (6, 6) of a screw at a point to the origin."""
     shift = np.eye(6)
     shift[3:, :3] = skew(np.array(point, dtype=float))
     return shift
 
 
 def drawn_in(folder, *tables):
-    """A robot of bodies and joints whose platform is the body "table"."""
+    """Return a robot with bodies and joints, whose platform is the body "table"."""
     file = folder / "drawn.toml"
     head = 'format = 2\nplatform = "table"\nplatform_at = [0, 0, 0]\n'
     file.write_text(head + "\n".join(tables))

@@ -1,4 +1,4 @@
-"""Every built-in robot, and those of the literature, converted to bodies and joints."""
+"""Conversion of built-in robots and robots from the literature to drawings."""
 
 from pathlib import Path
 
@@ -39,7 +39,7 @@ translation = [0.1, 0, 0]
 
 @pytest.fixture(params=[*BUILT_IN, *OTHERS])
 def robots(request, tmp_path):
-    """Of bodies and of frames."""
+    """Return the robot as a drawing and as frames."""
     name = request.param
     if name in BUILT_IN:
         robot = load_robot(name)
@@ -54,7 +54,7 @@ def robots(request, tmp_path):
 
 
 def compare(drawn, framed):
-    """Place, stiffness, mobility, margin, and the energy of errors under the weight."""
+    """Compare poses, stiffness, mobility, margin, and the energy due to errors."""
     at, expected = (posture.platform[:3, 3] for posture in (drawn, framed))
     assert np.abs(at - expected).max() < SAME
     K, reference = (platform_stiffness(each).stiffness for each in (drawn, framed))
@@ -80,14 +80,14 @@ def test_robot_converted_to_bodies_and_joints_is_equal_at_home(robots):
 
 
 def test_robot_converted_to_bodies_and_joints_is_equal_elsewhere(robots):
-    """Each drive 0.01 rad or m from home, the platform where the closures lead it."""
+    """The drives are moved by 0.01 rad or 0.01 m, and the platform follows."""
     if "snu" in robots[1].name or "gpm" in robots[1].name:
         pytest.skip("home is singular, or two drives determine the third")
     step = {f.name: f.position + 0.01 for f in robots[1].frames if f.actuated}
     compare(*(place_robot(robot, joints=step) for robot in robots))
 
 
-def test_ball_and_universal_joints_are_written_as_joints_of_several_freedoms(tmp_path):
+def test_ball_and_universal_joints_are_written_as_compound_joints(tmp_path):
     """The 6-UPS has a universal, a prismatic and a spherical joint in each leg."""
     convert("hexapod", tmp_path / "drawn.toml", version=2)
     text = (tmp_path / "drawn.toml").read_text()
@@ -107,7 +107,7 @@ def test_drawn_robots_are_equal_after_conversion_to_frames_and_back(name, tmp_pa
 
 
 def test_conversion_of_a_screw_to_bodies_and_joints_keeps_its_pitch_and_names(tmp_path):
-    """A turn of the drive lowers the table by the pitch of 5 mm."""
+    """One turn of the drive lowers the table by the pitch of 5 mm."""
     source = LITERATURE.with_name("robots_drawn") / "screw.toml"
     if not source.exists():
         pytest.skip(f"{source} is not here")
@@ -122,7 +122,7 @@ def test_conversion_of_a_screw_to_bodies_and_joints_keeps_its_pitch_and_names(tm
 
 
 def test_data_that_a_drawing_cannot_represent_are_reported(run, tmp_path):
-    """Axes of the platform that are not the base's, as of a flange."""
+    """For example, the axes of a platform flange differ from those of the base."""
     status, out, err = run(
         "convert", "arm6", "-o", tmp_path / "arm.toml", "--format", "2", "--json",
         tmp_path / "o.json",
@@ -139,7 +139,7 @@ def test_data_that_a_drawing_cannot_represent_are_reported(run, tmp_path):
     # a closure of two frames of one body
     (["-o", "x.toml", "--format", "2"], '[[frame]]\nname = "spot"\nparent = "arm"\n'
      'translation = [0.1, 0, 0]\n[[closure]]\nframes = ["tip", "spot"]\n',
-     'closure[1] ("tip", "spot"): found that it connects two frames of one rigid body'),
+     'closure[1] ("tip", "spot"): found a connection between two frames of the same '),
     (["-o", "x.toml", "--format", "2"], '[[effect]]\nname = "function"\nwhere = "tip"\n'
      'kind = "geometric_error"\ncomponents = ["TX"]\nform = "constant"\n'
      "parameters = { a = 1e-4 }\n", "effect"),
@@ -157,7 +157,7 @@ def test_robot_that_format_2_cannot_describe_is_refused_in_one_line(
 
 
 def test_rounded_closures_are_reported(tmp_path):
-    """Joints of a drawing coincide; here two of them are 1e-8 m apart."""
+    """Drawn joints coincide exactly, but here they are 1e-8 m apart."""
     (tmp_path / "rounded.toml").write_text(
         ALONE.replace(
             'name = "tip"\nparent = "arm"', 'name = "tip"\nparent = "pin"'
@@ -173,7 +173,7 @@ def test_rounded_closures_are_reported(tmp_path):
 
 
 def test_masses_and_moments_of_inertia_of_one_body_are_added(tmp_path):
-    """A rigid body has the frequencies of its parts, which do not move against it."""
+    """The frequencies stay unchanged when rigidly connected parts are combined."""
     (tmp_path / "heavy.toml").write_text(
         ALONE.replace(
             "actuated = true",
@@ -196,7 +196,7 @@ def test_masses_and_moments_of_inertia_of_one_body_are_added(tmp_path):
 
 
 def test_directions_of_a_mesh_are_unchanged_by_conversion(tmp_path):
-    """From base to tip, and of its height, in the axes of the base at home."""
+    """Both the link direction and the height direction are compared in base axes."""
     mesh = Path(__file__).parents[3] / "meshes" / "distal_plain.stl"
     (tmp_path / "mesh.toml").write_text(
         ALONE.replace('name = "tip"\nparent = "arm"\n', 'name = "elbow"\n'
@@ -266,7 +266,7 @@ frames = ["rod", "plate"]
 
 @pytest.mark.parametrize("text", [BALL_ON_A_TABLE, ROD_TO_THE_PLATE_AND_FLAG])
 def test_names_of_bodies_and_joints_remain_unique_after_conversion(text, tmp_path):
-    """A ball with an error of its last frame, and a body that joins another."""
+    """Cases: a ball joint with an error at its last frame, and two merged bodies."""
     (tmp_path / "given.toml").write_text(text)
     convert(tmp_path / "given.toml", tmp_path / "frames.toml", version=1)
     done = convert(tmp_path / "frames.toml", tmp_path / "drawn.toml", version=2)

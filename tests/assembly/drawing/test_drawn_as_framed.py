@@ -1,4 +1,4 @@
-"""Robots written as bodies and joints are those written as frames and closures."""
+"""Comparison of the same robots given by drawings and by frames."""
 
 import numpy as np
 import pytest
@@ -24,13 +24,13 @@ ROBOTS = {
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_drawn_robot_has_the_poses_stiffness_energy_and_freedoms_of_its_frames(
+def test_drawn_robot_has_the_poses_stiffness_energy_and_mobility_of_its_frames(
     name, tmp_path
 ):
-    """The axes of a drawn platform are the base's at home.
+    """The axes of a drawn platform coincide with the base axes at home.
 
-    Entries of a compliance are divided by the roots of its diagonal, so that rad and m
-    weigh alike.
+    Compliance matrices are scaled to a unit diagonal, so that entries in rad and in m
+    have equal weights.
     """
     text, pose = ROBOTS[name]
     (tmp_path / "drawn.toml").write_text(text())

@@ -1,4 +1,4 @@
-"""The example files of drawn robots: short, and with numbers that are known."""
+"""Tests of the example drawings, for which results are known."""
 
 from pathlib import Path
 
@@ -28,22 +28,22 @@ def test_examples_have_the_mobility_of_the_literature(name):
     ) == EXAMPLES[name]  # fmt: skip
 
 
-def test_the_tricept_is_as_stiff_along_z_as_its_drives():
-    """3 k cos^2 of a leg's inclination; the central tube slides along z."""
+def test_tricept_stiffness_along_z_equals_that_of_its_drives():
+    """The stiffness is 3 k cos^2(inclination), because the tube slides along z."""
     robot = load_robot(DRAWN / "tricept.toml")
     K = platform_stiffness(home_posture(robot)).stiffness
     assert K[5, 5] == pytest.approx(3 * 1.5e8 * 81 / 85, rel=1e-12)
 
 
 def test_tricept_platform_rotates_with_its_tube():
-    """Its flange is at right angles to the line from the cross."""
+    """The flange stays perpendicular to the line from the universal joint."""
     robot = load_robot(DRAWN / "tricept.toml")
     at = place_robot(robot, {"tx": 0.1, "ty": -0.05, "tz": -0.9}).platform
     along = at[:3, 3] / np.linalg.norm(at[:3, 3])
     assert at[:3, 2] == pytest.approx(-along, abs=1e-9)
 
 
-def test_the_agile_eye_turns_about_its_centre():
+def test_agile_eye_rotates_about_its_centre():
     robot = load_robot(DRAWN / "agile_eye.toml")
     at = place_robot(robot, joints={"leg1.drive": 0.2, "leg3.drive": -0.1})
     assert at.platform[:3, 3] == pytest.approx([0, 0, 0], abs=1e-12)
@@ -52,7 +52,7 @@ def test_the_agile_eye_turns_about_its_centre():
 
 @pytest.mark.parametrize("ending", ["toml", "xml", "urdf"])
 def test_drawn_robots_are_converted_to_files_of_other_programs(ending, tmp_path):
-    """What is written is read again, and its bodies compared."""
+    """The output files are read back, and the body poses are compared."""
     found = convert(DRAWN / "three_upu.toml", tmp_path / f"upu.{ending}")
     assert found.difference < 1e-12
     back = load_robot(tmp_path / f"upu.{ending}")
@@ -60,8 +60,8 @@ def test_drawn_robots_are_converted_to_files_of_other_programs(ending, tmp_path)
     assert np.abs(home_posture(back).platform[:3, 3] - expected[:3, 3]).max() < 1e-12
 
 
-def test_numbers_of_a_drawn_robot_can_be_varied_in_a_sweep():
-    """Those of its frames, in every leg at once: k along z of a 3-UPU is 3 k cos^2."""
+def test_parameters_of_a_drawn_robot_can_be_varied_in_a_sweep():
+    """The leg stiffness k of a 3-UPU is varied; along z it is 3 k cos^2."""
     design = load_design(DRAWN / "three_upu.toml")
     values = {"slide.joint_stiffness.tz": 1e3}
     names = design.find("rod.link.beam.radius")

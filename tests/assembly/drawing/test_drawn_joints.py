@@ -1,4 +1,4 @@
-"""Free motions of the joint types, and joints passed against their direction."""
+"""Free motions of all joint types, and joints traversed in reverse direction."""
 
 import numpy as np
 import pytest
@@ -55,7 +55,7 @@ def axes():
 
 @pytest.mark.parametrize("kind", [*FREE, "universal"])
 def test_relative_motion_of_a_joint_is_spanned_by_its_free_screws(kind):
-    """The screws of its frames span those of the table, at the base's origin."""
+    """The screws of the joint frames span the free screws in the table."""
     drawn = robot(joint(kind))
     screws = motion_screws(drawn, home_posture(drawn).transforms)[mobile(drawn)]
     if kind == "universal":
@@ -74,7 +74,7 @@ def test_relative_motion_of_a_joint_is_spanned_by_its_free_screws(kind):
 ])  # fmt: skip
 @pytest.mark.parametrize("reverse", [False, True])
 def test_joint_coordinate_moves_the_second_body_along_the_axis(kind, step, reverse):
-    """Relative to the first; so it does from the second body to the first."""
+    """This also holds if the tree traverses the joint in reverse direction."""
     ends = ("table", "base") if reverse else ("base", "table")
     drawn = robot(joint(kind, *ends, actuated=True, position=0.2))
     moved = place_robot(drawn, joints={"j": 0.5}).pose()
@@ -89,7 +89,7 @@ def test_joint_coordinate_moves_the_second_body_along_the_axis(kind, step, rever
 
 
 def numbers(rng, free):
-    """Error, clearance and a full stiffness, zero along the free motion."""
+    """Return an error, a clearance, and a full stiffness with one free motion."""
     root = rng.normal(size=(6, 6))
     K = (root @ root.T + 6 * np.eye(6)) * 1e5
     K[free] = K[:, free] = 0.0
@@ -99,7 +99,7 @@ def numbers(rng, free):
 
 @pytest.mark.parametrize("kind", ["revolute", "prismatic", "helical"])
 def test_joint_with_exchanged_bodies_describes_the_same_robot(kind):
-    """Bodies exchanged, z turned round: rows y and z of its numbers change sign."""
+    """If the bodies are exchanged and z is reversed, y and z components change sign."""
     rng = np.random.default_rng(5)
     given = numbers(rng, 5 if kind == "prismatic" else 2)
     signs = np.array([1, -1, -1, 1, -1, -1])
@@ -126,7 +126,7 @@ def test_joint_with_exchanged_bodies_describes_the_same_robot(kind):
 
 @pytest.mark.parametrize("kind", FREE)
 def test_error_of_a_joint_is_expressed_in_the_axes_of_the_joint(kind):
-    """Whatever frames it is made of: the screw moves the table as the joint's does."""
+    """The error moves the table by its screw, independently of the joint frames."""
     error = np.array([1e-4, -2e-4, 3e-4, 1e-5, -2e-5, 3e-5])
     drawn = robot(
         joint(kind, numbers=(JointNumbers(error=error, tolerance=2 * abs(error)),))
@@ -140,7 +140,7 @@ def test_error_of_a_joint_is_expressed_in_the_axes_of_the_joint(kind):
 
 
 def test_error_of_a_bearing_is_expressed_in_the_axes_of_the_bearing():
-    """Of a cross: z is the bearing's axis, x the part of the other one across it."""
+    """In a universal joint, z is the bearing axis, and x is normal to it."""
     errors = np.diag(np.arange(1, 7) * 1e-5)[[0, 5]]
     both = tuple(JointNumbers(error=error) for error in errors)
     drawn = robot(joint("universal", numbers=both))
@@ -156,7 +156,7 @@ def test_error_of_a_bearing_is_expressed_in_the_axes_of_the_bearing():
 
 @pytest.mark.parametrize("kind", ["spherical", "cylindrical", "planar"])
 def test_springs_of_a_joint_of_several_frames_act_only_once(kind):
-    """A table held by one joint with springs, and drives in its free motions' place."""
+    """The table is held by one joint with springs; its free motions are driven."""
     K = np.array([2e3, 3e3, 5e3, 2e6, 3e6, 5e6])
     free = {"spherical": [0, 1, 2], "cylindrical": [2, 5], "planar": [2, 3, 4]}[kind]
     K[free] = 0.0
@@ -169,7 +169,7 @@ def test_springs_of_a_joint_of_several_frames_act_only_once(kind):
 
 
 def test_link_has_the_same_stiffness_from_either_end():
-    """A stiffness read at one joint, and the same link read at the other."""
+    """The stiffness matrix of a link is given at one joint and at the other."""
     rng = np.random.default_rng(3)
     root = rng.normal(size=(6, 6))
     K = (root @ root.T + 6 * np.eye(6)) * 1e5
@@ -192,7 +192,7 @@ def test_link_has_the_same_stiffness_from_either_end():
     [("bar.link", True), ("bar.end", True), ("d.end", False), ("d.base", False)],
 )
 def test_a_body_may_have_the_name_of_a_frame_that_closes_a_loop(name, reverse):
-    """A four-bar whose loop closes in its elastic bar, or at the base."""
+    """The loop of a four-bar is closed at its elastic bar or at the base."""
 
     def compliance(name):
         link = {"link": MatrixLink(1e6 * np.eye(6)), "ends": ("b", "c")}

@@ -1,4 +1,4 @@
-"""Machines with guides in every other computation, against statics by hand."""
+"""Machines with guides, compared with statics solved by hand."""
 
 import itertools
 from functools import partial
@@ -58,7 +58,7 @@ def drawn(tmp_path):
 
 
 def sprung_slide(drawn, clearance=SLIDE, mass=""):
-    """A carrier on a spring at the origin, and a driven table in its guide along z."""
+    """Return a spring-mounted carrier with a driven table in a guide along z."""
     spring = f"joint_stiffness = {K.tolist()}"
     return drawn(
         body("carrier"), body("table") + mass,
@@ -67,8 +67,8 @@ def sprung_slide(drawn, clearance=SLIDE, mass=""):
     )  # fmt: skip
 
 
-def test_force_presses_a_block_flat_onto_its_pad_and_leaves_two_free_motions(drawn):
-    """FX holds TX, RY and RZ at four contacts; TY and RX keep their clearance."""
+def test_force_closes_pad_contacts_and_leaves_two_free_motions(drawn):
+    """FX closes the clearances in TX, RY and RZ, while TY and RX stay free."""
     posture = home_posture(sprung_slide(drawn))
     found = platform_stiffness(posture, "contact", load=[0, 0, 0, 50.0, 0, 0])
     expected = np.diag(np.where([1, 0, 0, 0, 1, 0], 0.0, K))
@@ -90,8 +90,8 @@ def test_a_guide_is_rigid_in_the_nominal_stiffness(drawn):
     # about z the edges of the wider faces touch first: 2 c / w
     ([0, 0, 5.0, 0, 0, 0], [0, 0, 2 * C / W + 5 / K[2], 0, 0, 0]),
 ])  # fmt: skip
-def test_loads_press_the_block_against_the_sides_of_its_guide(load, expected, drawn):
-    """The work of the load and its energy f^2 / 2 K, by hand."""
+def test_loads_close_the_contacts_of_a_guide(load, expected, drawn):
+    """The energy of the spring is f^2 / (2 K)."""
     posture = home_posture(sprung_slide(drawn))
     found = solve_assembly(posture, load)
     work = np.dot(load, expected)
@@ -99,8 +99,8 @@ def test_loads_press_the_block_against_the_sides_of_its_guide(load, expected, dr
     assert found.energy == pytest.approx((np.array(load) ** 2 / K).sum() / 2, rel=1e-7)
 
 
-def test_predicted_readings_of_a_guided_arm_rest_on_the_sides_of_the_guide(drawn):
-    """Readings under two loads, and again with the clearances held where they rest."""
+def test_predicted_readings_of_a_guided_arm_include_closed_contacts(drawn):
+    """The readings do not change if the closed clearances are locked."""
     loads = np.array([[0, 0, 0, 100.0, 40.0, 0], [0, 0, 0, -100.0, 40.0, 0]])
     posture = home_posture(sprung_slide(drawn))
     rows = as_declared(together([posture, posture]), loads)
@@ -113,7 +113,7 @@ def test_predicted_readings_of_a_guided_arm_rest_on_the_sides_of_the_guide(drawn
 
 
 def test_acceleration_moves_the_block_across_its_guide(drawn):
-    """m a at the guide's middle: the pose changes by the gap and m a / K."""
+    """The force m a moves the block by the gap and deforms the spring by m a / K."""
     robot = sprung_slide(drawn, mass="mass = 4.0\ncentre = [0, 0, 0]\n")
     path = instants(["q.slide"], [[0.0]], [[0.0]], [[3.0]])
     found = path_errors(robot, path, gravity=[0.0, -9.81, 0.0])
@@ -139,7 +139,7 @@ ERROR = [5e-4, -8e-4, 9e-4, 3e-5, -4e-5, 0.0]
 
 
 def test_step_that_closes_a_guided_loop_does_work_equal_to_the_assembly_energy(drawn):
-    """The contacts of a guide hold from the beginning; a step closes the loop."""
+    """The contacts of the guide are closed from the start; a step closes the loop."""
     posture = mounted(drawn, ERROR)
     (pair,) = loops(posture.robot)
     assert len(posture.robot.closures) == 2
@@ -150,14 +150,14 @@ def test_step_that_closes_a_guided_loop_does_work_equal_to_the_assembly_energy(d
 
 
 def test_energy_of_a_guide_equals_that_of_the_problem_printed_in_the_paper(drawn):
-    """All screws kept in cvxpy, no elimination: frames and closures are the same."""
+    """The problem is solved by cvxpy in all screws, without elimination."""
     posture = mounted(drawn, ERROR)
     printed, _ = energy_as_printed(posture)
     assert solve_assembly(posture).energy == pytest.approx(printed, rel=1e-6)
 
 
 def test_worst_case_of_a_guided_arm_is_the_farthest_corner(drawn):
-    """Corners of the errors and of the slabs; the shares of both add up to it."""
+    """The contributions of errors and clearances add up to the worst case."""
     robot = drawn(
         body("table"), joint("slide", "prismatic", "base", "table", Z, SLIDE, DRIVEN)
     )  # fmt: skip
@@ -179,7 +179,7 @@ def test_worst_case_of_a_guided_arm_is_the_farthest_corner(drawn):
 
 
 def test_positions_in_contact_are_at_corners_of_the_clearance_set_of_a_guide(drawn):
-    """Pressed by any wrench the block rests at a corner: at five of the eight slabs."""
+    """Under a generic wrench, five of the eight inequalities are active."""
     posture = home_posture(drawn(
         body("table"), joint("slide", "prismatic", "base", "table", Z, SLIDE, DRIVEN)
     ))  # fmt: skip
@@ -193,7 +193,7 @@ def test_positions_in_contact_are_at_corners_of_the_clearance_set_of_a_guide(dra
 
 
 def test_energies_in_a_sweep_of_a_guided_robot_equal_hand_calculation(drawn):
-    """FX at the table, q from the spring: F^2 / 2 K_TX + (q F)^2 / 2 K_RY."""
+    """With a lever arm q, the energy is F^2 / (2 K_TX) + (q F)^2 / (2 K_RY)."""
     found = sweep(
         sprung_slide(drawn), grid="q.slide=0:0.04:0.02", assumption="none",
         load=(0, 0, 0, 100.0, 0, 0),
@@ -210,7 +210,7 @@ def test_energies_in_a_sweep_of_a_guided_robot_equal_hand_calculation(drawn):
 def test_errors_of_either_body_of_a_contact_are_accepted_without_clearance(
     kind, clearance, reverse, drawn
 ):
-    """In a serial arm errors before and after the contacts move the platform alone."""
+    """In a serial arm, errors on either side of the contacts only move the platform."""
     ends = ("table", "base") if reverse else ("base", "table")
     robot = drawn(
         body("table"), joint("j", kind, *ends, Z, f"clearance = {{ {clearance} }}")
@@ -222,7 +222,7 @@ def test_errors_of_either_body_of_a_contact_are_accepted_without_clearance(
 
 
 def test_closures_between_contacts_are_not_exported_as_loops(drawn, tmp_path):
-    """MJCF has one weld for the loop of two guides, and results name one closure."""
+    """The loop through two guides becomes one weld in MJCF and one closure."""
     posture = mounted(drawn, ERROR)
     assert contact_closures(posture.robot).sum() == 1
     write_robot(posture.robot, tmp_path / "frames.toml")
@@ -234,7 +234,7 @@ def test_closures_between_contacts_are_not_exported_as_loops(drawn, tmp_path):
 
 
 def test_chain_of_bounded_clearances_is_counted_as_a_loop_of_the_mechanism():
-    """Two shafts in bores between the same bodies: six over-constraints, counted."""
+    """Two shafts in bores between the same bodies are overconstrained six times."""
     bore = Clearance(radial=1e-5, tilt=1e-4)
     frames = (
         Frame("first", clearance=bore), Frame("table", "first"),
@@ -247,7 +247,7 @@ def test_chain_of_bounded_clearances_is_counted_as_a_loop_of_the_mechanism():
 
 @pytest.mark.exudyn
 def test_simulated_arm_without_clearance_accepts_errors_of_every_frame(drawn, rng):
-    """Tight contacts are one rigid guide: only the load bends the spring, F^2 / 2 K."""
+    """Without clearance, only the spring deforms: the energy is F^2 / (2 K)."""
     robot = without_clearance(sprung_slide(drawn))
     robot = robot.with_errors(1e-4 * rng.uniform(-1, 1, size=(len(robot.frames), 6)))
     found = simulate_assembly(home_posture(robot), load=[0, 0, 0, 100.0, 0, 0])

@@ -1,11 +1,12 @@
-"""Exact clearances of guides and pads, against their slabs written out.
+"""Clearances of guides and pads compared with explicit inequalities.
 
-A guide of length L, width w and height t leaves its block the small screws
+A guide of length L, width w and height t allows the small screws that satisfy
 
-    |TX + s1 L/2 RY + s2 t/2 RZ| <= c_x,  |TY + s1 L/2 RX + s2 w/2 RZ| <= c_y,
+    |TX + s1 L/2 RY + s2 t/2 RZ| <= c_x,  |TY + s1 L/2 RX + s2 w/2 RZ| <= c_y
 
-s1, s2 = +-1, and a pad of 2A by 2B the octahedron |TZ| + B |RX| + A |RY| <= g.  Here
-they are rows of linear and convex programmes of other solvers.
+for s1, s2 = +-1.  A pad of 2A by 2B allows the octahedron |TZ| + B |RX| + A |RY| <= g.
+In these tests, the inequalities are constraints of linear and convex programs, which
+are solved by other solvers.
 """
 
 from functools import partial
@@ -76,7 +77,7 @@ def heights(posture, directions):
 def test_a_guide_has_the_support_function_of_its_eight_slabs(
     gap, gaps, reverse, drawn, rng
 ):
-    """Largest work of 40 wrenches by linear programming over the slabs."""
+    """The support function for 40 wrenches is computed by linear programming."""
     posture = one_joint(drawn, "prismatic", GUIDE.replace("1e-5", gap), reverse)
     wrenches = rng.normal(size=(40, 6)) * [L / 2, L / 2, W / 2, 1, 1, 0]
     expected = [support(w, guide_slabs(gaps)) for w in wrenches]
@@ -111,7 +112,7 @@ def positions(posture, screws):
 def test_every_small_screw_is_inside_exactly_if_it_is_inside_the_slabs(
     kind, clearance, slabs, box, drawn, rng
 ):
-    """Sampled in the least box; the octahedron fills one sixth of it."""
+    """Screws are sampled in the bounding box, of which the octahedron is one sixth."""
     screws = rng.uniform(-1, 1, size=(200_000, 6)) * box
     inside = (np.abs(screws @ slabs.T) <= 1).all(axis=1)
     found = positions(one_joint(drawn, kind, clearance), screws) <= 1
@@ -142,7 +143,7 @@ def errors_of(seed):
 def test_energy_of_a_forced_guide_equals_that_of_its_inequalities_solved_by_cvxpy(
     seed, kind, clearance, slabs, free, drawn
 ):
-    """Least v K v / 2 of a spring's screw v; v + clearance + error close the loop."""
+    """cvxpy minimises v K v / 2, where v + clearance + error closes the loop."""
     import cvxpy as cp
 
     error, unit = errors_of(seed), np.array([1e-3] * 3 + [1e-6] * 3)
@@ -185,7 +186,7 @@ def two_guide_slabs():
 def test_margin_of_two_rigid_guides_equals_that_of_a_linear_programme(
     method, drawn, rng
 ):
-    """Least t with abs(slabs (x - error of the guide)) <= t on both guides."""
+    """The margin is the minimum t with |slabs (x - error)| <= t for both guides."""
     for _ in range(3):
         error = rng.normal(size=6) * ([4e-4] * 3 + [4e-5] * 3)
         error[5] = 0.0
@@ -202,7 +203,7 @@ def test_margin_of_two_rigid_guides_equals_that_of_a_linear_programme(
 
 
 def test_pose_errors_of_two_rigid_guides_equal_those_of_a_linear_programme(drawn, rng):
-    """The table may be where both guides allow it: support function and reach."""
+    """The table can reach all screws that are possible in both guides."""
     posture = on_two_guides(drawn, np.zeros(6), passive=False)
     slabs = two_guide_slabs()
     wrenches = rng.normal(size=(20, 6)) * [0.1, 0.1, 0.1, 1, 1, 0]
@@ -229,7 +230,7 @@ def test_pose_errors_of_two_rigid_guides_equal_those_of_a_linear_programme(drawn
 
 
 def test_energy_of_two_guides_on_springs_equals_that_of_their_inequalities(drawn, rng):
-    """An over-constrained pair: spring of the second guide, errors beyond the gaps."""
+    """The pair is overconstrained, and the errors exceed the gaps."""
     import cvxpy as cp
 
     K = np.array([2e4, 3e4, 1e4, 2e7, 1e7, 0.0])
@@ -266,7 +267,7 @@ def test_both_exact_methods_agree_on_a_forced_guide(kind, clearance, drawn):
 def test_finite_motions_of_a_guide_differ_from_small_ones_by_second_order(
     kind, clearance, drawn
 ):
-    """Errors and clearances times s = 1, 1/2, 1/4: energies, s^2, differ by s^3."""
+    """With errors and clearances scaled by s, the energies differ by O(s^3)."""
     posture, changes = held(drawn, 4 * errors_of(1), kind, clearance), []
     for scale in (1.0, 0.5, 0.25):
         found = solve_exact(scaled(posture, scale))

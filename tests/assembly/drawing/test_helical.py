@@ -1,4 +1,4 @@
-"""Helical joints: a screw and its nut."""
+"""Tests of helical joints with a screw and a nut."""
 
 import numpy as np
 import pytest
@@ -34,15 +34,15 @@ def read(tmp_path):
     return robot
 
 
-def test_screw_lift_has_one_freedom_and_three_redundant_constraints(read):
-    """Column and screw both hold two tilts, and the distance between their axes."""
+def test_screw_lift_has_one_degree_of_freedom_and_three_redundant_constraints(read):
+    """Column and screw both constrain two tilts and the distance between the axes."""
     found = mobility(home_posture(read()))
     assert (found.freedoms, found.platform_freedoms) == (1, 1)
     assert (found.freedoms_drives_locked, found.redundant_constraints) == (0, 3)
 
 
 def test_one_turn_of_the_screw_moves_the_table_by_its_lead(read):
-    """Down if a right-hand screw turns about +z, up if a left-hand one does."""
+    """Turning about +z, a right-handed screw lowers the table."""
     for text, step in ((LIFT, -0.005), (LIFT.replace('"5 mm"', '"-5 mm"'), 0.005)):
         pose = place_robot(read(text), joints={"bearing": 2 * np.pi}).pose()
         expected = [0.3, 0, 0.4 + step, 0, 0, 0]
@@ -66,7 +66,7 @@ def test_compliance_of_the_table_is_lead_squared_over_drive_stiffness(method, re
 
 @pytest.mark.parametrize("method", METHODS)
 def test_energy_under_a_load_equals_that_of_the_drive_spring(method, read):
-    """F^2 lead^2 / 2 k, with finite motions too: the table moves straight."""
+    """The energy is F^2 lead^2 / (2 k), also for finite motions."""
     at, load = home_posture(read()), [0, 0, 0, 0, 0, 1000.0]
     found = solve_assembly(at, load, method=method)
     energy = 1e6 * LEAD**2 / 400
@@ -90,7 +90,7 @@ def test_frequency_of_the_table_equals_that_of_its_mass_on_the_screw(read):
 
 
 def test_rotation_error_of_the_screw_lowers_the_table_by_its_lead(read):
-    """Exact, however large the rotation is: all axes are parallel."""
+    """The result is exact for any rotation, because all axes are parallel."""
     robot, errors = read(), np.zeros((6, 6))
     errors[robot.index("bearing"), 2] = 0.3
     at = home_posture(robot.with_errors(errors))
@@ -102,7 +102,7 @@ def test_rotation_error_of_the_screw_lowers_the_table_by_its_lead(read):
 
 
 def test_differential_screw_moves_by_the_difference_of_its_pitches(read):
-    """A turn of the screw moves it by 5 mm, and the table back by 4 mm on the screw."""
+    """One turn advances the screw by 5 mm and moves the table back by 4 mm."""
     robot = read(DIFFERENTIAL)
     pose = place_robot(robot, joints={"coarse": 2 * np.pi}).pose()
     assert pose["tz"] == pytest.approx(0.101, abs=1e-14)
@@ -142,7 +142,7 @@ SPRUNG = LIFT.replace("pitch =", (
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_compiled_reference_and_printed_energies_of_a_loaded_lift_agree(seed, read):
-    """Three solvers; the printed one has the thread as a constraint of its own."""
+    """In the problem as printed, the thread is an additional constraint."""
     robot, rng = read(SPRUNG), np.random.default_rng(seed)
     robot = robot.with_errors(rng.normal(size=(len(robot.frames), 6)) * 1e-4)
     at, load = home_posture(robot), rng.normal(size=6) * 100
@@ -156,7 +156,7 @@ def test_compiled_reference_and_printed_energies_of_a_loaded_lift_agree(seed, re
 
 
 def test_lifts_of_different_pitch_have_readings_by_their_own_pitch(read):
-    """At the same frames, an error of 1 mrad moves the tables by their own lead."""
+    """An error of 1 mrad moves each table in proportion to its lead."""
     for pitch in (0.005, 0.009):
         robot = read(LIFT.replace('"5 mm"', str(pitch)))
         errors = np.zeros((6, 6))
@@ -167,7 +167,7 @@ def test_lifts_of_different_pitch_have_readings_by_their_own_pitch(read):
 
 
 def test_whole_turns_of_a_passive_nut_count_against_its_limits(read):
-    """After a turn a helical joint is elsewhere; a revolute joint is not."""
+    """Unlike a revolute joint, a helical joint has moved after a whole turn."""
     robot = read(LIFT.replace("pitch =", "limits = [-6.0, 6.0]\npitch ="))
     at = place_robot(robot, joints={"bearing": -7.0})
     assert limits_passed(robot, at.coordinates) == "nut at 7 rad, limits -6 to 6"

@@ -1,6 +1,6 @@
-"""Clearances by the sizes of contacts: closed forms, sampling, and other engines.
+"""Joint clearances compared with closed forms, sampling and other solvers.
 
-Expected numbers are worked by hand from the offset of the axis at the height z,
+Expected values are derived by hand from the offset of the axis at height z,
 ``e(z) = (TX + z RY, TY - z RX)``.
 """
 
@@ -75,7 +75,7 @@ def heights(posture, directions):
 def test_motion_of_a_shaft_in_a_bore_is_limited_by_the_clearance_at_its_ends(
     kind, height, expected, one_joint
 ):
-    """c max(1, 2 |h| / L), on the axis; a cylindrical joint slides beside it."""
+    """At height h, the axis moves by up to c max(1, 2 |h| / L)."""
     posture = one_joint(kind, BORE, [0, 0, height])
     if kind == "revolute":
         assert reach(posture) == pytest.approx(expected, abs=1e-9)
@@ -93,7 +93,7 @@ def bore_support(w, c=C, length=L):
 
 @pytest.mark.parametrize("reverse", [False, True])
 def test_small_screws_of_a_bore_equal_those_of_its_two_ends(reverse, one_joint, rng):
-    """By its support function, its volume, and members drawn without the program."""
+    """The support function, the volume and sampled screws are compared."""
     wrenches = rng.normal(size=(40, 6)) * [1 / L, 1 / L, 0, 1, 1, 0]
     posture = one_joint("revolute", BORE, reverse=reverse)
     found = heights(posture, wrenches)
@@ -116,7 +116,7 @@ def test_small_screws_of_a_bore_equal_those_of_its_two_ends(reverse, one_joint, 
 
 
 def test_largest_motion_of_a_shaft_in_a_bore_equals_that_of_finite_geometry(one_joint):
-    """Straight lines through points of the two rims; offset of their point at h."""
+    """The axis is a straight line through one point on each of the two rims."""
     angles = np.linspace(0, 2 * np.pi, 61)
     rim = C * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     low, high = (np.insert(rim, 2, z, axis=1) for z in (-L / 2, L / 2))
@@ -235,7 +235,7 @@ def test_a_guide_may_have_different_gaps_and_axes(one_joint):
     ("revolute", BEARINGS),
 ])  # fmt: skip
 def test_contacts_do_not_change_the_mobility(kind, clearance, one_joint, tmp_path):
-    """And they are the same in the frames that are written."""
+    """The mobility is also preserved in a written file with frames."""
     keys = "axis = [0, 0, 1]\naxis2 = [0, 1, 0]"
     bare, own = (mobility(one_joint(kind, text, keys=keys)) for text in ("", clearance))
     assert vars(bare) == vars(own)
@@ -344,7 +344,7 @@ def test_both_exact_methods_agree_with_contacts(clearance, held_shaft):
 def test_exact_model_differs_from_the_linear_model_by_second_order(
     clearance, held_shaft
 ):
-    """Errors and clearances times 1, 1/2, 1/4: platform screws differ by 1/4, 1/16."""
+    """If errors and clearances are halved, the difference is divided by four."""
     error = np.array([4e-3, -7e-3, 2e-3, 90e-6, -60e-6, 70e-6])
     posture, sizes = held_shaft(error, clearance), []
     for scale in (1.0, 0.5, 0.25):

@@ -1,7 +1,7 @@
-"""Freedoms and redundant constraints of mechanisms of the literature, as drawn.
+"""Mobility and redundant constraints of mechanisms from the literature.
 
-Each row was counted by singular values of the joints' screws in another program; most
-are Kutzbach's count as well, where the closures are independent.
+The expected counts were computed in another program from the singular values of the
+joint screws.  Where the closures are independent, they agree with Kutzbach's formula.
 """
 
 import numpy as np
@@ -23,7 +23,7 @@ X, Y, Z = np.eye(3)
 
 
 def joint(kind, first, second, at, axis=Z, axis2=None, driven=False):
-    """A joint whose name is that of its bodies."""
+    """Return a joint named after its bodies."""
     axis = unit(np.array(axis, float))
     across = perpendicular(axis) if axis2 is None else perpendicular(axis, axis2)
     axis2 = across if axis2 is None else unit(np.array(axis2, float))
@@ -32,7 +32,7 @@ def joint(kind, first, second, at, axis=Z, axis2=None, driven=False):
 
 
 def mechanism(platform, at, *joints):
-    """The robot of joints; their bodies have no mass."""
+    """Return a robot with the given joints and massless bodies."""
     names = dict.fromkeys(n for j in joints for n in (j.first, j.second) if n != "base")
     bodies = tuple(DrawnBody(name) for name in names)
     drawing = Drawing("mechanism", platform, np.array(at, float), bodies, joints)
@@ -198,15 +198,16 @@ def counts(posture):
 
 
 @pytest.mark.parametrize("name", MECHANISMS)
-def test_mechanisms_have_the_freedoms_of_the_literature(name):
+def test_mechanisms_have_the_degrees_of_freedom_given_in_the_literature(name):
     make, expected = MECHANISMS[name]
     assert counts(home_posture(make())) == expected
 
 
-def test_the_seoul_robot_has_three_freedoms_away_from_home():
-    """Moved by 0.13 m; of equal triangles all legs are parallel there as well.
+def test_seoul_robot_has_three_degrees_of_freedom_away_from_home():
+    """The platform is moved by 0.13 m; for equal triangles, all legs stay parallel.
 
-    The drives do not lock two motions, so two of their three constraints are redundant.
+    Two motions remain free with locked drives, so that two of their three constraints
+    are redundant.
     """
     pose = {"tx": 0.1, "ty": 0.08, "tz": 0.45, "rx": 0.0, "ry": 0.0, "rz": 0.0}
     at = place_robot(three_upu(X, 0.24), pose)
@@ -214,7 +215,7 @@ def test_the_seoul_robot_has_three_freedoms_away_from_home():
     assert mobility(at).overconstraint == 0
 
 
-def test_tsais_robot_has_the_same_freedoms_away_from_home():
+def test_tsai_robot_has_the_same_degrees_of_freedom_away_from_home():
     at = place_robot(three_upu(Y), {"tx": 0.05, "ty": 0.02, "tz": 0.5})
     assert counts(at) == (3, 3, 0, 0, 0)
     rotation = [at.pose()[key] for key in ("rx", "ry", "rz")]
@@ -222,12 +223,12 @@ def test_tsais_robot_has_the_same_freedoms_away_from_home():
 
 
 def test_four_bar_with_lengths_that_violate_bennetts_condition_is_rigid():
-    """An axis turned by 0.1 rad changes two twists."""
+    """Rotating one axis by 0.1 rad changes two twist angles."""
     assert counts(home_posture(bennett(0.1)))[0] == 0
 
 
-def test_universal_joints_with_an_axis_along_their_leg_let_the_leg_turn_at_home():
-    """9 freedoms and 3 redundant constraints there; 6 and none at a pose nearby."""
+def test_leg_can_rotate_at_home_if_universal_joint_axes_lie_along_it():
+    """At home: 9 degrees of freedom, 3 redundant constraints; nearby: 6 and none."""
     robot = gough("universal", axis_along=True)
     home = home_posture(robot)
     assert (mobility(home).freedoms, mobility(home).overconstraint) == (9, 3)

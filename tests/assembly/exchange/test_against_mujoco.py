@@ -1,4 +1,4 @@
-"""Forward kinematics of files read and written, compared with MuJoCo."""
+"""Comparison of the forward kinematics of imported and exported files with MuJoCo."""
 
 import re
 
@@ -15,7 +15,7 @@ mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
 
 
 def largest_gap(model, mechanism, rng):
-    """Largest difference of any entry of any body's pose in random postures."""
+    """Return the largest difference between body poses in random postures."""
     data, worst = mujoco.MjData(model), 0.0
     for _ in range(20):
         q = rng.uniform(-1, 1, len(mechanism.joints))

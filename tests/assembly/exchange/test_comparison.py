@@ -1,4 +1,4 @@
-"""The process of the other program: the conversion continues when it fails."""
+"""Failures of the MuJoCo process, which must not stop a conversion."""
 
 import importlib.util
 

@@ -1,4 +1,4 @@
-"""``forcefit convert``: example robots close, built-in robots survive a round trip."""
+"""Tests of ``forcefit convert`` with example robots and built-in robots."""
 
 import json
 from dataclasses import replace
@@ -54,7 +54,7 @@ SPATIAL_LOOP = """<robot name="bent"><link name="base"/><link name="a"/><link na
 
 
 def bent_loop(folder, types):
-    """Three bars in a plane that end on a tilted frame: only the points can meet."""
+    """Return three planar bars that end at a tilted frame, so that only points meet."""
     path = folder / "robot.urdf"
     path.write_text(SPATIAL_LOOP)
     loops = f"closed_loop: [[end, goal]]\n{types}name_mot: [one]\n"
@@ -70,7 +70,7 @@ def test_loop_of_the_default_type_is_closed_in_a_point(types, tmp_path):
     assert "loop1" in answer.text()
     assert answer.table()["taken"] == list(answer.taken)
     assert convert(path, tmp_path / "robot.toml", points=["goal"]).taken == ()
-    with pytest.raises(BadInput, match="loop1 .* cannot close"):
+    with pytest.raises(BadInput, match="loop1 .* cannot be closed"):
         convert(path, tmp_path / "robot.toml", points=())
 
 
@@ -103,7 +103,7 @@ QUICK = {"hexapod": "urdf", "delta": "xml", "orthoglide": "", "irsbot2": ""}
 def test_frames_of_built_in_robots_are_equal_after_conversion_and_back(
     name, ending, tmp_path
 ):
-    """Drives, platform, and every frame by its name, in the home pose and elsewhere."""
+    """Drives, platform and frames are compared at home and in other postures."""
     there, back = tmp_path / f"robot.{ending}", tmp_path / "back.toml"
     assert convert(name, there).difference < 1e-12
     assert convert(there, back).difference < 1e-12
@@ -123,7 +123,7 @@ def test_frames_of_built_in_robots_are_equal_after_conversion_and_back(
 
 
 def weight_on_the_ground(robot):
-    """(6,) [N m, N] of all weights together, at the base's origin."""
+    """Return the total weight (6,) [N m, N] at the base origin."""
     posture = home_posture(robot)
     bodies, carried = weights(posture, [1.0, 2.0, 3.0])
     wrenches = bodies + carried
@@ -133,7 +133,7 @@ def weight_on_the_ground(robot):
 
 @pytest.mark.parametrize("ending", ["urdf", "xml"])
 def test_masses_are_equal_after_conversion_and_back(ending, tmp_path):
-    """Beams with a density become masses: the same weight at the same place."""
+    """Beams with a density become masses with the same weight and centre."""
     there, back = tmp_path / f"robot.{ending}", tmp_path / "back.toml"
     convert("arm6", there)
     convert(there, back)
@@ -147,7 +147,7 @@ def test_masses_are_equal_after_conversion_and_back(ending, tmp_path):
 def test_conversion_includes_declared_errors_of_lengths_in_the_geometry(
     ending, tmp_path
 ):
-    """A four-bar with a longer crank and a longer rocker, which must close again."""
+    """The loop of a four-bar with a longer crank and rocker must be closed again."""
     robot = BUILT_IN["four_bar"]()
     source = tmp_path / "robot.toml"
     errors = np.zeros((len(robot.frames), 6))
@@ -169,7 +169,7 @@ def test_conversion_includes_declared_errors_of_lengths_in_the_geometry(
     assert places["end_rocker"] == pytest.approx(places["end_coupler"], abs=1e-9)
 
 
-def test_errors_that_no_rigid_robot_can_close_are_reported(tmp_path):
+def test_loops_that_rigid_bodies_cannot_close_are_reported(tmp_path):
     """The paper's robot is overconstrained: a longer link leaves its loops open."""
     robot = BUILT_IN["irsbot2"]()
     errors = np.zeros((len(robot.frames), 6))
@@ -218,8 +218,8 @@ def test_invalid_overlay_is_refused_with_its_message(run, text, message, tmp_pat
     assert not (tmp_path / "robot.toml").exists()
 
 
-def test_joints_of_several_freedoms_become_single_joints_and_mimics_drives(tmp_path):
-    """A ball becomes three turns, a mimic a drive; omissions are reported."""
+def test_compound_joints_become_single_joints_and_mimic_joints_become_drives(tmp_path):
+    """A ball joint becomes three revolute joints, and a mimic joint becomes a drive."""
     source = tmp_path / "robot.urdf"
     joint = (
         '<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{3}"/>{4}'
@@ -266,7 +266,7 @@ def test_convert_command_reports_files_and_largest_difference(run, tmp_path):
 
 @pytest.mark.parametrize("given", ["rocker", "tip"])
 def test_platform_named_by_an_overlay_is_not_reported_as_missing(given, tmp_path):
-    """A body with its own frame, and a body that gets one because it is named."""
+    """One body has its own frame; the other one gets a frame because it is named."""
     text = (
         '<robot name="r"><link name="a"/><link name="rocker"/><link name="tip"/>'
         '<joint name="j" type="revolute"><parent link="a"/><child link="rocker"/>'
@@ -283,7 +283,7 @@ def test_platform_named_by_an_overlay_is_not_reported_as_missing(given, tmp_path
 
 
 def test_platform_with_the_name_of_its_joint_is_found(tmp_path):
-    """MJCF often gives both one name; only the body can be the platform."""
+    """In MJCF, both often have the same name; only the body can be the platform."""
     source, overlay = tmp_path / "robot.xml", tmp_path / "overlay.toml"
     source.write_text(
         '<mujoco><worldbody><body name="wrist"><joint name="wrist"/>'

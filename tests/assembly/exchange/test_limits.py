@@ -1,4 +1,4 @@
-"""Joint ranges: read from every format and written back; infinite ones are omitted."""
+"""Import and export of joint limits; infinite limits are omitted."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ MJCF = """<mujoco><compiler angle="{unit}"/><worldbody><body name="b">
 
 
 def limits(tmp_path, name, text):
-    """Limits by joint of the robot that a file becomes."""
+    """Return the joint limits of the robot imported from a file."""
     source = tmp_path / name
     source.write_text(text)
     convert(source, tmp_path / "out.toml")

@@ -1,4 +1,4 @@
-"""MJCF files of every kind, compared with MuJoCo and with numbers worked by hand."""
+"""Import of MJCF files, compared with MuJoCo and with hand calculations."""
 
 import json
 from dataclasses import replace
@@ -18,7 +18,7 @@ M = '<inertial pos="0.1 0 0.05" mass="1" diaginertia="0.01 0.01 0.01"/>'
 
 
 def file_of(folder, text, name="robot.xml"):
-    """An MJCF file, ``[M]`` in it being a mass."""
+    """Write an MJCF file, in which ``[M]`` is replaced by a mass."""
     path = folder / name
     path.write_text(f"<mujoco>{text.replace('[M]', M)}</mujoco>")
     return path
@@ -138,7 +138,7 @@ def test_every_kind_of_mjcf_equals_mujoco(kind, tmp_path):
 
 
 def test_comparison_names_the_first_difference_from_mujoco(tmp_path):
-    """The comparison is falsified on purpose: a joint, a mass, the place of a loop."""
+    """A joint, a mass or the place of a loop is changed to provoke a difference."""
     path = file_of(tmp_path, KINDS["welds"])
     right = read_mjcf(path)
     joint = replace(right.joints[0], axis=np.array([0.0, 1.0, 0.0]))
@@ -217,10 +217,10 @@ def test_included_files_are_read_and_missing_or_recursive_files_are_refused(tmp_
         read_mjcf(path)
 
 
-def test_free_body_turned_at_home_closes_with_one_freedom(run, tmp_path):
-    """A loop turns it by 90 degrees about y, where three serial turns are singular.
+def test_free_body_turned_at_home_has_one_degree_of_freedom(run, tmp_path):
+    """A loop turns the body by 90 degrees about y, where serial rotations are singular.
 
-    A slide and a weld leave one freedom without overconstraint.
+    A slide and a weld leave one degree of freedom without overconstraint.
     """
     path = file_of(tmp_path, """<worldbody><body name="p">[M]<freejoint/>
         <site name="s"/></body><body name="l">[M]<joint name="d" type="slide"/>
@@ -255,9 +255,9 @@ def test_settotalmass_scales_all_masses(tmp_path):
 
 
 def test_legs_of_a_free_platform_carry_equal_shares_of_the_load(run, tmp_path):
-    """Three legs 30 degrees from the vertical carry 90 N: each 30 N / cos 30.
+    """Three legs inclined by 30 degrees carry 90 N, that is, 30 N / cos 30 deg each.
 
-    The usual way to write a parallel robot: a free body, and legs connected to it.
+    Parallel robots are often written as a free body to which the legs are connected.
     """
     legs, ties, drives = "", "", ""
     for i in range(3):
@@ -303,7 +303,7 @@ def test_coupled_joints_follow_polynomials_also_in_chains(tmp_path):
 
 
 def test_driven_joint_of_a_coupled_pair_becomes_the_leader(tmp_path):
-    """A command is given to the driven joint, and the other one follows."""
+    """The driven joint is commanded, and the second joint follows."""
     path = file_of(tmp_path, """<compiler angle="radian"/><worldbody><body name="A">[M]
         <joint name="a"/><body name="B">[M]<joint name="b"/></body></body></worldbody>
         <equality><joint joint1="b" joint2="a" polycoef="0.1 2 0 0 0"/></equality>

@@ -1,4 +1,4 @@
-"""Moments of inertia in URDF, SDF and MJCF, against MuJoCo and textbooks."""
+"""Moments of inertia in URDF, SDF and MJCF, compared with MuJoCo and textbooks."""
 
 from dataclasses import replace
 

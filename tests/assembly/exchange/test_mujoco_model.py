@@ -1,4 +1,4 @@
-"""Models of MuJoCo in memory: the robot of their files, and MuJoCo's kinematics."""
+"""Import of MuJoCo models from memory."""
 
 import numpy as np
 import pytest
@@ -76,7 +76,7 @@ def test_robot_from_a_mujoco_model_equals_the_robot_from_its_file(kind, tmp_path
 
 
 def test_mujoco_model_changed_in_memory_is_read_with_its_changes(tmp_path):
-    """A crank twice as long, which no file has."""
+    """The length of the crank is doubled in memory only."""
     model = mujoco.MjModel.from_xml_string(f"<mujoco>{FOUR_BAR}</mujoco>")
     model.body_pos[mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "coupler")] *= 2
     posture = ff.place_robot(ff.load_robot(model))

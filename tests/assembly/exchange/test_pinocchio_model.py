@@ -1,4 +1,4 @@
-"""Models of Pinocchio in memory move as Pinocchio's kinematics moves them."""
+"""Import of Pinocchio models from memory, compared with Pinocchio's kinematics."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def place(rng):
 
 
 def every_kind():
-    """A tree of all kinds of joints of one freedom, with masses and a tool."""
+    """Return a tree with all types of single-degree-of-freedom joints and masses."""
     rng, model = np.random.default_rng(4), pinocchio.Model()
     model.name, axis = "tree", np.array([0.6, 0.0, 0.8])
     kinds = (
@@ -97,7 +97,7 @@ def test_arm_from_a_pinocchio_model_equals_the_arm_from_its_urdf(tmp_path):
     )  # fmt: skip
 
 
-def test_message_about_a_joint_of_several_freedoms_names_the_joint():
+def test_message_about_a_joint_with_several_degrees_of_freedom_names_the_joint():
     model = pinocchio.Model()
     planar = pinocchio.JointModelPlanar()
     model.addJoint(0, planar, pinocchio.SE3.Identity(), "slab")

@@ -1,4 +1,4 @@
-"""Files of other programs that break a rule are each refused with one message."""
+"""Messages for invalid files of other programs."""
 
 import pytest
 
@@ -57,7 +57,7 @@ REFUSED = {
         "joint \"j\".origin.rpy: found '${pi/2} 0 0', expected 3 finite numbers [rad]"),
     ("urdf", "an axis without a direction"): (
         urdf(more='<axis xyz="0 0 0"/>'),
-        'joint "j".axis.xyz: found [0.0, 0.0, 0.0], expected a direction'),
+        'joint "j".axis.xyz: found [0.0, 0.0, 0.0], expected a nonzero vector'),
     ("sdf", "a pose of five numbers"): (
         sdf('<link name="a"><pose>0 0 0 0 0</pose></link>'
             + sdf_joint("j", "base", "a")),
@@ -193,11 +193,11 @@ REFUSED = {
         "found 2 models, expected exactly one"),
     ("sdf", "an axis of zero"): (
         four_bar().replace("<xyz>0 0 1</xyz>", "<xyz>0 0 0</xyz>"),
-        "joint \"drive\".axis.xyz: found [0.0, 0.0, 0.0], expected a direction"),
+        "joint \"drive\".axis.xyz: found [0.0, 0.0, 0.0], expected a nonzero vector"),
     ("sdf", "a joint to its own parent"): (
         sdf('<frame name="f" attached_to="base"/>' + sdf_joint("j", "f", "base")),
-        'joint "j".child: found "base", which is also its parent; expected another '
-        "link"),
+        'joint "j".child: found "base", which is also its parent; expected a '
+        "different link"),
     ("sdf", "a bushing"): (sdf(A + BUSHING.format("base", "a")),
         'drake:linear_bushing_rpy: found an element between "base" and "a" that may '
         "connect them and is not converted; expected joints: declare a joint"),

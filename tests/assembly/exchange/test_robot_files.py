@@ -1,4 +1,4 @@
-"""Files of other programs in place of a robot file, in commands and Python."""
+"""Use of files of other programs in place of robot files."""
 
 import json
 

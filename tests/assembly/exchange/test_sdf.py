@@ -1,4 +1,4 @@
-"""SDF: a four-bar whose joints close its loop, against the law of cosines."""
+"""Import of SDF: a four-bar linkage compared with the law of cosines, and screws."""
 
 import numpy as np
 import pytest

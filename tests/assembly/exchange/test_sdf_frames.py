@@ -1,4 +1,4 @@
-"""SDF: frames, nested models, old versions, default masses; worked by hand."""
+"""SDF frames, nested models, old versions and default masses."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Springs of joints: the deflection of one spring under a load, by hand."""
+"""Import of joint springs, whose deflection under a load is known."""
 
 import json
 
@@ -49,7 +49,7 @@ def test_converted_spring_deflects_by_load_over_stiffness(name, run, tmp_path):
     (MJCF.format('type="ball" stiffness="2000"'),
      "joint stiffness, not converted, though it may carry load: 1 (spring)"),
     (MJCF.format('axis="1 0 0"').replace('name="drive"', 'name="drive" stiffness="5"'),
-     "springs beside drives: 1 (drive)"),
+     "springs parallel to drives: 1 (drive)"),
 ])  # fmt: skip
 def test_spring_that_is_not_converted_is_reported(text, line, tmp_path):
     path = tmp_path / "robot.xml"

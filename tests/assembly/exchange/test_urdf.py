@@ -1,4 +1,4 @@
-"""URDF: variants of XML, loops in the file, joints that follow others; by hand."""
+"""Import of URDF: XML variants, loops in the file and mimic joints."""
 
 import json
 
@@ -117,7 +117,7 @@ CLOSING = {
 
 
 @pytest.mark.parametrize("kind", CLOSING)
-def test_loop_in_the_urdf_closes_with_one_freedom(kind, run, tmp_path):
+def test_loop_in_the_urdf_leaves_one_degree_of_freedom(kind, run, tmp_path):
     """Each kind of loop leaves one freedom, and the coupler only translates."""
     closing, redundant = CLOSING[kind]
     path = four_bar(closing, tmp_path)

@@ -138,8 +138,8 @@ def errors_row(robot):
 
 
 def test_shift_of_a_datum_uses_the_hole_of_its_fit(tmp_path):
-    """The hole of B is drawn once: its clearance is 2 times the shift at least, and
-    6 um more, the least play of g6."""
+    """The hole of B is drawn once: its clearance is at least twice the shift plus
+    6 um, the minimum clearance for g6."""
     robot = read(tmp_path, BRACKET)
     sources = sources_of(robot)
     values = sources.draw(0, 20_000, 1)
@@ -193,7 +193,7 @@ def test_envelope_requirement_limits_the_tilt_of_a_face_by_its_length(tmp_path):
          'datums: found "B (M)" as datum A, which can tilt in the hole; expected '
          '"datum_extent" too, the length of this hole'),
         ('datum_hole = "12 H7"', 'datum_hole = "12 H7"\ndatum_extent = "20 mm"',
-         "datum_extent: found it without (M) at datum A; expected none"),
+         "datum_extent: found without (M) at datum A; expected none"),
         ('datum_hole = "12 H7"', 'datum_hole = "12 H7"\ndatum_extent = "20 mm (M)"',
          "datum_extent: found (M), expected a length without (M)"),
         ('["A", "B (M)"]', '["B", "A (M)"]', 'found "A (M)", a planar joint; expected'),
@@ -202,20 +202,20 @@ def test_envelope_requirement_limits_the_tilt_of_a_face_by_its_length(tmp_path):
          'tolerance of "bore C": found the hole "12 H8", expected that of the fit'),
         ('datum_hole = "12 H7"', 'datum_hole = "12 h"', "expected a size such as"),
         ('datum_hole = "12 H7"', 'datum_hole = "12 g6"',
-         'datum_hole: found "12 g6", a shaft; expected a hole, whose letter is a cap'),
+         'datum_hole: found "12 g6", a shaft; expected a hole with a capital letter'),
         ('datum_hole = "12 H7"', 'datum_hole = "13 H7"',
          'found the hole "13 H7", expected that of the fit "12 H7/g6"'),
         ('["A", "B (M)"]', '["C", "B (M)"]',
-         'datums: found "C", which is the feature itself, expected another joint'),
+         'datums: found "C", which is the feature itself, expected a different joint'),
         ('"B (M)"', '"B"', "datum_hole: found a hole size, and 0 datums with (M)"),
         ('["A", "B (M)"]', '["A", "B", "B (M)"]', "expected each datum once"),
         ('diameter = "40 mm"', 'diameter = "40 mm"\nextent = ["40 mm", "30 mm"]',
-         'diameter: found it together with "extent"'),
-        ('diameter = "40 mm"', 'diameter = "0 mm"', "expected that of a round face"),
+         'diameter: found together with "extent"'),
+        ('diameter = "40 mm"', 'diameter = "0 mm"', "expected a diameter such as"),
         ('extent = "20 mm"', 'diameter = "20 mm"',
-         "diameter: found it at a feature that is an axis"),
+         "diameter: found for a feature that is an axis"),
         ('position = "0.04 mm"', 'length = "100 +- 0.1 mm (E)"',
-         "length: found (E) at a feature that is not a face"),
+         "length: found (E) for a feature that is not a face"),
         ('profile = "0.06 mm"\nparallelism = "0.04 mm"\ndiameter = "40 mm"',
          'length = "30 +- 0.05 mm (E)"', "extent: missing; expected two sizes"),
     ],

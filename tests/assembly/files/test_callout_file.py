@@ -1,4 +1,4 @@
-"""[[tolerance]] of robot files: both formats say the same, mistakes in one line."""
+"""Reading of ``[[tolerance]]`` tables in both robot file formats."""
 
 import numpy as np
 import pytest
@@ -126,7 +126,7 @@ def test_normal_of_a_face_is_the_normal_of_its_planar_joint(tmp_path, without_ci
 
 
 def test_contacts_of_a_joint_do_not_move_its_feature(tmp_path):
-    """A bore is two frames at its ends; the feature is in its middle all the same."""
+    """The feature is at the centre of a bore, although its frames are at the ends."""
     start = FILE.index('[[leg.body.tolerance]]\nfeature = "pad"')
     end = FILE.index('[[leg.body.tolerance]]\nfeature = "foot"')
     text = (FILE[:start] + FILE[end:]).replace('hole = "12 H7"\n', "")

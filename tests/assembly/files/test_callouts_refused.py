@@ -1,4 +1,4 @@
-"""Tolerances, form and fits of robot files that are refused, each with one message."""
+"""Messages for invalid tolerances, form tolerances and fits in robot files."""
 
 import pytest
 
@@ -75,7 +75,7 @@ REFUSED = {
         ('perpendicularity = "0.02 mm"', 'perpendicularity = "0.2 mm"',
          "found 0.2 mm, expected less than that of the location, 0.1 mm"),
         ('profile = "0.04 mm"', 'coaxiality = "0.04 mm"',
-         "found this zone at a feature that is a plane"),
+         "found this zone for a feature that is a plane"),
         ('hole = "12 H7"', "", 'found (M), expected only for the position of a bore'),
         ('position = "0.1 mm"\nextent = "10 mm"', "",
          "found no tolerance, expected one of position | coaxiality"),
@@ -84,7 +84,7 @@ REFUSED = {
         ('position = "0.1 mm"\nextent = "10 mm"', 'general = "DIN 7168"',
          'general: found "DIN 7168", expected a text such as "ISO 2768-mK"'),
         ('position = "0.1 mm"\nextent = "10 mm"', 'length = "590 +- 1 mm"',
-         "found a length of 590 mm, expected that at home, 600 mm"),
+         "found a length of 590 mm, expected the length at home, 600 mm"),
     ]),
     "frames": (FRAMES, [
         ('feature = "b"', 'feature = "c"', 'found "c", expected the name of a frame'),
@@ -96,7 +96,7 @@ REFUSED = {
         ('length = "400 +- 0.05 mm"', f'{BORE}direction = [0, 0, 1]',
          "direction: found a direction that is not"),
         ("translation = [0.4, 0, 0]\n", "",
-         "found a length of 400 mm, expected that at home, 0 mm"),
+         "found a length of 400 mm, expected the length at home, 0 mm"),
         ('name = "b"', 'name = "b"\nclearance = { fit = "25 H7/p6" }',
          'clearance.fit: found "25 H7/p6", an interference fit'),
         ('name = "b"', 'name = "b"\nclearance = { fit = "12 H7/g6", radial = 1e-5 }',
@@ -111,19 +111,19 @@ REFUSED = {
     "frames at one place": (FRAMES.replace("[0.4, 0, 0]", "[0, 0, 0]"), [
         # within the accepted difference from the geometry, which is 0
         ('"400 +- 0.05 mm"', '"0.0001 +- 0.00001 mm"',
-         "a datum at the same place, expected"),
+         "a coincident datum, expected"),
     ]),
     "form": (ARM, [
         ('"0.006 mm"', '"0.006"', 'tolerance of "pin".cylindricity: found \'0.006\''),
         ('"0.006 mm"', '"0.006 mm (M)"', "found a width with (M), expected a width"),
-        ("cylindricity", "flatness", "found no gap that the flatness of its features"),
+        ("cylindricity", "flatness", "found no gap that is affected by the flatness"),
         ('{ fit = "12 H7/g6", length = "40 mm" }', '{ axial = "5 um" }',
-         'joint "pin".clearance: found no gap that the cylindricity of its features '
-         "could widen, expected a radial clearance, a fit or bearings"),
+         'joint "pin".clearance: found no gap that is affected by the cylindricity of '
+         "its features, expected a radial clearance, a fit or bearings"),
         ('{ fit = "12 H7/g6", length = "40 mm" }', '{ fit = "25 H7/p6" }',
          'clearance.fit: found "25 H7/p6", an interference fit'),
         ('cylindricity = "0.006 mm"', 'cylindricity = "0.006 mm"\ndatums = ["pin"]',
-         "datums: found this key at a feature that has only a form tolerance, expected "
+         "datums: found this key for a feature with only a form tolerance, expected "
          "none"),
     ]),
     "zones, which form, orientation and location decrease in this order": (TWO_PINS, [
@@ -139,7 +139,7 @@ REFUSED = {
         ("FIT", '"25 H7/p6"', 'guide.fit: found "25 H7/p6", an interference fit'),
         ("FIT", '["40 H7/g6"]', "guide.fit: found a list of length 1, expected one"),
         ("FIT", "12", "guide.fit: found 12, expected a fit such as"),
-        ("FIT", '"40 H7/g6", gap = "5 um"', 'guide.gap: found it together with "fit"'),
+        ("FIT", '"40 H7/g6", gap = "5 um"', 'guide.gap: found together with "fit"'),
         ("guide = { fit = FIT", 'fit = "40 H7/g6"\nguide = { gap = "5 um"',
          'with "guide", expected it in the guide'),
     ]),
@@ -150,7 +150,7 @@ REFUSED = {
          "direction: found a direction for a feature without a zone, expected none"),
         (LENGTH, f'{BORE}hole = "12 H7"', "hole: found a hole without (M), expected a"),
         (LENGTH, f"{BORE}cp = 1.33",
-         "cp: found a cp for a uniform distribution, expected"),
+         "cp: found cp with a uniform distribution, expected"),
         (LENGTH, 'coaxiality = "0.05 mm"\nextent = "20 mm"',
          'tolerance of "B on crank": found coaxiality to an axis 100 mm away'),
         (LENGTH, f'{BORE}name = "x"\n[[body.tolerance]]\nfeature = "A"\n'
@@ -195,5 +195,5 @@ def test_class_of_perpendicularity_needs_the_length_of_a_square_bore(tmp_path):
     head, pin, tail = CRANK.replace(LENGTH, 'general = "ISO 2768-mK"').partition(PIN)
     text = head + pin + tail.replace("axis = [0, 0, 1]", "axis = [1, 0, 0]", 1)
     (tmp_path / "robot.toml").write_text(text)
-    with pytest.raises(BadInput, match="found class K of a bore without its length, "):
+    with pytest.raises(BadInput, match="found class K for a bore without its length, "):
         read_robot(tmp_path / "robot.toml")

@@ -1,4 +1,4 @@
-"""Files of bodies and joints: what they mean, and what is refused in one line."""
+"""Reading of files with bodies and joints, and messages for invalid files."""
 
 import re
 
@@ -109,7 +109,7 @@ def test_remark_names_the_bodies_whose_mass_has_no_centre(read):
 
 
 def test_remark_states_between_which_of_many_joints_a_link_is_placed(read):
-    """Of the platform, which has one in each leg; none where a key says it."""
+    """The platform has one joint per leg; if the key is given, there is no remark."""
     link = "link = { beam = { radius = 0.01 }, young = 7e10, poisson = 0.3 }"
     text = TSAI.replace("mass = 3.0", f"mass = 3.0\n{link}")
     remark = 'links from first to second joint: "platform" "leg1.upper" to "leg2.upper"'
@@ -119,7 +119,7 @@ def test_remark_states_between_which_of_many_joints_a_link_is_placed(read):
 
 
 def test_a_leg_may_be_repeated_about_an_axis_through_a_point(read):
-    """Two legs, half a turn about the line x = 0.3: the second at 0.6 - 0.24."""
+    """The second leg is rotated by half a turn about the line x = 0.3."""
     repeat = '{ count = 2, about = [0, 0, 2], at = ["300 mm", 0, 0] }'
     text = re.sub(r"repeat = .*", f"repeat = {repeat}", TSAI)
     text = text.replace(
@@ -211,7 +211,7 @@ at = [0.6, 0, 0]
 
 
 def test_frames_of_a_drawn_arm_are_at_their_positions_at_home(read):
-    """The drive's spring, the link from joint to joint, and the mass of the hand."""
+    """The spring of the drive, the link and the mass of the hand are also checked."""
     robot = read(ARM)
     turn, arm, hand = (robot.frame(name) for name in ("turn", "arm", "hand"))
     assert np.diag(turn.joint_stiffness).tolist() == [*[np.inf] * 2, 1e4, *[np.inf] * 3]
@@ -223,7 +223,7 @@ def test_frames_of_a_drawn_arm_are_at_their_positions_at_home(read):
 
 @pytest.mark.parametrize(("up", "soft"), [("", "TY"), (", up = [0, 1, 0]", "TZ")])
 def test_height_of_a_beam_section_is_along_the_z_axis_of_the_base(up, soft, read):
-    """A cantilever deflects by F L^3 / 3 E I: less where it is higher."""
+    """A cantilever deflects by F L^3 / (3 E I), less along the larger height."""
     text = ARM.replace('height = "30 mm"', f'height = "30 mm", theory = "euler"{up}')
     text = text.replace("drive_stiffness = 1e4\n", "")
     C = platform_stiffness(home_posture(read(text))).compliance
@@ -290,7 +290,7 @@ def test_arc_has_the_mass_and_centre_of_mass_of_a_quarter_circle(read):
 
 
 def test_copies_of_an_arc_are_turned_with_their_leg(read):
-    """Two arcs side by side hold the hand in the middle twice as stiffly."""
+    """Two parallel arcs have twice the stiffness of one arc."""
     one = read(ARC)
     text = ARC.replace("count = 1, about = [0, 0, 1]", "count = 2, about = [0, 1, 0]")
     two = read(text)
@@ -330,7 +330,7 @@ def held_by(kind, keys):
 
 @pytest.mark.parametrize("full", [False, True], ids=["diagonal", "rows"])
 @pytest.mark.parametrize("kind", SEVERAL)
-def test_springs_of_a_joint_of_several_freedoms_resist_only_the_other_directions(
+def test_springs_of_a_compound_joint_resist_only_constrained_directions(
     kind, full, read
 ):
     """Zero along the free motions; a number there is refused."""
@@ -354,7 +354,7 @@ def test_springs_of_a_joint_of_several_freedoms_resist_only_the_other_directions
 
 @pytest.mark.parametrize("bound", ["radial", "axial", "tilt", "spin"])
 @pytest.mark.parametrize("kind", SEVERAL)
-def test_clearances_of_a_joint_of_several_freedoms_bound_only_the_other_directions(
+def test_clearances_of_a_compound_joint_bound_only_constrained_directions(
     kind, bound, read
 ):
     text = held_by(kind, f"clearance = {{ {bound} = 1e-5 }}")
@@ -448,7 +448,7 @@ REFUSED = {
     "format": ("format = 2", "format = 3", "format: found 3, expected 1 | 2"),
     "format of frames": (
         "format = 2", "format = 1",
-        "format: found 1 in a file of bodies and joints, expected 2"),
+        "format: found 1 in a file with bodies and joints, expected 2"),
     "a frame": (
         "[[leg]]", '[[frame]]\nname = "tip"\n[[leg]]', 'unknown key "frame"'),
     "unknown body": (
@@ -474,10 +474,10 @@ REFUSED = {
         'leg "leg".joint "upper".axis2: missing; expected 3 finite numbers'),
     "no direction": (
         "axis = [-16, 0, 45]", "axis = [0, 0, 0]",
-        'leg "leg".joint "slide".axis: found only zeros, expected a direction: 3 '),
+        'leg "leg".joint "slide".axis: found a zero vector, expected a nonzero '),
     "a body without joints": (
         '[[leg]]', '[[body]]\nname = "lost"\n[[leg]]',
-        'body "lost": found no joint that connects it with "base", expected one'),
+        'body "lost": found no chain of joints that connects it to "base", expected'),
     "two bodies of a name": (
         '[[leg]]', '[[body]]\nname = "platform"\n[[leg]]',
         'body: found "platform" twice, expected different names'),
@@ -486,7 +486,7 @@ REFUSED = {
         'joint: found "leg1.slide" twice, expected different names'),
     "base": (
         'name = "tube"', 'name = "base"',
-        'leg "leg".body "base".name: found "base", which is fixed; '),
+        'leg "leg".body "base".name: found "base", which is reserved; '),
     "a body with itself": (
         'between = ["tube", "rod"]', 'between = ["rod", "rod"]',
         'leg "leg".joint "slide".between: found "rod" twice, expected two bodies'),
@@ -542,7 +542,7 @@ REFUSED = {
         'leg "leg".joint "slide".clearance.guide.gap: found -1, expected 2 numbers >='),
     "a guide and a bore": (
         "drive_stiffness = 2e7", "clearance = { length = 0.1, guide = { gap = 1e-5 } }",
-        '.clearance.guide: found together with "length", expected one of them'),
+        '.clearance.guide: found together with "length", expected only one of them'),
     "three bearings": (
         "drive_stiffness = 2e7", "clearance = { bearings = [1, 2, 3] }",
         'leg "leg".joint "slide".clearance.bearings: found [1, 2, 3], expected two t'),
@@ -571,8 +571,8 @@ REFUSED = {
         'expected exactly one of "beam" | "curve" | "stiffness" | "mesh" | "library"'),
     "the name of another joint's frame": (
         'name = "slide"', 'name = "lower.second"',
-        'joint "leg1.lower.second": found "leg1.lower.second" as the name of a frame, '
-        'which joint "leg1.lower" has too; expected another name'),
+        'joint "leg1.lower.second": found "leg1.lower.second" as the name of a frame '
+        'that joint "leg1.lower" also has; expected a different name'),
     "copies": (
         "count = 3", "count = 0",
         'leg "leg".repeat.count: found 0, expected a whole number >= 1'),

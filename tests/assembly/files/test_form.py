@@ -1,4 +1,4 @@
-"""Flatness and cylindricity add half their width to the clearance of a joint."""
+"""Flatness and cylindricity increase a joint clearance by half their width."""
 
 import pytest
 
@@ -62,7 +62,7 @@ def test_cylindricity_of_both_parts_widens_a_fit(tmp_path):
     assert radial.mean() == pytest.approx(15.25e-6, abs=0.3e-6)
 
 
-def test_form_tolerance_is_kept_in_a_file_of_frames(tmp_path):
+def test_form_tolerance_is_preserved_in_a_file_with_frames(tmp_path):
     robot = read(tmp_path, ARM)
     write_robot(robot, tmp_path / "frames.toml")
     again = read_robot(tmp_path / "frames.toml")

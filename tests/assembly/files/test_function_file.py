@@ -1,4 +1,4 @@
-"""``[[effect]]`` named function: the public format, and what is refused."""
+"""Reading and writing of the effect ``function``, and messages for invalid files."""
 
 import json
 from math import cos, sin
@@ -76,7 +76,7 @@ REFUSED = {
         'such as "gain" or "time_constant"'),
     "a compliance of a reading": (PUBLIC, 'where = "drive"',
         'where = "reading"\nkind = "compliance"',
-        '.kind: found "compliance" in the reading, expected "screw"'),
+        '.kind: found "compliance" for reading, expected "screw"'),
     "an unknown key": (PUBLIC, "session =", "sesion =",
         ': unknown key "sesion"; did you mean "session"?'),
     "a knee at no load": (PUBLIC, WAVES,

@@ -1,4 +1,4 @@
-"""A fit as the gaps of a guide: its limits by hand, in draws and in the worst case."""
+"""Guides with a fit: limits, random draws and worst case."""
 
 import numpy as np
 import pytest
@@ -49,7 +49,7 @@ def test_block_tilts_by_the_largest_gap_of_its_fit(tmp_path, fit, um):
     assert worst(robot) == pytest.approx(5e-6 * np.hypot(*um), rel=1e-6)
 
 
-def test_file_of_frames_keeps_the_fit_of_a_guide(tmp_path):
+def test_fit_of_a_guide_is_preserved_in_a_file_with_frames(tmp_path):
     robot = read(tmp_path, GUIDE.replace("FIT", TWO))
     write_robot(robot, tmp_path / "frames.toml")
     again = read_robot(tmp_path / "frames.toml")

@@ -1,4 +1,4 @@
-"""Links of robot files that break a rule are each refused with one message."""
+"""Messages for invalid links in robot files."""
 
 import pytest
 
@@ -11,7 +11,7 @@ REFUSED_LINKS = {
         "but [6, 3] = 0.000000e+00, expected equal numbers"),
     "a link of nothing": (
         LINK, "link = {}",
-        'frame "coupler".link: found no kind of link, expected exactly one of "beam" | '
+        'frame "coupler".link: found no type of link, expected exactly one of "beam" | '
         '"stiffness" | "mesh" | "library"'),
     "a link of two kinds": (
         BEAM, f'{BEAM}, library = "x#y"',
@@ -56,7 +56,8 @@ REFUSED_LINKS = {
         "neither"),
     "an axis of zero": (
         BEAM, "beam = { radius = 0.04, length = 1, axis = [0, 0, 0] }",
-        'frame "coupler".link.beam.axis: found [0.0, 0.0, 0.0], expected a direction'),
+        'frame "coupler".link.beam.axis: found [0.0, 0.0, 0.0], expected a nonzero '
+        "direction vector"),
     "up along the beam": (
         BEAM, "beam = { width = 0.1, height = 0.2, up = [-2, 0, 0] }",
         'frame "coupler".link.beam.up: up = '),

@@ -1,4 +1,4 @@
-"""Parts of another material of a mesh link, in robot files."""
+"""Mesh links with parts of different materials in robot files."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Files of ``forcefit new``: read, solved, and of the mobility of the literature."""
+"""Tests of the robot files written by ``forcefit new``."""
 
 import json
 import sys
@@ -74,7 +74,7 @@ def test_additional_legs_of_a_new_robot_are_redundant(
     ) == expected  # fmt: skip
 
 
-def test_new_robot_overwrites_no_file(run, tmp_path):
+def test_new_robot_does_not_overwrite_an_existing_file(run, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text("# Written by forcefit.\n")
     status, _, err = run("new", path, "--kind", "RRR")
@@ -83,7 +83,7 @@ def test_new_robot_overwrites_no_file(run, tmp_path):
     assert path.read_text() == "# Written by forcefit.\n"
 
 
-def test_new_robot_asks_for_its_kind_on_a_terminal(run, tmp_path, monkeypatch):
+def test_new_robot_prompts_for_its_type_on_a_terminal(run, tmp_path, monkeypatch):
     answers = iter(["UPU", 4])
     monkeypatch.setattr(sys.stdin, "isatty", lambda: True)
     monkeypatch.setattr("typer.prompt", lambda *_, **__: next(answers))

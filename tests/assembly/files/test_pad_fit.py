@@ -78,7 +78,7 @@ def test_pad_tilts_by_the_largest_gap_of_its_fit_and_its_form(tmp_path, more, um
     assert found.attained == pytest.approx(um * 1e-6 / B, rel=1e-6)
 
 
-def test_file_of_frames_keeps_the_fit_of_a_pad(tmp_path, rng):
+def test_fit_of_a_pad_is_preserved_in_a_file_with_frames(tmp_path, rng):
     robot = read(tmp_path)
     write_robot(robot, tmp_path / "frames.toml")
     again = read_robot(tmp_path / "frames.toml")
@@ -90,7 +90,7 @@ def test_file_of_frames_keeps_the_fit_of_a_pad(tmp_path, rng):
     ("old", "new", "message"),
     [
         ("FIT", 'fit = "25 H7/p6"', 'pad.fit: found "25 H7/p6", an interference fit'),
-        ("FIT", FIT + ', gap = "5 um"', 'pad.gap: found it together with "fit"'),
+        ("FIT", FIT + ', gap = "5 um"', 'pad.gap: found together with "fit"'),
         ("pad = { FIT", FIT + ', pad = { gap = "5 um"',
          'fit: found together with "pad", expected it in the pad'),
     ],

@@ -113,7 +113,7 @@ def test_beam_below_a_slide_has_the_length_between_origins_at_home(write_file):
 def test_mesh_below_a_slide_not_at_zero_is_refused(write_file):
     path = write_file(SLIDER.replace("beam = { radius = 0.01 }", mesh()))
     with pytest.raises(
-        BadInput, match=r'"tool"\.link\.mesh: found a mesh on a frame below'
+        BadInput, match=r'"tool"\.link\.mesh: found a mesh on a frame after'
     ):
         read_robot(path)
 

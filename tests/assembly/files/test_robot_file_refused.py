@@ -1,4 +1,4 @@
-"""Robot files that break a rule are each refused with one message."""
+"""Messages for invalid robot files."""
 
 import math
 import re
@@ -52,8 +52,8 @@ REFUSED = {
         '"coupler"?'),
     "the base as platform": (
         'platform = "coupler"', 'platform = "base"',
-        'platform: found "base"; expected a frame (add a fixed one whose parent is '
-        "it)"),
+        'platform: found "base"; expected a frame (add a fixed frame with parent '
+        '"base")'),
     "a frame without a parent": (
         'parent = "wrist"', "",
         'frame "seat".parent: missing; expected the name of a frame, or "base"'),
@@ -64,15 +64,15 @@ REFUSED = {
     "a ring of parents": (
         'name = "rocker"\nparent = "base"', 'name = "rocker"\nparent = "seat"',
         'frame "rocker".parent: found "seat", which leads to a cycle of parents; '
-        'expected parents that lead to "base"'),
+        'expected a chain of parents that ends at "base"'),
     "a name given twice": (
         'name = "wrist"', 'name = "crank"',
-        'frame[5].name: found "crank", already the name of frame[1]; expected '
-        "another name"),
+        'frame[5].name: found "crank", which is already the name of '
+        "frame[1]; expected a different name"),
     "a frame called base": (
         'name = "wrist"', 'name = "base"',
-        'frame[5].name: found "base", already the name of the root; expected '
-        'another name'),
+        'frame[5].name: found "base", which is already the name of the '
+        "root; expected a different name"),
     "a joint of another kind": (
         'joint = "revolute"\nactuated', 'joint = "revolut"\nactuated',
         'frame "crank".joint: found \'revolut\', expected "fixed" | "revolute" | '
@@ -82,7 +82,7 @@ REFUSED = {
         'frame "crank".pitch: missing; expected a finite number [m per turn]'),
     "a pitch of 0": (
         'joint = "revolute"\nactuated', 'joint = "helical"\npitch = 0\nactuated',
-        'frame "crank".pitch: found 0, expected at least 1e-09 m, or at most minus'),
+        'frame "crank".pitch: found 0, expected a magnitude of at least 1e-09 m'),
     "a pitch of another joint": (
         'joint = "revolute"\nactuated', 'joint = "revolute"\npitch = 0.01\nactuated',
         'frame "crank".pitch: found a pitch on a revolute joint, expected none, or a '),
@@ -100,7 +100,7 @@ REFUSED = {
         "actuated = true", "actuated = true\ndrive_force = 5.0",
         'frame "crank".drive_force: found a force on a joint that is not passive; '
         'expected a joint = "revolute" | "prismatic" | "helical" that is not '
-        "actuated: a drive that applies a force holds no coordinate"),
+        "actuated, because a force-controlled drive does not hold its coordinate"),
     "a force that is no number": (
         "position = 1.0\njoint_stiffness", "position = 1.0\ndrive_force = nan\n"
         "joint_stiffness",
@@ -112,7 +112,7 @@ REFUSED = {
     "a length beyond any machine": (
         "translation = [0.3, 0.0, 0.0]", "translation = [3e6, 0.0, 0.0]",
         'frame "wrist".translation: found [3000000.0, 0.0, 0.0], expected numbers of '
-        "size at most 1e+06 [m]"),
+        "magnitude at most 1e+06 [m]"),
     "dh beside a translation": (
         "translation = [0.3, 0.0, 0.0]", "translation = [0.3, 0.0, 0.0]\ndh = {a = 1}",
         'frame "wrist".translation: found translation together with "dh"; both '
@@ -129,8 +129,8 @@ REFUSED = {
         'frame "elbow".clearance.radial: found 1e-200, expected 0 or'),
     "a ball beside a radial clearance": (
         "radial = 29e-6", "ball = 1e-5, radial = 29e-6",
-        'frame "elbow".clearance.radial: found together with "ball", expected one of '
-        "them"),
+        'frame "elbow".clearance.radial: found together with "ball", expected only '
+        "one of them"),
     "a ball on a slide": (
         'joint = "revolute"\nposition = -1.0\n' + PLAY,
         'joint = "prismatic"\nclearance = { ball = 1e-5 }',
@@ -183,8 +183,8 @@ REFUSED = {
         '"seat"?'),
     "a closure with the base": (
         '["coupler", "seat"]', '["coupler", "base"]',
-        'closure[1].frames: found "base"; expected a frame (add a fixed one whose '
-        "parent is it)"),
+        'closure[1].frames: found "base"; expected a frame (add a fixed frame with '
+        'parent "base")'),
     "a closure at a joint": (
         '["coupler", "seat"]', '["coupler", "wrist"]',
         'closure[1].frames: found a revolute joint at frame "wrist"; expected a fixed '

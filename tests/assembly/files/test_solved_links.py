@@ -1,4 +1,4 @@
-"""Links of meshes and libraries are solved when a robot is loaded, and never later."""
+"""Links given by meshes and libraries are solved only when a robot is loaded."""
 
 import builtins
 import copy
@@ -88,7 +88,7 @@ OF_A_SHAPE = {
 
 
 def refuse(*given, **named):
-    """In place of what only loading may do."""
+    """Fail if a function that only loading may use is called."""
     raise AssertionError(f"below the loading of a robot: {given[:1]}")
 
 
@@ -114,7 +114,7 @@ def robot(folder):
 
 @pytest.fixture
 def sealed(monkeypatch, folder):
-    """Called, no file of the robot or mesh may be opened, no finite elements run."""
+    """Return a function that disables reading of files and finite elements."""
     ours = str(folder), str(cache_folder())
     usual = io.open
 
@@ -161,7 +161,7 @@ def test_stress_and_mass_of_a_loaded_robot_read_no_file(folder, solver, sealed):
 
 
 def test_modulus_scale_of_a_mesh_link_scales_its_compliance(folder, robot, sealed):
-    """K is proportional to E; finite elements with that E agree to their rounding."""
+    """K is proportional to E, in agreement with finite elements for the same E."""
     (folder / "half.toml").write_text(FILE.replace("6e10", "3e10", 1))
     expected = link_compliances(load_robot(folder / "half.toml"))
     effect = '[[effect]]\nname = "modulus_scale"\nparameters = { elbow = 0.5 }\n'

@@ -1,4 +1,4 @@
-"""Stored solutions of mesh links: bit-identical, and only for the same link."""
+"""Cached solutions of mesh links are bit-identical and used only for the same link."""
 
 import os
 import subprocess
@@ -74,7 +74,7 @@ def cache(solved_once, tmp_path, monkeypatch):
 
 @pytest.fixture
 def runs(solved_once, monkeypatch):
-    """Of finite elements, which are not run: each gives the known solution."""
+    """Count calls of the finite elements, replaced by the known solution."""
     runs = []
 
     def solve(frame, link, digest, options):
@@ -97,7 +97,7 @@ def stored_file(folder):
 
 
 def assert_same(one, other):
-    """To the last bit, and of the same types."""
+    """Check that two solutions are bit-identical and have the same types."""
     assert type(one) is type(other)
     if isinstance(one, np.ndarray):
         assert one.dtype == other.dtype

@@ -181,7 +181,7 @@ def _platform(home, errors):
         ([replace(hole(A), widths={"parallelism": 1e-5}, datums=(Datum("B"),))],
          "90 deg at home, expected 0 deg"),
         ([replace(hole(B), widths={}, length=(0.09, 1e-4))],
-         "found a length of 90 mm, expected that at home, 80 mm"),
+         "found a length of 90 mm, expected the length at home, 80 mm"),
         ([replace(hole(Datum("hole")), feature="tip", after=True)],
          "no frame that its joint"),
     ],

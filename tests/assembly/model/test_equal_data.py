@@ -1,4 +1,4 @@
-"""Robots of equal data are equal; results are never those of another robot."""
+"""Equality of robots with equal data, and separate results for different robots."""
 
 import pickle
 import subprocess
@@ -22,7 +22,7 @@ K = np.diag([1e3, 1e3, 1e3, 1e5, 1e5, 1e5])
 
 
 def made(**other):
-    """A robot with something in every field, made again at each call."""
+    """Create a new robot in which all fields are set."""
     drive = Frame(
         "drive", joint="revolute", actuated=True, limits=(-1.0, 1.0),
         clearance=Clearance(radial=1e-4), tolerance=np.full(6, 1e-5), mass=2.0,

@@ -1,4 +1,4 @@
-"""Draws of geometric errors: repeatable, and of the requested distributions."""
+"""Random draws of geometric errors: reproducibility and distributions."""
 
 from dataclasses import replace
 
@@ -71,7 +71,7 @@ def test_every_source_has_the_requested_distribution(sources):
         assert variance == pytest.approx(law.var(), rel=1e-9), label
 
 
-def test_errors_of_random_sign_keep_their_least_absolute_value():
+def test_errors_with_random_signs_respect_their_minimum_absolute_value():
     robot = load_robot("four_bar")
     sources = tolerance_sources(robot, [1e-3, 0, 0, 0, 0, 0])
     gapped = replace(sources, least=np.full(len(sources), 0.4))

@@ -1,4 +1,4 @@
-"""Loads by component: the same wrench, and its effect by closed forms."""
+"""Loads given by component, compared with closed forms."""
 
 from pathlib import Path
 
@@ -89,7 +89,7 @@ def test_command_line_and_python_read_the_same_load():
         ({"fq": 1.0}, 'load: unknown component "fq"; valid: fx, fy, fz, mx, my, mz'),
         ({"FZ": 1.0}, 'load: unknown component "FZ"'),
         ({"fz": "heavy"}, "load fz: found 'heavy', expected a number [N]"),
-        ({"my": np.nan}, "load my: found nan, expected a number [N m] of size"),
+        ({"my": np.nan}, "load my: found nan, expected a number [N m] of magnitude"),
         ({"fz": [1, 2], "fx": [1, 2, 3]}, "load: found fz 2, fx 3 numbers"),
     ],
 )  # fmt: skip

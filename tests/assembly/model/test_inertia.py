@@ -1,4 +1,4 @@
-"""Moments of inertia of frames, and of bodies joined together."""
+"""Moments of inertia of frames and of combined bodies."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def box(mass, edges):
 
 
 @pytest.mark.parametrize("turn", [[0, 0, 0], [0.3, -1.1, 0.7]])
-def test_a_box_cut_in_three_has_the_moments_of_the_whole_box(turn):
+def test_box_divided_into_three_has_the_moments_of_the_whole_box(turn):
     R, at = rotation_matrix(turn), np.array([0.3, -0.2, 0.5])
     cuts = np.array([0.0, 0.1, 0.25, 0.6])
     lengths = np.diff(cuts)
@@ -42,13 +42,13 @@ def test_bodies_without_mass_keep_their_moments():
     (np.diag([1.0, 1.0, -0.1]), "principal moments -0.1, 1, 1"),
     (np.diag([0.1, 1.0, 1.2]), "principal moments 0.1, 1, 1.2"),
 ])  # fmt: skip
-def test_a_frame_with_moments_of_no_body_is_refused(inertia, message):
+def test_frame_with_impossible_moments_of_inertia_is_refused(inertia, message):
     with pytest.raises(BadInput, match=r'^frame "arm"\.inertia: found .*' + message):
         Frame("arm", mass=1.0, inertia=inertia)
 
 
 def test_a_thin_plate_has_the_largest_possible_moment():
-    """Iz = Ix + Iy, and a rod none about itself: both are bodies, in any axes."""
+    """A plate with Iz = Ix + Iy and a thin rod are valid bodies in any axes."""
     R = rotation_matrix([0.4, 0.5, -0.6])
     for moments in ([1.0, 2.0, 3.0], [0.0, 1.0, 1.0]):
         J = R @ np.diag(moments) @ R.T

@@ -1,4 +1,4 @@
-"""Joints of several freedoms under the name that the user gave them."""
+"""Joints with several degrees of freedom, referred to by their user-defined names."""
 
 import numpy as np
 import pytest

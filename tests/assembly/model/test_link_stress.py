@@ -1,4 +1,4 @@
-"""Peak stress of links inside a robot, against formulas worked by hand."""
+"""Peak stress of links in a robot, compared with formulas."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -70,8 +70,8 @@ def test_links_without_a_section_have_no_stress():
 def test_finite_element_stress_equals_the_beam_away_from_the_ends():
     """Evaluated from one radius above the base: F / A there, and F (L - r) / W.
 
-    What the clamped ends do to an axial force has fallen to 3.9 % at one radius and to
-    0.02 % at three (Saint-Venant), so it is seen here, from above.
+    The effect of the clamped ends on an axial force has decayed to 3.9 % at a distance
+    of one radius, and to 0.02 % at three (Saint-Venant); it is still visible here.
     """
     link = MeshLink(PLAIN, "z=0", "z=0.452", 6e10, 0.3)
     frame = Frame("distal", translation=[0.452, 0, 0], link=link)

@@ -1,4 +1,4 @@
-"""Placement of mesh links: rotations from mesh axes to frame axes."""
+"""Rotation of mesh links from mesh axes to frame axes."""
 
 from dataclasses import replace
 
@@ -125,10 +125,10 @@ def test_mesh_axis_below_a_moved_slide_is_read_and_written(ram, tmp_path):
     [
         ({}, 'link: found a distance of 0 m from .*, or a mesh with "axis"'),
         ({"more": "translation = [0, 0, 0.1]", "position": 0.1},
-         'home position is 0.1 m; expected a home position of 0'),
-        ({"axis": ", axis = [0, 0, 0]"}, "mesh.axis: found .*, expected a direction"),
+         'home position of 0.1 m; expected a home position of 0'),
+        ({"axis": ", axis = [0, 0, 0]"}, "mesh.axis: found .*, expected a nonzero"),
         ({"axis": ", axis = [0, 0, 1], up = [1, 0, 0]", "more": "up = [0, 0, 3]"},
-         r'"tool".up: up = .* lies along the axis .*; expected another direction'),
+         r'"tool".up: up = .* lies along the axis .*; expected a different direction'),
     ],
 )  # fmt: skip
 def test_mesh_without_a_direction_is_refused(ram, changes, message):
@@ -138,6 +138,6 @@ def test_mesh_without_a_direction_is_refused(ram, changes, message):
 
 def test_up_direction_along_the_mesh_axis_is_refused(ram):
     path = ram(", axis = [0, 0, 1], up = [0, 0, 1]", "up = [1, 0, 0]")
-    message = r'"tool".link.mesh: up = .* lies along the axis .*; expected another'
+    message = r'"tool".link.mesh: up = .* lies along the axis .*; expected a different'
     with pytest.raises(BadInput, match=message):
         solved_link(read_robot(path).frame("tool"))

@@ -182,7 +182,7 @@ def test_animation_begins_open_and_ends_as_the_picture_of_the_assembly(
          'x.png: found the ending ".png", expected an animation: .gif'),
         (["--figure", "x.gif"], 'x.gif: found the ending ".gif", expected a picture'),
         (["--closing", "--figure", "x.gif", "--error-body", "rotation"],
-         "--closing: found it together with --error-body"),
+         "--closing: found together with --error-body"),
         (["--closing", "--figure", "x.gif"],
          "--closing: five_bar has no open closure; expected geometric errors"),
     ],

@@ -173,4 +173,4 @@ def test_invalid_statistics_options_are_rejected_with_one_line(
 def test_tolerances_of_a_robot_without_errors_are_rejected(run):
     status, _, err = run("assembly", "tolerances", "four_bar", "--grid", "tx=0.2")
     assert status == 2
-    assert "found no geometric_error of a frame" in err
+    assert "found no geometric_error in any frame" in err

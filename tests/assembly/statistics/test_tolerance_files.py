@@ -119,7 +119,7 @@ def test_tolerance_files_of_the_example_are_read(name):
 
 REFUSED = {
     "a yield above 1": ("yield = 0.95", "yield = 1.2",
-        "yield: found 1.2, expected a number of size at most 1 [1]"),
+        "yield: found 1.2, expected a number of magnitude at most 1 [1]"),
     "a yield of none": ("yield = 0.95", "yield = 0.0",
         "yield: found 0.0, expected a finite number > 0 [1]"),
     "no deviations": ("yield", "deviations = 0.0\nyield",
@@ -127,7 +127,7 @@ REFUSED = {
     "no draws": ("yield", "draws = 0\nyield",
         "draws: found 0, expected a finite number >= 1 [1]"),
     "too many draws": ("yield", "draws = 10000001\nyield",
-        "draws: found 10000001, expected a number of size at most 1e+07 [1]"),
+        "draws: found 10000001, expected a number of magnitude at most 1e+07 [1]"),
     "half a draw": ("yield", "draws = 10.5\nyield",
         "draws: expected whole numbers for draws and seed"),
     "half a seed": ("yield", "seed = 0.5\nyield",

@@ -285,7 +285,7 @@ def test_ctrl_c_preserves_the_journal_and_the_command_resumes(tmp_path, words):
     os.killpg(next(run).pid, signal.SIGINT)
     status, message = next(run)
     assert status == 130
-    assert "points are kept in" in message
+    assert "points are stored in" in message
     assert "Traceback" not in message
     assert sorted(p.name for p in tmp_path.iterdir()) == ["map.nc.journal"]
     subprocess.run([*COMMAND, "-o", tmp_path / "map.nc"], check=True)

@@ -138,17 +138,17 @@ def test_each_assumption_and_component_has_a_separate_result(run, tmp_path):
     ("words", "message"),
     [
         (["solve", "--load", "fx=1e300"],
-         "--load fx: found 1e+300, expected a number of size at most 1e+40"),
+         "--load fx: found 1e+300, expected a number of magnitude at most 1e+40"),
         (["solve", "--gravity", "z=1e300"],
-         "--gravity z: found 1e+300, expected a number of size at most 1e+06"),
+         "--gravity z: found 1e+300, expected a number of magnitude at most 1e+06"),
         (["solve", "--pose", "tx=1e300"], "--pose tx: found 1e+300"),
         (["solve", "--joint", "left.drive=1e300"], "--joint left.drive: found 1e+300"),
         (["solve", "--under", "temperature=1e300"], "--under temperature: found"),
         (["error", "--energy-budget", "1e300"], "--energy-budget: found 1e+300"),
         (["error", "--at", "tx=1"], '--at: unknown component "tx"; valid: x, y, z'),
         (["error", "--along", "mx=1"], '--along: unknown component "mx"'),
-        (["error", "--along", "tx=0"], "expected components of a translation or of"),
-        (["error", "--along", "tx=1,rz=1"], "expected components of a translation or"),
+        (["error", "--along", "tx=0"], "translation or rotation components (not both)"),
+        (["error", "--along", "tx=1,rz=1"], "expected either translation or rotation"),
         (["solve", "--rest", "ankle"], '--rest: no frame "ankle"'),
         (["solve", "--mismatch", "glue"], '--mismatch: found "glue"'),
     ],
@@ -192,7 +192,7 @@ most = [5e-4, 5e-4, 5e-4, 5e-5, 5e-5, 5e-5]
      ("solve", "--quantities", "margin"),
      ("sweep", "--grid", "tx=0,ty=0,tz=0.45", "-o", "x.nc")],
 )  # fmt: skip
-def test_every_command_reports_that_first_order_decides_nothing_when_singular(
+def test_every_command_reports_that_first_order_is_inconclusive_when_singular(
     run, tmp_path, monkeypatch, words
 ):
     monkeypatch.chdir(tmp_path)

@@ -1,4 +1,4 @@
-"""``forcefit check``: all messages about a file, each that of its reader alone."""
+"""``forcefit check`` reports all messages that the reader of a file would raise."""
 
 import copy
 import itertools
@@ -183,7 +183,7 @@ def test_messages_about_a_wrong_unit_of_a_whole_column_stop_at_the_maximum_numbe
 @pytest.mark.parametrize(("text", "place"), [
     (FOUR_BAR.replace("[0.5, 0.0, 0.0]\nlink", "[5.0, 0.0, 0.0]\nlink"), "closure"),
     ("name = ", "not valid TOML"),
-    ("a = 1\n", "another kind"),
+    ("a = 1\n", "unknown type of file"),
 ])  # fmt: skip
 def test_mistake_without_a_place_in_the_file_has_one_message(
     run, tmp_path, text, place

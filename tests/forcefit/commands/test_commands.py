@@ -1,4 +1,4 @@
-"""Commands: the results that they write, and their refusals."""
+"""Results of commands, and messages for invalid input."""
 
 import json
 import os
@@ -160,7 +160,7 @@ def test_show_refuses_an_exaggeration_of_a_page_with_a_slider(run, tmp_path):
     words = ["hexapod", "--exaggeration", 5, "--figure", page]
     status, _, err = run("assembly", "show", *words)
     assert (status, page.exists()) == (2, False)
-    assert "--exaggeration: found it together with an HTML figure" in err
+    assert "--exaggeration: found together with an HTML figure" in err
 
 
 @pytest.mark.parametrize(
@@ -193,7 +193,7 @@ def test_show_refuses_an_exaggeration_of_a_page_with_a_slider(run, tmp_path):
         (["assembly", "error", "irsbot2", "--energy-budget", "x"],
          "Invalid value for '--energy-budget': "),
         (["assembly", "stiffness", "delta", "--along", "tx=0"],
-         "--along: expected components of a translation"),
+         "--along: expected either translation or rotation"),
         (["assembly", "stiffness", "delta", "--along", "tx=nan"],
          "--along tx: found nan"),
         (["assembly", "stiffness", "delta", "--at", "1,2"],
@@ -207,7 +207,7 @@ def test_show_refuses_an_exaggeration_of_a_page_with_a_slider(run, tmp_path):
         (["assembly", "deflection", "four_bar", "--along", "fq=0:1:1"],
          '--along: unknown component "fq"'),
         (["assembly", "deflection", "four_bar", "--along", "fz=0:1:0"],
-         "expected two different loads and a step"),
+         "expected two different loads and a nonzero step"),
         (["assembly", "deflection", "four_bar", "--along", "fz=0:inf:1"],
          "expected finite numbers"),
         (["assembly", "deflection", "four_bar", "--along", "fz=0:1e9:1"],
@@ -217,7 +217,7 @@ def test_show_refuses_an_exaggeration_of_a_page_with_a_slider(run, tmp_path):
         (["assembly", "frequencies", "irsbot2"],
          'irsbot2: found no moving mass; expected "density"'),
         (["example", "irsbot"], 'example: found "irsbot"; did you mean "irsbot2"?'),
-        (["example", "irsbot2", "-o", "nowhere"], "nowhere: found no such folder"),
+        (["example", "irsbot2", "-o", "nowhere"], "nowhere: folder not found"),
         (["new", "mine"],
          "--kind: missing, expected UPS | RUS | UPU | PRS | RRR | delta"),
         (["new", "mine", "--kind", "UPX"], '--kind: found "UPX"; did you mean "UPU"?'),

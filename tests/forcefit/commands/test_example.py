@@ -66,7 +66,7 @@ def test_example_files_are_unchanged_on_repeat_and_edited_files_are_kept(run, tm
     mine.write_text("mine")
     status, out, err = run("example", "campaign", "irsbot2", "-o", tmp_path)
     assert (status, out, err.count("\n")) == (2, "", 1)
-    assert f"{mine}: found a file with other content" in err
+    assert f"{mine}: found a file whose content differs" in err
     assert files_of(tmp_path) == before
 
 

@@ -21,7 +21,7 @@ def test_frequencies_are_ascending_with_shares_of_the_parts(run):
         assert sum(mode["shares"].values()) == pytest.approx(1.0)
 
 
-def test_nominal_frequencies_report_that_gravity_is_left_out(run, tmp_path):
+def test_nominal_frequencies_report_that_gravity_is_neglected(run, tmp_path):
     """A compound pendulum has the frequency sqrt(m g l / I) / (2 pi);
     nominally it has none."""
     pendulum = Robot("pendulum", "tip", (

@@ -1,4 +1,4 @@
-"""Commands that answer several questions: combinations of options, and refusals."""
+"""Commands with several functions: combinations of options and invalid input."""
 
 import json
 

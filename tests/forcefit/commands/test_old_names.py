@@ -1,4 +1,4 @@
-"""Options by their old names: they work, and the new name is reported."""
+"""Deprecated names of commands and options still work and report the new name."""
 
 import pytest
 import typer

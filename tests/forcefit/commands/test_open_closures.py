@@ -164,7 +164,7 @@ def test_tolerances_accept_an_open_closure_with_rest_or_mismatch(
     assert err.count("forcefit: note: ") == 1
 
 
-def test_mismatch_at_home_is_kept_as_a_drive_error_at_other_poses(run, tmp_path):
+def test_mismatch_at_home_remains_a_drive_error_at_other_poses(run, tmp_path):
     """Both slides move by the same amount, so that the springs keep their preload."""
     (tmp_path / "robot.toml").write_text(SLIDES)
     words = ["--mismatch", "spring", "--pose", "tx=0.42", "--json", "-"]

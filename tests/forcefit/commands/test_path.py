@@ -197,7 +197,7 @@ def test_path_refuses_a_drive_force_and_a_state_that_do_not_exist(run, slide):
     assert not list(slide.glob("way.nc*"))
 
 
-def test_path_notes_components_that_it_leaves_free(run, tmp_path):
+def test_path_reports_unconstrained_pose_components(run, tmp_path):
     """A hexapod has six freedoms; two columns leave four of them open."""
     rows = "pose.tx,pose.tz\n0,0.53\n0.01,0.53\n"
     (tmp_path / "way.csv").write_text(rows)

@@ -127,7 +127,7 @@ def test_wrong_option_is_refused_by_name_before_meshing(words, message):
                 "--part",
                 "z=0..1/young=1,poisson=0",
             ],
-            "--part: found together with a section",
+            "--part: found together with a cross section",
         ),
     ],
 )
@@ -159,7 +159,7 @@ def test_fea_writes_the_keys_of_the_format(tmp_path):
 
 
 @pytest.mark.slow
-def test_fea_of_two_materials_in_series_adds_their_compliances():
+def test_compliances_of_two_materials_in_series_add_up_in_fea():
     """Without Poisson's effect plane sections stay plane, and compliances add up: h/EI
     for pure bending, h/GJ with G = E/2 for torsion, h/EA for tension. The accuracy
     is 1 %. The faces between the materials are those of elements, not the plane,

@@ -1,4 +1,4 @@
-"""``forcefit assembly sweep`` and ``plot``: files that they write, and refusals."""
+"""``forcefit assembly sweep`` and ``plot``: output files and invalid input."""
 
 import json
 import os
@@ -216,7 +216,7 @@ def test_sweep_of_listed_poses_and_designs_draws_a_map(run, tmp_path):
         (["-o", "robot.toml"], 'robot.toml: found the ending ".toml", expected a '
          "NetCDF file of forcefit: .nc"),
         (["-o", "other.nc"], "other.nc: found a file that is not a NetCDF file of "
-         "forcefit; expected such a file, or no file: it is not overwritten"),
+         "forcefit; it is not overwritten"),
         (["-o", "measured.nc"], "measured.nc: found a NetCDF file that is not one of a "
          "sweep by forcefit"),
         (["-o", "x.nc", "--figure", "x.xyz"], 'x.xyz: found the ending ".xyz", '
@@ -306,11 +306,11 @@ def test_damaged_sweep_file_is_reported_by_one_message(run, tmp_path, monkeypatc
     ("words", "said"),
     [(["--gravity", "z=-9.81"], 1), (["--load", "fx=1"], 1), ([], 0)],
 )  # fmt: skip
-def test_sweep_reports_that_frequencies_leave_load_and_gravity_out(
+def test_sweep_reports_that_frequencies_neglect_load_and_gravity(
     run, tmp_path, words, said
 ):
     grid = ["--grid", "tx=0,ty=0.13", "--assumption", "none", "--frequencies", "1"]
     target = ["-o", tmp_path / "x.nc"]
     status, _, err = run("assembly", "sweep", "five_bar", *grid, *words, *target)
     assert status == 0
-    assert err.count("the frequencies leave out load and gravity") == said
+    assert err.count("the frequencies neglect load and gravity") == said

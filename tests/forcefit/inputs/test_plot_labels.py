@@ -1,4 +1,4 @@
-"""Names that users chose are shown unchanged in every figure."""
+"""User-defined names are shown unchanged in all figures."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ ODD = ["$x^{<b>&_\\$", "a$b", "$\\frac{1}{$", "_$_$", "\\$", "\\\\$a$", "^_\\&<>
 
 
 def drawn(figure):
-    """The figure, drawn; a text that is no formula but read as one dies here."""
+    """Draw the figure; text that is wrongly parsed as a formula raises an error."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     FigureCanvasAgg(figure).draw()

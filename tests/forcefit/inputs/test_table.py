@@ -1,4 +1,4 @@
-"""Strict reading of tables: found and expected value, in one short line."""
+"""Reading of tables, with short messages for invalid values."""
 
 import math
 
@@ -23,7 +23,7 @@ def table(**content):
 
 
 def message(function, *args, **kwargs):
-    """What a call complains of."""
+    """Return the message of the error raised by a call."""
     with pytest.raises(BadInput) as caught:
         function(*args, **kwargs)
     return str(caught.value)
@@ -113,7 +113,7 @@ def test_file_above_64_mib_is_refused(tmp_path):
     path = tmp_path / "large"
     with path.open("wb") as file:
         file.truncate((64 << 20) + 1)
-    expected = "found a file larger than 64 MiB, expected a smaller one"
+    expected = "found a file larger than 64 MiB, expected a smaller file"
     assert message(read_text, path) == f"{path}: {expected}"
 
 
@@ -122,7 +122,7 @@ def test_file_above_64_mib_is_refused(tmp_path):
     ("a = " + "[" * 5000, "nested too deeply"),
     ("a = " + "{a=" * 5000, "nested too deeply"),
     ("[" + "a." * 50_000 + "a]", "nested too deeply"),
-    ("a = " + "9" * 5000, "found a whole number of thousands of digits"),
+    ("a = " + "9" * 5000, "found an integer with thousands of digits"),
     ("a = 1\na = 2", "Cannot overwrite a value"),
 ])  # fmt: skip
 def test_wrong_toml_is_refused_with_its_reason(text, reason, tmp_path):

@@ -1,6 +1,6 @@
-"""A study's page in a real browser: it draws, and slider, click and switch work.
+"""Tests of the study report in a browser: figures, sliders, clicks and unit switch.
 
-Headless Chromium by selenium; skipped where it is not installed.
+The tests run in headless Chromium with selenium, and are skipped without them.
 """
 
 import base64
@@ -44,7 +44,7 @@ def results(tmp_path_factory):
 
 
 def browser():
-    """Headless Chromium, or a skip that says what is missing."""
+    """Start headless Chromium, or skip the test and state what is missing."""
     webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is absent")
     names = ("chromium", "chromium-browser", "google-chrome")
     program = next(filter(None, map(shutil.which, names)), None)
@@ -73,14 +73,14 @@ def tab(results):
 
 
 def wait(tab, script):
-    """What a script returns, once it returns something."""
+    """Wait until a script returns a value, and return this value."""
     from selenium.webdriver.support.ui import WebDriverWait
 
     return WebDriverWait(tab, PATIENCE, 0.05).until(lambda t: t.execute_script(script))
 
 
 def traces(tab):
-    """Name and points of what the scene draws."""
+    """Return the names and points of the traces in the scene."""
     drawn = tab.execute_script(
         "return document.querySelector('figure.scene .plot').data"
         ".map(t => [t.name, t.x, t.y, t.z])"
@@ -277,7 +277,7 @@ def test_dark_colour_scheme_has_a_dark_page_with_light_text(tab):
         assert abs(axis - back) > 128
 
 
-def test_phone_layout_breaks_no_number_and_scrolls_wide_tables(tab):
+def test_phone_layout_keeps_numbers_on_one_line_and_scrolls_wide_tables(tab):
     phone = {"width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": True}
     tab.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", phone)
     try:
@@ -311,7 +311,7 @@ def test_enter_key_sorts_by_the_focused_column_header(tab):
 
 
 @pytest.mark.parametrize("colours", ["dark", "light"])
-def test_study_page_breaks_no_serious_rule_of_accessibility(tab, colours):
+def test_study_page_has_no_serious_accessibility_violation(tab, colours):
     scheme(tab, colours)
     wait(tab, "return getComputedStyle(document.documentElement).colorScheme"
          f" === '{colours}'")  # fmt: skip

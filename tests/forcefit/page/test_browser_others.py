@@ -139,7 +139,7 @@ def test_page_fits_the_width_of_a_phone_and_of_paper(opened):
 
 
 @pytest.mark.parametrize("colours", ["light", "dark"])
-def test_page_breaks_no_serious_rule_of_accessibility(opened, colours):
+def test_page_has_no_serious_accessibility_violation(opened, colours):
     tab, *_ = opened
     scheme(tab, colours)
     wait(tab, "return getComputedStyle(document.documentElement).colorScheme"

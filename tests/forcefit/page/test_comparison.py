@@ -91,7 +91,7 @@ def test_report_compare_accepts_pages_and_json_files(tmp_path, run):
 @pytest.mark.parametrize(("name", "content", "message"), [
     ("none.json", None, "none.json: cannot be read: No such file"),
     ("a.json", b"\xff\xfe\xff", "a.json: cannot be read: it is not text"),
-    ("a.json", b"[1]", "a.json: found a JSON list or value, expected results"),
+    ("a.json", b"[1]", "a.json: found a JSON list or value, expected"),
 ])  # fmt: skip
 def test_files_that_cannot_be_compared_are_refused_in_one_line(
     tmp_path, run, name, content, message

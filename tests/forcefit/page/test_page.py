@@ -1,4 +1,4 @@
-"""Pages: their numbers equal the results, nothing is fetched, names stay names."""
+"""Tests of report pages: numbers, escaping and self-containedness."""
 
 import math
 import re
@@ -42,7 +42,7 @@ def written(*body, **changes):
     (0.25, "", "0.25"),
     (3.0, "m/s^2", "3 m/s^2"),
 ])  # fmt: skip
-def test_page_numbers_are_shown_in_drawing_units(value, unit, text):
+def test_page_shows_numbers_in_display_units(value, unit, text):
     (cell,) = parse(table(["a"], [[Value(value, unit)]])).tables[0][1]
     assert cell.text == text
     assert cell.value == pytest.approx(value, nan_ok=True)
@@ -65,7 +65,7 @@ def test_table_column_states_its_unit_once_and_keeps_every_digit():
     assert (first[1].text, first[1].value, first[1].si) == ("300", value, "0.3")
 
 
-def test_names_on_a_page_are_escaped_in_html_and_data():
+def test_names_on_a_page_are_escaped_in_html_and_json():
     trace = {"type": "scatter", "x": [0.0], "y": [1.0], "name": ODD}
     named = bars({ODD: 1.0}, Axis(ODD, "m"), ODD)
     drawn = chart([trace], Axis(ODD), Axis(ODD), ODD)
@@ -144,15 +144,15 @@ def test_page_states_the_command_and_digests_of_its_input_files(tmp_path):
     assert rows["SHA-256 of robot.toml"] == (
         "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
     )
-    assert rows["SHA-256 of gone.toml"].startswith("cannot be read any more")
+    assert rows["SHA-256 of gone.toml"].startswith("can no longer be read")
     assert {"forcefit", "Python", "numpy", "clarabel"} <= set(rows)
 
 
 @pytest.mark.parametrize(("text", "message"), [
-    ("<!doctype html><p>", "x: found a page without results of forcefit"),
-    ("hello", "neither HTML nor JSON, expected a report of forcefit or the JSON"),
+    ("<!doctype html><p>", "x: found an HTML page without forcefit results"),
+    ("hello", "neither HTML nor JSON, expected a forcefit report or JSON"),
     ("[" * 100_000, "x: found text that is neither HTML nor JSON, expected"),
-    ("[1]", "x: found a JSON list or value, expected results"),
+    ("[1]", "x: found a JSON list or value, expected a JSON object"),
 ])  # fmt: skip
 def test_page_without_results_is_refused(text, message):
     with pytest.raises(BadInput, match=message):

@@ -1,4 +1,4 @@
-"""Cells, headers and colours of a page as a browser receives them."""
+"""Tests of cells, headings and colours in the HTML of a page."""
 
 import re
 
@@ -21,7 +21,7 @@ def test_table_headers_can_have_the_keyboard_focus():
     [(True, "good", "OK"), (None, "mixed", "Caution"), (False, "bad", "Not OK")],
 )
 def test_verdict_has_the_colour_and_the_word_of_its_outcome(good, kind, word):
-    """The colour alone does not tell a reader who does not see it."""
+    """Readers who cannot distinguish the colours need the word."""
     text = page(Page("t", "v", good, [], "", [], [], Provenance(), {}))
     assert f"<p class='verdict {kind}'><strong>{word}:</strong> v</p>" in text
 

@@ -273,7 +273,7 @@ def test_matrix_is_converted_from_one_program_to_another_in_one_step(run, tmp_pa
     ("words", "message"),
     [
         (["k.pch", "--to", "abaqus"], "found only one of --to and --output"),
-        (["k.json"], "--to: missing; expected the format of the file to write"),
+        (["k.json"], "--to: missing; expected the format of the output file"),
         (["k.json", "--tip", "2", "--to", "numpy", "-o", "k.npy"],
          "--tip: found together with the results k.json"),
     ],
@@ -285,8 +285,8 @@ def test_options_not_applicable_to_a_conversion_are_rejected(run, words, message
 
 
 @pytest.mark.parametrize(("to", "name", "message"), [
-    ("numpy", "rod.npz", '--output: found "rod.npz", expected the ending'),
-    ("nastran", "rod.npy", '--output: found "rod.npy", expected the ending'),
+    ("numpy", "rod.npz", '--output: found "rod.npz", expected a file extension'),
+    ("nastran", "rod.npy", '--output: found "rod.npy", expected a file extension'),
     ("nastra", "rod.pch", 'did you mean "nastran"?'),
     ("nastran", "rod.mtx", "found a file that is not a matrix for nastran"),
 ])  # fmt: skip

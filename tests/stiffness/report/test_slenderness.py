@@ -223,7 +223,7 @@ def test_compare_rejects_a_curve_file_together_with_a_section(run, tmp_path):
     command = ["stiffness", "compare", "x.stl", "--base", "z=0", "--tip", "x=0.15"]
     status, _, err = run(*command, *MATERIAL, "--curve", path, "--radius", "0.1")
     assert status == 2
-    assert "--curve: found together with options" in err
+    assert "--curve: found together with cross section options" in err
 
 
 def rectangle(width, height, up, stiffer=1.0, axis=(0, 0, 1)):

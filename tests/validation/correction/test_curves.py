@@ -66,9 +66,9 @@ def test_function_of_two_variables_is_shown_by_three_curves(tmp_path, run):
 
 
 @pytest.mark.parametrize(("words", "effects", "message"), [
-    ((), (), "found no learned function to show"),
+    ((), (), "found no learned function"),
     (("--over", "q.driv=0:1"), (PUBLIC,), 'did you mean "q.drive"'),
-    (("--over", "q.drive=1:0"), (PUBLIC,), "expected LEAST:LARGEST"),
+    (("--over", "q.drive=1:0"), (PUBLIC,), "expected MINIMUM:MAXIMUM"),
 ])  # fmt: skip
 def test_explain_refuses_wrong_functions_and_ranges(
     words, effects, message, tmp_path, run
