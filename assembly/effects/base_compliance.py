@@ -21,7 +21,7 @@ def on_foundation(conditions: Conditions) -> Conditions:
     """Return conditions with a new frame at the base that carries all other frames.
 
     Args:
-        conditions: R rows.
+        conditions: conditions of R measurements.
 
     Returns:
         The conditions; the new frame is the first frame.  If the robot already has such

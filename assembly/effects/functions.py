@@ -130,7 +130,7 @@ def basis(conditions: Conditions, function: Function, names: Sequence[str]) -> N
     """Return the column of each linear coefficient of a function.
 
     Args:
-        conditions: R rows.
+        conditions: conditions of R measurements.
         function: function with a form (no formula) whose variables are not wrenches;
             among its parameters, only the shapes are used.
         names: p names of columns, such as ``"1.sine"``.
@@ -147,7 +147,7 @@ def inputs_of(conditions: Conditions, function: Function) -> NDArray:
     """Return the inputs of a function, computed from its variables and their past.
 
     Args:
-        conditions: R rows.
+        conditions: conditions of R measurements.
         function: the function.
 
     Returns:
@@ -241,7 +241,7 @@ def apply_functions(
     """Return the conditions with functions added, each in its session.
 
     Args:
-        conditions: R rows.
+        conditions: conditions of R measurements.
         functions: the functions.
         recorded: conditions before other effects, on which the functions depend.
 
@@ -310,7 +310,7 @@ def _yielding(
     inputs: NDArray,
     acts: NDArray,
 ) -> Conditions:
-    """Return conditions with a compliant place that depends on the wrench there."""
+    """Return conditions with a compliant location that depends on the wrench there."""
     slots: dict[int, int] = {}  # column of the inputs for each wrench, by its index
     through: list[tuple[str, int]] = []
     for k, name in enumerate(function.variables):
@@ -348,7 +348,7 @@ def in_session_alone(
     """Return the conditions with effects in the rows of one session only.
 
     Args:
-        conditions: R rows without the effects.
+        conditions: conditions of R measurements without the effects.
         changed: the same R rows with effects that change individual rows.
         session: name of the session in which the effects act.
 

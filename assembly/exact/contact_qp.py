@@ -7,8 +7,8 @@ A step of the exact equilibrium requires the change v of the clearances u that m
 S has directions of negative curvature.  Directions normal to the boundaries of active
 constraints are harmless, but other directions occur too.  Far from the solution, S is
 made convex, and :mod:`forcefit.assembly.solvers.conic` solves the problem.  Near the
-solution, Newton's method on the active boundaries is accurate to rounding, while the
-conic solver reaches only half of the digits.
+solution, Newton's method on the active boundaries is accurate to machine precision,
+while the conic solver reaches only half of the digits.
 
 ======  ===========  =========  =====================================================
 symbol  code         shape      meaning

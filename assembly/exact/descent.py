@@ -241,7 +241,7 @@ def advance(
     least = max(least, pull)
     before = potential(start, local.loads) + penalised
     noise = 1e-13 * (abs(before) + abs(energy_of(start)))
-    # rounding errors of angles and positions, multiplied by the forces on them
+    # round-off errors of angles and positions, multiplied by the forces on them
     noise += 1e-14 * (penalty + pull)
     for attempt in range(_ATTEMPTS):
         # if a Newton step is rejected, the conic solver repeats the step before the

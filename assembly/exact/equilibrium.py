@@ -17,7 +17,7 @@ from forcefit.assembly.exact.dead_load import load_magnitudes
 from forcefit.assembly.exact.descent import Expansion
 from forcefit.assembly.solvers.cones import cone_sizes
 
-# [-] rounding error of an angle, relative to the residual that counts as small
+# [-] round-off error of an angle, relative to the residual that counts as small
 _ANGLE_ROUNDING = 1e-5
 
 
@@ -37,7 +37,7 @@ def imbalance(local: Expansion) -> float:
     wrench = float(np.linalg.norm(local.multipliers)) + local.small_wrench
     loads = load_magnitudes(at, local.loads)
     acting = np.linalg.norm(A, axis=0) * wrench + np.abs(local.gradient) + loads
-    # in an open chain, the forces on unloaded parts are only rounding errors
+    # in an open chain, the forces on unloaded parts are only round-off errors
     unit = np.sqrt(np.diag(model.metric))
     acting = np.maximum(acting, local.small_wrench * unit)
     # a clearance inside its cone carries no force; at the boundary, its force is normal
@@ -59,9 +59,9 @@ def least_curvature(local: Expansion) -> float:
 
     Returns:
         [J/rad^2] smallest second derivative of the potential along the motions that
-        keep closures and active constraints, per squared rad and reference length of
-        all screws.  The curvature is positive at a strict minimum, and inf if no motion
-        is possible.
+        preserve closures and active constraints, per squared rad and reference length
+        of all screws.  The curvature is positive at a strict minimum, and inf if no
+        motion is possible.
     """
     D, H = tangent_space(local)
     if not D.shape[1]:
@@ -73,7 +73,8 @@ def least_curvature(local: Expansion) -> float:
 def tangent_space(
     local: Expansion, hold_touching: bool = False
 ) -> tuple[NDArray, NDArray]:
-    """Return the motions at an equilibrium that keep closures and active clearances.
+    """Return the motions at an equilibrium that preserve closures and active
+    clearances.
 
     Args:
         local: expansion at the equilibrium.

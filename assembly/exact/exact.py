@@ -1,4 +1,4 @@
-r"""Forced assembly of least energy with finite motions, whose closures hold on SE(3).
+r"""Forced minimum-energy assembly with finite motions, whose closures hold on SE(3).
 
 Springs, clearance cones and geometric errors are those of the linear virtual-joint
 model (:mod:`forcefit.assembly.linear.energy`).  Only the closures differ, because
@@ -91,7 +91,7 @@ _RESTLESS = 100
 _STILL = 1e-9  # [rad, reference lengths] size of a last step without damping
 # [-] largest accepted relative imbalance of a solution; usually it is 1e-12
 _STATIONARY = 1e-7
-# [J] energies below this are rounding errors; without errors they are about 1e-48 J
+# [J] energies below this are round-off errors; without errors they are about 1e-48 J
 _ROUNDING = 1e-30
 
 
@@ -128,7 +128,7 @@ class ExactAssembly:
             scaled closures.
         stationarity: [-] largest relative imbalance of an unknown.
         iterations: number of steps.
-        method: method of all cone programmes: ``"compiled"``, with Clarabel if the
+        method: method of all cone programs: ``"compiled"``, with Clarabel if the
             compiled solution is not proved; or ``"reference"``, with numpy and Clarabel
             only.
     """
@@ -296,7 +296,7 @@ class ExactAssembly:
         """Difference of platform screw and energy: linear minus exact result."""
         screw = self.linear.platform_screw - self.platform_screw
         energy = self.linear.energy - self.energy
-        # inside an assembly zone both energies are zero except for rounding errors
+        # inside an assembly zone both energies are zero except for round-off errors
         scale = max(self.energy, 1e-6 * self.linear.energy_without_clearance, _ROUNDING)
         return LinearisationError(screw[:3], screw[3:], energy, energy / scale)
 
@@ -322,7 +322,8 @@ def solve_exact(
     progress: Callable[[int, int], None] = lambda done, most: None,
     method: Method = "compiled",
 ) -> ExactAssembly:
-    """Close a manipulator with least energy and finite motions, from the linear model.
+    """Close a manipulator with minimum energy and finite motions, from the linear
+    model.
 
     Args:
         posture: configuration of the robot, with its errors, clearances, links and

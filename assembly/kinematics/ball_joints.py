@@ -1,9 +1,9 @@
 """Detection of ball joints that are modelled as three revolute frames.
 
 In the home pose, the three axes are at right angles.  If the middle joint rotates by 90
-degrees, two axes coincide, and the model loses a freedom.  A real ball joint does not:
-it can rotate about any axis through its centre.  This module therefore treats such
-frames as a ball joint at every posture.
+degrees, two axes coincide, and the model loses a degree of freedom.  A real ball joint
+does not: it can rotate about any axis through its centre.  This module therefore treats
+such frames as a ball joint at every posture.
 """
 
 from collections import Counter

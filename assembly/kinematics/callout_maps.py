@@ -38,7 +38,7 @@ from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, quoted
 from forcefit.stiffness.screws import screw_map, transform
 
-_RANK = 1e-9  # singular values below this are rounding errors
+_RANK = 1e-9  # singular values below this are round-off errors
 
 # name of a frame; True for the body after its joint, False for that before
 Side = tuple[str, bool]

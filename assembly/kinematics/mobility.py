@@ -1,8 +1,8 @@
 """Mobility and redundant constraints of the perfect robot, from ranks of its closures.
 
-:func:`mobility` counts freedoms at one posture.  :func:`platform_screws` returns the
-free motions of the platform there.  :func:`mobility_near` counts freedoms at postures
-close to it.
+:func:`mobility` counts the degrees of freedom at one posture.  :func:`platform_screws`
+returns the free motions of the platform there.  :func:`mobility_near` counts the
+degrees of freedom at postures close to it.
 """
 
 from collections import Counter
@@ -27,7 +27,7 @@ ZERO = 1e-5
 # [rad, lengths] least motion of the platform for unit joint rates
 _PLATFORM_RANK = 1e-6
 _ERROR = 10.0  # assumed error of free motions times the ratio of singular values
-_NOISE = 1e-14  # relative rounding error of singular values
+_NOISE = 1e-14  # relative round-off error of singular values
 _DISTANCE = 0.05  # [rad or reference lengths] distance to nearby postures
 _NEIGHBOURS = 16  # largest number of nearby postures
 _AGREEING = 3  # number of nearby postures whose counts must agree
@@ -42,12 +42,12 @@ class Mobility:
     """Degrees of freedom at one posture, if joints are rigid except for their motion.
 
     Attributes:
-        freedoms: number of independent joint motions that keep all closures, with the
-            drives free.
+        freedoms: number of independent joint motions that preserve all closures, with
+            the drives free.
         platform_freedoms: number of independent motions of the platform among them.
             The others are local motions of the legs, during which the platform is at
             rest.
-        freedoms_drives_locked: number of independent joint motions that keep all
+        freedoms_drives_locked: number of independent joint motions that preserve all
             closures, with the drives locked.
         platform_freedoms_drives_locked: number of independent motions of the platform,
             with the drives locked.
@@ -64,9 +64,9 @@ class Mobility:
         actuation_redundancy: number of redundant drives: drives minus the freedoms that
             the drives lock.
         singular_value_gap: [-] least singular value that counts as nonzero, divided by
-            the largest that counts as zero, or by the rounding errors if there is none.
-            The value is the smaller one of two ratios, with the drives free and locked.
-            If it is below about 100, the counts are uncertain.
+            the largest that counts as zero, or by the round-off errors if there is
+            none.  The value is the smaller one of two ratios, with the drives free and
+            locked.  If it is below about 100, the counts are uncertain.
     """
 
     freedoms: int
@@ -90,8 +90,9 @@ class NearMobility:
     """Mobility at postures close to a given posture.
 
     Attributes:
-        freedoms: the least number of freedoms at these postures; 0 if no motion leaves
-            the given posture, because its freedoms are only infinitesimal.
+        freedoms: the least number of degrees of freedom at these postures; 0 if no
+            motion leaves the given posture, because its freedoms are only
+            infinitesimal.
         there: the counts at a nearby posture with this number; None if no posture was
             found.
     """
@@ -169,8 +170,8 @@ def mobility_near(posture: Posture, here: Mobility) -> NearMobility:
         here: mobility at this posture.
 
     Returns:
-        The least number of freedoms, and the counts at a nearby posture with this
-        number.
+        The least number of degrees of freedom, and the counts at a nearby posture with
+        this number.
     """
     robot, q = posture.robot, posture.coordinates
     if here.freedoms == 0 or _certainly_least(here):
@@ -196,14 +197,16 @@ def mobility_near(posture: Posture, here: Mobility) -> NearMobility:
         if _AGREEING in {returned, *agreeing.values()}:
             break
     if not found:
-        # no nearby posture was found, so no smaller number of freedoms is known
+        # no nearby posture was found, so no smaller number of degrees of freedom is
+        # known
         return NearMobility(0 if returned == _AGREEING else here.freedoms, None)
     least = min(found, key=lambda m: (m.freedoms, m.freedoms_drives_locked))
     return NearMobility(min(least.freedoms, here.freedoms), least)
 
 
 def _certainly_least(here: Mobility) -> bool:
-    """Return whether all closures are independent, so no posture has fewer freedoms."""
+    """Return whether all closures are independent, so no posture has fewer degrees of
+    freedom."""
     return here.overconstraint == 0 and here.freedoms_drives_locked == 0
 
 
@@ -237,7 +240,7 @@ def _rates(posture: Posture) -> tuple[NDArray, NDArray]:
 
 @dataclass(frozen=True, eq=False)
 class _Motions:
-    """Joint motions that keep the closures, and the resulting platform motions.
+    """Joint motions that preserve the closures, and the resulting platform motions.
 
     Attributes:
         values: singular values of the closures, the largest first.
@@ -277,7 +280,7 @@ class _Motions:
 
 
 def _motions(A: NDArray, P: NDArray, tolerance: float, least: float = 0.0) -> _Motions:
-    """Return the joint motions that keep the closures, and the platform motions.
+    """Return the joint motions that preserve the closures, and the platform motions.
 
     Args:
         A: (6 closures, joints) velocities of closures for unit joint rates.

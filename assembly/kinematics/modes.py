@@ -1,7 +1,7 @@
 """Continuation from a singular home pose, where several operation modes meet.
 
 At such a pose, the closures and a partial pose, or the drives, do not determine the
-operation mode; rounding errors would select it.  The platform therefore keeps the pose
+operation mode; round-off errors would select it.  The platform therefore keeps the pose
 components that are not given at their home values, if possible: first all of them, then
 the rotation, then the translation.
 """

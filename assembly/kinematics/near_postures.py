@@ -43,7 +43,8 @@ def near_postures(
 
 
 def _steps_aside(robot: Robot, T: NDArray, distance: float, count: int) -> NDArray:
-    """Return (count, n) random joint steps that keep the closures to first order."""
+    """Return (count, n) random joint steps that preserve the closures to first
+    order."""
     A = closure_matrices(robot, T[None])[0][0]
     _, values, Vt = np.linalg.svd(A)
     rank = int((values > SINGULAR * values[:1]).sum())

@@ -1,9 +1,9 @@
 """Solution of the nominal closures: joint coordinates at which the robot closes.
 
 Many targets are followed together, each along a straight line from the home pose.
-Steps are damped Gauss-Newton steps of least norm.  Coordinates that closures and target
-leave undetermined therefore do not change, and overconstrained robots need no special
-case.  The loops are compiled:
+Steps are damped Gauss-Newton steps of minimum norm.  Coordinates that closures and
+target leave undetermined therefore do not change, and overconstrained robots need no
+special case.  The loops are compiled:
 :mod:`forcefit.assembly.kinematics.continuation_side_by_side`.
 """
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 # both limits are for files rounded to 6 digits; parallel rods rotate a platform by ten
-# times this rounding error
+# times this round-off error
 _TURN = 1e-4  # [rad] largest rotation per reference length of a pure translation
 _PITCH = 1e-5  # [reference lengths] largest translation per rad of a pure rotation
 

@@ -11,7 +11,7 @@ ROWS_RANK = 1e-9  # the same threshold for closure rows that only clearances can
 # factor; this factor times the nominal closure error is added to RANK, for rounded
 # robot files
 MISMATCH_FACTOR = 30.0
-# relative rounding error of columns that a projection removes
+# relative round-off error of columns that a projection removes
 NOISE = 1e-12
 UNBOUNDED = 1e-8  # [rad, m] least platform motion per unit of a free motion
 
@@ -44,7 +44,7 @@ def rank_of(values: NDArray, tolerance: float, noise: float = 0.0) -> int:
 
 
 def noise_of(columns: ArrayLike) -> float:
-    """Return the rounding error of columns that a projection removes.
+    """Return the round-off error of columns that a projection removes.
 
     Args:
         columns: (m, n) columns before the projection.

@@ -110,8 +110,8 @@ def second_form(screw: ArrayLike, wrench: ArrayLike) -> NDArray:
     """Return the work of a wrench on the second-order part of a screw's change.
 
     To second order, ``exp(s + h) = exp(J h + D(h, h) / 2) exp(s)``.  This function
-    returns the matrix of ``w.D(h, h)``, computed to rounding from the series of J in
-    brackets.
+    returns the matrix of ``w.D(h, h)``, computed to machine precision from the series
+    of J in brackets.
 
     Args:
         screw: (..., 6) s [rad, m].

@@ -1,11 +1,11 @@
-"""Singular postures, at which the robot with locked drives gains a freedom.
+"""Singular postures, at which the robot with locked drives gains a degree of freedom.
 
 With locked drives, a robot keeps the freedoms that its closures allow.  At a singular
-posture, it has more freedoms than at nearby postures, because its closures are linearly
-dependent there to first order.  Small errors can then cause large motions, or none.
-Equations (17) to (27) are linear in the errors.  At such a posture, they determine
-neither whether the robot can be assembled nor the size of its errors.  Operation modes
-meet at singular postures (Zlatanov, Bonev, Gosselin 2002).
+posture, it has more degrees of freedom than at nearby postures, because its closures
+are linearly dependent there to first order.  Small errors can then cause large motions,
+or none.  Equations (17) to (27) are linear in the errors.  At such a posture, they
+determine neither whether the robot can be assembled nor the size of its errors.
+Operation modes meet at singular postures (Zlatanov, Bonev, Gosselin 2002).
 
 Start with :func:`is_singular`.
 """
@@ -29,7 +29,8 @@ _NOISE = 1e3  # singular values below this factor times the closure error count 
 
 
 def is_singular(robot: Robot, q: NDArray, T: NDArray) -> bool:
-    """Return whether the locked robot has more freedoms than at nearby postures.
+    """Return whether the locked robot has more degrees of freedom than at nearby
+    postures.
 
     Args:
         robot: robot of n frames.
@@ -37,8 +38,8 @@ def is_singular(robot: Robot, q: NDArray, T: NDArray) -> bool:
         T: (n, 4, 4) frames seen from the base.
 
     Returns:
-        True at a singular posture.  False if the number of freedoms is equal nearby,
-        which includes robots without drives.
+        True at a singular posture.  False if the number of degrees of freedom is equal
+        nearby, which includes robots without drives.
     """
     rank = int(locked_ranks(robot, T[None])[0])
     # if the rank equals the number of columns, no posture has a larger rank

@@ -97,13 +97,13 @@ class Conditions:
         row: (R,) indices of these rows in the history.
         target: (R, 3) [m] measured point, platform axes; None for the reference point.
         laws: contact springs in series with joints.
-        yields: compliant places with laws.
+        yields: compliant locations with laws.
         exact: whether the model with finite motions is used instead of the linear
             model.
         second_order: (R, 6) [rad, m] exact minus linear platform screw without load;
             see :func:`forcefit.assembly.measurement.predict.with_second_order`.
         rest: (R, n, 6) rest positions of the clearances relative to their bounds; None
-            if they follow from the least energy.
+            if they follow from the minimum energy.
         base: (6,) or (R, 6) [rad, m] rotation and translation of the measuring frame.
             They multiply the measured pose from the left.
         tool: (3,) or (R, 3) [m] vector from the reference point to the measured point,

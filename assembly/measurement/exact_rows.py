@@ -47,7 +47,8 @@ def solve_rows(
     """Return the platform screws of finite motions under every row's loads.
 
     Args:
-        conditions: R rows of a robot without clearances, all with finite motions.
+        conditions: conditions of R measurements of a robot without clearances, all with
+            finite motions.
         linear_deflections: (R, s) [rad or m] deflections of s contacts in the linear
             model.
 
@@ -115,7 +116,7 @@ def _solve(rows: Rows) -> tuple[NDArray, NDArray]:
     converged &= np.abs(state.residual).max(axis=1, initial=0.0) <= _CLOSURE_TOLERANCE
     converged &= np.all(np.abs(state.motions) <= flexible.limit, axis=1)
     _, free_forces, _ = state.imbalance()
-    # without loads, wrenches are only rounding errors
+    # without loads, wrenches are only round-off errors
     zero_load = _ZERO_LOAD / flexible.softness
     largest = np.abs(state.total_wrenches / rows.scale).max(
         axis=(0, 2, 3), initial=zero_load

@@ -172,7 +172,7 @@ def with_second_order(conditions: Conditions) -> Conditions:
     configuration; effects of the load remain linear.
 
     Args:
-        conditions: R rows, as declared.
+        conditions: conditions of R measurements, as declared.
 
     Returns:
         The conditions, with ``second_order``.
@@ -197,7 +197,7 @@ def with_finite_motions(conditions: Conditions) -> Conditions:
     loads.  The declared model is then exact, and effects are added to first order.
 
     Args:
-        conditions: R rows, as declared.
+        conditions: conditions of R measurements, as declared.
 
     Returns:
         The conditions, with ``second_order`` and without ``exact``.
@@ -208,7 +208,7 @@ def with_finite_motions(conditions: Conditions) -> Conditions:
 def _finite_part(conditions: Conditions, one_by_one: int | None = None) -> NDArray:
     """Return (R, 6) exact minus linear platform screws; zero if a solution is missing.
 
-    Compliant places with laws are solved by the linear model.
+    Compliant locations with laws are solved by the linear model.
     """
     conditions = replace(conditions, yields=())
     exact, linear = (
@@ -225,7 +225,7 @@ def with_rest_positions(conditions: Conditions) -> Conditions:
     result is correct to first order as long as the contact points do not change.
 
     Args:
-        conditions: R rows.
+        conditions: conditions of R measurements.
 
     Returns:
         The conditions, with ``rest``; clearances are centred in rows without a
@@ -245,7 +245,7 @@ def read(conditions: Conditions, screws: NDArray) -> NDArray:
     """Return the device's readings of platform screws.
 
     Args:
-        conditions: R rows.
+        conditions: conditions of R measurements.
         screws: (R, 6) [rad, m] rotation vector of R R_nominal^T and translation of the
             platform's origin, base axes.
 
@@ -261,7 +261,7 @@ def read(conditions: Conditions, screws: NDArray) -> NDArray:
     shift = screws[:, 3:] + lever + tool
     base = rotation_matrix(conditions.base[..., :3])
     # the device's rotation acts on the position itself; without a rotation there is no
-    # rounding error
+    # round-off error
     translation = _turned(base - np.eye(3), p + arm) + _turned(base, shift)
     translation += conditions.base[..., 3:]
     turns = conditions.base[..., :3].any()
@@ -327,7 +327,7 @@ def assemble_row(
 def _assemble_yielding(
     row: Conditions, bodies: NDArray | None, carried: NDArray | None
 ) -> Assembly | ExactAssembly:
-    """Solve one row with compliant places that have laws."""
+    """Solve one row with compliant locations that have laws."""
 
     def solve(held: Conditions) -> tuple[Assembly | ExactAssembly, NDArray]:
         assembly = assemble_row(held, 0, bodies, carried)
@@ -371,7 +371,7 @@ def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
 
 
 def _linear(conditions: Conditions) -> tuple[NDArray, NDArray, NDArray]:
-    """Solve rows of robots without clearances and without compliant places.
+    """Solve rows of robots without clearances and without compliant locations.
 
     Returns:
         (R, 6) platform screws, (R, 6n) joint wrenches of the linear model, and (R,)

@@ -50,7 +50,7 @@ class Rows:
     """Rows to be solved, with the quantities that do not change in the iteration.
 
     Attributes:
-        conditions: R rows.
+        conditions: conditions of R measurements.
         flexible: linear model at the distinct postures.
         posture_of_row: (R,) index of each row's posture among the distinct postures.
         linear_deflections: (R, s) [rad or m] deflections of contacts in the linear

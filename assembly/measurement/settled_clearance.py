@@ -33,7 +33,7 @@ def with_clearances_taken_up(conditions: Conditions) -> tuple[Conditions, NDArra
     """Return the conditions with clearances replaced by their screws under the load.
 
     Args:
-        conditions: R rows of a robot with clearances.
+        conditions: conditions of R measurements of a robot with clearances.
 
     Returns:
         The same rows for a robot without clearances, whose errors include these screws.
@@ -69,7 +69,8 @@ def with_clearances_at_rest(conditions: Conditions) -> Conditions:
     """Return the conditions with clearances replaced by their rest positions.
 
     Args:
-        conditions: R rows of a robot with clearances, and with ``rest``.
+        conditions: conditions of R measurements of a robot with clearances, and with
+            ``rest``.
 
     Returns:
         The same rows for a robot without clearances, whose errors include these screws.

@@ -22,7 +22,7 @@ def variable(conditions: Conditions, name: str) -> NDArray:
     """Return the values of a variable in all rows.
 
     Args:
-        conditions: R rows.
+        conditions: conditions of R measurements.
         name: public name of the variable, which must not be a wrench.
 
     Returns:
@@ -48,7 +48,7 @@ def past(conditions: Conditions, names: Iterable[str]) -> tuple[History, NDArray
     """Return the history that contains the rows of the conditions.
 
     Args:
-        conditions: R rows.
+        conditions: conditions of R measurements.
         names: names of the required variables.
 
     Returns:
@@ -68,7 +68,7 @@ def with_history(conditions: Conditions) -> Conditions:
     """Return the conditions as rows measured in sequence, as in a campaign.
 
     Args:
-        conditions: R rows, as declared.
+        conditions: conditions of R measurements, as declared.
 
     Returns:
         The conditions; selections by :meth:`Conditions.take` retain the whole history.

@@ -42,7 +42,7 @@ from forcefit.assembly.model.links import (
     own_screws,
 )
 
-# relative size below which an eigenvalue counts as a rounding error. If an eigenvalue
+# relative size below which an eigenvalue counts as a round-off error. If an eigenvalue
 # is between this size and RANK, the numerical rank is ambiguous
 _ROUNDING = 1e-13
 # largest padding relative to the number of rows; beyond it, rows are solved one by one

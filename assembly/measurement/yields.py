@@ -37,7 +37,7 @@ class Yields:
     """Compliant places of a robot, described by columns of small screws.
 
     Attributes:
-        conditions: R rows of a robot of n frames.
+        conditions: conditions of R measurements of a robot of n frames.
     """
 
     conditions: Conditions
@@ -119,12 +119,12 @@ def with_deflections(
     """Return conditions with given deflections as stress-free screws, without laws.
 
     Args:
-        conditions: R rows.
-        places: (6n, m) unit screws of the compliant places.
+        conditions: conditions of R measurements.
+        places: (6n, m) unit screws of the compliant locations.
         give: (R, m) [rad or m] deflections.
 
     Returns:
-        The conditions without compliant places.
+        The conditions without compliant locations.
     """
     screws = (give @ places.T).reshape(conditions.errors.shape)
     return replace(conditions, errors=conditions.errors + screws, yields=())
@@ -135,10 +135,10 @@ def settle_yields(
     solve: Callable[[Conditions], tuple[T, NDArray]],
     A: Callable[[Yields], NDArray],
 ) -> T:
-    """Solve conditions whose compliant places deflect by their laws.
+    """Solve conditions whose compliant locations deflect by their laws.
 
     Args:
-        conditions: R rows.
+        conditions: conditions of R measurements.
         solve: function that returns solutions and (R, 6n) joint wrenches without laws.
         A: (R, t, m) first-order derivative of the laws' wrenches with respect to the
             deflections.
@@ -162,14 +162,15 @@ def settle_yields(
 
 
 def with_springs(conditions: Conditions, row: int) -> Conditions:
-    """Return one row whose linear compliant places are springs in series with joints.
+    """Return one row whose linear compliant locations are springs in series with
+    joints.
 
     Args:
         conditions: conditions of all rows.
         row: index of the row.
 
     Returns:
-        Conditions of the row.  Compliant places with a nonlinear law or without
+        Conditions of the row.  Compliant locations with a nonlinear law or without
         positive compliance remain.
     """
     one, left = conditions.take([row]), []

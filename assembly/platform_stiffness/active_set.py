@@ -1,16 +1,16 @@
 r"""Newton's method for an equilibrium at which the loaded clearances are known.
 
 A clearance is called pressed here if it is at its bound and carries a force.  Cone
-programmes are solved up to a certified gap: pressed clearances are within 1e-6 of their
-bounds, and their forces have the same accuracy.  Once the pressed clearances are known,
+programmes are solved up to a certified gap: closed clearances are within 1e-6 of their
+bounds, and their forces have the same accuracy.  Once the closed clearances are known,
 the conditions of equilibrium are equations,
 
     [ H   A'  N ] [ dx       ]     [ g ]      g = H_y y - loads - A' lambda + N f
     [ A   0   0 ] [ -dlambda ] = - [ r ],     r = A x + misfit
     [ N'  0   0 ] [ df       ]     [ c ]      c = (|u_k|^2 - 1) / 2
 
-which Newton's method solves to rounding.  N contains the normals u_k of the bounds of
-pressed clearances.
+which Newton's method solves to machine precision.  N contains the normals u_k of the
+bounds of closed clearances.
 
 Sources:
     Nocedal, Wright (2006), Numerical Optimization, sections 16.2 and 18.1.
@@ -38,7 +38,7 @@ _RANK = 1e-10  # relative size below which a singular value counts as zero
 _FLAT = 1e-12  # relative to the largest curvature: smaller curvatures count as zero
 _STEPS = 4  # largest number of Newton steps; two are usual
 _SETTLED = 1e-14  # [-] largest accepted relative excess of a clearance over its bound
-_GUESSES = 3  # largest number of guesses of the pressed clearances
+_GUESSES = 3  # largest number of guesses of the closed clearances
 
 
 def contacts(assembly: Assembly) -> tuple[NDArray, NDArray]:
@@ -49,7 +49,7 @@ def contacts(assembly: Assembly) -> tuple[NDArray, NDArray]:
     decides whether the clearance is pressed.
 
     Args:
-        assembly: the manipulator with least energy.
+        assembly: the manipulator with minimum energy.
 
     Returns:
         Two masks (cones,) bool: clearances that carry a force, and clearances at their
@@ -73,14 +73,15 @@ def bound_forces(assembly: Assembly) -> NDArray:
 
 
 def settle(assembly: Assembly) -> Assembly:
-    """Refine an equilibrium of (22) to rounding, with pressed clearances at bounds.
+    """Refine an equilibrium of (22) to machine precision, with closed clearances at
+    bounds.
 
     Args:
-        assembly: the manipulator with least energy, as computed by a cone solver.
+        assembly: the manipulator with minimum energy, as computed by a cone solver.
 
     Returns:
         The result of Newton's method; the given assembly if no clearance is pressed, or
-        if the pressed clearances cannot be identified.
+        if the closed clearances cannot be identified.
     """
     pressed, _ = contacts(assembly)
     for _ in range(_GUESSES):
@@ -185,7 +186,7 @@ def newton_step(
         gradient: (N,) [J] gradient of the Lagrangian.
 
     Returns:
-        (N,) change of the unknowns, and (m,) change of the multipliers; each of least
+        (N,) change of the unknowns, and (m,) change of the multipliers; each of minimum
         norm if it is not unique.
     """
     closing = -np.linalg.lstsq(held, left, rcond=_RANK)[0]

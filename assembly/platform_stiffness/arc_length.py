@@ -9,8 +9,8 @@ to it,
         [ Z'HZ   -Z'q ] [ t       ]     [ unbalanced force       ]
         [ tau_x   tau ] [ dlambda ] = - [ error of step's length ].
 
-Z contains the motions that keep the closures, H is the exact second derivative of the
-potential, q the work of a unit load, and tau the direction of the step.  Stable and
+Z contains the motions that preserve the closures, H is the exact second derivative of
+the potential, q the work of a unit load, and tau the direction of the step.  Stable and
 unstable equilibria are found.  Clearances are fixed at zero.
 
 The load is critical if an eigenvalue of Z'HZ changes its sign.  At a limit point, the

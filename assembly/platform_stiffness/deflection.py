@@ -4,7 +4,7 @@ One component of the load is changed through a list of values while the others a
 constant.  At each value, the equilibrium is computed by problem (22) or with finite
 motions.  With finite motions, each computation starts from the previous equilibrium, so
 that a path is followed forwards or backwards.  The curve has a kink where the set of
-pressed clearances (clearances that carry a force) changes.  The load is critical where
+closed clearances (clearances that carry a force) changes.  The load is critical where
 the least second derivative of the potential passes through zero.  There, the
 equilibrium branches, or it ends and the platform jumps to another equilibrium.
 Bisection brackets these loads.
@@ -53,12 +53,12 @@ _HALVINGS = 14  # bisections that locate an event to 6e-5 of a load step
 # product of force and bound, relative to the largest product, that counts as zero
 _CARRIES = 1e-6
 # largest number of contact changes that are followed within a load step: in symmetric
-# robots, rounding errors can cause forces in some contacts
+# robots, round-off errors can cause forces in some contacts
 _CHANGES = 8
 # platform motion, relative to the largest motion in a mode, below which the platform
 # counts as fixed
 _STAYS = 1e-6
-_STILL = 1e-12  # smaller motions, in characteristic lengths, count as rounding errors
+_STILL = 1e-12  # smaller motions, in characteristic lengths, count as round-off errors
 # a motion is a jump if it exceeds the motion predicted by both tangents by this factor
 _JUMP = 5.0
 # relative to the largest load: under smaller loads, clearances can leave the pose
@@ -260,7 +260,7 @@ def _solve(
             posture, wrench, gravity=gravity, progress=progress, method=method
         )
     active, force = active_clearances(equilibrium.expansion)
-    # omit contacts whose forces are only rounding errors
+    # omit contacts whose forces are only round-off errors
     active &= force > _CARRIES * force.max(initial=0.0)
     names = clearance_names(equilibrium.expansion.placement.model.joints, active)
     return _Point(value, equilibrium, exact_tangent(equilibrium, "unloading"), names)

@@ -1,7 +1,7 @@
 r"""Tangent stiffness of the exact equilibrium on SE(3), with geometric stiffness.
 
 Near an equilibrium the unknowns move by Z t, along closures and along the bounds of
-pressed clearances.  The total potential (energy minus the work of loads) changes by
+closed clearances.  The total potential (energy minus the work of loads) changes by
 t.Z'HZt / 2.  H is the exact second derivative of the Lagrangian.  It includes the
 springs and the forces of assembly and load on parts that rotate.  A small additional
 wrench w does the work w.(V Z t), where V Z t is the platform's small motion in base

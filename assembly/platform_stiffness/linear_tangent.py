@@ -10,7 +10,7 @@ C = L L', where L contains the platform's screws.  The method does not add compl
 so stiff and soft springs keep their relative accuracy.
 
 A clearance is either fixed at zero (the classical model), or has the state of problem
-(22): free within its bound, or pressed against it.  A pressed clearance is rigid in the
+(22): free within its bound, or pressed against it.  A closed clearance is rigid in the
 direction normal to its bound.  Along a round bound it is compliant: the curvature
 rotates the force f [J, per unit of the bound], which so acts as a spring of stiffness
 f.
@@ -49,7 +49,7 @@ from forcefit.assembly.solvers.method import Method
 
 Side = Literal["loading", "unloading"]
 _RANK = 1e-10  # relative size below which a singular value counts as zero
-_NOISE = 1e-12  # relative rounding error of a column that a projection removes
+_NOISE = 1e-12  # relative round-off error of a column that a projection removes
 
 
 def without_clearance(posture: Posture) -> PlatformStiffness:
@@ -70,7 +70,7 @@ def in_contact(assembly: Assembly, side: Side = "loading") -> PlatformStiffness:
     """Return the tangent of problem (22), with each clearance free or pressed.
 
     Args:
-        assembly: the manipulator with least energy under its loads.
+        assembly: the manipulator with minimum energy under its loads.
         side: state of clearances at their bound without a force: ``"loading"``, in
             which they stay at the bound, or ``"unloading"``, in which they leave it.
 
@@ -85,7 +85,7 @@ def active_tangent(assembly: Assembly, side: Side = "loading") -> PlatformStiffn
     """Return the tangent stiffness of an assembly that is nearly in equilibrium.
 
     Args:
-        assembly: assembly with clearances that are accurate to rounding.
+        assembly: assembly with clearances that are accurate to machine precision.
         side: state of clearances at their bound without a force, see
             :func:`in_contact`.
 

@@ -174,7 +174,8 @@ class Stiffnesses:
         d, scale = np.asarray(direction), np.repeat([self.length, 1.0], 3)
         compliance = np.sum((self.springs @ d) ** 2, axis=1)
         largest = np.sum((self.springs * scale) ** 2, axis=(1, 2))
-        # along a motion that no part allows, the compliance consists of rounding errors
+        # along a motion that no part allows, the compliance consists of round-off
+        # errors
         still = compliance <= _RANK**2 * largest * np.sum((d / scale) ** 2)
         with np.errstate(divide="ignore"):
             K = 1.0 / np.where(still, 0.0, compliance)

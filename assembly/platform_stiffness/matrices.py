@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     import xarray
 
 _RANK = 1e-10  # relative size below which a motion counts as zero
-_ROUNDING = 1e-12  # relative rounding error of platform motions
+_ROUNDING = 1e-12  # relative round-off error of platform motions
 _UNTOUCHED = 1e-9  # component of a unit screw below which it counts as zero
 
 
@@ -214,8 +214,8 @@ class PlatformStiffness:
         basis = null_space((scale * self.free).T) if self.free.size else np.eye(6)
         whole = scale * self.root
         U, S, Vt = np.linalg.svd(basis.T @ whole)
-        # the contribution of springs along free motions causes rounding errors in other
-        # directions
+        # the contribution of springs along free motions causes round-off errors in
+        # other directions
         rounding = _ROUNDING * np.abs(whole).max(initial=0.0)
         rank = int(np.sum(S > max(_RANK * S.max(initial=0.0), rounding)))
         inverse = np.diag(1.0 / S[:rank])
@@ -271,7 +271,7 @@ class PlatformStiffness:
         screws = self.root.T @ d
         largest = np.linalg.norm(self._scale[:, None] * self.root)
         if np.linalg.norm(screws) <= _RANK * largest * np.linalg.norm(d / self._scale):
-            return 0.0  # no part allows this motion, so the value is a rounding error
+            return 0.0  # no part allows this motion, so the value is a round-off error
         return float(self.signs @ screws**2)
 
     def _held(self, d: NDArray) -> float:
@@ -343,7 +343,7 @@ def unit_screws(screws: NDArray, length: float) -> NDArray:
 
     Args:
         screws: (6, k) [rad, m] in units of about 1 rad or length; much smaller screws
-            count as rounding errors.
+            count as round-off errors.
         length: [m] length by which rotations are multiplied.
 
     Returns:

@@ -2,7 +2,7 @@ r"""Derivatives of the platform's compliance with respect to one number of the r
 
 The stiffness at an equilibrium depends on a number p directly, and through the
 equilibrium (x, lambda, f): unknowns, multipliers of the closures and forces of the
-pressed clearances.  The change of the equilibrium follows from the derivative of its
+closed clearances.  The change of the equilibrium follows from the derivative of its
 conditions,
 
     [ H   A'  N ] [ dx       ]     [ dg/dp ]
@@ -10,13 +10,13 @@ conditions,
     [ N'  0   0 ] [ df       ]     [   0   ]
 
 (:mod:`.active_set`).  Here g is the gradient of the Lagrangian, r the residual of the
-closures at x, and N the normals of the bounds of pressed clearances.  Both g and r are
+closures at x, and N the normals of the bounds of closed clearances.  Both g and r are
 known in closed form for any p, so no problem is solved again.  The tangent is then
 evaluated one step ahead and one step back along (p, x, lambda).  The error of these
 central differences is proportional to the square of the step.
 
-Pressed clearances are assumed to remain pressed.  At a change of contact, the tangent
-has no derivative, and the result is NaN.
+Closed clearances are assumed to remain closed.  At a change of contact, the tangent has
+no derivative, and the result is NaN.
 
 Sources:
     Haftka, Adelman (1989), Recent developments in structural sensitivity analysis

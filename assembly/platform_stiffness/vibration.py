@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     import xarray
 
 _NULL = 1e-12  # eigenvalues below this share of the largest count as zero
-_ROUNDING = 1e-14  # rounding error of the mass matrix, relative to its largest entry
+_ROUNDING = 1e-14  # round-off error of the mass matrix, relative to its largest entry
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +141,7 @@ def natural_modes(
     if not np.trace(M) > 0.0:
         raise BadInput(_no_mass(posture.robot))
     squares, modes = _modes(H, M, rounding)
-    if not squares.size:  # the moving parts have no mass except for rounding errors
+    if not squares.size:  # the moving parts have no mass except for round-off errors
         raise BadInput(_no_mass(posture.robot))
     squares, modes, idle = _without_idle(
         squares, modes, platform_moves(equilibrium.expansion) @ D
@@ -198,7 +198,7 @@ def _modes(K: NDArray, M: NDArray, rounding: NDArray) -> tuple[NDArray, NDArray]
     Args:
         K: (k, k) stiffness.
         M: (k, k) mass.
-        rounding: (k, k) bound of the rounding errors of M as a quadratic form.
+        rounding: (k, k) bound of the round-off errors of M as a quadratic form.
 
     Returns:
         (m,) squared frequencies and (k, m) modes.

@@ -66,8 +66,8 @@ def mobility_of(posture: Posture) -> dict[str, Any]:
 
     Returns:
         The counts of :class:`forcefit.assembly.kinematics.mobility.Mobility`, the
-        platform's motions, and whether there are more freedoms than at nearby postures;
-        then also the counts at the nearby postures.
+        platform's motions, and whether there are more degrees of freedom than at nearby
+        postures; then also the counts at the nearby postures.
     """
     here = mobility(posture)
     near = mobility_near(posture, here)
@@ -162,7 +162,7 @@ def _direction(d: Any) -> str:
 
 
 def _plain(value: float) -> str:
-    """Return a number with 4 digits as text; rounding errors become 0."""
+    """Return a number with 4 digits as text; round-off errors become 0."""
     return f"{0.0 if abs(value) < 1e-9 else value:.4g}"
 
 

@@ -1,7 +1,7 @@
 """Animation of a robot whose loops close, from open loops to the assembly.
 
 In the first picture, the bodies have only their geometric errors, so closures are open.
-The deformations and joint motions of the least-energy solution, problem (22), then
+The deformations and joint motions of the minimum-energy solution, problem (22), then
 increase from zero to their values.
 """
 

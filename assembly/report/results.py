@@ -296,7 +296,7 @@ def _linearisation_lines(results: dict[str, Any]) -> dict[str, str]:
         f"linearisation_{part}": float(np.linalg.norm(error[part]))
         for part in ("rotation", "translation")
     } | {"linearisation_energy": error["relative_energy"]}
-    # differences of equal solutions are rounding errors: 1e-12 rad, 1e-15 m, and 1e-11
+    # differences of equal solutions are round-off errors: 1e-12 rad, 1e-15 m, and 1e-11
     # of the energy
     least = (1e-12, 1e-15, 1e-11)
     for name, small in zip(sizes, least, strict=True):
@@ -328,10 +328,10 @@ def status_line(results: dict[str, Any]) -> str:
 
 
 def worst(assembly: Assembly) -> dict[str, Any] | None:
-    """Return certified bounds of the largest pose error for the assumption ``frozen``.
+    """Return certified bounds on the largest pose error for the assumption ``frozen``.
 
     Args:
-        assembly: the least-energy solution.
+        assembly: the minimum-energy solution.
 
     Returns:
         Upper bounds ``rotation`` [rad] and ``translation`` [m]; None if there is no

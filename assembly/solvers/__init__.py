@@ -1,5 +1,5 @@
-"""Solvers of cone programmes on plain arrays, independent of robots.
+"""Solvers of cone programs on plain arrays, independent of robots.
 
-Start with ``conic.py``, the second-order cone programme with its certificate.
+Start with ``conic.py``, the second-order cone program with its certificate.
 ``one_problem.py`` calls the compiled methods of ``assembly/kernels/solvers``.
 """

@@ -1,6 +1,6 @@
-"""Second-order cone programmes in the clearances, with certified solutions.
+"""Second-order cone programs in the clearances, with certified solutions.
 
-The module solves two problems: the least energy of a reduced problem (22), and the
+The module solves two problems: the minimum energy of a reduced problem (22), and the
 least factor on the clearances of problem (21).  Both are scaled here to size 1.
 Clarabel solves the second problem.  With ``"reference"``, Clarabel also solves the
 first problem, and :mod:`forcefit.assembly.solvers.pressed_cones` refines each solution.
@@ -70,7 +70,7 @@ class ConicSolution:
             the duality gap.
         rigid_multipliers: (p,) [J] multipliers of the rows without springs.
         value: [J] value of the objective.
-        bound: [J] certified lower bound of the objective.
+        bound: [J] certified lower bound on the objective.
         feasible: whether there are clearances that satisfy the rows without springs.
     """
 
@@ -262,7 +262,7 @@ def _certify(
 
 
 def _energy_bound(problem: ConeProgramme, spring: NDArray, rigid: NDArray) -> float:
-    """Return a certified lower bound of problem (22) from estimated multipliers.
+    """Return a certified lower bound on problem (22) from estimated multipliers.
 
     For every y and n:  |Gu + h|^2/2 - d.u  >=  y.(Gu + h) - y.y/2 - d.u + n.(k - Hu).
     The minimum of the right side over the unit cones has a closed form.
@@ -382,7 +382,7 @@ def _proves_no_point(
 ) -> bool:
     """Return whether n proves that no u with |u_k| <= radius_k satisfies H u = k."""
     # n.H u is at most the sum of radius_k |(H^T n)_k|, so n.k > that sum is a proof if
-    # the difference also exceeds the rounding errors of the terms
+    # the difference also exceeds the round-off errors of the terms
     most = float(cone_sizes(H.T @ n, group) @ radius)
     rounding = 1e-13 * float(np.abs(n) @ (np.abs(k) + np.abs(H).sum(axis=1)))
     return bool(float(n @ k) > most + rounding)

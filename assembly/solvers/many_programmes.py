@@ -1,4 +1,4 @@
-"""Compiled solution of cone programmes with equal matrices and many right sides.
+"""Compiled solution of cone programs with equal matrices and many right sides.
 
 Each programme has the form of :func:`forcefit.assembly.solvers.conic.minimise_energy`.
 Each lane of the processor's vector registers solves one programme.  Programmes whose
@@ -133,7 +133,7 @@ def closest_of_same_energy(
 
 
 def _closest(u: NDArray, last: NDArray, rows: NDArray, group: NDArray) -> NDArray:
-    """Return the closest point as the solution of a cone programme."""
+    """Return the closest point as the solution of a cone program."""
     eye, zero = np.eye(len(u)), np.zeros(len(u))
     try:
         found = minimise_energy(eye, -last, zero, rows, rows @ u, group)

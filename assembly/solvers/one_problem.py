@@ -84,7 +84,7 @@ def farthest_points(
     Returns:
         u (k, nu) and the multipliers n (k, p) of the rows at the last iterate.  They
         satisfy d.u <= n.right + sum |(d - rows^T n)_c|.  Also (k,) bool, True if the
-        gap between both sides is small enough and the rows hold to rounding.
+        gap between both sides is small enough and the rows hold to machine precision.
     """
     count, (p, nu) = len(directions), rows.shape
     points, multipliers = np.zeros((count, nu)), np.zeros((count, p))

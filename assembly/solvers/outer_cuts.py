@@ -1,7 +1,7 @@
 """Bounds of the farthest screw of a convex set by cuts, in numpy (reference method).
 
 Each support function d.x <= h(d) cuts off a half space.  The cuts form a polytope
-around the set.  The farthest corner of the polytope is an upper bound of the distance.
+around the set.  The farthest corner of the polytope is an upper bound on the distance.
 The farthest point that attains a support function is a lower bound.  The next cut is
 made in the direction of that corner.
 

@@ -2,7 +2,7 @@ r"""Refinement of a minimum of :func:`.conic.minimise_energy` in numpy.
 
 A cone solver stops at a small duality gap.  If the cones at their bounds, with contact
 forces f, are known, the minimum satisfies equations that Newton's method solves to
-rounding.  Let y be the springs and n the multipliers of H:
+machine precision.  Let y be the springs and n the multipliers of H:
 
     G u + h - y = 0,  G' y - d - H' n + f_c u_c = 0,  H u = k,  (|u_c|^2 - 1) / 2 = 0.
 

@@ -24,7 +24,7 @@ from tests.robots_for_tests import random_robot
 
 @pytest.mark.parametrize("size", [1e-7, 1e-2, 0.5, 1.5])
 def test_finite_motion_equals_the_matrix_exponential_of_its_screw(rng, size):
-    """Equal to SciPy's matrix exponential up to rounding."""
+    """Equal to SciPy's matrix exponential up to machine precision."""
     s = size * rng.normal(size=6)
     generator = np.zeros((4, 4))
     x, y, z = s[:3]

@@ -31,7 +31,7 @@ def test_solutions_with_nan_or_wrong_values_are_not_certified():
     ):
         assert unproved(spoilt_answer)
     weaker = replace(answer, multipliers=0.9 * answer.multipliers)
-    assert "the minimum of the energy is certified to" in unproved(weaker)
+    assert "the minimum energy is certified to within" in unproved(weaker)
     assert "stays open" in unproved(replace(answer, elastic=1.1 * answer.elastic))
     assert "exceeded by" in unproved(replace(answer, clearances=2 * answer.clearances))
 
@@ -153,10 +153,10 @@ def test_rotation_and_translation_are_certified_to_their_own_tolerances():
     assert np.abs(assembly.platform_screw[0]) == pytest.approx(0.1)
     open_ = replace(bound_screw(assembly), rotation_error=9e-5, translation_error=2e-5)
     (sentence,) = unproved_screw(assembly, open_)
-    assert "translation is certified to 2.0e-05 m only, expected 1.0e-05 m" in sentence
+    assert "translation is certified to within 2.0e-05 m only, expected 1.0e-05 m" in sentence
     open_ = replace(open_, rotation_error=2e-4, translation_error=9e-6)
     (sentence,) = unproved_screw(assembly, open_)
-    assert "rotation is certified to 2.0e-04 rad only, expected 1.1e-04 rad" in sentence
+    assert "rotation is certified to within 2.0e-04 rad only, expected 1.1e-04 rad" in sentence
 
 
 def disturbed(rng, seed):
@@ -216,7 +216,7 @@ def test_any_wrenches_imply_a_lower_bound_of_the_energy(rng):
 
 
 def test_joining_solutions_keeps_the_certificate_of_each_point():
-    """The bound is the energy less the gap, also above the least energy."""
+    """The bound is the energy less the gap, also above the minimum energy."""
     robot = coaxial_beams([0, 0, 0, 1e-4, 0, 0])
     best = solve_assembly(home_posture(robot))
     worse = replace(best, elastic=1.001 * best.elastic)

@@ -117,7 +117,7 @@ def test_robot_that_cannot_be_assembled_has_no_pose_error_bounds():
 
 
 def test_load_on_a_motion_freed_by_the_assumption_is_reported():
-    """A hinge held by a soft spring turns freely under the assumption free."""
+    """A hinge held by a soft spring rotates freely under the assumption free."""
     spring = np.diag([np.inf, np.inf, 1e2, *[np.inf] * 3])
     robot = Robot("sprung door", "tip", (
         Frame("hinge", joint="revolute", joint_stiffness=spring),

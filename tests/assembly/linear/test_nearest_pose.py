@@ -107,7 +107,7 @@ def nearest_by_cvxpy(posture, point, load=None):
 @pytest.mark.parametrize("name", ["five_bar", "delta", "hexapod", "four_bar"])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_reported_pose_inside_the_zone_is_the_nearest_to_the_nominal_pose(name, seed):
-    """Without load the springs are unloaded: a cone programme solved by cvxpy."""
+    """Without load the springs are unloaded: a cone program solved by cvxpy."""
     posture = erring(name, seed)
     here = as_declared(posture, point=POINT)
     found = predict(here)

@@ -1,4 +1,4 @@
-"""The certificate of the platform screw against least energies in exact fractions."""
+"""The certificate of the platform screw against minimum energies in exact fractions."""
 
 from dataclasses import replace
 from fractions import Fraction

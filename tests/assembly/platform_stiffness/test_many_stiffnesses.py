@@ -104,7 +104,7 @@ def test_tangents_of_many_postures_are_bit_identical_to_those_of_single_postures
 
 
 def test_free_motion_of_another_body_is_refused_with_a_fixed_platform():
-    """A wheel turns freely, driven by a couple on its rim."""
+    """A wheel rotates freely, driven by a couple on its rim."""
     frames = (
         Frame("wheel", joint="revolute"),
         Frame("rim", "wheel", [0.1, 0, 0]),

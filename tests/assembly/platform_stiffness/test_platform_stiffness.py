@@ -121,10 +121,10 @@ LOAD = np.array([3.0, -5.0, 2.0, 150.0, 80.0, -200.0])
 
 @pytest.mark.parametrize("case", NUMBERS["cases"], ids=lambda case: case["name"])
 def test_paper_robot_tangent_equals_differences_of_its_equilibria(case):
-    """At the paper's full errors, with pressed clearances and internal forces.
+    """At the paper's full errors, with closed clearances and internal forces.
 
     The cone solver stops at a gap of 1e-8 of the energy, which leaves 1e-4 in screws;
-    the exact equilibrium is solved to rounding.
+    the exact equilibrium is solved to machine precision.
     """
     posture = place_robot(irsbot2_with(case), {"tx": 0.1, "tz": -0.5})
     linear, exact = solve_assembly(posture, LOAD), solve_exact(posture, LOAD)

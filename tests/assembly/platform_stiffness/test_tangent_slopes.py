@@ -70,7 +70,7 @@ def test_slope_of_a_pressed_ball_by_its_radius_is_1_over_the_load(state):
     ],
 )
 def test_slopes_of_the_paper_robot_equal_differences_of_solutions(state, path, step):
-    """At its full errors, under load; pressed clearances stay pressed."""
+    """At its full errors, under load; closed clearances stay pressed."""
     design, asked = design_of(PAPER), TangentState(state, LOAD, at=(0, 0, 0.05))
     slope = stiffness_slopes(design, [path], POSE, asked=asked)[path]
 

@@ -72,7 +72,7 @@ def test_energy_pose_and_wrenches_equal_the_reference(case, point):
     assert answer.closure_residual() < 1e-13
     assert answer.clearance_excess() < 1e-12
     assert answer.energy == pytest.approx(point["energy"], rel=1e-9, abs=1e-11)
-    # a gap of 1e-11 J moves the least energy's place by its root, 1e-5 of itself
+    # a gap of 1e-11 J moves the minimum energy's place by its root, 1e-5 of itself
     scale = np.abs(np.reshape(point["x_opt"], (2, 3))).max(axis=1).repeat(3)
     assert np.abs((answer.platform_screw - point["x_opt"]) / scale).max() < 1e-5
     # a link holding all of the energy would move by the root of 2 E C_ii

@@ -72,7 +72,7 @@ def arm_jacobian(posture):
 
 
 def test_arm_compliance_equals_that_of_its_drives(rng):
-    """C = J K^-1 J^T to rounding, with the Jacobian of the axes."""
+    """C = J K^-1 J^T to machine precision, with the Jacobian of the axes."""
     robot = only_drives_give(BUILT_IN["arm6"]())
     posture = place_robot(robot, pose=random_pose("arm6", rng))
     J = arm_jacobian(posture)

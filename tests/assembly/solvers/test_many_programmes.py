@@ -1,4 +1,4 @@
-"""Many cone programmes of the same matrices, against Clarabel and by hand."""
+"""Many cone programs of the same matrices, against Clarabel and by hand."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""One cone programme, and one farthest screw: closed forms, Clarabel, proofs."""
+"""One cone program, and one farthest screw: closed forms, Clarabel, proofs."""
 
 import cvxpy as cp
 import numpy as np
@@ -57,7 +57,7 @@ def value(p, u):
 @pytest.mark.parametrize("widest", [1, 2, 3, 20])
 @pytest.mark.parametrize("springs", [0, 5])
 def test_least_energies_of_both_methods_are_above_both_bounds(rng, widest, springs):
-    """The certified bound of each method is at most the other's value."""
+    """The certified bound on each method is at most the other's value."""
     for _ in range(6):
         group = random_cones(rng, widest)
         p = rng.integers(0, max(1, min(4, len(group) - 2)))
