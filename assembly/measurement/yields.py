@@ -162,16 +162,15 @@ def settle_yields(
 
 
 def with_springs(conditions: Conditions, row: int) -> Conditions:
-    """Return one row whose linear compliant locations are springs in series with
-    joints.
+    """Replace linear compliant locations by springs in series with the joints.
 
     Args:
         conditions: conditions of all rows.
         row: index of the row.
 
     Returns:
-        Conditions of the row.  Compliant locations with a nonlinear law or without
-        positive compliance remain.
+        Conditions of one measurement.  Compliant locations that have a nonlinear law or
+        no positive compliance are retained.
     """
     one, left = conditions.take([row]), []
     frames = list(conditions.robot.frames)

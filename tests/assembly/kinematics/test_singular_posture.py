@@ -94,7 +94,7 @@ def test_pose_reached_only_by_rotating_the_platform_is_reported_as_another_mode(
 
 
 def test_unreachable_pose_message_states_that_home_is_singular():
-    with pytest.raises(BadInput, match=r"home is a singular posture: name all six"):
+    with pytest.raises(BadInput, match=r"home is a singular posture: specify all six"):
         place_robot(three_upu(), pose={"tz": HEIGHT, "rz": 3.0})
 
 

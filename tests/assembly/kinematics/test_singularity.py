@@ -123,8 +123,7 @@ def test_orthoglide_is_isotropic_at_home():
 
 
 def test_arm_with_aligned_wrist_axes_is_serially_singular():
-    """An arm's wrist with its fourth and sixth axes in line loses a degree of
-    freedom."""
+    """A wrist with aligned fourth and sixth axes loses a degree of freedom."""
     robot = load_robot("arm6")
     driven = [f.name for f in robot.frames if f.actuated]
     goals = np.full((2, len(robot.frames)), np.nan)

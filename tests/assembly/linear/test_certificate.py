@@ -153,10 +153,16 @@ def test_rotation_and_translation_are_certified_to_their_own_tolerances():
     assert np.abs(assembly.platform_screw[0]) == pytest.approx(0.1)
     open_ = replace(bound_screw(assembly), rotation_error=9e-5, translation_error=2e-5)
     (sentence,) = unproved_screw(assembly, open_)
-    assert "translation is certified to within 2.0e-05 m only, expected 1.0e-05 m" in sentence
+    assert (
+        "translation is certified to within 2.0e-05 m only, expected 1.0e-05 m"
+        in sentence
+    )
     open_ = replace(open_, rotation_error=2e-4, translation_error=9e-6)
     (sentence,) = unproved_screw(assembly, open_)
-    assert "rotation is certified to within 2.0e-04 rad only, expected 1.1e-04 rad" in sentence
+    assert (
+        "rotation is certified to within 2.0e-04 rad only, expected 1.1e-04 rad"
+        in sentence
+    )
 
 
 def disturbed(rng, seed):
