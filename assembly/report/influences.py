@@ -1,4 +1,4 @@
-"""Effect of the order of joining on the assembled robot, as text and values."""
+"""Effect of the order of the assembly steps on the assembled robot."""
 
 from itertools import takewhile
 from typing import Any
@@ -17,17 +17,17 @@ from forcefit.assembly.steps.state import State
 def influences_among_joins(
     machine: Machine, state: State, plan: Plan, number: int
 ) -> list[Influence]:
-    """Return the influences among consecutive joins that begin with a given step.
+    """Return the mutual influences of consecutive joins, starting at a given step.
 
     Args:
-        machine: columns and rows of the robot.
+        machine: columns and closure rows of the robot.
         state: state before the step.
-        plan: the steps.
+        plan: assembly steps.
         number: index of the step, from 0.
 
     Returns:
         The influences; empty if the step is not the first of consecutive joins, or if
-        clearances are loose.
+        clearances are open.
     """
     before = plan.steps[number - 1] if number else None
     if isinstance(before, Join) or not state.is_linear(machine):
@@ -37,11 +37,11 @@ def influences_among_joins(
 
 
 def about_influences(plan: Plan, found: list[Influence]) -> list[str]:
-    """Return sentences on whether the order matters and which steps move openings.
+    """Describe whether the order of the steps matters and which steps move openings.
 
     Args:
-        plan: the steps.
-        found: influences among the plan's joins.
+        plan: assembly steps.
+        found: influences among the joins of the plan.
 
     Returns:
         The sentences.
@@ -64,7 +64,7 @@ def about_influences(plan: Plan, found: list[Influence]) -> list[str]:
 
 
 def influence_values(pair: Influence) -> dict[str, Any]:
-    """Return the influence of one join on another as a dictionary of plain values.
+    """Convert the influence between two joins to a dictionary of plain values.
 
     Args:
         pair: influence between the two joins.
@@ -79,10 +79,10 @@ def influence_values(pair: Influence) -> dict[str, Any]:
 
 
 def about_order(plan: Plan) -> str:
-    """Return a sentence on whether the result of a plan depends on the order.
+    """Describe whether the result of a plan depends on the order of its steps.
 
     Args:
-        plan: the steps.
+        plan: assembly steps.
 
     Returns:
         The sentence.
