@@ -215,7 +215,7 @@ def _solve_one(
         if rows["outcome"][0] < _LEFT:
             break
         if bounded or not _bounds_matter(structure, rows["outcome"])[0]:
-            log_reference(robot.name, "least energy", 1, 1)
+            log_reference(robot.name, "minimum energy", 1, 1)
             return least_energy(posture, load, loads)
     multipliers, residual = rows["multipliers"], rows["residual"] + rounding
     drop_zeros(rows["energy"], rows["bound"], multipliers, residual, acting is not None)
@@ -264,7 +264,7 @@ def _solve_many(
     points = _of_rows(posture, joints, rows, load, loads, own)
     left = np.flatnonzero(rows["outcome"] >= _LEFT).tolist()
     if left and method == "compiled":
-        log_reference(robot.name, "least energy", len(left), count)
+        log_reference(robot.name, "minimum energy", len(left), count)
     for i in left:
         one = points[i]  # posture and loads of point i
         _record(rows, points.apart, i, _by_reference(one, own_axes_free))

@@ -156,7 +156,7 @@ def minimise_energy(
         if best is not None and _proved(best, scaled.h):
             break
     if best is None:
-        raise SolverFailed("least energy", status)
+        raise SolverFailed("minimum energy", status)
     joule = size**2
     return ConicSolution(
         clearances=best.clearances,

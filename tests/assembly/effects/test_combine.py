@@ -65,7 +65,7 @@ def standing():
 
 
 @pytest.mark.parametrize("name", IN_TURN)
-def test_combined_effect_predicts_the_same_reading_as_both_effects_applied_in_turn(
+def test_combined_effect_predicts_the_reading_of_both_effects_in_sequence(
     name, standing
 ):
     declared, found = ({name: values} for values in IN_TURN[name])
@@ -102,7 +102,7 @@ def test_effects_with_different_exponents_or_time_constants_cannot_be_combined()
     slow, slower = ({"a": 1e-5, "a.time_constant": t} for t in (60.0, 90.0))
     with pytest.raises(ValueError, match="two delayed expansions"):
         combined({"delayed_expansion": slow}, {"delayed_expansion": slower})
-    with pytest.raises(ValueError, match="two contact laws of one joint"):
+    with pytest.raises(ValueError, match="two contact laws in series at one joint"):
         combined({"contact_stiffening": law}, {"contact_stiffening": law})
     other = {"b.coefficient": 2e7, "b.exponent": 2.0}
     both = combined({"contact_stiffening": law}, {"contact_stiffening": other})

@@ -63,7 +63,7 @@ def test_thermal_expansion_lengthens_the_beam_along_its_axis():
     assert seen == pytest.approx([0, 0, 0, dL * cos(0.4), dL * sin(0.4), 0], abs=1e-18)
 
 
-def test_drive_compliance_turns_the_drive_by_moment_over_stiffness():
+def test_drive_compliance_rotates_the_drive_by_moment_over_stiffness():
     F = 30.0
     seen = change(
         here(arm(rigid=True), (0, 0, 0, 0, F, 0)), "drive_compliance", {"drive": K}
@@ -80,7 +80,7 @@ def test_base_compliance_deflects_by_the_force_and_its_moment():
     assert seen == pytest.approx(expected, rel=1e-6, abs=1e-12)
 
 
-def test_encoder_offset_turns_the_arm_by_that_angle():
+def test_encoder_offset_rotates_the_arm_by_the_offset():
     seen = change(here(arm(), q=0.7), "encoder_offset", {"drive": 1e-5})
     expected = [0, 0, 1e-5, -1e-5 * L * sin(0.7), 1e-5 * L * cos(0.7), 0]
     assert seen == pytest.approx(expected, rel=1e-4, abs=1e-10)
@@ -172,14 +172,14 @@ def test_load_moves_a_joint_to_the_bound_of_its_clearance():
     assert seen == pytest.approx(expected, rel=1e-6, abs=1e-9)
 
 
-def test_clearance_without_load_leaves_the_row_undetermined():
+def test_unloaded_clearance_leaves_the_reading_undetermined():
     values = {"joint_clearance": {"drive.radial": 2e-5}}
     found = predict(apply_effects(here(arm(rigid=True)), values))
     assert found.undetermined.all()
     assert found.deviation == pytest.approx(0.0, abs=1e-18)
 
 
-def test_friction_turns_an_elastic_drive_against_the_approach_direction():
+def test_friction_rotates_an_elastic_drive_against_the_approach_direction():
     for approach in (-1.0, 1.0):
         seen = change(
             here(arm(K), approach=approach), "friction_hysteresis", {"drive": 2.0}
@@ -275,7 +275,7 @@ def parallel():
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_effects_of_all_rows_together_equal_the_cone_solver(name, parallel):
+def test_effects_on_all_measurements_together_match_the_cone_solver(name, parallel):
     there = apply_effects(parallel, {name: CASES[name]})
     fast = predict(there).deviation
     slow = read(
@@ -286,7 +286,7 @@ def test_effects_of_all_rows_together_equal_the_cone_solver(name, parallel):
     assert np.abs(fast - slow).max() < 1e-7 * np.abs(fast).max()
 
 
-def test_friction_needs_an_elastic_joint_and_slip_a_joint_without_clearance():
+def test_friction_requires_an_elastic_joint_and_slip_a_joint_without_clearance():
     """Friction: a joint spring of any stiffness. Slip: no clearance except spin."""
     own = np.diag([np.inf, np.inf, 0.4, np.inf, np.inf, np.inf])
     robot = Robot("chain", "tip", (

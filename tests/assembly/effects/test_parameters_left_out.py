@@ -95,7 +95,7 @@ def test_functions_name_the_covariates_of_their_sessions(form, variables, needed
     assert list(covariates_of(in_one, ["b", "a"])) == needed
 
 
-def test_geometric_stiffening_without_finite_motions_is_refused():
+def test_geometric_stiffening_without_finite_motions_is_rejected():
     robot = replace(arm(K), effects={"geometric_stiffening": {}})
     check_covariates(robot, {}, finite=True)
     with pytest.raises(BadInput, match="is defined for finite motions only"):

@@ -112,7 +112,7 @@ def test_effect_units_depend_on_the_kind_of_joint(effect, name):
     ("drive_compliance", "{}.compliance", "{}"),
     ("base_compliance", "compliance.{}", "stiffness.{}"),
 ])  # fmt: skip
-def test_fitted_compliance_becomes_a_stiffness_and_zero_is_left_out(
+def test_fitted_compliance_becomes_a_stiffness_and_zero_is_omitted(
     effect, before, after
 ):
     found = {"rx": 2e-6, "tz": 1e-8, "rz": 0.0}

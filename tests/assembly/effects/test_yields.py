@@ -26,7 +26,7 @@ def loaded(q):
 
 
 @pytest.mark.parametrize("place", ["base", "drive"])
-def test_function_of_the_base_moment_turns_the_drive(place):
+def test_function_of_the_base_moment_rotates_the_drive(place):
     """The base's origin is the drive's, so both carry the same moment about z."""
     law = at_drive({"2": 1e-7}, variables=(f"wrench.{place}.mz",))
     turn = 1e-7 * (F * L * cos(0.5)) ** 2
@@ -34,7 +34,7 @@ def test_function_of_the_base_moment_turns_the_drive(place):
     assert found == pytest.approx(turned(turn, 0.5), rel=1e-4, abs=1e-9)
 
 
-def test_compliance_linear_in_the_moment_turns_by_its_closed_form():
+def test_compliance_linear_in_the_moment_matches_its_closed_form():
     """The turn is (c + d M) M."""
     soft = at_drive(
         {"0": 1e-5, "1": 2e-7}, variables=("wrench.drive.mz",), kind="compliance"

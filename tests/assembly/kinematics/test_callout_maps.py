@@ -1,4 +1,4 @@
-"""Datum frames and the errors of frames, against hand calculation and finite motion."""
+"""Datum frames and frame errors, compared with hand calculation and finite motions."""
 
 from dataclasses import replace
 
@@ -42,12 +42,12 @@ def hole(*datums):
 
 
 def with_bore(x, y):
-    """The plate with another bore along z at a point [m]."""
+    """The plate with an additional bore along z at a point [m]."""
     bore = Frame("bore", "plate", np.array([x, y, 0]))
     return replace(PLATE, frames=(*PLATE.frames, bore))
 
 
-def test_exchanging_two_datums_moves_a_hole_by_the_amount_computed_by_hand():
+def test_exchanging_two_datums_moves_a_hole_as_computed_by_hand():
     """B out of square to A by 0.05 over 60 mm (0.833 mrad): the hole 80 mm from B
     moves by 66.7 um normal to A in B|A, not at all in A|B."""
     row = PLATE.index("hole")
@@ -61,7 +61,7 @@ def test_exchanging_two_datums_moves_a_hole_by_the_amount_computed_by_hand():
 
 
 def _on_screw(placed_callout, row):
-    """(6,) direction whose product with the screw of u is row @ u."""
+    """(6,) vector whose product with the screw of u equals row @ u."""
     return row @ np.linalg.pinv(placed_callout.zone.columns)
 
 
@@ -73,8 +73,8 @@ def test_side_face_tilts_at_most_its_width_over_its_side():
     )
 
 
-def test_datum_restricted_by_an_earlier_datum_fixes_only_the_remaining_freedoms():
-    """A (plane) holds RX, RY, TZ.  A bore B along z then holds TX and TY, not RZ."""
+def test_secondary_datum_fixes_only_the_remaining_degrees_of_freedom():
+    """Plane A fixes RX, RY, TZ; a bore B along z then fixes TX, TY but not RZ."""
     robot = with_bore(0.0, 0.05)
     bore = Callout("bore", "bore", (A,), extent=(0.02,), widths={"position": 0.1e-3})
     first, _ = placed(robot, bore, hole(A, Datum("bore")))
@@ -186,7 +186,7 @@ def _platform(home, errors):
          "no frame that its joint"),
     ],
 )  # fmt: skip
-def test_callout_that_does_not_apply_to_its_feature_is_refused_in_one_line(
+def test_callout_that_does_not_apply_to_its_feature_is_rejected_in_one_line(
     callouts, message
 ):
     with pytest.raises(BadInput, match=message) as error:

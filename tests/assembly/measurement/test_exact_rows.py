@@ -45,7 +45,7 @@ def loaded_rows(name, rng, laws=()):
 
 @pytest.mark.parametrize(("name", "pieces"), [*((n, 1) for n in ROBOTS),
                                               ("five_bar", 3)])  # fmt: skip
-def test_exact_solutions_of_all_rows_together_equal_single_exact_solutions(
+def test_exact_solutions_of_all_measurements_equal_single_exact_solutions(
     name, pieces, rng
 ):
     """Both converge to 1e-12; nominal closures are rounded to 1e-12 at worst."""
@@ -75,7 +75,7 @@ BAR = Robot(
 
 
 @pytest.mark.parametrize("force", [5.0, 200.0, -200.0])
-def test_bar_on_a_contact_rests_at_its_moment_balance(force):
+def test_bar_on_a_contact_rests_where_its_moments_balance(force):
     """c |a|^n sign(a) = F L cos a for the angle a: the arm shortens as it turns."""
     c, n = 2e5, 1.5
     load = [0, 0, 0, 0, force, 0]
@@ -95,7 +95,7 @@ def test_contact_without_load_has_zero_deflection():
     np.testing.assert_array_equal(predict(here).deviation, 0.0)
 
 
-def test_rows_that_do_not_converge_are_solved_by_the_exact_solver():
+def test_measurements_that_do_not_converge_are_solved_one_by_one():
     """A spring so soft that the bar turns by radians."""
     K = np.diag([np.inf, np.inf, 1.0, np.inf, np.inf, np.inf])
     frames = (replace(BAR.frames[0], joint_stiffness=K), BAR.frames[1])

@@ -45,7 +45,7 @@ def test_lag_of_an_effect_equals_the_integrated_differential_equation(
     )
 
 
-def test_history_of_effects_begins_at_rest_in_each_session_for_rows_in_any_order(rng):
+def test_history_of_effects_starts_at_rest_in_each_session_whatever_the_row_order(rng):
     """The state of each row depends on the rows of its own session only."""
     mixed = rng.permutation(12)
     times, values = np.tile(TIMES, 2)[mixed], np.r_[VALUES, 2 * VALUES][mixed]

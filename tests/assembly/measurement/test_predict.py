@@ -74,7 +74,7 @@ def test_second_order_part_equals_finite_errors_without_load():
 
 
 @pytest.mark.parametrize("exact", [False, True])
-def test_finite_motions_are_evaluated_at_the_load_of_each_row(exact):
+def test_finite_motions_are_evaluated_at_the_load_of_each_measurement(exact):
     """K a = F L cos(q + e + a) in each row, so the declared model becomes exact."""
     e = 0.03
     here = replace(rows(arm(), error=e), exact=exact)
@@ -91,7 +91,7 @@ def test_finite_motions_are_evaluated_at_the_load_of_each_row(exact):
 
 
 @pytest.mark.parametrize("exact", [False, True])
-def test_single_row_with_a_contact_equals_its_closed_form_and_all_rows(exact):
+def test_single_measurement_with_a_contact_matches_its_closed_form_and_the_batch(exact):
     """a = F L cos(q + a) / K + (M / c)^(1/n), the moment by finite motions or not."""
     c, n, force = 5e4, 1.5, 20.0
     here = replace(rows(arm(), force), laws=(ContactLaw("drive", c, n),), exact=exact)
@@ -127,7 +127,7 @@ def test_function_of_a_wrench_uses_the_moment_of_finite_motions():
         assert seen.deviation[:, 2] == pytest.approx(turn, rel=1e-6)
 
 
-def test_row_that_cannot_close_has_no_prediction_and_centred_clearance():
+def test_measurement_that_cannot_close_has_no_prediction_and_centred_clearance():
     """A four-bar with a loose pin; in one row its coupler is out of the plane."""
     robot = four_bar()
     frames = tuple(
@@ -155,7 +155,7 @@ def test_row_that_cannot_close_has_no_prediction_and_centred_clearance():
 
 
 @pytest.mark.parametrize("exact", [False, True])
-def test_contact_in_parallel_with_a_spring_carries_its_share_of_the_force(exact):
+def test_contact_in_parallel_with_a_spring_carries_part_of_the_force(exact):
     """x = f / K + (f / c)^(2/3) = (F - f) / K along two sliders that end together."""
     K, c, forces = 1e6, 3e8, [500.0, -2.0, 40.0]
     spring = np.diag([np.inf] * 5 + [K])

@@ -33,7 +33,7 @@ def pin(**clearance):
 
 
 @pytest.mark.parametrize("unit", [1e-12, 1.0, 1e6])
-def test_load_of_any_size_moves_a_joint_to_its_bound_in_the_direction_of_the_load(unit):
+def test_load_of_any_size_moves_a_joint_to_its_bound_along_the_load(unit):
     """A pin along x: radially by its clearance, axially by nothing."""
     conditions = at_home(pin(radial=RADIAL), unit * np.array([0, 0, 0, 2.0, 0, 0]))
     settled, undetermined = with_clearances_taken_up(conditions)
@@ -44,7 +44,7 @@ def test_load_of_any_size_moves_a_joint_to_its_bound_in_the_direction_of_the_loa
     assert undetermined.tolist() == [False]
 
 
-def test_a_ball_rests_at_its_radius_in_the_direction_of_the_load():
+def test_ball_clearance_rests_at_its_radius_along_the_load():
     """The pin is turned by 0.7 rad about x; a cylinder would rest at its corner."""
     load = np.array([0, 0, 0, 2.0, 1.0, -2.0])
     settled, undetermined = with_clearances_taken_up(at_home(pin(ball=RADIAL), load))

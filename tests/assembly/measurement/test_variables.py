@@ -30,7 +30,7 @@ def rows(rng):
     return here, commands, known
 
 
-def test_each_variable_name_has_the_value_of_its_row(rows):
+def test_each_variable_name_has_the_value_of_its_measurement(rows):
     """Positions are those of the platform; covariates with their prefix or, three of
     them, without; a quantity that is not given is unknown."""
     here, commands, known = rows

@@ -108,7 +108,7 @@ def test_rigid_four_bar_with_out_of_plane_errors_is_not_solved(row, size):
     assert told.reason[0]
 
 
-def test_robot_with_clearance_is_refused():
+def test_robot_with_clearance_is_rejected():
     robot = coaxial_beams(np.zeros(6), clearance=Clearance(radial=1e-5))
     with pytest.raises(ValueError, match="found a clearance, expected a robot without"):
         flexibility(at_home(robot))

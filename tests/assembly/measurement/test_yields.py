@@ -41,7 +41,7 @@ def test_deformation_by_a_power_law_equals_bisection(power, unit):
     assert give / unit == pytest.approx(expected, rel=1e-9)
 
 
-def test_springs_of_unbounded_deformation_are_refused():
+def test_springs_of_unbounded_deformation_are_rejected():
     """d = w + d has no solution under a load."""
     one = Yield("foot", 1, (("foot", 1),), np.zeros((1, 1)), lambda x, w: w[:, 0])
     here = replace(as_declared(home_posture(POST), np.zeros(6)), yields=(one,))
@@ -49,7 +49,7 @@ def test_springs_of_unbounded_deformation_are_refused():
         Yields(here).correction(np.ones((1, 1)), np.zeros((1, 1)), np.ones((1, 1, 1)))
 
 
-def test_law_without_convergence_is_refused():
+def test_law_without_convergence_is_rejected():
     """It deforms under any load so far that the load vanishes."""
     with pytest.raises(SolverFailed, match="do not converge in 40 steps"):
         settled_by(lambda w: np.where(w > 0, 2.0, 0.0))

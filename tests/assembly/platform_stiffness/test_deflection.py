@@ -46,7 +46,7 @@ def test_rigid_direction_has_infinite_stiffness_and_no_events(state):
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_curve_passes_the_clearance_and_then_follows_the_spring(state):
+def test_curve_crosses_the_clearance_and_then_follows_the_spring(state):
     """Deflection = sign(F) c + F / k; without load it is anywhere in the clearance."""
     c, k = 1e-4, 1e5
     curve = deflection_curve(bush(c, k), FZ, np.arange(-30.0, 31.0, 10.0), state=state)

@@ -103,7 +103,7 @@ def test_tangents_of_many_postures_are_bit_identical_to_those_of_single_postures
     assert shares == {part: [s] * 2 for part, s in one.shares(UNIT[3]).items()}
 
 
-def test_free_motion_of_another_body_is_refused_with_a_fixed_platform():
+def test_load_along_a_free_motion_of_another_body_is_rejected():
     """A wheel rotates freely, driven by a couple on its rim."""
     frames = (
         Frame("wheel", joint="revolute"),
@@ -127,13 +127,13 @@ def test_free_motion_of_another_body_is_refused_with_a_fixed_platform():
         ({"side": "left"}, "no side 'left'"),
     ],
 )
-def test_invalid_point_load_or_state_is_refused(words, message):
+def test_invalid_point_load_or_state_is_rejected(words, message):
     with pytest.raises(ValueError, match=message):
         platform_stiffness(home_posture(load_robot("orthoglide")), **words)
 
 
 @pytest.mark.parametrize("direction", [[0] * 6, [1, 0, 0], [np.nan] * 6, "tx"])
-def test_invalid_direction_is_refused(direction):
+def test_invalid_direction_is_rejected(direction):
     stiffness = platform_stiffness(home_posture(load_robot("orthoglide")))
     for asked in (stiffness.along, stiffness.shares):
         with pytest.raises(BadInput, match="direction: found"):

@@ -54,7 +54,7 @@ def test_torsion_pendulum_has_the_frequency_of_the_textbook():
     assert np.abs(found / expected - 1).min() < 1e-9
 
 
-def test_disc_on_a_cantilever_couples_bending_and_turning():
+def test_disc_on_a_cantilever_couples_bending_and_rotation():
     """Two unknowns in a plane: w and its slope at the tip, K = EI [[12, -6L], ..]."""
     length, side, E, m, J = 0.8, 0.02, 7e10, 4.0, 0.3
     EI = E * side**4 / 12
@@ -77,7 +77,7 @@ def test_products_of_inertia_do_not_change_the_modes_of_equal_springs(mass):
     np.testing.assert_allclose(found, hertz([*200.0 / PRINCIPAL, *shifts]), rtol=1e-9)
 
 
-def test_centre_away_from_the_springs_couples_turning_and_shifting():
+def test_centre_of_mass_away_from_the_springs_couples_rotation_and_translation():
     """Along the arm r: k_t / m, k_r / J; across: [[k_t, k_t r], [k_t r, k_r + ..]]."""
     k_r, k_t, m, J, r = 200.0, 3e5, 5.0, 0.04, 0.03
     # unknowns at the springs: x and the turn; kinetic energy m (x + r t)^2 + J t^2
@@ -88,7 +88,7 @@ def test_centre_away_from_the_springs_couples_turning_and_shifting():
     np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
-def test_two_rotors_on_a_shaft_turn_against_each_other():
+def test_two_rotors_on_a_shaft_oscillate_in_opposition():
     """Free ends: 0 and k (1/J1 + 1/J2); a rotor without mass has a moment only."""
     k, J1, J2 = 900.0, 0.02, 0.05
     bearing = Frame("bearing", joint="revolute")

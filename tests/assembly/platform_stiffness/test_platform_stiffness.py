@@ -53,7 +53,7 @@ def test_cantilever_compliance_equals_the_textbook():
     assert_same_matrix(C, expected, 1e-12)
 
 
-def test_compliance_of_a_serial_chain_is_the_sum_over_its_parts_moved_to_the_tip():
+def test_compliance_of_a_serial_chain_is_the_sum_of_its_parts_transformed_to_the_tip():
     """C = sum of X C_i X', each part moved to the tip: a serial arm."""
     rng = np.random.default_rng(1)
     frames, expected = [], np.zeros((6, 6))
@@ -170,7 +170,7 @@ def test_tangent_equals_differences_at_rotations_of_a_radian(seed):
     assert by_differences(posture, load)[0] < 1e-8
 
 
-def test_compliance_at_another_point_follows_the_screw_transform():
+def test_compliance_at_another_point_follows_from_the_screw_transform():
     """w . s does not depend on the reference point: C changes to X C X'."""
     posture = home_posture(load_robot("irsbot2"))
     at_origin, r = platform_stiffness(posture), np.array([0.1, -0.2, 0.05])
@@ -260,7 +260,7 @@ def test_tangent_of_a_column_on_a_torsion_spring_vanishes_at_buckling():
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_pressed_pin_is_stiff_normal_to_its_rim_and_rolls_along_it(state):
+def test_closed_pin_is_stiff_normal_to_its_rim_and_compliant_along_it(state):
     """Pressed by F with a radial clearance c, its stiffness along the rim is F/c."""
     force, c, k = 30.0, 1e-3, 1e5
     K = np.diag([1e9, 1e9, 1e9, k, k, k])  # so that the arm c turns nothing

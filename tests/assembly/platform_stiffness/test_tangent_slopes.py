@@ -23,7 +23,7 @@ def torsion_bar(k, L):
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, -1.0, 1.5])
-def test_slopes_of_a_loaded_bar_equal_its_closed_form(share):
+def test_compliance_derivatives_of_a_loaded_bar_equal_their_closed_form(share):
     """C = 1 / (k/L^2 - F/L), by k and by L, below, without and beyond buckling."""
     k, L = 50.0, 0.4
     F = share * k / L
@@ -37,7 +37,7 @@ def test_slopes_of_a_loaded_bar_equal_its_closed_form(share):
     assert by_L[4, 4] == pytest.approx(C**2 * (2 * k / L**3 - F / L**2), rel=1e-6)
 
 
-def test_slope_of_a_pressed_pin_by_its_clearance_is_1_over_the_load():
+def test_compliance_derivative_of_a_closed_pin_by_its_clearance_is_1_over_the_load():
     """C = c / F, where F is the load: dC/dc = 1 / F, with the motion of the contact."""
     c, F = 1e-4, 200.0
     pin = Frame("pin", clearance=Clearance(radial=c, axial=0.0, tilt=0.0, spin=0.0))
@@ -49,7 +49,7 @@ def test_slope_of_a_pressed_pin_by_its_clearance_is_1_over_the_load():
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_slope_of_a_pressed_ball_by_its_radius_is_1_over_the_load(state):
+def test_compliance_derivative_of_a_closed_ball_by_its_radius_is_1_over_the_load(state):
     """Across the load in both directions, and nothing along it."""
     ball = Frame("ball", clearance=Clearance(ball=1e-4))
     robot = Robot("ball", "tip", (ball, Frame("tip", "ball")))
@@ -69,7 +69,9 @@ def test_slope_of_a_pressed_ball_by_its_radius_is_1_over_the_load(state):
         ("leg1.link_a.geometric_error.tx", 1e-7),
     ],
 )
-def test_slopes_of_the_paper_robot_equal_differences_of_solutions(state, path, step):
+def test_compliance_derivatives_of_the_paper_robot_equal_differences_of_solutions(
+    state, path, step
+):
     """At its full errors, under load; closed clearances stay pressed."""
     design, asked = design_of(PAPER), TangentState(state, LOAD, at=(0, 0, 0.05))
     slope = stiffness_slopes(design, [path], POSE, asked=asked)[path]
@@ -92,7 +94,7 @@ def test_slopes_of_the_paper_robot_equal_differences_of_solutions(state, path, s
     )
 
 
-def test_slope_at_a_change_of_contact_is_nan():
+def test_compliance_derivative_at_a_change_of_contact_is_nan():
     """The gap equals the clearance that takes it up: contact without a force."""
     touching = coaxial_beams(
         [0, 0, 0, 0, 1e-4, 0], clearance=Clearance(radial=1e-4, axial=0, tilt=0, spin=0)

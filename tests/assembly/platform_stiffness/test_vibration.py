@@ -102,7 +102,7 @@ def test_free_motion_has_zero_frequency():
     np.testing.assert_array_equal(modes.frequencies, [0.0])
 
 
-def test_vibration_ignores_clearances_and_refuses_a_robot_without_mass():
+def test_vibration_ignores_clearances_and_rejects_a_robot_without_mass():
     posture = cantilever(1)
     (tip,) = posture.robot.frames
     loose = replace(tip, name="beam", clearance=Clearance(radial=1e-4))
@@ -207,7 +207,7 @@ joint = [
 """  # noqa: E501
 
 
-def test_point_mass_on_six_rods_has_three_modes_and_no_rounding_modes(tmp_path):
+def test_point_mass_on_six_rods_has_three_modes_and_no_spurious_modes(tmp_path):
     """Expected: K of the six bars, condensed to the translations of the mass.
 
     The two bars of a leg are springs EA/L, and their common drive is a spring along z.

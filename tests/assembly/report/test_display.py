@@ -49,7 +49,7 @@ def shown(answer, link):
     ]  # fmt: skip
 
 
-def test_text_of_every_result_object_has_a_few_lines(shown):
+def test_text_of_every_result_object_is_a_few_lines_long(shown):
     """The default text of a robot has 11 000 characters, of an assembly 52 000."""
     for thing in shown:
         text = repr(thing)

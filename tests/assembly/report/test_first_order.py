@@ -47,7 +47,7 @@ def test_pose_error_at_a_singular_posture_has_no_first_order_bound(seed):
     assert SAID in pose_error_text(results)
 
 
-def test_energy_only_of_finite_motions_is_reported_as_singular():
+def test_energy_that_exists_only_for_finite_motions_is_reported_as_singular():
     """Near its dead centre a short rod is in tension: k (e - s)^2 / 2.
 
     By s = crank + rod - distance it could be shorter; first order turns the crank

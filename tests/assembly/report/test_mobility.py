@@ -47,7 +47,7 @@ def test_mobility_in_words_equals_the_literature(name):
     assert found["counts_certain"]
 
 
-def test_coupler_of_a_four_bar_turns_about_the_crossing_of_its_arms():
+def test_coupler_of_a_four_bar_rotates_about_the_crossing_of_its_arms():
     """Crank (0, 0) to (0.1, 0.3), rocker (0.8, 0) to (0.7, 0.5): 3x = -5 (x - 0.8)."""
     (turn,) = mobility_of(home_posture(MECHANISMS["four_bar"][0]()))["motions"]
     assert turn["kind"] == "turn"
@@ -68,7 +68,7 @@ def test_redundant_drive_is_reported():
     assert mobility_lines(found)["redundant drives"] == "1"
 
 
-def test_seoul_robot_has_fewer_freedoms_near_its_singular_home():
+def test_seoul_robot_has_fewer_degrees_of_freedom_near_its_singular_home():
     """5 at home and 3 near it (Zlatanov, Bonev, Gosselin 2002)."""
     found = mobility_of(home_posture(three_upu(X, 0.24)))
     assert (found["freedoms"], found["singular"]) == (5, True)
@@ -98,7 +98,7 @@ def test_regular_home_is_not_singular(name):
     assert "near" not in found
 
 
-def test_ball_joint_rotated_by_a_right_angle_has_three_freedoms():
+def test_ball_joint_rotated_by_a_right_angle_has_three_degrees_of_freedom():
     """Whatever three axes it is made of: it turns about every axis."""
     robot = mechanism("ball", [0, 0, 0.2], joint("spherical", "base", "ball", [0] * 3))
     home = home_posture(robot)

@@ -70,7 +70,7 @@ def test_picture_shows_the_axes_of_driven_and_passive_joints():
          "--exaggeration: found 1e+300"),
     ],
 )  # fmt: skip
-def test_picture_that_cannot_be_drawn_is_refused_before_solving(
+def test_picture_that_cannot_be_drawn_is_rejected_before_solving(
     run, tmp_path, monkeypatch, words, message
 ):
     import forcefit.assembly.linear.energy
@@ -148,9 +148,7 @@ def test_gaps_shrink_from_the_length_error_to_zero(robot, closing):
 
 
 @pytest.mark.slow
-def test_animation_begins_open_and_ends_as_the_picture_of_the_assembly(
-    robot, run, tmp_path
-):
+def test_animation_begins_open_and_ends_with_the_assembly(robot, run, tmp_path):
     write_robot(robot, tmp_path / "long.toml")
     words = ["assembly", "show", tmp_path / "long.toml", "--pose", "tx=0.1,tz=-0.5",
              "--exaggeration", "50"]  # fmt: skip
@@ -187,7 +185,7 @@ def test_animation_begins_open_and_ends_as_the_picture_of_the_assembly(
          "--closing: five_bar has no open closure; expected geometric errors"),
     ],
 )  # fmt: skip
-def test_animation_that_cannot_be_drawn_is_refused(
+def test_animation_that_cannot_be_drawn_is_rejected(
     run, tmp_path, monkeypatch, words, message
 ):
     monkeypatch.chdir(tmp_path)

@@ -144,7 +144,7 @@ def test_modes_table_has_a_row_for_each_mode_and_shares_that_sum_to_one():
     assert table.attrs["units"]["frequency"] == "Hz"
 
 
-def test_curve_table_of_a_bar_follows_hookes_law():
+def test_curve_table_of_a_bar_obeys_hookes_law():
     lateral = 3 * 2e11 * np.pi * 1e-8 / 4 / 0.4**3
     table = ff.deflection_curve(small_stiffness(), 5, [-10, 0, 20]).to_pandas()
     np.testing.assert_array_equal(table["load", ""], [-10, 0, 20])

@@ -54,7 +54,7 @@ def test_frame_poses_equal_the_reference(robot, point):
     assert turned + home == pytest.approx(point["q_leg1"], abs=1e-12)
 
 
-def test_irsbot2_has_two_freedoms_and_an_overconstraint_of_eight(robot):
+def test_irsbot2_has_two_degrees_of_freedom_and_an_overconstraint_of_eight(robot):
     for x, z in [(0, -0.5), (0.4, -0.45), (-0.3, -0.2), (0.0, -0.7)]:
         found = mobility(place_robot(robot, pose={"tx": x, "tz": z}))
         assert (found.freedoms, found.locked_freedoms) == (2, 0)
@@ -153,6 +153,6 @@ def test_grid_points_are_reached_exactly_within_the_reach_of_the_links(robot):
         assert bool(reason) != within
 
 
-def test_home_pose_out_of_reach_is_refused_with_the_reach():
+def test_home_pose_out_of_reach_is_rejected_with_the_reach():
     with pytest.raises(BadInput, match=r"requires a reach of 0.9\d* m, the links"):
         irsbot2(z=-0.9)

@@ -48,7 +48,7 @@ def assert_as_printed(values, printed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", NUMBERS["cases"], ids=lambda c: c["name"])
-def test_maps_have_the_least_median_and_largest_values_of_the_reference(case):
+def test_maps_have_the_smallest_median_and_largest_values_of_the_reference(case):
     data = sweep_poses(irsbot2_with(case), parse_grid(GRID))
     # the paper counts what home reaches through singularities too
     reached = np.isin(data.status.values, ["ok", "beyond_singularity"])
@@ -68,7 +68,7 @@ def test_maps_have_the_least_median_and_largest_values_of_the_reference(case):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", NUMBERS["cases"], ids=lambda c: c["name"])
-def test_pose_errors_have_least_median_and_largest_values_of_the_reference(case):
+def test_pose_errors_have_the_smallest_median_and_largest_values_of_the_reference(case):
     x, z = np.meshgrid(*parse_grid(GRID).values(), indexing="ij")
     poses = np.full((x.size, 6), np.nan)
     poses[:, 0], poses[:, 2] = x.ravel(), z.ravel()

@@ -23,7 +23,7 @@ from tests.built_in_robots_for_tests import (
 )
 
 
-def test_hoekens_crank_turns_fully_and_its_point_has_the_closed_form():
+def test_hoekens_crank_rotates_fully_and_its_point_follows_the_closed_form():
     """Grashof: 1 + 2.5 < 2 + 2.5, and the shortest is the crank."""
     robot = BUILT_IN["four_bar"]()
     foot = np.array([0.2, 0.0])
@@ -148,6 +148,6 @@ def test_displacement_of_the_3rrr_robot_under_load_equals_its_pin_clearances(rng
         assert answer.energy == 0.0
 
 
-def test_planar_legs_out_of_reach_are_refused_with_the_reach():
+def test_planar_legs_out_of_reach_are_rejected_with_the_reach():
     with pytest.raises(BadInput, match=r"5r: the home pose requires a reach of 3 m"):
         arm_angle("5r", [0, 0], [3, 0], 1.0, 1.0, 1)

@@ -81,7 +81,7 @@ def test_beams_extend_from_the_parent_origin_to_the_frame_origin(robot):
         assert np.abs(origins[row] - start - length * R @ axis).max() < 1e-12
 
 
-def test_freedoms_and_overconstraint_equal_published_values(name, robot, rng):
+def test_degrees_of_freedom_and_overconstraint_equal_published_values(name, robot, rng):
     """In the home pose and elsewhere, as the home pose could be a special one."""
     postures = [home_posture(robot)]
     postures += [place_robot(robot, pose=random_pose(name, rng)) for _ in range(3)]
@@ -104,7 +104,7 @@ def test_pose_is_recovered_from_its_joint_positions(name, robot, rng):
 
 
 @pytest.mark.parametrize("load", [None, LOAD], ids=["free", "loaded"])
-def test_energies_equal_the_printed_problem_in_cvxpy(name, robot, rng, load):
+def test_energies_of_built_in_robots_match_the_paper_in_cvxpy(name, robot, rng, load):
     """Energies of 1e-6 J or more; just constrained robots store none without a load."""
     faulty = with_random_errors(robot, rng)
     posture = place_robot(faulty, pose=random_pose(name, rng))
@@ -173,14 +173,14 @@ def test_error_along_a_drive_moves_the_platform_by_its_jacobian_column(name, rng
 
 
 @pytest.mark.parametrize("name", sorted(set(BUILT_IN) - {"hexapod"}))
-def test_pose_out_of_reach_is_refused(name):
+def test_pose_out_of_reach_is_rejected(name):
     """A pose ten metres away; the hexapod is omitted, as its stroke is unlimited."""
     robot = BUILT_IN[name]()
     with pytest.raises(BadInput, match="cannot be reached"):
         place_robot(robot, pose={next(iter(WORKSPACE[name])): 10.0})
 
 
-def test_misspelt_robot_name_is_refused_with_the_nearest_name():
+def test_misspelt_robot_name_is_rejected_with_the_nearest_name():
     assert load_robot("3rrr").name == "3rrr"
     with pytest.raises(BadInput, match="hexapod"):
         load_robot("hexpod")

@@ -151,7 +151,7 @@ def test_delta_platform_has_constant_orientation_and_parallel_rods(rng):
             assert np.linalg.norm(apart) == pytest.approx(0.131, abs=1e-11)
 
 
-def test_delta_without_the_spins_of_its_rods_has_three_freedoms():
+def test_delta_without_rod_spins_has_three_degrees_of_freedom():
     """A rod that cannot turn in its upper ball joint still turns in the lower one."""
     robot = BUILT_IN["delta"]()
     frames = (
@@ -162,7 +162,7 @@ def test_delta_without_the_spins_of_its_rods_has_three_freedoms():
     assert (found.freedoms, found.locked_freedoms) == (3, 0)
 
 
-def test_delta_out_of_reach_is_refused_with_the_reach():
+def test_delta_out_of_reach_is_rejected_with_the_reach():
     with pytest.raises(BadInput, match=r"delta: a leg requires a reach of 2\.0\d* m"):
         drive_angle(DeltaParameters(), 0.0, np.array([0.0, 0.0, -2.0]))
 
