@@ -1,4 +1,4 @@
-"""Columns of function forms against SciPy, NumPy and their definitions."""
+"""Columns of function forms, compared with SciPy, NumPy and their definitions."""
 
 import numpy as np
 import pytest
@@ -84,7 +84,7 @@ def test_spline_of_fewer_than_three_knots_has_zero_roughness(count):
 
 
 def test_knee_changes_its_slope_at_the_given_load():
-    """A spring of 2 rad/(N m) up to 3 N m, of 0.5 beyond; and a jump of 0.1."""
+    """Compliance 2 rad/(N m) up to 3 N m and 0.5 beyond, with a jump of 0.1."""
     load = np.array([-5.0, -3.0, -1.0, 0.0, 2.0, 7.0])
     found = FORMS["knee"].basis(["below", "above"], [load], {"at": 3.0})
     assert found @ [2.0, 0.5] == pytest.approx([-7, -6, -2, 0, 4, 8])

@@ -1,4 +1,4 @@
-"""Formulas: values against Python's eval, units by hand, refusal of other code."""
+"""Formulas: values from Python's eval, units by hand, and rejection of other code."""
 
 import math
 
@@ -75,7 +75,7 @@ def test_formula_with_inconsistent_units_is_rejected(text, variables, result):
 
 @pytest.mark.parametrize("around", ["-{}", "+{}", "abs({})", "(a+{})", "({}*a)"])
 def test_formula_nested_deeper_than_fifty_operations_is_rejected(around):
-    """Each kind of operation, nested on either side."""
+    """Each kind of operation is nested on either side."""
     text = "q"
     for _ in range(50):
         text = around.format(text)
@@ -91,7 +91,7 @@ def test_formula_longer_than_500_characters_is_rejected():
 
 
 def test_exponents_of_units_add_up_across_powers():
-    """(a t)^2 sqrt(b t) / t is a length: a and b share it, one of them is a number."""
+    """(a t)^2 sqrt(b t) / t is a length, which determines a and b up to one unit."""
     tree = parse_formula("(a*t)**2*t**0.5*sqrt(b)/t")
     found = parameter_units(tree, {"t": S}, M)
     a, b = ({**dict.fromkeys("ms", 0), **found[name]} for name in "ab")

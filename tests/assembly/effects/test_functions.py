@@ -1,4 +1,4 @@
-"""Functions in robot files against closed forms of an arm and equivalent springs."""
+"""Functions in robot files, compared with closed forms and equivalent springs."""
 
 from dataclasses import replace
 from math import cos, exp, sin
@@ -25,7 +25,7 @@ RIGID = arm(rigid=True)
 
 
 def seen(conditions, *functions):
-    """What functions add to the reading."""
+    """Change of the reading due to functions."""
     both = predict(apply_functions(conditions, functions))
     assert list(both.reason) == [""] * len(conditions)
     return both.deviation - predict(conditions).deviation
@@ -36,7 +36,7 @@ def at_drive(parameters, form="powers", variables=("q.drive",), **more):
 
 
 def turned(angle, q):
-    """Reading of an arm whose drive stands off by a small angle."""
+    """Reading of an arm whose drive is off by a small angle."""
     return [0, 0, angle, -angle * L * sin(q), angle * L * cos(q), 0]
 
 
@@ -57,7 +57,7 @@ def test_formula_effect_rotates_the_drive_by_its_value():
 
 
 def test_base_functions_rotate_and_translate_the_whole_robot():
-    """A turned base swings the tip about the base's origin; a shifted one shifts it."""
+    """The tip rotates about the base origin, or translates together with the base."""
     turn = Function("base", ("ry",), ("cov.tilt",), "powers", {"1": 1.0})
     shift = Function("base", ("tx",), ("temperature",), "powers", {"1": 1e-6})
     shift = replace(shift, variables=("cov.temperature",))
@@ -79,7 +79,7 @@ def test_load_and_reading_functions_change_the_load_and_the_reading():
 
 
 def test_compliance_function_equals_an_elastic_drive():
-    """M / k of an elastic drive, softer where the angle is larger."""
+    """M / k of an elastic drive whose compliance increases with the angle."""
     soft = at_drive({"0": 1e-5, "2": 3e-5}, kind="compliance")
     F, q = 30.0, 0.7
     there = here(RIGID, (0, 0, 0, 0, F, 0), q=q)
@@ -109,7 +109,7 @@ def three_rrr(load):
 
 @pytest.mark.parametrize("exact", [False, True])
 def test_compliance_in_a_closed_chain_equals_a_joint_spring(exact):
-    """Newton's method for the function, against a spring of the robot."""
+    """Newton's method for the function, compared with a spring of the robot."""
     there = replace(three_rrr([0, 0, 5, 40, -30, 0]), exact=exact)
     robot = there.robot
     names = [f.name for f in robot.frames if f.actuated]
@@ -143,7 +143,7 @@ def test_nonlinear_law_in_a_closed_chain_holds_at_the_solved_wrench():
 
 
 def campaign_of(times, **columns):
-    """Rows of an arm measured one after the other."""
+    """Readings of an arm, measured in sequence."""
     q = np.array(columns.pop("q", np.zeros(len(times))), dtype=float)
     coordinates = np.column_stack([q, np.zeros(len(q))])
     postures, _ = place_many_joints(RIGID, coordinates)
@@ -178,7 +178,7 @@ def test_reversal_sign_follows_the_motion_since_the_previous_reading():
     q = [0.0, 0.5, 0.5, 0.2, 0.9]
     rows = campaign_of(np.arange(5.0), q=q, approach=-1.0)
     back = at_drive({"0": 1e-5, "1": 1e-5}, "reversal", ("q.drive", "q.drive"))
-    side = np.array([-1, 1, 1, -1, 1])  # the first as the column says
+    side = np.array([-1, 1, 1, -1, 1])  # the first sign comes from the column
     expected = side * (1e-5 + 1e-5 * np.array(q))
     assert seen(rows, back)[:, 2] == pytest.approx(expected, rel=1e-9)
 

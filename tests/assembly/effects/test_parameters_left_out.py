@@ -15,7 +15,7 @@ from tests.assembly.effects.test_effects import K, L, arm, change, here
 
 
 def public(name, values, robot=None):
-    """Parameters of an effect from what a fit finds."""
+    """Convert fitted unknowns to the parameters of an effect."""
     return LIBRARY[name].public(robot or arm(), values)
 
 

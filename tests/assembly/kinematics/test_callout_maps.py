@@ -183,7 +183,7 @@ def _platform(home, errors):
         ([replace(hole(B), widths={}, length=(0.09, 1e-4))],
          "found a length of 90 mm, expected that at home, 80 mm"),
         ([replace(hole(Datum("hole")), feature="tip", after=True)],
-         "no frame that its joint"),
+         "no frame carried by its joint"),
     ],
 )  # fmt: skip
 def test_callout_that_does_not_apply_to_its_feature_is_rejected_in_one_line(

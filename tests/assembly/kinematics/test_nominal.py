@@ -65,7 +65,7 @@ def test_message_states_the_angle_at_which_a_limited_crank_stops():
     left = (1 - flat / 2.0) * 100
     with pytest.raises(BadInput, match="short: these joint coordinates") as caught:
         place_robot(robot, joints={"crank": 2.0})
-    found = float(str(caught.value).split("to hold ")[1].split(" %")[0])
+    found = float(str(caught.value).split("closures fail ")[1].split(" %")[0])
     assert found == pytest.approx(left, abs=0.1)
 
 

@@ -1,4 +1,4 @@
-"""Variables of effects by public name, and the history of rows."""
+"""Variables of effects by public name, and the history of readings."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ ROWS = 4
 
 @pytest.fixture
 def rows(rng):
-    """A drive that turns, and one that slides, under loads and covariates."""
+    """A revolute and a prismatic drive, under loads and with covariates."""
     robot = Robot("arm", "tip", (
         Frame("turn", joint="revolute", actuated=True),
         Frame("slide", "turn", [0.4, 0.1, 0.2], joint="prismatic", actuated=True),

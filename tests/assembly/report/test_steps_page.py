@@ -1,4 +1,4 @@
-"""The page of the order of assembly."""
+"""HTML page of stepwise assembly."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ from tests.pages_for_tests import parse
 
 
 def pinned(posture):
-    """All closures joined one after another, and the states in between."""
+    """All closures joined in sequence, and the intermediate states."""
     plan = Plan(tuple(Join(" - ".join(c), c) for c in posture.robot.closures))
     states = []
     results = steps_of(plan, posture, states=states)
@@ -62,7 +62,7 @@ def test_report_page_contains_the_numbers_of_every_step(four_bar):
 def test_interrupted_sampling_returns_quantiles_of_the_machines_computed_so_far(
     four_bar, rng
 ):
-    """Blocks of 10000 machines: the second one is interrupted."""
+    """The second block of machines is interrupted."""
     plan = Plan(tuple(Join(" - ".join(c), c) for c in four_bar.robot.closures))
     errors = rng.normal(size=(20_001, *four_bar.robot.errors.shape)) * 1e-5
 
