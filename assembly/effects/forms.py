@@ -26,7 +26,7 @@ slip       ``size``                       -1 to 1: friction element that slips a
                                           a motion x of ``depth``
 scaled_    ``k.sine``, ``k.cosine``       of k turns of x, times y
 waves
-reversal_  ``k.sine``, ``k.cosine``       direction of x times waves of y, or of x
+reversal_  ``k.sine``, ``k.cosine``       direction of x times harmonics of y or x
 waves
 knee       ``below``, ``above``;          part of x within -``at`` to ``at``; part
            ``size``                       beyond; -1 to 1, reached at ``at``
@@ -233,24 +233,24 @@ FORMS: dict[str, Form] = {
     form.name: form
     for form in (
         Form("powers", "a polynomial", 2, {}, (0, 20), ("",), _powers),
-        Form("waves", "sine waves, whole periods per turn", 2, {"period": False},
+        Form("waves", "harmonics with whole periods per turn", 2, {"period": False},
              (-_MOST, _MOST), _WAVES, _waves),
-        Form("spline", "a smooth curve through values at even knots", 2,
+        Form("spline", "a cubic spline through values at evenly spaced knots", 2,
              dict.fromkeys(_ENDS, True), (1, _MOST), ("",), _spline),
-        _memory("lag", "what follows slowly"),
-        _memory("creep", "what yields slowly"),
+        _memory("lag", "a first-order lag"),
+        _memory("creep", "creep under a stepwise load"),
         Form("step", "a jump", 1, {"at": True}, None, ("size",), _step),
-        Form("slow_wave", "one slow wave", 1, {"period": True}, None, _WAVES,
+        Form("slow_wave", "a slow oscillation", 1, {"period": True}, None, _WAVES,
              _slow_wave),
-        Form("reversal", "a jump where the direction of motion reverses", 2, {},
+        Form("reversal", "a jump when the direction of motion reverses", 2, {},
              (0, 20), ("",), _reversal, remembers=True),
         Form("slip", "a slipping element, saturated after a reversal", 1,
              {"depth": True}, None, ("size",), _slip, remembers=True),
-        Form("scaled_waves", "sine waves times a second variable", 2, {"period": False},
+        Form("scaled_waves", "harmonics times a second variable", 2, {"period": False},
              (0, _MOST), _WAVES, _scaled_waves, least=2),
-        Form("reversal_waves", "sine waves with the sign of the direction", 2,
+        Form("reversal_waves", "harmonics with the sign of the direction", 2,
              {"period": False}, (0, _MOST), _WAVES, _reversal_waves, remembers=True),
-        Form("knee", "one slope up to a load, another beyond it", 1, {"at": True}, None,
+        Form("knee", "one slope up to a load, another beyond", 1, {"at": True}, None,
              ("below", "above", "size"), _knee),
     )
 }  # fmt: skip

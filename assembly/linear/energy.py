@@ -232,7 +232,7 @@ def _solve_one(
 
 @lru_cache(maxsize=32)  # cached, because it is called for one robot at many postures
 def _rounding_of(robot: Robot) -> float:
-    """Return the largest closure error [rad, lengths] that rounding can cause."""
+    """Return the largest closure error [rad, lengths] that round-off can cause."""
     joints, _ = structure_of(robot)
     return float(closure_rounding(robot.errors, joints, checked_size(robot)))
 

@@ -9,7 +9,7 @@ another second-order cone program,
     minimise  |x + X (v - u)|^2    subject to  H (v - u) = 0,  |v_k| <= 1.
 
 Here x is the deviation at the solution u, X its derivative with respect to the unloaded
-clearances, v their new values, and H contains the rows of the closures.
+clearances, v their new values, and H contains the closure equations.
 
 Sources:
     Public format, section 5, item 15: the minimum-energy pose and, among these poses,

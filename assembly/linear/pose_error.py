@@ -1,8 +1,8 @@
 """Certified bounds on the largest pose error of the platform, problem (27).
 
-As printed in the paper, (27) is degenerate: if the deformations keep their values of
-problem (22), complementary slackness fixes every loaded clearance.  The argument
-``assumption`` therefore selects which screws can still move:
+As printed in the paper, (27) is degenerate: if the deformations are fixed at their
+values in problem (22), complementary slackness fixes every loaded clearance.  The
+argument ``assumption`` therefore selects which screws can still move:
 
 ======== =================================================================
 frozen   all deformations are fixed; only unloaded clearances move (paper)

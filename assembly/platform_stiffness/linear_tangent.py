@@ -4,9 +4,9 @@ Without loads, the small motions of springs y and free joints q satisfy the clos
 
     A_q q + A_y y = 0,      platform screw  P_q q + P_y y.
 
-Multiplication by rows orthogonal to A_q eliminates q and gives Z'A_y y = 0.  The
-solutions y = W t, with W orthonormal, are the modes.  Their energy is t.t / 2, and
-C = L L', where L contains the platform's screws.  Because compliances are never added,
+Multiplication by rows orthogonal to A_q eliminates q, which leads to Z'A_y y = 0.  The
+solutions y = W t, with W orthonormal, are the modes.  Their energy is t.t / 2, and C =
+L L', where L contains the platform's screws.  Because compliances are never added,
 stiff and soft springs retain their relative accuracy.
 
 A clearance is either fixed at zero (classical model) or in its state in problem (22):

@@ -52,14 +52,16 @@ def about_influences(plan: Plan, found: list[Influence]) -> list[str]:
     still = [name for name, steps in moved.items() if not steps]
     if {s.name for s in plan.steps if depends_on_state(s)} == set(still):
         return [
-            "the order of joins next to each other does not change the assembled "
-            f"machine: they do not move what {', '.join(still)} finds (influence "
-            "coefficients zero); it changes the closing forces"
+            "the order of consecutive joins does not change the assembled machine: "
+            f"they do not move the openings found by {', '.join(still)} (zero "
+            "influence coefficients); it changes the closing forces"
         ]
     remarks = [about_order(plan)]
     for name, steps in moved.items():
-        moving = f"{', '.join(steps)} moves it" if steps else "no join next to it does"
-        remarks.append(f"{name} holds an opening as it lies: {moving}")
+        moving = (
+            f"moved by {', '.join(steps)}" if steps else "moved by no adjacent join"
+        )
+        remarks.append(f"{name} fixes an opening in its current position, {moving}")
     return remarks
 
 
@@ -89,7 +91,9 @@ def about_order(plan: Plan) -> str:
     """
     why = why_order_matters(plan)
     if why:
-        return f"the order matters: these steps hold what they find: {why}"
+        return (
+            f"the order matters: these steps fix parts in their current position: {why}"
+        )
     return (
         "the order does not change the assembled machine, because every part is joined "
         "at a fixed position; it changes the closing forces"

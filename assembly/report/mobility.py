@@ -195,7 +195,7 @@ def mobility_lines(counts: Mapping[str, Any]) -> dict[str, str]:
     if not counts["counts_certain"]:
         gap = counts["singular_value_gap"]
         lines["counts not certain"] = (
-            f"singular values that count and that do not differ only by {gap:.3g} times"
+            f"nonzero and zero singular values differ only by a factor of {gap:.3g}"
         )
     return lines
 
