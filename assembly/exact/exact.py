@@ -117,8 +117,8 @@ class ExactAssembly:
     """Equilibrium of a manipulator assembled with finite motions.
 
     The solution is stationary, closed and within the cones, up to the reported
-    residuals.  The sign of ``least_curvature`` shows whether the equilibrium
-    is a local minimum.  A lower minimum may exist elsewhere.
+    residuals.  The sign of ``least_curvature`` shows whether the equilibrium is a local
+    minimum.  A lower minimum may exist elsewhere.
 
     Attributes:
         whole: the robot's nominal configuration, with uncut beams.

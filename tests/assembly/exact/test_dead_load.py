@@ -145,8 +145,8 @@ def test_rotating_robot_and_gravity_together_rotates_the_solution(seed):
 @pytest.mark.parametrize("gravity", [[0, 0, -9.81], [300.0, -200.0, -500.0]])
 def test_exact_solution_with_weight_equals_the_multibody_simulation(gravity):
     """Bodies of a kilogram or two off their frames' origins, links as springs, at 60 g
-    too.  Poses agree as without weight, see ``test_exact``.  The energy alone is not
-    least under a load: it differs by the weight's work on what the poses differ.
+    too.  Poses agree as without weight, see ``test_exact``. Under a load the energy
+    alone is not minimal: it differs by the work of the weight on the pose difference.
     """
     robot = without_clearance(irsbot2_with(NUMBERS["cases"][1]))
     robot = with_bodies(robot, np.random.default_rng(4), heaviest=2, off=0.05)

@@ -123,7 +123,7 @@ def test_energy_of_an_elastic_bar_equals_its_closed_form(longer):
 def test_passive_joint_stops_exactly_at_its_bound(longer, bound):
     """The bar deforms until the pin reaches its bound.
 
-    The second bound is beyond what the linear model turns the pin by, 0.352 rad, and
+    The second bound exceeds the pin rotation of the linear model, 0.352 rad, and is
     reached only by finite motions, 0.497 rad.
     """
     free = solve_exact(two_bars(longer, stretch=True))

@@ -87,7 +87,7 @@ def test_platform_displacement_equals_the_potential_derivative_by_castigliano(
 ):
     """Castigliano's theorem, also if symmetry leaves touching clearances unloaded.
 
-    They carry forces of the size of rounding, and may move without end.
+    They carry forces of the size of round-off, and their motion is undetermined.
     """
     posture = home_posture(load_robot(name))
     unit, step = np.eye(6)[component], 1e-3
@@ -175,8 +175,8 @@ def test_force_at_a_platform_point_moves_with_the_platform(point):
 def test_exact_solution_balances_loads_from_nanonewtons_to_newtons(pieces, radius):
     """Displacements are proportional to loads down to nanonewtons.
 
-    The energy change of a step is then below the rounding of the load's work, and
-    the step is accepted nevertheless.
+    The energy change of a step is then below the round-off of the work of the load, but
+    the step is still accepted.
     """
     link = BeamLink({"radius": radius}, 7e10, 0.3, pieces=pieces)
     arm = Frame("arm", translation=[0.5, 0.1, 0.2], rotation=[0, 0, 0.4], link=link)

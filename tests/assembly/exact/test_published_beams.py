@@ -221,8 +221,8 @@ def test_composite_beam_deflection_equals_literature():
 def test_plane_cantilever_deflection_equals_literature():
     """ux 0.15097, uy 0.71057 m; the error falls with the square of the pieces.
 
-    Stiff across its plane, as the published model has no other; left soft there, this
-    load is beyond that of lateral buckling.
+    The beam is stiff across its plane, like the published planar model; otherwise this
+    load would exceed the lateral buckling load.
     """
     width, height, nu = 0.1, 0.5, 0.3
     shear = 10 * (1 + nu) / (12 + 11 * nu)
@@ -241,7 +241,7 @@ def test_plane_cantilever_deflection_equals_literature():
 
 @pytest.mark.parametrize("angle", [1.0, 3.0])
 def test_beam_under_an_end_moment_bends_to_a_circular_arc(angle):
-    """Tip at (L sin a / a, L (1 - cos a) / a), a = M L / EI; half of a turn and less.
+    """The tip is at (L sin a / a, L (1 - cos a) / a), a = M L / EI, up to half a turn.
 
     The moment's work m . theta is its own in a plane, up to a turn of pi.
     """
@@ -260,7 +260,7 @@ def test_beam_under_an_end_moment_bends_to_a_circular_arc(angle):
 
 @pytest.mark.parametrize("pieces", [4, 8, 16])
 def test_column_in_pieces_buckles_at_the_euler_load(pieces):
-    """pi^2 EI / 4 L^2 of a clamped column; least eigenvalue of K through zero there.
+    """The smallest eigenvalue of K vanishes at pi^2 EI / 4 L^2 for a clamped column.
 
     Pieces buckle earlier by pi^2 / 24 n^2: half of it as rigid bars on springs do,
     whose load is (sin x / x)^2 of Euler's with x = pi / 4 n, half for the deflection of

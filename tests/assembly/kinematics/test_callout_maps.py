@@ -48,8 +48,8 @@ def with_bore(x, y):
 
 
 def test_exchanging_two_datums_moves_a_hole_as_computed_by_hand():
-    """B out of square to A by 0.05 over 60 mm (0.833 mrad): the hole 80 mm from B
-    moves by 66.7 um normal to A in B|A, not at all in A|B."""
+    """B out of square to A by 0.05 over 60 mm (0.833 mrad): the hole 80 mm from B moves
+    by 66.7 um normal to A in B|A, and by zero in A|B."""
     row = PLATE.index("hole")
     largest = []
     for datums in ((A, B), (B, A)):
@@ -86,7 +86,7 @@ def test_secondary_datum_fixes_only_the_remaining_degrees_of_freedom():
 
 
 def test_shift_of_a_datum_at_maximum_material_depends_on_the_size_of_its_hole():
-    """Bore 12 H7 after face A: 0 to 18 um larger than its least size, so the datum
+    """Bore 12 H7 after face A: 0 to 18 um larger than its minimum size, so the datum
     shifts by up to 9 um along x and y; uniform sizes and positions: 9 um / sqrt 12."""
     robot = with_bore(0.0, 0.05)
     shifting = Datum("bore", hole="12 H7", hole_of="bore")
@@ -106,7 +106,7 @@ def test_shift_of_a_datum_at_maximum_material_depends_on_the_size_of_its_hole():
 
 
 def test_shift_of_a_second_bore_rotates_the_features_measured_from_it():
-    """Bore A at the origin holds all but the turn.  Bore B, 50 mm from A, shifts by
+    """Bore A at the origin fixes all but the rotation.  Bore B, 50 mm from A, shifts by
     9 um: the hole, 80 mm from A, moves by 9 um x 80/50 = 14.4 um around A."""
     robot = with_bore(0.05, 0.0)
     shifting = Datum("bore", hole="12 H7", hole_of="bore")

@@ -28,7 +28,7 @@ def at(robot, **options):
 def five_bar_jacobian(T, robot):
     """(2, 2) [m/rad] drives to tip: A v = B q', Gosselin and Angeles' two matrices.
 
-    The second arm keeps its length: d.v = d.(k x a) q', a the first arm, d the second.
+    The length of the second arm d is constant: d.v = d.(k x a) q' for the first arm a.
     """
     A, B = np.zeros((2, 2)), np.zeros((2, 2))
     tip = T[robot.index("left.tip"), :2, 3]
@@ -76,7 +76,7 @@ def test_singularity_distances_of_a_five_bar_equal_its_closed_form_jacobian(five
 
 
 def test_serial_singularity_of_aligned_arms_is_reported_with_the_name_of_the_drive():
-    """B_11 = d.(k x a) = 0 where the left arms are one line, 180 mm long.
+    """B_11 = d.(k x a) = 0 where the left arms are collinear, 180 mm long.
 
     If they are shorter by e, they are bent by an angle proportional to sqrt(e).
     """
@@ -184,8 +184,8 @@ def test_closure_singularity_of_a_flat_parallelogram_is_reported_with_its_joint(
 
 
 def screws_by_hand(robot, T):
-    """(n, 6) what a unit of each joint does to the platform's origin if it is on the
-    way there; lengths, and slides, in the robot's size."""
+    """(n, 6) platform motion per unit of each joint on the path to the platform, with
+    lengths and slides in units of the robot's size."""
     size, screws = size_of(robot), np.zeros((len(robot.frames), 6))
     last = robot.index(robot.platform)
     for k, frame in enumerate(robot.frames):
@@ -209,8 +209,8 @@ def way_to(robot, name):
 
 @pytest.mark.parametrize("name", ["five_bar", "3rrr", "orthoglide", "arm6", "delta"])
 def test_singular_motions_satisfy_the_closures_and_have_unit_size(name):
-    """Motions have size one; the platform's, or the drives', share is the least.
-    Passive joints move with them, and closures stay closed."""
+    """The motions have unit size with the smallest possible platform or drive part.
+    Passive joints follow, and the closures hold."""
     robot = load_robot(name)
     driven = [k for k, f in enumerate(robot.frames) if f.actuated]
     home = home_posture(robot)

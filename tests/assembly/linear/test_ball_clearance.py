@@ -43,7 +43,7 @@ def pointed(clearance, at=(0.0, 0.0, 0.0)):
 def test_ball_clearance_allows_its_radius_in_every_direction(method, width):
     """The circumscribed cylinder, with radial = axial = c, reaches sqrt(2) c.
 
-    The reference cuts a round set by 400 planes at most, the compiled method bounds it.
+    The reference method cuts a round set by at most 400 planes.
     """
     for clearance, expected in (
         (Clearance(ball=C), C),

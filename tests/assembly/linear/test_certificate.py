@@ -38,7 +38,7 @@ def test_solutions_with_nan_or_wrong_values_are_not_certified():
 
 def arm_against_wall(young, soft=50.0):
     """A bar of modulus ``young`` between a soft hinge and a wall that is off by 0.1 mm
-    along it and 0.2 mm across; asked for is how far the hinge turns.
+    along the bar and 0.2 mm across; the hinge rotation is computed.
     """
     K = np.diag([np.inf, np.inf, soft, np.inf, np.inf, np.inf])
     bar = BeamLink({"radius": 0.01}, young, 0.3, theory="euler")
@@ -57,8 +57,8 @@ def arm_against_wall(young, soft=50.0):
 def test_hinge_rotation_error_is_within_its_bound_or_rejected_as_ill_conditioned(
     young,
 ):
-    """By hand: a force F across turns the hinge by F L / K = t and bends the bar by
-    F L^3 / (3 E I); together t L + F L^3 / (3 E I) = 0.2 mm.
+    """A transverse force F rotates the hinge by t = F L / K and bends the bar by F L^3
+    / (3 E I); together t L + F L^3 / (3 E I) = 0.2 mm.
     """
     if young >= 1e30:
         with pytest.raises(CannotAssemble, match="the stiffest spring is 3e"):
@@ -75,8 +75,8 @@ def test_hinge_rotation_error_is_within_its_bound_or_rejected_as_ill_conditioned
 
 
 def test_platform_screw_computed_by_cvxpy_is_within_the_certified_bound():
-    """cvxpy's energies are above the least by 1e-8 J, its screws off by the root of it:
-    that excess is added to the uncertainty.
+    """Energies from cvxpy exceed the minimum by 1e-8 J, which is added to the
+    uncertainty.
     """
     compared = 0
     for seed in range(16):

@@ -15,8 +15,8 @@ ASSUMPTIONS = ("frozen", "free")
 
 
 def assert_overlap(batch, i, one, uncertain=2e-7, width=1e-6):
-    """Both brackets hold the truth; the two solutions of (22) differ by the root of
-    their gaps, 1e-8 and less of the energy.
+    """Both intervals contain the true value; the solutions of (22) differ by the square
+    root of their gaps, at most 1e-8 of the energy.
     """
     for name in PARTS:
         low, high = getattr(batch, name)[i]

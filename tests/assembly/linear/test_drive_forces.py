@@ -19,7 +19,7 @@ METHODS = ("compiled", "reference")
 def opposing_slides(k_rod, k_first=np.inf, k_second=np.inf):
     """Two opposing slides on one line, with a spring between them along x.
 
-    The slide's coordinates grow along +x, both; the rod's tip is at the second slide.
+    Both slide coordinates increase along +x, and the rod tip is at the second slide.
     """
     stiff = np.diag([1e9, 1e9, 1e9, k_rod, 1e9, 1e9])
     frames = (
@@ -81,7 +81,7 @@ def test_force_control_removes_the_stiffness_of_the_drive():
 def crossed_cranks(radius=0.004):
     """A four-bar with both cranks driven: crank 0.3 m, coupler 0.5 m, ground 0.5 m.
 
-    A parallelogram with cranks at 60 deg, the coupler a beam along x without shear.
+    The cranks of the parallelogram are at 60 deg; the coupler is a beam along x.
     """
     beam = BeamLink({"radius": radius}, 7e10, 0.3, None, "euler")
     up = np.pi / 3
@@ -101,8 +101,8 @@ def crossed_cranks(radius=0.004):
 def test_torque_of_a_redundant_crank_loads_the_coupler_by_its_lever_arm(torque):
     """Moments about the rocker's pivot: the coupler's force N r sin 60 = -torque.
 
-    A positive torque turns the rocker towards the crank and presses the coupler.  The
-    crank's drive holds the same moment; the rocker turns by N L / (EA r sin 60).
+    A positive torque rotates the rocker towards the crank and compresses the coupler.
+    The crank drive supports the same moment; the rocker rotates by N L / (EA r sin 60).
     """
     robot = with_drive_forces(crossed_cranks(), {"rocker": torque})
     posture = home_posture(robot)

@@ -154,8 +154,8 @@ def test_passive_joint_is_stopped_by_its_motion_limit(method):
 
 
 def as_bearings(robot):
-    """The robot with compliant joints free along their own motion; the same with each
-    of them as two frames: the springs, rigid along it, then a bare free joint.
+    """The robot with compliant joints that move freely along their axes, and the same
+    robot with each of them replaced by springs in series with a free joint.
     """
     bearings, split, after = [], [], {}
     for f in robot.frames:

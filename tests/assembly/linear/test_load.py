@@ -118,9 +118,9 @@ def test_large_loads_cause_deflections_by_the_compliance(size):
 
 @pytest.mark.parametrize(("shift", "hangs"), [(0.0, True), (1e-9, False)])
 def test_pendulum_is_in_equilibrium_only_when_hanging(shift, hangs):
-    """Its hinge, turned and off the origin, carries 2 kg; its moment is rounding.
+    """The rotated hinge, off the origin, carries 2 kg; its moment is only round-off.
 
-    A mass centre that is 1 nm off turns it.
+    A centre of mass that is off by 1 nm rotates it.
     """
     at, turn = np.array([0.1, 0.2, 0.7]), np.array([-0.3, 0.2, 0.9])
     inside = rotation_matrix(turn).T @ [shift, 0.0, -0.3]
@@ -152,8 +152,9 @@ def test_load_about_a_free_hinge_is_rejected_with_its_unit_motion():
 
 
 def test_link_wrenches_of_a_chain_balance_all_distal_loads(rng):
-    """Three beams in any directions: at each start the weights and moments of all that
-    lies beyond, the tip's load among them; at each tip the next one's start."""
+    """Three beams in arbitrary directions: the wrench at each start balances all loads
+    beyond it, including the tip load; the wrench at each tip is that of the next
+    start."""
     link = BeamLink({"width": 0.02, "height": 0.03}, E, 0.3, density=RHO)
     frames = tuple(
         Frame(f"p{k}", f"p{k - 1}" if k else "base", rng.normal(size=3),
@@ -199,7 +200,7 @@ def beam_on_two_pins():
 def test_beam_on_two_pins_has_zero_end_moments_under_its_weight():
     """q L / 2 and no moment at both ends; the deformation corresponds to q L^2 / 12.
 
-    Finite motions leave no moment there either.
+    The end moments vanish for finite motions as well.
     """
     posture = home_posture(beam_on_two_pins())
     answer = solve_assembly(posture, gravity=[0, 0, -G])

@@ -32,8 +32,8 @@ def compiled(posture, *loads, **others):
 def test_second_spring_deforms_only_after_the_pin_touches_its_rim(force):
     """Only the platform spring deforms until the pin reaches its radial clearance c.
 
-    From there on k1 x + k2 (x - c) = w.  Rim and force by hand: k1 = 1e6 N/m,
-    c = 1e-4 m, so up to w = 100 N the other spring is at rest.
+    From there on k1 x + k2 (x - c) = w.  With k1 = 1e6 N/m and c = 1e-4 m, the second
+    spring is unloaded up to w = 100 N.
     """
     k1, k2, c = 1e6, 3e6, 1e-4
     robot = coaxial_beams([0.0] * 6, (k1, k2), clearance=Clearance(radial=c))

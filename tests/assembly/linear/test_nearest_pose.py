@@ -47,8 +47,8 @@ def at_point(answer, posture):
 def nearest_by_cvxpy(posture, point, load=None):
     """(6,) [rad, m] nearest pose, with all screws as variables of the program.
 
-    Without a load springs give nothing; under one the energy minus its work is the
-    least, by the problem as printed, to 1e-9.
+    Without a load the springs are undeformed; under a load the energy minus its work is
+    minimal, to 1e-9, for the problem as printed.
     """
     robot, count = posture.robot, len(posture.robot.frames)
     c, e, b = (cp.Variable((count, 6)) for _ in range(3))
@@ -153,8 +153,8 @@ def test_pose_error_of_a_platform_on_two_pins_is_its_error_minus_one_clearance(
 ):
     """Two rigid chains carry one platform, 0.1 mm apart, on pins with clearance c.
 
-    The platform stands where both pins reach it: nearest to nominal it is off by
-    what the first pin's clearance does not make good, 0.1 mm - c.
+    Both pins must reach the platform: its pose nearest to nominal is off by 0.1 mm - c,
+    the part of the error that the first pin's clearance does not cover.
     """
     pin = Clearance(radial=clearance, spin=0.0)
     frames = (
@@ -250,7 +250,7 @@ def test_commands_report_readings_with_undetermined_clearance(
 def test_nearest_pose_respects_the_motion_limit_of_a_joint():
     """A pin limited to 1e-3 rad with an error of 1.5e-3: it cannot return to nominal.
 
-    Closed against a clearance of 2e-3 it turns by q + 1.5e-3 = v: 5e-4 at least.
+    Closed by a clearance of 2e-3, it rotates by v = q + 1.5e-3, which is at least 5e-4.
     """
     robot = Robot("pin", "end", (
         Frame("pin", joint="revolute", clearance=Clearance(spin=1e-3),

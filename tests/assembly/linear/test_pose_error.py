@@ -55,7 +55,7 @@ def assert_holds(bracket, value, tolerance):
 
 def test_pose_error_of_one_joint_equals_its_clearances_by_hand():
     """Rotation: tilt and spin are perpendicular.  Translation: disc and interval, and
-    the arm of 0.3 m sweeps (spin along y, tilt along z); worked by hand below.
+    the arm of 0.3 m adds spin along y and tilt along z.
     """
     clearance = Clearance(radial=2e-5, axial=1e-5, tilt=4e-4, spin=3e-4)
     found = bounds(serial(clearance))
@@ -228,8 +228,8 @@ def test_unknown_assumption_and_budget_under_load_are_rejected():
 @pytest.mark.parametrize(("case", "point"), CASES)
 @pytest.mark.parametrize(("key", "assumption"), [("rigid", "frozen"), ("free", "free")])
 def test_pose_error_bounds_overlap_the_published_bounds(case, point, key, assumption):
-    """Both hold the truth, so they overlap; 1e-7 is what the reference's own
-    deformations leave uncertain where the energy is nearly zero.
+    """Both contain the true value, so they overlap; the published deformations are
+    uncertain by 1e-7 where the energy is nearly zero.
     """
     pose = {"tx": point["x"], "tz": point["z"]}
     for name, robot in (("full", irsbot2_with(case)), ("clear", irsbot2())):

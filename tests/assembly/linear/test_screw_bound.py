@@ -161,8 +161,8 @@ def two_springs(k, gap, open_):
 def test_screw_bound_of_two_springs_equals_its_closed_form():
     """(y_1, y_2) within sqrt(2 g), equal if closed: sqrt(g / k) along every axis.
 
-    Where the closure may stay open y_2 may be zero, and y_1 all: sqrt(2 g / k).
-    The box around a ball is sqrt(3) times as far.
+    If the closure may stay open, y_2 can be zero and y_1 carries the whole gap:
+    sqrt(2 g / k).  The box around a ball is larger by a factor of sqrt(3).
     """
     k, gap = 4e4, 1e-6
     closed = bound_screw(two_springs(k, gap, 1e-15))

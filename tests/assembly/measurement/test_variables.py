@@ -31,8 +31,8 @@ def rows(rng):
 
 
 def test_each_variable_name_has_the_value_of_its_measurement(rows):
-    """Positions are those of the platform; covariates with their prefix or, three of
-    them, without; a quantity that is not given is unknown."""
+    """Positions refer to the platform; covariates have a prefix, except for three of
+    them; unspecified quantities are unknown."""
     here, commands, known = rows
     expected = {"q.turn": commands[:, 0], "q.slide": commands[:, 1], "q.tip": [0.0] * 4}
     for k, name in enumerate(("mx", "my", "mz", "fx", "fy", "fz")):

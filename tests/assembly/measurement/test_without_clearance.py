@@ -73,8 +73,8 @@ def rigid_four_bar(error):
 def test_rigid_four_bar_compensates_in_plane_errors_as_in_closed_form():
     """The closure has rank 3 of 6, which is sufficient in the plane.
 
-    The rocker longer by a: the pin of the coupler, which the locked crank holds, moves
-    by h along the coupler's normal, and h n . u = a along the rocker's u.
+    With the rocker longer by a and the crank locked, the coupler pin moves by h along
+    the coupler normal n, where h n . u = a along the rocker direction u.
     """
     a = 1e-5
     robot = rigid_four_bar([0, 0, 0, 0, 0, 0])

@@ -171,7 +171,7 @@ def test_shallow_arch_jumps_at_its_limit_load():
 def test_pinned_column_with_a_guided_platform_buckles_in_its_links():
     """Euler load pi^2 E I / L^2 of a column with both ends pinned, guided by a slide.
 
-    Sixteen pieces buckle earlier by a share that falls with the square of their number.
+    The buckling load of n pieces is too low by a fraction proportional to 1 / n^2.
     """
     E, width, height = 7e10, 0.01, 0.02
     beam = BeamLink({"width": width, "height": height}, E, 0.3, up=(0, 0, 1), pieces=16)

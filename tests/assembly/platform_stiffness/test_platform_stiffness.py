@@ -290,7 +290,7 @@ def test_platform_within_its_clearance_has_zero_stiffness(state):
 def test_stiffness_at_a_change_of_contact_depends_on_the_side(state):
     """An error just takes up the clearance: rigid at the stop, otherwise a spring.
 
-    The contact force is zero, so both apply, each for one direction of the load.
+    The contact force is zero, so each applies for one direction of the load.
     """
     K = np.diag([1e3, 1e3, 1e3, 1e5, 1e5, 1e5])
     frames = (

@@ -31,7 +31,7 @@ def cantilever(pieces, axis=(1.0, 0.0, 0.0)):
 def bending(root):
     """[Hz] a clamped-free beam, roots of cos x cosh x = -1, with its sections' turning.
 
-    Rayleigh's quotient with Euler's shape: the mass gains rho I times slope squared.
+    Rayleigh's quotient with Euler's shape, where the mass includes rho I slope^2.
     """
     inertia, area = SIDE**4 / 12, SIDE**2
     speed = np.sqrt(E * inertia / (RHO * area)) / LENGTH**2

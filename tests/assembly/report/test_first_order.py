@@ -50,8 +50,8 @@ def test_pose_error_at_a_singular_posture_has_no_first_order_bound(seed):
 def test_energy_that_exists_only_for_finite_motions_is_reported_as_singular():
     """Near its dead centre, a rod that is too short is in tension: k (e - s)^2 / 2.
 
-    By s = crank + rod - distance it could be shorter; first order turns the crank
-    through the dead centre and sees no force.
+    The slack is s = crank + rod - distance; to first order, the crank rotates through
+    the dead centre without a force.
     """
     angle, short = 0.02, 2e-4
     rod = BeamLink({"radius": 0.01}, 70e9, 0.33)

@@ -134,8 +134,8 @@ def arm_lines(posture):
 def test_displacement_of_the_3rrr_robot_under_load_equals_its_pin_clearances(rng):
     """Support function of the reachable errors: w.x <= sum of |f| 2c over the legs.
 
-    A leg's second arm passes a force f along itself; its two pins give by c each.
-    The wrench on the platform is the sum of the arms' forces, f = J^-T w.
+    The second arm of a leg transmits an axial force f, and its two pins move by c each.
+    The wrench on the platform is the sum of the arm forces, f = J^-T w.
     """
     posture = place_robot(only_play(BUILT_IN["3rrr"]()), pose=random_pose("3rrr", rng))
     play = posture.robot.frame("leg1.pin").clearance.radial

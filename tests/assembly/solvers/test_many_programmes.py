@@ -24,7 +24,7 @@ def test_energies_of_many_cone_programs_equal_those_of_clarabel(
 ):
     """Both certify a gap of 1e-9 of the energy.
 
-    Clarabel, which solves the few that are not proved, closes rows to 2e-10.
+    Clarabel, which solves the few that are not certified, satisfies equations to 2e-10.
     """
     n, nu = 23, len(group)
     G, H = rng.normal(size=(4, nu)), rng.normal(size=(rigid, nu))
